@@ -1,0 +1,70 @@
+# The verbs of the project. `make demo` and `make test` set all up first; both can be run again.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+BUILD := build
+
+# what the installed package is made of
+SOURCES := CMakeLists.txt pyproject.toml README.md \
+           $(shell find core bindings python include -type f \
+             \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.py' -o -name '*.xml' \
+                -o -name py.typed \) 2>/dev/null)
+CXX_SOURCES := $(shell find core bindings tests -name '*.[ch]pp')
+
+.PHONY: setup demo test lint format clean help
+
+help:
+	@echo "make setup   install what is missing, build, install fclib into $(VENV)"
+	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
+	@echo "make test    set up, then run all tests"
+	@echo "make lint    check style and types (ruff, mypy, clang-format)"
+	@echo "make format  put the sources into the style that lint checks"
+	@echo "make clean   remove what was built (not $(VENV))"
+
+setup: $(VENV)/.installed
+
+demo: setup
+	$(BIN)/fclib demo
+
+test: setup $(VENV)/.test-tools
+	cmake --build $(BUILD) --target fclib_tests
+	ctest --test-dir $(BUILD) --output-on-failure
+	$(BIN)/python -m pytest
+
+lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
+	$(BIN)/ruff check python tests benchmarks
+	$(BIN)/ruff format --check python tests benchmarks
+	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
+	$(BIN)/mypy --package fclib
+	$(BIN)/mypy tests benchmarks
+
+format: $(VENV)/.lint-tools
+	$(BIN)/ruff check --fix python tests benchmarks
+	$(BIN)/ruff format python tests benchmarks
+	$(BIN)/clang-format -i $(CXX_SOURCES)
+
+clean:
+	rm -rf $(BUILD) demo $(VENV)/.installed
+
+$(VENV)/.system: scripts/system-packages.sh
+	@PYTHON=$(PYTHON) sh scripts/system-packages.sh
+	@test -x $(BIN)/python || { echo "== making $(VENV)"; $(PYTHON) -m venv $(VENV); }
+	@touch $@
+
+$(VENV)/.build-tools: $(VENV)/.system pyproject.toml
+	@echo "== installing the build tools into $(VENV)"
+	@$(BIN)/python scripts/requirements.py build-system | xargs $(BIN)/pip install --quiet
+	@touch $@
+
+# --no-build-isolation keeps one build folder, so that only what changed is compiled again
+$(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
+	@echo "== building and installing fclib into $(VENV) (two minutes the first time)"
+	@$(BIN)/pip install --no-build-isolation \
+	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON .
+	@touch $@
+
+$(VENV)/.%-tools: $(VENV)/.installed pyproject.toml
+	@echo "== installing the tools of make $*"
+	@$(BIN)/python scripts/requirements.py $* | xargs $(BIN)/pip install --quiet
+	@touch $@

@@ -1,0 +1,292 @@
+// The Python module fclib._core: problems, files, solvers and merits.
+//
+// Loops over the formulations, their fields and the solvers' registry; names none of them.
+
+#include <nanobind/nanobind.h>
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <filesystem>
+
+#include "convert/condense.hpp"
+#include "convert/eliminate.hpp"
+#include "fields.hpp"
+#include "io/hdf5.hpp"
+#include "merit/merit.hpp"
+#include "solve/driver.hpp"
+#include "version.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace fclib::bindings {
+
+namespace {
+
+namespace fs = std::filesystem;
+using Unlocked = nb::gil_scoped_release;
+
+// ---- errors
+
+PyObject* exception_of[4];
+
+void translate(const std::exception_ptr& pointer, void*) {
+  try {
+    std::rethrow_exception(pointer);
+  } catch (const Error& error) {
+    PyErr_SetString(exception_of[static_cast<int>(error.kind)], error.what());
+  }
+}
+
+void bind_errors(nb::module_& m) {
+  const auto define = [&](const char* name, nb::handle bases, const char* doc) {
+    const std::string full = "fclib." + std::string(name);
+    const nb::object type =
+        nb::steal(PyErr_NewExceptionWithDoc(full.c_str(), doc, bases.ptr(), nullptr));
+    m.attr(name) = type;
+    return type;
+  };
+  const nb::object base = define("Error", PyExc_Exception, "Base of all errors of fclib.");
+  const auto derived = [&](ErrorKind kind, const char* name, PyObject* standard, const char* doc) {
+    const nb::tuple bases = nb::make_tuple(base, nb::borrow(standard));
+    exception_of[static_cast<int>(kind)] = define(name, bases, doc).release().ptr();
+  };
+  derived(ErrorKind::file, "FileError", PyExc_OSError,
+          "A file cannot be read or written, or is not in the FCLIB layout.");
+  derived(ErrorKind::problem, "ProblemError", PyExc_ValueError,
+          "The data of a problem or of a solution is not valid.");
+  derived(ErrorKind::option, "OptionError", PyExc_ValueError,
+          "An unknown solver or option, or a value out of its range.");
+  derived(ErrorKind::unsuitable, "UnsuitableError", PyExc_ValueError,
+          "What is asked cannot be done for this problem.");
+  nb::register_exception_translator(translate);
+}
+
+// ---- problems
+
+/// "LocalProblem" for the kind "local".
+std::string class_name(std::string_view kind) {
+  std::string name;
+  bool initial = true;
+  for (const char c : kind) {
+    if (c == '_') {
+      initial = true;
+      continue;
+    }
+    name += initial ? static_cast<char>(std::toupper(c)) : c;
+    initial = false;
+  }
+  return name + "Problem";
+}
+
+template <class P>
+void bind_problem(nb::module_& m) {
+  const std::string name = class_name(P::kind);
+  nb::class_<P> cls(m, name.c_str());
+  def_construction(cls);
+  def_fields(cls);
+  cls.def_prop_ro("info", [](const P& p) { return p.info; }, "title, description, math_info");
+  const auto def_size = [&](const char* dim_name, Dim dim, const char* doc) {
+    cls.def_prop_ro(dim_name, [dim](const P& p) { return p.size(dim); }, doc);
+  };
+  def_size("n", Dim::n, "degrees of freedom (0 for a local problem)");
+  def_size("m", Dim::m, "local unknowns, spacedim * nc");
+  def_size("p", Dim::p, "bilateral constraints");
+  def_size("nc", Dim::nc, "contacts");
+  cls.def_prop_ro("formulation", [](const P& p) { return formulation(p); },
+                  "the name of the formulation in RT-0444: 3DFC, GM3DFC, ...");
+  cls.def_prop_ro("kind", [](const P&) { return std::string(P::kind); },
+                  "the kind of the problem, which names its class and its group in a file");
+  cls.def("validate", [](const P& p) { validate(p); }, nb::call_guard<Unlocked>(),
+          "Raises ProblemError at the first thing wrong with the data.");
+  cls.def("__repr__", [name](const P& p) {
+    std::string text = "<" + name + " " + formulation(p) + ": nc = " + std::to_string(p.size(Dim::nc));
+    if (p.size(Dim::n) > 0) text += ", n = " + std::to_string(p.size(Dim::n));
+    if (p.size(Dim::p) > 0) text += ", p = " + std::to_string(p.size(Dim::p));
+    return text + (p.info.title.empty() ? "" : ", '" + p.info.title + "'") + ">";
+  });
+}
+
+void bind_conversions(nb::module_& m) {
+  nb::handle global = m.attr("GlobalProblem");
+  nb::cpp_function_def(
+      [](const GlobalProblem& p) {
+        validate(p);
+        return condense(p);
+      },
+      nb::scope(global), nb::name("condense"), nb::is_method(), nb::call_guard<Unlocked>(),
+      "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
+      "Raises UnsuitableError where M is singular or not positive definite.");
+  nb::handle local = m.attr("LocalProblem");
+  nb::cpp_function_def(
+      [](const LocalProblem& p) {
+        validate(p);
+        return is_mixed(p) ? Elimination(p).plain() : p;
+      },
+      nb::scope(local), nb::name("eliminate"), nb::is_method(), nb::call_guard<Unlocked>(),
+      "The problem without bilateral constraints: W - V R^-1 V^T, q - V R^-1 s.\n\n"
+      "Raises UnsuitableError where R is singular.");
+}
+
+// ---- solving
+
+/// The user's callback, which needs the GIL.
+std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
+  if (callback.is_none()) return {};
+  return [&callback](const Progress& progress) {
+    const nb::gil_scoped_acquire gil;
+    const nb::object answer = callback(progress.iteration, progress.error, progress.time);
+    return answer.is_none() || nb::cast<bool>(answer);
+  };
+}
+
+/// Lets Ctrl-C through.
+bool poll_signals() {
+  const nb::gil_scoped_acquire gil;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+  return true;
+}
+
+template <class P>
+void bind_solve(nb::module_& m) {
+  m.def(
+      "solve",
+      [](const P& problem, const std::string& solver, double tolerance, std::int64_t max_iterations,
+         double time_limit, const OptionValues& options, const Solution* guess,
+         const nb::object& callback) {
+        Settings settings{.tolerance = tolerance,
+                          .max_iterations = max_iterations,
+                          .time_limit = time_limit,
+                          .callback = make_callback(callback),
+                          .poll = poll_signals};
+        const Unlocked unlocked;
+        return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
+      },
+      "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
+      "guess"_a.none(), "callback"_a.none());
+}
+
+void bind_solvers(nb::module_& m) {
+  nb::class_<OptionInfo>(m, "OptionInfo", "An option of a solver.")
+      .def_ro("name", &OptionInfo::name)
+      .def_ro("type", &OptionInfo::type, "bool, int, float or choice")
+      .def_ro("default", &OptionInfo::default_value)
+      .def_ro("unit", &OptionInfo::unit)
+      .def_ro("doc", &OptionInfo::doc)
+      .def_ro("choices", &OptionInfo::choices, "the values of a choice")
+      .def_ro("lowest", &OptionInfo::lowest)
+      .def_ro("highest", &OptionInfo::highest);
+  nb::class_<Solver>(m, "SolverInfo", "A solver of the registry.")
+      .def_prop_ro("name", [](const Solver& s) { return std::string(s.name); })
+      .def_prop_ro("family", [](const Solver& s) { return std::string(s.family); })
+      .def_prop_ro("title", [](const Solver& s) { return std::string(s.title); })
+      .def_prop_ro("citation", [](const Solver& s) { return std::string(s.citation); })
+      .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
+      .def_ro("options", &Solver::options);
+  m.def("solvers", [] {
+    nb::list result;
+    for (const Solver* solver : solvers()) result.append(nb::cast(solver, nb::rv_policy::reference));
+    return result;
+  }, nb::sig("def solvers() -> list[SolverInfo]"), "All solvers, by name.");
+
+  nb::class_<Result>(m, "Result", "What fclib.solve returns.")
+      .def_ro("solution", &Result::solution)
+      .def_prop_ro("status", [](const Result& r) { return std::string(name_of(r.status)); },
+                   "converged, iteration_limit, time_limit, diverged, inaccurate or interrupted")
+      .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
+      .def_ro("iterations", &Result::iterations)
+      .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
+      .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
+      .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
+      .def_ro("solver", &Result::solver)
+      .def("__repr__", [](const Result& r) {
+        char text[160];
+        std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",
+                      r.solver.c_str(), std::string(name_of(r.status)).c_str(),
+                      static_cast<long long>(r.iterations), r.error, r.cpu_s);
+        return std::string(text);
+      });
+}
+
+// ---- files
+
+void bind_files(nb::module_& m) {
+  m.def(
+      "read",
+      [](const fs::path& path, const std::optional<std::string>& kind) {
+        Problem problem = [&] {
+          const Unlocked unlocked;
+          return read_problem(path.string(), kind.value_or(""));
+        }();
+        return std::visit([](auto& p) { return nb::cast(std::move(p)); }, problem);
+      },
+      "path"_a, "kind"_a = nb::none(),
+      nb::sig("def read(path: str | os.PathLike[str], kind: str | None = None) -> Problem"),
+      "The problem in an FCLIB file, validated. `kind` (\"local\", \"global\") chooses where the "
+      "file holds several.\n\nRaises FileError, or ProblemError, naming file and dataset.");
+  m.def(
+      "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
+      nb::call_guard<Unlocked>(), "The stored solution of a file, or None. Raises FileError.");
+  m.def(
+      "contents",
+      [](const fs::path& path) {
+        Contents contents = read_contents(path.string());
+        if (contents.solution) contents.kinds.emplace_back("solution");
+        return contents.kinds;
+      },
+      "path"_a, nb::call_guard<Unlocked>(),
+      "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
+  m.def(
+      "write_solution",
+      [](const fs::path& path, const Solution& solution) { write_solution(path.string(), solution); },
+      "path"_a, "solution"_a, nb::call_guard<Unlocked>(),
+      "Puts a solution into a file that has its problem, in place of the one it had, atomically.\n\n"
+      "Raises FileError, or ProblemError where the sizes disagree.");
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    m.def(
+        "write",
+        [](const fs::path& path, const P& problem, const Solution* solution) {
+          write_file(path.string(), &problem, solution);
+        },
+        "path"_a, "problem"_a, "solution"_a.none() = nb::none(), nb::call_guard<Unlocked>(),
+        "Writes an FCLIB file, or replaces the old one whole, atomically.\n\n"
+        "Raises FileError, or ProblemError where the data is not valid.");
+  });
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  m.doc() = "The core of fclib, in C++.";
+  m.attr("__version__") = version;
+  bind_errors(m);
+
+  nb::class_<ProblemInfo> info(m, "ProblemInfo", "What a file says about its problem in words.");
+  def_construction(info);
+  def_fields(info);
+  nb::class_<Solution> solution(m, "Solution", "A solution, or a guess, of any formulation.");
+  def_construction(solution);
+  def_fields(solution);
+  nb::class_<Merit> merit_class(m, "Merit", "How good a solution is, judged from the data alone.");
+  def_fields(merit_class);
+
+  for_each_formulation([&]<class P>(std::type_identity<P>) { bind_problem<P>(m); });
+  bind_conversions(m);
+  bind_solvers(m);
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    bind_solve<P>(m);
+    m.def("merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
+          "solution"_a, nb::call_guard<Unlocked>(),
+          "The merit of a solution. A missing v is computed, a missing u is not judged.\n\n"
+          "Raises ProblemError where problem or solution are not valid.");
+  });
+  bind_files(m);
+}
+
+}  // namespace fclib::bindings

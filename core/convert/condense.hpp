@@ -1,0 +1,30 @@
+// Condensation: from the global problem to the local one, and back for its solution.
+//
+//   W = H^T M^-1 H,   q = H^T M^-1 f + w,   V = H^T M^-1 G,   R = G^T M^-1 G,   s = G^T M^-1 f + b
+#pragma once
+
+#include "linalg/factorization.hpp"
+#include "problem.hpp"
+
+namespace fclib {
+
+/// Keeps the factorisation of M, so that a solution of the local problem is taken back cheaply.
+class Condensation {
+ public:
+  /// Throws Error (unsuitable) where M is singular, or symmetric and not positive definite.
+  explicit Condensation(const GlobalProblem& problem);
+
+  [[nodiscard]] const LocalProblem& local() const { return local_; }
+  /// Completes v = M^-1 (H r + G lambda + f) and u = H^T v + w from r and l.
+  [[nodiscard]] Solution expand(const Solution& local) const;
+
+ private:
+  const GlobalProblem& problem_;
+  Factorization mass_;
+  LocalProblem local_;
+};
+
+/// The local form of a global problem (M3DFC from GM3DFC).
+LocalProblem condense(const GlobalProblem& problem);
+
+}  // namespace fclib

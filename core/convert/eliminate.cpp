@@ -1,0 +1,28 @@
+#include "convert/eliminate.hpp"
+
+namespace fclib {
+
+Elimination::Elimination(const LocalProblem& problem)
+    : problem_(problem), bilateral_(to_eigen(problem.R), "R", false) {
+  plain_.spacedim = problem.spacedim;
+  plain_.mu = problem.mu;
+  plain_.info = problem.info;
+  const SparseColumns v = to_eigen(problem.V);
+  const SparseColumns coupling = bilateral_.solve(SparseColumns(v.transpose()));
+  const SparseColumns w = to_eigen(problem.W) - SparseColumns(v * coupling);
+  plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
+  plain_.q = problem.q - v * bilateral_.solve(problem.s);
+}
+
+Solution Elimination::expand(const Solution& plain) const {
+  Solution result = plain;
+  Vector velocity = problem_.s;
+  multiply_transposed_add(problem_.V, plain.r, velocity);
+  result.l = -bilateral_.solve(velocity);
+  result.u = problem_.q;
+  multiply_add(problem_.W, plain.r, result.u);
+  multiply_add(problem_.V, result.l, result.u);
+  return result;
+}
+
+}  // namespace fclib

@@ -1,0 +1,98 @@
+#include "linalg/block_matrix.hpp"
+
+#include <algorithm>
+
+namespace fclib {
+
+namespace {
+// a dense column costs less than the gather over blocks while at least this share of them is there
+constexpr double dense_share = 0.6;
+// ... and the dense matrix stays inside the first-level cache or nearly so
+constexpr std::size_t dense_limit = 128;
+}  // namespace
+
+BlockMatrix::BlockMatrix(const Matrix& a, int d) : d_(d), nc_(a.rows / d) {
+  if (d == 2) {
+    fill<2>(a);
+  } else {
+    fill<3>(a);
+  }
+}
+
+template <int D>
+void BlockMatrix::fill(const Matrix& a) {
+  const auto nc = static_cast<std::size_t>(nc_);
+  const Matrix columns = a.storage == Storage::csc || a.storage == Storage::dense
+                             ? Matrix{}
+                             : converted(a, Storage::csc);
+  const Matrix& source = columns.empty() ? a : columns;
+  const auto entries_of = [&](Index col, auto&& visit) {
+    if (source.storage == Storage::dense) {
+      const double* first = source.x.data() + static_cast<std::size_t>(col) * source.rows;
+      for (Index row = 0; row < source.rows; ++row) {
+        if (first[row] != 0) visit(row, first[row]);
+      }
+    } else {
+      for (Index k = source.p[col]; k < source.p[col + 1]; ++k) visit(source.i[k], source.x[k]);
+    }
+  };
+
+  // the pattern of blocks, the diagonal one always included
+  std::vector<Index> last_seen(nc, -1);
+  column_.assign(1, 0);
+  diagonal_.resize(nc);
+  for (Index contact = 0; contact < nc_; ++contact) {
+    const auto first = row_.size();
+    last_seen[contact] = contact;
+    row_.push_back(contact);
+    for (int c = 0; c < D; ++c) {
+      entries_of(D * contact + c, [&](Index row, double) {
+        const Index block_row = row / D;
+        if (last_seen[block_row] != contact) {
+          last_seen[block_row] = contact;
+          row_.push_back(block_row);
+        }
+      });
+    }
+    std::sort(row_.begin() + static_cast<std::ptrdiff_t>(first), row_.end());
+    const auto at = std::lower_bound(row_.begin() + static_cast<std::ptrdiff_t>(first), row_.end(),
+                                     contact);
+    diagonal_[contact] = static_cast<std::size_t>(at - row_.begin());
+    column_.push_back(row_.size());
+  }
+
+  dense_ = nc <= dense_limit && static_cast<double>(row_.size()) >=
+                                    dense_share * static_cast<double>(nc) * static_cast<double>(nc);
+  if (dense_) {
+    const std::size_t m = D * nc;
+    values_.assign(m * m, 0.0);
+    for (Index col = 0; col < D * nc_; ++col) {
+      entries_of(col, [&](Index row, double value) { values_[m * col + row] += value; });
+    }
+    return;
+  }
+  values_.assign(D * D * row_.size(), 0.0);
+  std::vector<std::size_t> position(nc);
+  for (Index contact = 0; contact < nc_; ++contact) {
+    for (auto k = column_[contact]; k < column_[contact + 1]; ++k) position[row_[k]] = k;
+    for (int c = 0; c < D; ++c) {
+      entries_of(D * contact + c, [&](Index row, double value) {
+        values_[D * D * position[row / D] + D * c + row % D] += value;
+      });
+    }
+  }
+}
+
+void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y) const {
+  y = q;
+  for (Index contact = 0; contact < nc_; ++contact) {
+    const double* part = x.data() + std::ptrdiff_t{d_} * contact;
+    if (d_ == 2) {
+      if (part[0] != 0 || part[1] != 0) add_column<2>(contact, part, y.data());
+    } else {
+      if (part[0] != 0 || part[1] != 0 || part[2] != 0) add_column<3>(contact, part, y.data());
+    }
+  }
+}
+
+}  // namespace fclib

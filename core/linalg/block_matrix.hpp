@@ -1,0 +1,96 @@
+// A square matrix of d x d blocks, one block row and column a contact: how solvers hold W.
+//
+// Stored by block columns, because Gauss-Seidel changes one reaction at a time and then adds
+// W(:, k) delta to the velocities: a contact whose reaction does not change costs nothing. The
+// blocks of a column stand one after another, each by columns. Where most blocks are there anyway
+// (small problems), the whole matrix is kept dense by columns, without an index.
+#pragma once
+
+#include <vector>
+
+#include "linalg/matrix.hpp"
+
+namespace fclib {
+
+class BlockMatrix {
+ public:
+  BlockMatrix() = default;
+  /// From a (d nc) x (d nc) matrix in any storage.
+  BlockMatrix(const Matrix& a, int d);
+
+  [[nodiscard]] int block_size() const { return d_; }
+  [[nodiscard]] Index block_count() const { return nc_; }
+  [[nodiscard]] bool dense() const { return dense_; }
+
+  /// The diagonal block of a contact, D x D by columns. Zero where the matrix has none.
+  template <int D>
+  [[nodiscard]] Eigen::Matrix<double, D, D> diagonal_block(Index contact) const {
+    using Block = Eigen::Matrix<double, D, D>;
+    if (dense_) {
+      const Eigen::Index m = Eigen::Index{D} * nc_;
+      const double* first = values_.data() + (m + 1) * D * contact;
+      return Eigen::Map<const Block, 0, Eigen::OuterStride<>>(first, Eigen::OuterStride<>(m));
+    }
+    return Eigen::Map<const Block>(values_.data() + std::size_t{D * D} * diagonal_[contact]);
+  }
+
+  /// y += W(:, contact) delta, with delta of length D and y of length D nc.
+  template <int D>
+  void add_column(Index contact, const double* delta, double* y) const;
+
+  /// y = W x + q, all of length d nc.
+  void multiply_add(const Vector& x, const Vector& q, Vector& y) const;
+
+ private:
+  template <int D>
+  void fill(const Matrix& a);
+
+  int d_ = 3;
+  Index nc_ = 0;
+  bool dense_ = false;
+  std::vector<std::size_t> column_;   // first block of each column (nc + 1)
+  std::vector<Index> row_;            // block row of each block
+  std::vector<std::size_t> diagonal_; // position of each diagonal block (nc)
+  std::vector<double> values_;
+};
+
+template <int D>
+inline void BlockMatrix::add_column(Index contact, const double* delta, double* __restrict y) const {
+  double x[D];
+  for (int c = 0; c < D; ++c) x[c] = delta[c];
+  if (dense_) {
+    const std::size_t m = std::size_t{D} * static_cast<std::size_t>(nc_);
+    const double* column = values_.data() + m * D * static_cast<std::size_t>(contact);
+    for (std::size_t row = 0; row < m; ++row) {
+      double sum = y[row];
+      for (int c = 0; c < D; ++c) sum += column[row + static_cast<std::size_t>(c) * m] * x[c];
+      y[row] = sum;
+    }
+    return;
+  }
+  const std::size_t first = column_[contact];
+  const std::size_t last = column_[contact + 1];
+  const double* block = values_.data() + std::size_t{D * D} * first;
+  for (std::size_t k = first; k < last; ++k, block += D * D) {
+    double* target = y + std::ptrdiff_t{D} * row_[k];
+    if constexpr (D == 3) {
+      // two rows at once; compilers do not find this by themselves
+      using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
+      const auto pair = [](const double* p) { return *reinterpret_cast<const Pair*>(p); };
+      Pair upper = pair(target);
+      double lower = target[2];
+      for (int c = 0; c < D; ++c) {
+        upper += pair(block + D * c) * x[c];
+        lower += block[D * c + 2] * x[c];
+      }
+      *reinterpret_cast<Pair*>(target) = upper;
+      target[2] = lower;
+    } else {
+      for (int r = 0; r < D; ++r) {
+        for (int c = 0; c < D; ++c) target[r] += block[r + D * c] * x[c];
+      }
+    }
+  }
+}
+
+}  // namespace fclib

@@ -1,0 +1,101 @@
+#include "linalg/factorization.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "error.hpp"
+
+namespace fclib {
+
+namespace {
+
+bool is_symmetric(const SparseColumns& a) {
+  const SparseColumns transposed = a.transpose();
+  const SparseColumns difference = a - transposed;
+  double largest = 0;
+  double gap = 0;
+  for (Eigen::Index k = 0; k < a.nonZeros(); ++k) {
+    largest = std::max(largest, std::abs(a.valuePtr()[k]));
+  }
+  for (Eigen::Index k = 0; k < difference.nonZeros(); ++k) {
+    gap = std::max(gap, std::abs(difference.valuePtr()[k]));
+  }
+  return gap <= 1e-15 * largest;
+}
+
+}  // namespace
+
+Factorization::Factorization(const SparseColumns& a, const std::string& name, bool definite) {
+  if (a.rows() == 0) return;
+  if (definite && is_symmetric(a)) {
+    cholesky_ = std::make_unique<Cholesky>(a);
+    if (cholesky_->info() != Eigen::Success) {
+      throw Error(ErrorKind::unsuitable, name + " is not positive definite");
+    }
+    return;
+  }
+  lu_ = std::make_unique<LU>();
+  lu_->compute(a);
+  if (lu_->info() != Eigen::Success) {
+    throw Error(ErrorKind::unsuitable, name + " is singular");
+  }
+}
+
+Vector Factorization::solve(ConstVectorRef b) const {
+  if (cholesky_) return cholesky_->solve(b);
+  if (lu_) return lu_->solve(b);
+  return b;
+}
+
+SparseColumns Factorization::solve(const SparseColumns& b) const {
+  if (cholesky_) return cholesky_->solve(b);
+  if (lu_) return lu_->solve(b);
+  return b;
+}
+
+SparseColumns Factorization::half_solve(const SparseColumns& b) const {
+  if (!cholesky_) return b;
+  const SparseColumns& lower = cholesky_->matrixL().nestedExpression();
+  const SparseColumns permuted = cholesky_->permutationP() * b;
+  const auto n = static_cast<std::size_t>(lower.rows());
+
+  // parent in the elimination tree: the first entry below the diagonal of each column of L
+  std::vector<Index> parent(n, -1);
+  for (std::size_t col = 0; col < n; ++col) {
+    for (SparseColumns::InnerIterator entry(lower, static_cast<Eigen::Index>(col)); entry; ++entry) {
+      const auto row = static_cast<Index>(entry.row());
+      if (row > static_cast<Index>(col) && (parent[col] < 0 || row < parent[col])) parent[col] = row;
+    }
+  }
+
+  // each column: its pattern is what the tree reaches from the right-hand side's (Gilbert & Peierls)
+  std::vector<double> work(n, 0.0);
+  std::vector<Index> visited(n, -1);
+  std::vector<Index> reach;
+  SparseColumns result(b.rows(), b.cols());
+  result.reserve(permuted.nonZeros());
+  for (Index col = 0; col < static_cast<Index>(b.cols()); ++col) {
+    reach.clear();
+    for (SparseColumns::InnerIterator entry(permuted, col); entry; ++entry) {
+      work[static_cast<std::size_t>(entry.row())] = entry.value();
+      for (auto node = static_cast<Index>(entry.row()); node >= 0 && visited[node] != col;
+           node = parent[node]) {
+        visited[node] = col;
+        reach.push_back(node);
+      }
+    }
+    std::sort(reach.begin(), reach.end());
+    result.startVec(col);
+    for (const Index node : reach) {
+      SparseColumns::InnerIterator entry(lower, node);  // the diagonal comes first
+      const double value = work[node] / entry.value();
+      for (++entry; entry; ++entry) work[entry.row()] -= entry.value() * value;
+      result.insertBack(node, col) = value;
+      work[node] = 0;
+    }
+  }
+  result.finalize();
+  return result;
+}
+
+}  // namespace fclib

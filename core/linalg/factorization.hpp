@@ -1,0 +1,41 @@
+// Solving with the matrices of a problem: M (n x n) and R (p x p), factorised once.
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseLU>
+#include <memory>
+#include <string>
+
+#include "linalg/matrix.hpp"
+
+namespace fclib {
+
+/// A sparse factorisation: Cholesky where the matrix is symmetric, LU where it is not.
+///
+/// Files hold mass matrices whose symmetry is lost to rounding or to a linearisation (1e-7
+/// relative in CubeH8); half of such a matrix would be another problem.
+class Factorization {
+ public:
+  /// Throws Error (unsuitable) where the matrix is symmetric but not positive definite, or
+  /// singular; `name` is what the message calls it. With `definite` false a symmetric indefinite
+  /// matrix is accepted too.
+  Factorization(const SparseColumns& a, const std::string& name, bool definite = true);
+
+  /// A^-1 b.
+  [[nodiscard]] Vector solve(ConstVectorRef b) const;
+  /// A^-1 B.
+  [[nodiscard]] SparseColumns solve(const SparseColumns& b) const;
+
+  [[nodiscard]] bool is_cholesky() const { return cholesky_ != nullptr; }
+  /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y (Cholesky only). Costs the non-zeros it makes, not
+  /// n times the columns: bodies that do not touch stay apart.
+  [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;
+
+ private:
+  using Cholesky = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<Index>>;
+  using LU = Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>>;
+  std::unique_ptr<Cholesky> cholesky_;
+  std::unique_ptr<LU> lu_;
+};
+
+}  // namespace fclib

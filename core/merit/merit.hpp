@@ -1,0 +1,88 @@
+// How good a solution is, judged from the data of the problem alone.
+//
+// The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
+// error = ||F||_2 / ||q||_2, absolute where q is zero. u is recomputed: W r + V lambda + q, or
+// H^T v + w, never taken from the solution.
+#pragma once
+
+#include <string_view>
+#include <tuple>
+
+#include "problem.hpp"
+
+namespace fclib {
+
+struct Merit {
+  double error = 0;
+  double natural = 0;
+  double scaled_natural = 0;
+  double dynamics = 0;
+  double bilateral = 0;
+  double kinematics = 0;
+  double cone = 0;
+  double dual_cone = 0;
+  double complementarity = 0;
+  Index open = 0;
+  Index stick = 0;
+  Index slide = 0;
+
+  static constexpr auto fields() {
+    using M = Merit;
+    return std::tuple{
+        Field<M, double>{.name = "error",
+                         .member = &M::error,
+                         .doc = "what a tolerance bounds: the largest of natural, dynamics, "
+                                "bilateral and kinematics"},
+        Field<M, double>{.name = "natural",
+                         .member = &M::natural,
+                         .doc = "||r - P_K(r - u^)|| / ||q||, q condensed for a global problem"},
+        Field<M, double>{.name = "scaled_natural",
+                         .member = &M::scaled_natural,
+                         .doc = "||r - P_K(r - rho u^)|| / ||rho q||, rho = d / tr(W_aa): the same "
+                                "in all units"},
+        Field<M, double>{.name = "dynamics",
+                         .member = &M::dynamics,
+                         .doc = "||M v - H r - G lambda - f|| over its largest term"},
+        Field<M, double>{.name = "bilateral",
+                         .member = &M::bilateral,
+                         .doc = "residual of the bilateral constraints over its largest term"},
+        Field<M, double>{.name = "kinematics",
+                         .member = &M::kinematics,
+                         .doc = "distance of the solution's u from the recomputed one, over the "
+                                "largest term of its equation"},
+        Field<M, double>{.name = "cone",
+                         .member = &M::cone,
+                         .unit = "N s",
+                         .doc = "largest distance of a contact's r from K"},
+        Field<M, double>{.name = "dual_cone",
+                         .member = &M::dual_cone,
+                         .unit = "m/s",
+                         .doc = "largest distance of a contact's u^ from K*"},
+        Field<M, double>{.name = "complementarity",
+                         .member = &M::complementarity,
+                         .unit = "J",
+                         .doc = "largest |r . u^| of a contact"},
+        Field<M, Index>{.name = "open",
+                        .member = &M::open,
+                        .unit = "1",
+                        .doc = "contacts without a reaction"},
+        Field<M, Index>{.name = "stick",
+                        .member = &M::stick,
+                        .unit = "1",
+                        .doc = "contacts whose reaction is inside the cone"},
+        Field<M, Index>{.name = "slide",
+                        .member = &M::slide,
+                        .unit = "1",
+                        .doc = "contacts whose reaction is on the boundary of the cone"},
+    };
+  }
+};
+
+/// The merit of (solution, problem). r is required, and l where there are bilateral constraints;
+/// a missing v follows from them, a missing u is not judged.
+///
+/// Throws Error (problem) where problem or solution are not valid, (unsuitable) where M is singular.
+Merit merit(const LocalProblem& problem, const Solution& solution);
+Merit merit(const GlobalProblem& problem, const Solution& solution);
+
+}  // namespace fclib

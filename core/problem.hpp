@@ -1,0 +1,137 @@
+// What holds for every formulation: the union of them, their names and their validation.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <string>
+#include <type_traits>
+#include <variant>
+
+#include "error.hpp"
+#include "field.hpp"
+#include "formulations.hpp"  // generated from the files in problems/
+#include "solution.hpp"
+
+namespace fclib {
+
+namespace detail {
+template <class Variant>
+struct Pointers;
+template <class... P>
+struct Pointers<std::variant<P...>> {
+  using type = std::variant<const P*...>;
+};
+}  // namespace detail
+
+/// A problem of any formulation that somebody else owns.
+using ProblemPointer = detail::Pointers<Problem>::type;
+
+/// Calls visit(std::type_identity<P>) for each formulation P.
+template <class Visitor>
+constexpr void for_each_formulation(Visitor&& visit) {
+  [&]<class... P>(std::type_identity<std::variant<P...>>) {
+    (visit(std::type_identity<P>{}), ...);
+  }(std::type_identity<Problem>{});
+}
+
+/// The HDF5 group of a formulation, "fclib_local" for the kind "local".
+template <class P>
+std::string group_name() {
+  return "fclib_" + std::string(P::kind);
+}
+
+/// Where a field is found inside its group: matrices are groups, vectors share "vectors".
+template <class Struct>
+std::string field_path(const Field<Struct, Matrix>& field) {
+  return std::string(field.name);
+}
+template <class Struct>
+std::string field_path(const Field<Struct, Index>& field) {
+  return std::string(field.name);
+}
+template <class Struct>
+std::string field_path(const Field<Struct, Vector>& field) {
+  return "vectors/" + std::string(field.name);
+}
+
+/// Whether the problem has bilateral constraints.
+template <class P>
+bool is_mixed(const P& problem) {
+  return problem.size(Dim::p) > 0;
+}
+
+/// "3DFC", "M3DFC", "G2DFC", ...: the name of the formulation in RT-0444.
+template <class P>
+std::string formulation(const P& problem) {
+  return std::string(P::prefix) + (is_mixed(problem) ? "M" : "") +
+         std::to_string(problem.spacedim) + "DFC";
+}
+
+namespace detail {
+
+inline void require_size(Index actual, Index expected, Dim dim, const std::string& where,
+                         const char* what) {
+  if (actual != expected) {
+    throw Error(ErrorKind::problem,
+                std::string("has ") + std::to_string(actual) + " " + what + ", expected " +
+                    std::string(name_of(dim)) + " = " + std::to_string(expected),
+                where);
+  }
+}
+
+template <class Struct>
+void validate_vector(const Vector& values, Index expected, const Field<Struct, Vector>& field,
+                     const std::string& where) {
+  require_size(static_cast<Index>(values.size()), expected, field.rows, where, "entries");
+  for (Eigen::Index k = 0; k < values.size(); ++k) {
+    const std::string entry = where + "[" + std::to_string(k) + "]";
+    if (!std::isfinite(values[k])) {
+      throw Error(ErrorKind::problem, "the value is not a finite number", entry);
+    }
+    if (field.range == Range::nonnegative && values[k] < 0) {
+      throw Error(ErrorKind::problem,
+                  "is " + std::to_string(values[k]) + ", but must not be negative", entry);
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Throws Error (problem) at the first thing wrong with the data: a size that disagrees, an index
+/// out of range, a value that is not finite, a negative coefficient of friction.
+template <class P>
+void validate(const P& problem) {
+  const std::string group = "/" + group_name<P>() + "/";
+  if (problem.spacedim != 2 && problem.spacedim != 3) {
+    throw Error(ErrorKind::problem,
+                "is " + std::to_string(problem.spacedim) + ", but must be 2 or 3",
+                group + "spacedim");
+  }
+  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
+    const std::string where = group + field_path(field);
+    const Member& member = problem.*field.member;
+    if constexpr (std::same_as<Member, Matrix>) {
+      const bool absent = field.presence == Presence::mixed && !is_mixed(problem);
+      if (absent && member.empty()) return;
+      detail::require_size(member.rows, problem.size(field.rows), field.rows, where, "rows");
+      detail::require_size(member.cols, problem.size(field.cols), field.cols, where, "columns");
+      validate(member, where);
+    } else if constexpr (std::same_as<Member, Vector>) {
+      detail::validate_vector(member, problem.size(field.rows), field, where);
+    }
+  });
+}
+
+/// Throws Error (problem) where the members of a solution do not fit the problem. Members that may
+/// be absent (v and u, which follow from r) are accepted empty.
+template <class P>
+void validate(const Solution& solution, const P& problem) {
+  for_each_field<Solution>([&](const Field<Solution, Vector>& field) {
+    const Vector& values = solution.*field.member;
+    if (field.presence == Presence::optional && values.size() == 0) return;
+    detail::validate_vector(values, problem.size(field.rows), field,
+                            "/solution/" + std::string(field.name));
+  });
+}
+
+}  // namespace fclib

@@ -1,0 +1,139 @@
+#include "solve/driver.hpp"
+
+#include <ctime>
+
+#include "convert/condense.hpp"
+#include "convert/eliminate.hpp"
+
+namespace fclib {
+
+namespace {
+
+double cpu_time() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// How often the solver is sent back to work where its own error met the tolerance and the merit
+/// of the original problem did not (conversions round).
+constexpr int max_corrections = 4;
+
+struct Request {
+  const Solver& solver;
+  const Settings& settings;
+  const OptionValues& options;
+};
+
+/// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
+template <class Judge>
+Result run(const LocalProblem& plain, const Request& request, const Solution& guess,
+           const Judge& judge) {
+  const Delassus reduced{BlockMatrix(plain.W, plain.spacedim), plain.q, plain.mu};
+  Result result;
+  result.solver = request.solver.name;
+  Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
+  Settings settings = request.settings;
+  for (int correction = 0;; ++correction) {
+    const double start = cpu_time();
+    const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
+    result.cpu_s += cpu_time() - start;
+    result.iterations += outcome.iterations;
+    result.status = outcome.status;
+    if (!r.allFinite()) {
+      result.status = Status::diverged;
+      r.setZero();
+    }
+    result.solution.r = r;
+    result.error = judge(result.solution);
+    if (result.status != Status::converged || result.error <= request.settings.tolerance) return result;
+    result.status = Status::inaccurate;
+    if (correction == max_corrections) return result;
+    settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
+  }
+}
+
+template <class P>
+void require_solvable(const P& problem, const Solver& solver, const Solution& guess) {
+  validate(problem);
+  if (guess.r.size() > 0) {
+    Solution reaction;
+    reaction.r = guess.r;
+    if (guess.r.size() != problem.size(Dim::m) || !guess.r.allFinite()) {
+      throw Error(ErrorKind::problem,
+                  "has " + std::to_string(guess.r.size()) + " entries, expected m = " +
+                      std::to_string(problem.size(Dim::m)) + " finite ones",
+                  "guess r");
+    }
+  }
+  for (const int d : solver.dimensions) {
+    if (d == problem.spacedim) return;
+  }
+  throw Error(ErrorKind::unsuitable, "solver " + std::string(solver.name) + " does not take " +
+                                         formulation(problem) + " problems");
+}
+
+Result solve_local(const LocalProblem& problem, const Request& request, const Solution& guess) {
+  if (is_mixed(problem)) {
+    const Elimination elimination(problem);
+    return run(elimination.plain(), request, guess, [&](Solution& solution) {
+      solution = elimination.expand(solution);
+      return merit(problem, solution).error;
+    });
+  }
+  return run(problem, request, guess, [&](Solution& solution) {
+    solution.u = problem.q;
+    multiply_add(problem.W, solution.r, solution.u);
+    return merit(problem, solution).error;
+  });
+}
+
+template <class Body>
+Result timed(const Body& body) {
+  const double start = cpu_time();
+  Result result = body();
+  result.setup_s = cpu_time() - start - result.cpu_s;
+  return result;
+}
+
+}  // namespace
+
+const Solver& find_solver(std::string_view name) {
+  std::string known;
+  for (const Solver* solver : solvers()) {
+    if (solver->name == name) return *solver;
+    known += (known.empty() ? "" : ", ") + std::string(solver->name);
+  }
+  throw Error(ErrorKind::option, "unknown; there is: " + known, "solver '" + std::string(name) + "'");
+}
+
+Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings,
+             const OptionValues& options, const Solution& guess) {
+  return timed([&] {
+    const Request request{find_solver(solver), settings, options};
+    require_solvable(problem, request.solver, guess);
+    return solve_local(problem, request, guess);
+  });
+}
+
+Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings,
+             const OptionValues& options, const Solution& guess) {
+  return timed([&] {
+    const Request request{find_solver(solver), settings, options};
+    require_solvable(problem, request.solver, guess);
+    const Condensation condensation(problem);
+    const LocalProblem& local = condensation.local();
+    const auto judge = [&](Solution& solution) {
+      solution = condensation.expand(solution);
+      return merit(problem, solution).error;
+    };
+    if (!is_mixed(local)) return run(local, request, guess, judge);
+    const Elimination elimination(local);
+    return run(elimination.plain(), request, guess, [&](Solution& solution) {
+      solution = elimination.expand(solution);
+      return judge(solution);
+    });
+  });
+}
+
+}  // namespace fclib

@@ -1,0 +1,34 @@
+// The driver: any problem, any solver. It validates, converts, solves, takes the solution back to
+// the formulation of the problem, and has the merit judge it.
+#pragma once
+
+#include <string>
+
+#include "merit/merit.hpp"
+#include "problem.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib {
+
+struct Result {
+  Solution solution;
+  Status status = Status::diverged;
+  std::int64_t iterations = 0;
+  double error = 0;    ///< Merit::error of the solution, on the problem as it was given
+  double cpu_s = 0;    ///< CPU time of the solver alone [s]
+  double setup_s = 0;  ///< CPU time of conversions, validation and merit [s]
+  std::string solver;
+
+  [[nodiscard]] bool converged() const { return status == Status::converged; }
+};
+
+/// Solves a problem of any formulation. `guess` may be empty; of it only r is used.
+///
+/// Throws Error: (problem) for invalid data, (option) for an unknown solver or option,
+/// (unsuitable) where the problem cannot be brought to the form that the solver takes.
+Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings = {},
+             const OptionValues& options = {}, const Solution& guess = {});
+Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings = {},
+             const OptionValues& options = {}, const Solution& guess = {});
+
+}  // namespace fclib

@@ -1,0 +1,146 @@
+// The contract between a solver and the rest: what it is given, what it returns, when it stops.
+//
+// A solver is one file in solvers/. It defines, in a namespace of the file's name,
+//
+//   const Solver& solver();
+//
+// and is found by the build. It knows no file and no format, and it is not believed: the driver
+// recomputes the merit of what it returns.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "linalg/block_matrix.hpp"
+#include "solve/options.hpp"
+
+namespace fclib {
+
+enum class Status {
+  converged,        ///< the merit is at most the tolerance
+  iteration_limit,  ///< stopped at max_iterations
+  time_limit,       ///< stopped at time_limit
+  diverged,         ///< an iterate was not finite
+  inaccurate,       ///< the solver was content, the merit of the original problem is not
+  interrupted,      ///< the callback asked to stop
+};
+
+constexpr std::string_view name_of(Status status) {
+  switch (status) {
+    case Status::converged: return "converged";
+    case Status::iteration_limit: return "iteration_limit";
+    case Status::time_limit: return "time_limit";
+    case Status::diverged: return "diverged";
+    case Status::inaccurate: return "inaccurate";
+    case Status::interrupted: return "interrupted";
+  }
+  return "?";
+}
+
+/// A point of the convergence history.
+struct Progress {
+  std::int64_t iteration = 0;
+  double error = 0;  ///< the solver's own, relative to ||q||
+  double time = 0;   ///< wall clock since the solver started [s]
+};
+
+/// What a caller asks of any solver.
+struct Settings {
+  double tolerance = 1e-8;         ///< on Merit::error
+  std::int64_t max_iterations = 0; ///< 0: the solver's own default
+  double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s]
+  std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
+  std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or
+                                                  ///< iterations; false stops the solver
+};
+
+/// The problem in the form that reduced solvers take: W (m x m) by blocks, q (m), mu (nc).
+struct Delassus {
+  BlockMatrix W;
+  Vector q;
+  Vector mu;
+
+  [[nodiscard]] int d() const { return W.block_size(); }
+  [[nodiscard]] Index nc() const { return W.block_count(); }
+};
+
+/// Watches over a solver: it reports its iterates, and learns whether to stop.
+class Monitor {
+ public:
+  Monitor(const Settings& settings, std::int64_t default_iterations)
+      : settings_(settings),
+        max_iterations_(settings.max_iterations > 0 ? settings.max_iterations
+                                                    : default_iterations) {}
+
+  [[nodiscard]] double tolerance() const { return settings_.tolerance; }
+  [[nodiscard]] std::int64_t max_iterations() const { return max_iterations_; }
+
+  /// The reason to stop at this iterate, if there is one.
+  std::optional<Status> report(std::int64_t iteration, double error) {
+    if (!(error < std::numeric_limits<double>::infinity())) return Status::diverged;
+    if (settings_.callback && !settings_.callback({iteration, error, elapsed()})) {
+      return Status::interrupted;
+    }
+    if (error <= settings_.tolerance) return Status::converged;
+    if (iteration >= max_iterations_) return Status::iteration_limit;
+    if (settings_.time_limit < std::numeric_limits<double>::infinity() &&
+        elapsed() > settings_.time_limit) {
+      return Status::time_limit;
+    }
+    if (due()) {
+      last_poll_ = Clock::now();
+      if (settings_.poll && !settings_.poll()) return Status::interrupted;
+    }
+    return std::nullopt;
+  }
+
+  /// Whether a report is wanted now, between those that the solver makes of its own accord. To be
+  /// asked every few iterations by solvers that report seldom.
+  [[nodiscard]] bool due() const {
+    return Clock::now() - last_poll_ > poll_interval || elapsed() > settings_.time_limit;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::chrono::milliseconds poll_interval{100};
+
+  [[nodiscard]] double elapsed() const {
+    return std::chrono::duration<double>(Clock::now() - start_).count();
+  }
+
+  const Settings& settings_;
+  std::int64_t max_iterations_;
+  Clock::time_point start_ = Clock::now();
+  Clock::time_point last_poll_ = start_;
+};
+
+/// What a solver returns beside r.
+struct Outcome {
+  Status status = Status::diverged;
+  std::int64_t iterations = 0;
+};
+
+/// The entry of a solver in the registry.
+struct Solver {
+  std::string_view name;
+  std::string_view family;
+  std::string_view title;
+  std::string_view citation;
+  std::vector<int> dimensions;  ///< the spacedims it takes
+  std::vector<OptionInfo> options;
+  /// Solves from the guess in r (length m), and leaves its best iterate there.
+  Outcome (*solve)(const Delassus& problem, const OptionValues& options, const Settings& settings,
+                   Vector& r);
+};
+
+/// All solvers, by name; generated from the files in solvers/.
+const std::vector<const Solver*>& solvers();
+
+/// Throws Error (option) with the known names where there is none of this name.
+const Solver& find_solver(std::string_view name);
+
+}  // namespace fclib

@@ -1,0 +1,212 @@
+// NSGS: nonsmooth Gauss-Seidel, one contact after another.
+//
+//   for each contact a:  b = u^a - W_aa r^a,  r^a <- solution of the one-contact problem (W_aa, b)
+//                        u <- u + W(:, a) (r^a - r^a_old)
+//
+// Jean & Moreau, "Unilaterality and dry friction in the dynamics of rigid body collections" (1992);
+// Jourdan, Alart & Jean, "A Gauss-Seidel like algorithm to solve frictional contact problems"
+// (1998); algorithm 4 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
+// formulations and numerical comparisons" (2018).
+//
+// Differs from the papers in: the velocities are kept up to date by columns, so that contacts whose
+// reaction does not change cost nothing, and the natural map costs no product with W.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <numeric>
+#include <random>
+
+#include "kernels/natural_error.hpp"
+#include "kernels/one_contact.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::nsgs {
+
+namespace {
+
+enum class LocalSolver { exact, projection };
+constexpr std::array<std::string_view, 2> local_solvers{"exact", "projection"};
+
+enum class Shuffle { no, once, always };
+constexpr std::array<std::string_view, 3> shuffles{"no", "once", "always"};
+
+struct Options {
+  LocalSolver local_solver = LocalSolver::exact;
+  double relaxation = 1.0;
+  Shuffle shuffle = Shuffle::no;
+  std::int64_t seed = 0;
+  std::int64_t local_iterations = 100;
+  double local_accuracy = 1e-14;
+  std::int64_t error_interval = 0;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, LocalSolver>{
+            .name = "local_solver",
+            .member = &O::local_solver,
+            .doc = "one-contact solver: exact (enumeration of statuses) or projection (P_K with "
+                   "local iterations)",
+            .choices = local_solvers},
+        OptionField<O, double>{.name = "relaxation",
+                               .member = &O::relaxation,
+                               .unit = "1",
+                               .doc = "omega in r <- omega r_local + (1 - omega) r; above 1 r may "
+                                      "leave the cone and is projected back",
+                               .lowest = 1e-3,
+                               .highest = 1.999},
+        OptionField<O, Shuffle>{.name = "shuffle",
+                                .member = &O::shuffle,
+                                .doc = "order of the contacts: as given, shuffled once, or "
+                                       "shuffled before every sweep",
+                                .choices = shuffles},
+        OptionField<O, std::int64_t>{.name = "seed",
+                                     .member = &O::seed,
+                                     .unit = "1",
+                                     .doc = "of the shuffling",
+                                     .lowest = 0},
+        OptionField<O, std::int64_t>{.name = "local_iterations",
+                                     .member = &O::local_iterations,
+                                     .unit = "1",
+                                     .doc = "limit of the iterations of the projection",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, double>{.name = "local_accuracy",
+                               .member = &O::local_accuracy,
+                               .unit = "1",
+                               .doc = "relative step at which the projection stops",
+                               .lowest = 0,
+                               .highest = 1},
+        OptionField<O, std::int64_t>{
+            .name = "error_interval",
+            .member = &O::error_interval,
+            .unit = "sweeps",
+            .doc = "sweeps between evaluations of the error; 0 adapts it to the convergence",
+            .lowest = 0},
+    };
+  }
+};
+
+/// When to evaluate the error next: soon at first, then where the last two values say that the
+/// tolerance will be met, and never after more than a quarter of the sweeps done so far.
+class Schedule {
+ public:
+  Schedule(std::int64_t interval, double tolerance) : interval_(interval), tolerance_(tolerance) {}
+
+  [[nodiscard]] bool due(std::int64_t sweep) const { return sweep >= next_; }
+
+  void evaluated(std::int64_t sweep, double error) {
+    std::int64_t step = interval_;
+    if (interval_ == 0) {
+      step = std::max<std::int64_t>(1, sweep / 4);
+      if (error < last_error_ && tolerance_ > 0) {
+        const double rate = std::log(last_error_ / error) / static_cast<double>(sweep - last_sweep_);
+        const double left = std::log(error / tolerance_) / rate;
+        if (left < static_cast<double>(step)) step = std::max<std::int64_t>(1, std::llround(left));
+      }
+    }
+    last_sweep_ = sweep;
+    last_error_ = error;
+    next_ = sweep + step;
+  }
+
+ private:
+  std::int64_t interval_;
+  double tolerance_;
+  std::int64_t next_ = 1;
+  std::int64_t last_sweep_ = 0;
+  double last_error_ = 0;
+};
+
+void shuffle_order(std::vector<Index>& order, std::mt19937_64& random) {
+  // Fisher-Yates by hand: std::shuffle differs between standard libraries
+  for (std::size_t k = order.size(); k > 1; --k) std::swap(order[k - 1], order[random() % k]);
+}
+
+/// The rounding of the updates of u is taken out by u = W r + q at least this often [sweeps].
+constexpr std::int64_t refresh_interval = 1000;
+
+template <int D>
+Outcome iterate(const Delassus& problem, const Options& options, Monitor& monitor, Vector& r) {
+  const Index nc = problem.nc();
+  std::vector<OneContact<D>> contacts;
+  contacts.reserve(static_cast<std::size_t>(nc));
+  for (Index a = 0; a < nc; ++a) {
+    contacts.emplace_back(problem.W.template diagonal_block<D>(a), problem.mu[a]);
+  }
+  std::vector<Index> order(static_cast<std::size_t>(nc));
+  std::iota(order.begin(), order.end(), 0);
+  std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
+  if (options.shuffle == Shuffle::once) shuffle_order(order, random);
+
+  const double norm_q = problem.q.norm();
+  const double scale = norm_q > 0 ? 1.0 / norm_q : 1.0;
+  const auto error_of = [&](const Vector& u) {
+    return scale * std::sqrt(natural_map_squared<D>(u, r, problem.mu));
+  };
+
+  Vector u(problem.q.size());
+  problem.W.multiply_add(r, problem.q, u);
+  if (const auto stop = monitor.report(0, error_of(u))) return {*stop, 0};
+
+  Schedule schedule(options.error_interval, monitor.tolerance());
+  for (std::int64_t sweep = 1;; ++sweep) {
+    if (options.shuffle == Shuffle::always) shuffle_order(order, random);
+    for (const Index a : order) {
+      OneContact<D>& contact = contacts[static_cast<std::size_t>(a)];
+      const ContactVector<D> old = r.segment<D>(D * a);
+      const ContactVector<D> b = u.segment<D>(D * a) - contact.block() * old;
+      ContactVector<D> next = old;
+      if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
+        contact.solve_by_projection(b, options.local_accuracy,
+                                    static_cast<int>(options.local_iterations), next);
+      }
+      if (options.relaxation != 1.0) {
+        next = project_on_cone<D>(options.relaxation * next + (1.0 - options.relaxation) * old,
+                                  problem.mu[a]);
+      }
+      const ContactVector<D> delta = next - old;
+      if ((delta.array() == 0).all()) continue;
+      r.segment<D>(D * a) = next;
+      problem.W.template add_column<D>(a, delta.data(), u.data());
+    }
+
+    if (sweep % refresh_interval == 0) problem.W.multiply_add(r, problem.q, u);
+    if (schedule.due(sweep) || sweep >= monitor.max_iterations() ||
+        (sweep % 16 == 0 && monitor.due())) {
+      double error = error_of(u);
+      if (error <= monitor.tolerance()) {
+        problem.W.multiply_add(r, problem.q, u);
+        error = error_of(u);
+      }
+      if (const auto stop = monitor.report(sweep, error)) return {*stop, sweep};
+      schedule.evaluated(sweep, error);
+    }
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  Monitor monitor(settings, 1'000'000);
+  return problem.d() == 2 ? iterate<2>(problem, options, monitor, r)
+                          : iterate<3>(problem, options, monitor, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "nsgs",
+      .family = "splitting",
+      .title = "Nonsmooth Gauss-Seidel",
+      .citation = "Jean & Moreau 1992; Jourdan, Alart & Jean 1998; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .options = describe_options<Options>(),
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::nsgs

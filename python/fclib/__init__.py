@@ -1,0 +1,58 @@
+"""FCLIB: discrete frictional contact problems, and a test bench for the algorithms that solve them.
+
+>>> import fclib
+>>> problem = fclib.read("stack.hdf5")
+>>> result = fclib.solve(problem, tol=1e-8)
+>>> fclib.merit(problem, result.solution).error
+"""
+
+from fclib._core import (
+    Error,
+    FileError,
+    GlobalProblem,
+    LocalProblem,
+    Merit,
+    OptionError,
+    OptionInfo,
+    ProblemError,
+    ProblemInfo,
+    Result,
+    Solution,
+    SolverInfo,
+    UnsuitableError,
+    __version__,
+    contents,
+    merit,
+    read,
+    read_solution,
+    solvers,
+    write,
+    write_solution,
+)
+from fclib._solve import Problem, solve
+
+__all__ = [
+    "Error",
+    "FileError",
+    "GlobalProblem",
+    "LocalProblem",
+    "Merit",
+    "OptionError",
+    "OptionInfo",
+    "Problem",
+    "ProblemError",
+    "ProblemInfo",
+    "Result",
+    "Solution",
+    "SolverInfo",
+    "UnsuitableError",
+    "__version__",
+    "contents",
+    "merit",
+    "read",
+    "read_solution",
+    "solve",
+    "solvers",
+    "write",
+    "write_solution",
+]

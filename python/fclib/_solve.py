@@ -1,0 +1,62 @@
+"""The one entry to every solver."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TypeAlias
+
+from fclib import _core
+
+Problem: TypeAlias = _core.LocalProblem | _core.GlobalProblem
+
+
+def solve(
+    problem: Problem,
+    solver: str = "nsgs",
+    tol: float = 1e-8,
+    *,
+    max_iterations: int | None = None,
+    time_limit: float | None = None,
+    guess: _core.Solution | None = None,
+    callback: Callable[[int, float, float], bool | None] | None = None,
+    **options: bool | int | float | str,
+) -> _core.Result:
+    """Solve a frictional contact problem of any formulation.
+
+    Args:
+        problem: a local or a global problem, with or without bilateral constraints.
+        solver: a name of ``fclib.solvers()``.
+        tol: bound on ``Merit.error``, the relative natural-map error.
+        max_iterations: limit of the solver's iterations, its own default where None.
+        time_limit: [s] limit of wall-clock time.
+        guess: a starting point; of it ``r`` is used.
+        callback: called as ``callback(iteration, error, seconds)`` where the solver evaluates its
+            error; returning False stops it.
+        **options: the solver's own options, see ``fclib solvers``.
+
+    Returns:
+        The solution with its status: ``converged`` means that the merit, recomputed on the problem
+        as it was given, is at most ``tol``.
+
+    Raises:
+        ProblemError: the data of the problem or of the guess is not valid.
+        OptionError: unknown solver or option, or a value out of range.
+        UnsuitableError: the problem cannot be brought to the form that the solver takes.
+    """
+    if not tol >= 0:
+        raise _core.OptionError(f"tol: {tol} is not a positive number")
+    if max_iterations is not None and max_iterations < 1:
+        raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
+    if time_limit is not None and not time_limit > 0:
+        raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    return _core.solve(
+        problem,
+        solver,
+        tol,
+        max_iterations or 0,
+        math.inf if time_limit is None else time_limit,
+        options,
+        guess,
+        callback,
+    )

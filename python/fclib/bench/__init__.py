@@ -1,0 +1,5 @@
+"""The bench: solvers are run here, and judged by the merit, never by themselves."""
+
+from fclib.bench.run import Run, run
+
+__all__ = ["Run", "run"]

@@ -1,0 +1,83 @@
+"""One run: a problem, a solver, and what came of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import fclib
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run, as it is printed and stored; the first nine columns are its record."""
+
+    problem: str
+    formulation: str
+    n: int  # degrees of freedom, 0 for a local problem
+    nc: int  # contacts
+    solver: str  # with the options that were set: "nsgs relaxation=1.2"
+    status: str
+    iterations: int
+    cpu_s: float  # [s] CPU time of the solver alone
+    error: float  # Merit.error, recomputed from the returned solution
+    result: fclib.Result = field(repr=False, compare=False)
+
+    @property
+    def record(self) -> dict[str, Any]:
+        """The columns of the run, without the solution itself."""
+        return {name: getattr(self, name) for name in COLUMNS}
+
+
+COLUMNS = (
+    "problem",
+    "formulation",
+    "n",
+    "nc",
+    "solver",
+    "status",
+    "iterations",
+    "cpu_s",
+    "error",
+)
+
+
+def run(
+    name: str,
+    problem: fclib.Problem,
+    solver: str = "nsgs",
+    tol: float = 1e-8,
+    time_limit: float | None = None,
+    **options: bool | int | float | str,
+) -> Run:
+    """Solve a problem and judge the solution.
+
+    Args:
+        name: what the record calls the problem.
+        problem: any formulation.
+        solver: a name of ``fclib.solvers()``.
+        tol: bound on the merit.
+        time_limit: [s] wall clock.
+        **options: the solver's own.
+
+    Raises:
+        fclib.Error: as ``fclib.solve`` does.
+    """
+    result = fclib.solve(problem, solver, tol, time_limit=time_limit, **options)
+    error = fclib.merit(problem, result.solution).error
+    status = result.status
+    if status == "converged" and not error <= tol:
+        status = "inaccurate"
+    label = " ".join([solver, *(f"{key}={value}" for key, value in options.items())])
+    return Run(
+        problem=name,
+        formulation=problem.formulation,
+        n=problem.n,
+        nc=problem.nc,
+        solver=label,
+        status=status,
+        iterations=result.iterations,
+        cpu_s=result.cpu_s,
+        error=error,
+        result=result,
+    )

@@ -1,0 +1,29 @@
+"""The command line: ``fclib info | check | solve | solvers | demo``.
+
+Each command is one module with one function; all of them keep the same rules. Results go to the
+standard output, as a table or with ``--json`` as one object a line; errors and progress go to the
+standard error. The exit status is 0 only if all went well, 1 if not, 2 for a usage error.
+"""
+
+from __future__ import annotations
+
+import typer
+
+from fclib.cli import check, demo, info, solve, solvers
+from fclib.cli._output import print_version
+
+app = typer.Typer(
+    name="fclib",
+    help="Frictional contact problems, and a test bench for the algorithms that solve them.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for module in (info, check, solve, solvers, demo):
+    app.command(module.__name__.rpartition(".")[2])(module.command)
+app.callback(invoke_without_command=True)(print_version)
+
+
+def main() -> None:
+    """Entry point of the ``fclib`` script."""
+    app()

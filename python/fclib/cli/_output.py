@@ -1,0 +1,162 @@
+"""What the commands share: tables and JSON lines, errors, progress, options."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+import fclib
+
+out = Console(soft_wrap=True)
+err = Console(stderr=True, soft_wrap=True)
+
+Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
+Tolerance = Annotated[
+    float, typer.Option("--tol", help="Bound on the relative natural-map error.", min=0.0)
+]
+
+
+def print_version(
+    ctx: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Print the version where it is asked for."""
+    if version:
+        out.print(f"fclib {fclib.__version__}", highlight=False)
+        raise typer.Exit
+    if ctx.invoked_subcommand is None:
+        raise typer.BadParameter("a command is missing, see fclib --help")
+
+
+def usage_error(error: Exception) -> NoReturn:
+    """End the command with the message and exit status 2."""
+    raise typer.BadParameter(str(error)) from None
+
+
+def parse_options(pairs: Sequence[str]) -> dict[str, str]:
+    """``["relaxation=1.2"]`` as a dictionary; anything else is a usage error."""
+    options: dict[str, str] = {}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not (name and equals and value):
+            raise typer.BadParameter(f"'{pair}' is not of the form name=value")
+        options[name] = value
+    return options
+
+
+@contextmanager
+def progress_bar(what: str, total: int) -> Iterator[Progress]:
+    """A bar on the standard error while it is a terminal and there is more than one thing to do."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    hidden = not err.is_terminal or total < 2
+    with Progress(*columns, console=err, transient=True, disable=hidden) as progress:
+        progress.add_task(what, total=total)
+        yield progress
+
+
+def advance(progress: Progress, what: str) -> None:
+    """One step further, with a word on what is being done."""
+    progress.update(progress.task_ids[0], description=what, advance=1)
+
+
+def format_value(value: object) -> str:
+    """A cell of a table."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.1e}" if value and not 1e-2 <= abs(value) < 1e4 else f"{value:.4g}"
+    return str(value)
+
+
+def make_table(records: Sequence[dict[str, Any]], title: str | None = None) -> Table:
+    """A table with a column a key; statuses and verdicts in colour."""
+    table = Table(title=title, title_justify="left", box=None, header_style="bold", pad_edge=False)
+    for key in records[0]:
+        numeric = any(isinstance(r[key], (int, float)) for r in records if not isinstance(r[key], bool))
+        wraps = isinstance(records[0][key], str) and key in ("problem", "title")
+        table.add_column(
+            key,
+            justify="right" if numeric else "left",
+            no_wrap=not wraps,
+            overflow="fold" if wraps else "ellipsis",
+        )
+    for record in records:
+        cells = [Text(format_value(value)) for value in record.values()]
+        for key, cell in zip(record, cells, strict=True):
+            if key == "status":
+                cell.stylize("green" if cell.plain in ("converged", "ok") else "red")
+        table.add_row(*cells)
+    return table
+
+
+@dataclass
+class Report:
+    """Gathers the records of a command, prints them, and knows the exit status."""
+
+    as_json: bool
+    hidden: tuple[str, ...] = ()  # columns of the JSON that the table leaves out
+    records: list[dict[str, Any]] = field(default_factory=list)
+    failed: bool = False
+
+    def add(self, record: dict[str, Any], good: bool = True) -> None:
+        """Take a record; with --json print it at once."""
+        self.failed = self.failed or not good
+        self.records.append(record)
+        if self.as_json:
+            # a number that is not finite is no JSON
+            safe = {
+                key: None if isinstance(value, float) and not math.isfinite(value) else value
+                for key, value in record.items()
+            }
+            typer.echo(json.dumps(safe))
+
+    def error(self, path: Path, error: Exception) -> None:
+        """Report a file that could not be dealt with; the others go on."""
+        self.failed = True
+        if self.as_json:
+            typer.echo(json.dumps({"problem": str(path), "error": str(error)}))
+        err.print(f"fclib: {error}", style="red", markup=False, highlight=False)
+
+    def finish(self) -> NoReturn:
+        """Print the table, and exit with the status."""
+        if self.records and not self.as_json:
+            shown = [
+                {key: value for key, value in record.items() if key not in self.hidden}
+                for record in self.records
+            ]
+            print_table(make_table(shown))
+        raise typer.Exit(int(self.failed))
+
+
+def print_table(table: Table) -> None:
+    """Print a table, whole even where the output is no terminal."""
+    width = None if out.is_terminal else 200
+    out.print(table, width=width)
+
+
+def each_file(files: Iterable[Path], what: str, report: Report) -> Iterator[Path]:
+    """Go through the files with progress; the caller's errors of one file do not stop the rest."""
+    paths = list(files)
+    with progress_bar(what, len(paths)) as progress:
+        for path in paths:
+            yield path
+            advance(progress, what)

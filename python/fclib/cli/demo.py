@@ -1,0 +1,5 @@
+"""``fclib demo``: placeholder until written below."""
+
+
+def command() -> None:
+    """Run the main job."""

@@ -1,0 +1,54 @@
+"""``fclib info``: what files hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import fclib
+from fclib.cli._output import Files, Json, Report, each_file
+
+MATRICES = ("M", "H", "G", "W", "V", "R")
+
+
+def describe(path: Path, kind: str) -> dict[str, Any]:
+    """The record of one problem of a file.
+
+    Raises:
+        fclib.Error: the file cannot be read, or the problem is not valid.
+    """
+    problem = fclib.read(path, kind)
+    stored = {name: getattr(problem, name, None) for name in MATRICES}
+    nnz = {
+        name: int(getattr(a, "nnz", a.size)) for name, a in stored.items() if a is not None
+    }
+    return {
+        "problem": str(path),
+        "formulation": problem.formulation,
+        "spacedim": problem.spacedim,
+        "n": problem.n,
+        "m": problem.m,
+        "p": problem.p,
+        "nc": problem.nc,
+        "nnz": sum(nnz.values()),
+        "nnz_of": nnz,
+        "mu_min": float(problem.mu.min()) if problem.nc else None,
+        "mu_max": float(problem.mu.max()) if problem.nc else None,
+        "solution": "solution" in fclib.contents(path),
+        "title": problem.info.title,
+        "description": problem.info.description,
+        "math_info": problem.info.math_info,
+    }
+
+
+def command(files: Files, as_json: Json = False) -> None:
+    """Print formulation, sizes and friction of FCLIB files."""
+    report = Report(as_json, hidden=("nnz_of", "description", "math_info", "spacedim", "m"))
+    for path in each_file(files, "reading", report):
+        try:
+            kinds = [kind for kind in fclib.contents(path) if kind != "solution"]
+            for kind in kinds or [None]:
+                report.add(describe(path, kind))
+        except fclib.Error as error:
+            report.error(path, error)
+    report.finish()

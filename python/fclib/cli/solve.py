@@ -1,0 +1,52 @@
+"""``fclib solve``: solves the problems in files."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+import fclib
+from fclib import bench
+from fclib.cli._output import (
+    Files,
+    Json,
+    Report,
+    Tolerance,
+    each_file,
+    parse_options,
+    usage_error,
+)
+
+
+def command(
+    files: Files,
+    solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "nsgs",
+    tol: Tolerance = 1e-8,
+    time_limit: Annotated[
+        float | None, typer.Option(help="[s] wall clock for each problem.", min=0.0)
+    ] = None,
+    write: Annotated[
+        bool, typer.Option("--write", help="Store the solution in the file, if it is one.")
+    ] = False,
+    option: Annotated[
+        list[str] | None, typer.Option(help="An option of the solver, name=value.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Solve problems, and judge the solutions."""
+    options = parse_options(option or [])
+    report = Report(as_json)
+    for path in each_file(files, "solving", report):
+        try:
+            run = bench.run(str(path), fclib.read(path), solver, tol, time_limit, **options)
+            if write and run.status == "converged":
+                fclib.write_solution(path, run.result.solution)
+        except fclib.OptionError as error:
+            usage_error(error)
+        except fclib.Error as error:
+            named = str(error).startswith(str(path))
+            report.error(path, error if named else fclib.Error(f"{path}: {error}"))
+        else:
+            report.add(run.record, run.status == "converged")
+    report.finish()

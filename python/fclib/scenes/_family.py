@@ -1,0 +1,86 @@
+"""What a family of scenes is, and what it makes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Protocol
+
+Law = Literal["velocity", "gap"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A mechanical scene, ready to be simulated: an MJCF model and how to step it.
+
+    A keyframe named ``start`` gives the initial positions, velocities and controls; without it
+    the scene starts at rest in the positions of the model.
+
+    To solve a problem of a scene again, one needs what is here and nothing else.
+    """
+
+    name: str
+    xml: str  # MJCF text
+    time_step: float | None = None  # h [s]; None: the one of the MJCF file
+    restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
+    law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
+    parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
+    seed: int | None = None
+    title: str = ""
+    description: str = ""
+    ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
+    path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
+
+    @classmethod
+    def from_file(
+        cls,
+        path: str | Path,
+        *,
+        time_step: float | None = None,
+        restitution: float = 0.0,
+        law: Law = "velocity",
+        ignore: tuple[str, ...] = (),
+    ) -> Scene:
+        """The scene of an MJCF file. OSError where it cannot be read.
+
+        Its parameters hold the file's name and its SHA-256, not the files that it includes.
+        """
+        path = Path(path)
+        xml = path.read_text(encoding="utf-8")
+        digest = hashlib.sha256(xml.encode()).hexdigest()
+        return cls(
+            name=path.stem,
+            xml=xml,
+            time_step=time_step,
+            restitution=restitution,
+            law=law,
+            parameters={"file": path.name, "sha256": digest},
+            title=path.stem,
+            description=f"Problems of the scene {path.name}.",
+            ignore=tuple(ignore),
+            path=path,
+        )
+
+
+class Family(Protocol):
+    """A frozen dataclass whose fields, all with defaults, are the parameters of its scenes."""
+
+    title: ClassVar[str]
+    description: ClassVar[str]
+    application: ClassVar[str]  # field of application
+    authors: ClassVar[str]  # of the original family
+    friction: ClassVar[str]  # the law of friction, in words
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __init__(self, **parameters: Any) -> None: ...
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene of these parameters; the same seed gives the same scene, bit for bit."""
+        ...
+
+
+def parameter(default: Any, unit: str, doc: str) -> Any:
+    """A dataclass field that carries its unit ("1" where it has none) and its meaning."""
+    return field(default=default, metadata={"unit": unit, "doc": doc})

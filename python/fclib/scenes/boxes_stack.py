@@ -1,0 +1,90 @@
+"""Boxes dropped one upon another: a tower under its own weight."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class BoxesStack:
+    """A column of equal cubes, a small gap below each, that falls on the floor and comes to rest.
+
+    A tall stack is hard for a first-order method: a reaction at the bottom carries the weight of
+    all that is above, and information climbs one box a sweep.
+
+    After the family BoxesStack of V. Acary, M. Bremond and O. Huber, On solving contact problems
+    with Coulomb friction: formulations and numerical comparisons, in Advanced Topics in Nonsmooth
+    Dynamics, Springer, 2018 (Inria report RT-0444). The original scene is not public: sizes,
+    masses and friction are its own, the gaps and offsets are chosen here.
+    """
+
+    title: ClassVar[str] = "Stack of boxes"
+    description: ClassVar[str] = (
+        "Equal cubes dropped one upon another on a horizontal floor, under gravity."
+    )
+    application: ClassVar[str] = "multibody systems, masonry"
+    authors: ClassVar[str] = "V. Acary, M. Bremond, O. Huber"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+
+    boxes: int = parameter(50, "1", "number of boxes, at least 1")
+    size: float = parameter(2.0, "m", "edge of a box")
+    mass: float = parameter(1.0, "kg", "mass of a box")
+    mu: float = parameter(0.7, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    gap: float = parameter(0.05, "m", "clearance below each box at the start")
+    offset: float = parameter(0.05, "m", "largest horizontal offset of a box along x and along y")
+    yaw: float = parameter(0.05, "rad", "largest rotation of a box about the vertical")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(5e-3, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        if self.boxes < 1:
+            raise ValueError(f"BoxesStack: boxes must be at least 1, not {self.boxes}")
+        for name in ("size", "mass", "time_step"):
+            if not getattr(self, name) > 0:
+                raise ValueError(f"BoxesStack: {name} must be positive, not {getattr(self, name)}")
+        for name in ("mu", "gap", "offset", "yaw"):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"BoxesStack: {name} must be >= 0, not {getattr(self, name)}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the offsets and the rotations."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        # one row a box (x, y, yaw), drawn at once: a taller stack begins like a smaller one
+        draws = random.uniform(-1.0, 1.0, size=(self.boxes, 3))
+        draws *= (self.offset, self.offset, self.yaw)
+
+        bodies = []
+        for i, (x, y, yaw) in enumerate(draws):
+            z = (i + 0.5) * self.size + (i + 1) * self.gap
+            bodies.append(
+                f'<body name="box{i}" pos="{_mjcf.numbers(x, y, z)}"'
+                f' euler="{_mjcf.numbers(0, 0, yaw)}"><freejoint/>'
+                f'<geom type="mesh" mesh="box" mass="{self.mass!r}" friction="{self.mu!r}"'
+                f' condim="3" material="solid" rgba="{_mjcf.shade(i, self.boxes)}"/></body>'
+            )
+        xml = _mjcf.document(
+            "BoxesStack",
+            bodies=bodies,
+            assets=[_mjcf.cube_mesh("box", self.size)],
+            time_step=self.time_step,
+            gravity=self.gravity,
+            floor_mu=self.mu,
+            tile=self.size,
+        )
+        return Scene(
+            name="BoxesStack",
+            xml=xml,
+            time_step=self.time_step,
+            restitution=self.restitution,
+            parameters=asdict(self),
+            seed=seed,
+            title=self.title,
+            description=self.description,
+        )

@@ -1,0 +1,35 @@
+"""Simulate a scene, and obtain the discrete problem of every step.
+
+    for step in fclib.simulate.simulate(scene, steps=100):
+        step.problem, step.result
+
+    scenes ──> MujocoModel ──> System ──> MoreauJean ──> GlobalProblem ──> fclib.solve
+                    ^                                                          │
+                    └───────────── integrate(h, v) ────────────────────────────┘
+
+moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
+mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
+simulation.py     the loop, warm starts, and what each problem says of its origin
+render.py         a picture of a state with its reactions
+
+Importing this package needs MuJoCo, in the version that `_mujoco.py` pins.
+"""
+
+from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
+from fclib.simulate.mujoco_model import MujocoModel, UnsupportedSceneError
+from fclib.simulate.render import NoRenderer, render
+from fclib.simulate.simulation import Step, provenance, simulate
+
+__all__ = [
+    "ContactModel",
+    "Contacts",
+    "MoreauJean",
+    "MujocoModel",
+    "NoRenderer",
+    "Step",
+    "System",
+    "UnsupportedSceneError",
+    "provenance",
+    "render",
+    "simulate",
+]

@@ -1,0 +1,30 @@
+"""MuJoCo, in the one version that reproduces the collection.
+
+Contact points, their order and their frames change between versions of MuJoCo, so problems are
+equal bit for bit only with the version pinned here. Its soft contact solver is not used.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+VERSION = "4.0.0"
+
+
+def load() -> Any:
+    """The module `mujoco`. ImportError, with what to install, where it is not version 4.0.0."""
+    remedy = f"install it with: pip install mujoco=={VERSION} (Python 3.11 or later)"
+    try:
+        mujoco = importlib.import_module("mujoco")
+    except ImportError as error:
+        raise ImportError(
+            f"fclib.simulate needs MuJoCo {VERSION}, which cannot be imported ({error}); {remedy}"
+        ) from error
+    found = getattr(mujoco, "__version__", "of unknown version")
+    if found != VERSION:
+        raise ImportError(f"fclib.simulate needs MuJoCo {VERSION}, found {found}; {remedy}")
+    return mujoco
+
+
+mujoco: Any = load()

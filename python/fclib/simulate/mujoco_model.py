@@ -1,0 +1,321 @@
+"""MuJoCo as the source of kinematics, inertia, forces and collisions.
+
+MuJoCo's rows of the constraint Jacobian are the columns of H and G: the three rows of a contact
+are N, T1, T2 of its frame, N points from its first geometry to its second, and J v is the
+velocity of the second relative to the first. A row of an equality is the rate of the violation
+`efc_pos`. Only MuJoCo's own solver, its soft contacts and its integrator are left aside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from fclib.scenes import Scene
+from fclib.simulate._mujoco import mujoco
+from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
+
+MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
+ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
+
+# features that a scene may leave out knowingly, and the flag of MuJoCo that does so
+IGNORABLE: Final = {
+    "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
+    "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
+}
+
+
+class UnsupportedSceneError(ValueError):
+    """The scene holds something that these problems cannot represent yet."""
+
+
+class MujocoModel:
+    """A `ContactModel` made of an MJCF scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        """ValueError where the MJCF is wrong, UnsupportedSceneError where it asks too much."""
+        self.scene = scene
+        self.model: Any = compile_scene(scene)
+        self.data: Any = mujoco.MjData(self.model)
+        refuse_unsupported(scene, self.model)
+
+        m = self.model
+        self._margin = m.geom_margin.copy()
+        self._pair_margin = m.pair_margin.copy()
+        self._pattern = mass_pattern(m)
+        # every contact detected gives rows
+        m.geom_gap[:] = 0
+        m.pair_gap[:] = 0
+
+        start = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_KEY, "start")
+        if start >= 0:
+            mujoco.mj_resetDataKeyframe(m, self.data, start)
+
+    @property
+    def time_step(self) -> float:
+        """Step h [s]: the scene's, or the MJCF file's where the scene names none."""
+        return float(self.scene.time_step or self.model.opt.timestep)
+
+    @property
+    def position(self) -> Vector:
+        """Configuration q (nq), a copy."""
+        q: Vector = self.data.qpos.copy()
+        return q
+
+    @property
+    def velocity(self) -> Vector:
+        """Velocity v (n), a copy."""
+        v: Vector = self.data.qvel.copy()
+        return v
+
+    def assemble(self, h: float, *, shared_speed: bool = False) -> System:
+        """The system at (q, v), with every contact that may close within h.
+
+        MemoryError where MuJoCo's arena is too small, UnsupportedSceneError where a contact is of a
+        kind that has no problem yet.
+        """
+        m, d = self.model, self.data
+        mujoco.mj_kinematics(m, d)
+        mujoco.mj_comPos(m, d)
+        if m.ntendon:
+            mujoco.mj_tendon(m, d)
+        mujoco.mj_makeM(m, d)
+        mujoco.mj_factorM(m, d)
+        mujoco.mj_comVel(m, d)
+        self._set_reach(h, shared_speed)
+        mujoco.mj_collision(m, d)
+        frictionless_to_frictional(d)
+        mujoco.mj_makeConstraint(m, d)
+        self._check_warnings()
+
+        rows = jacobian(m, d)
+        H, contacts = contact_columns(d, rows)
+        G, violation = equality_columns(d, rows)
+        return System(self._pattern.fill(d.M), self._force(), H, contacts, G, violation)
+
+    def integrate(self, h: float, v: Vector) -> None:
+        """Take v (n) as the velocity and move by h v: q <- q (+) h v."""
+        self.data.qvel[:] = v
+        mujoco.mj_integratePos(self.model, self.data.qpos, v, h)
+        self.data.time += h
+
+    def energy(self) -> float:
+        """Kinetic plus potential energy [J] at (q, v)."""
+        m, d = self.model, self.data
+        mujoco.mj_fwdPosition(m, d)
+        mujoco.mj_energyPos(m, d)
+        mujoco.mj_energyVel(m, d)
+        return float(d.energy.sum())
+
+    def _set_reach(self, h: float, shared_speed: bool) -> None:
+        """Detect contacts as far as the geometries may move within h; their margins add up."""
+        m, d = self.model, self.data
+        body = m.geom_bodyid
+        omega = d.cvel[body, :3]
+        # MuJoCo gives the linear velocity at the centre of mass of the whole tree
+        arm = d.geom_xpos - d.subtree_com[m.body_rootid[body]]
+        speed = np.linalg.norm(d.cvel[body, 3:] + np.cross(omega, arm), axis=1)
+        speed += np.linalg.norm(omega, axis=1) * m.geom_rbound
+        if shared_speed:
+            speed[:] = speed.max(initial=0.0)
+        reach = h * speed + h**2 * np.linalg.norm(m.opt.gravity)
+
+        m.geom_margin[:] = np.maximum(self._margin, reach)
+        m.body_margin[:] = 0
+        np.maximum.at(m.body_margin, body, m.geom_margin)
+        pair = np.column_stack((m.pair_geom1, m.pair_geom2))
+        m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
+
+    def _force(self) -> Vector:
+        """F (n): passive, actuator and applied forces less the bias c(q, v)."""
+        m, d = self.model, self.data
+        if m.nu:
+            mujoco.mj_transmission(m, d)
+        if m.nu or m.ntendon:
+            # also sets the rates of tendons and actuators, which their damping needs
+            mujoco.mj_fwdVelocity(m, d)
+        else:
+            mujoco.mj_passive(m, d)
+            mujoco.mj_rne(m, d, 0, d.qfrc_bias)
+        force: Vector = d.qfrc_passive + d.qfrc_applied - d.qfrc_bias
+        if m.nu:
+            mujoco.mj_fwdActuation(m, d)
+            force += d.qfrc_actuator
+        for body in np.flatnonzero(d.xfrc_applied.any(axis=1)):
+            push = d.xfrc_applied[body]
+            mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
+        return force
+
+    def _check_warnings(self) -> None:
+        kinds = mujoco.mjtWarning
+        for kind in (kinds.mjWARN_CONTACTFULL, kinds.mjWARN_CNSTRFULL):
+            if self.data.warning[kind].number:
+                raise MemoryError(
+                    f"{self.scene.name}: MuJoCo's memory for contacts is full; raise"
+                    ' <size memory="..."/> in the MJCF'
+                )
+        if self.data.warning[kinds.mjWARN_INERTIA].number:
+            raise ValueError(f"{self.scene.name}: the mass matrix is singular")
+
+
+def compile_scene(scene: Scene) -> Any:
+    """The MjModel of a scene, with the options that problems need. ValueError for bad MJCF."""
+    unknown = set(scene.ignore) - set(IGNORABLE)
+    if unknown:
+        raise ValueError(
+            f"{scene.name}: cannot ignore {', '.join(sorted(unknown))};"
+            f" only {', '.join(sorted(IGNORABLE))}"
+        )
+    try:
+        if scene.path is not None:
+            spec = mujoco.MjSpec.from_file(str(scene.path))
+        else:
+            spec = mujoco.MjSpec.from_string(scene.xml)
+        if spec.memory < 0:
+            spec.memory = MEMORY
+        m = spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{scene.name}: MuJoCo refuses the MJCF: {reason}") from error
+
+    m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+    # these serve MuJoCo's own step, and override fakes margins, distances and friction
+    enable = mujoco.mjtEnableBit
+    for flag in (
+        enable.mjENBL_OVERRIDE,
+        enable.mjENBL_SLEEP,
+        enable.mjENBL_IPC,
+        enable.mjENBL_SPECULATIVE,
+    ):
+        m.opt.enableflags &= ~int(flag)
+    for feature in scene.ignore:
+        m.opt.disableflags |= int(IGNORABLE[feature])
+    return m
+
+
+def refuse_unsupported(scene: Scene, m: Any) -> None:
+    """Name all that the scene asks and no problem can hold yet, before the first step."""
+    lost = []
+    disabled = m.opt.disableflags
+    limits_off = disabled & int(IGNORABLE["limits"])
+    if not limits_off and (m.jnt_limited.any() or m.tendon_limited.any()):
+        lost.append('limits of joints or tendons (left out with ignore=("limits",))')
+    loss_off = disabled & int(IGNORABLE["frictionloss"])
+    if not loss_off and (m.dof_frictionloss.any() or m.tendon_frictionloss.any()):
+        lost.append('dry friction in joints or tendons (left out with ignore=("frictionloss",))')
+    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+    for condim in (4, 6):
+        if condim in m.geom_condim[collides] or condim in m.pair_dim:
+            lost.append(f"contacts of condim {condim} (torsional and rolling friction)")
+    if m.nflex:
+        lost.append("deformable bodies (flex)")
+    if m.flg_surfacevel:
+        lost.append("surfaces with a prescribed velocity (surfacevel)")
+    if m.flg_adhesion:
+        lost.append("adhesion")
+    if m.na:
+        lost.append("actuators with a state of their own")
+    if m.nplugin:
+        lost.append("plugins")
+    if lost:
+        raise UnsupportedSceneError(f"{scene.name}: not supported yet: {'; '.join(lost)}")
+
+
+def frictionless_to_frictional(d: Any) -> None:
+    """Give a contact of condim 1 its tangential rows, and mu = 0: the same law, K = {r_T = 0}."""
+    frictionless = np.flatnonzero(d.contact.dim == 1)
+    if frictionless.size:
+        d.contact.dim[frictionless] = 3
+        d.contact.friction[frictionless] = 0
+
+
+@dataclass(frozen=True)
+class MassPattern:
+    """Where the entries of MuJoCo's M lie: it keeps the lower triangle, by rows."""
+
+    entries: npt.NDArray[np.int64]  # (nnz) of MuJoCo's M, the upper triangle's among them
+    rows: npt.NDArray[np.int32]  # (nnz) by columns
+    pointers: npt.NDArray[np.int64]  # (n + 1) of the columns
+
+    def fill(self, values: Vector) -> Sparse:
+        """M (n x n), by columns and without explicit zeros."""
+        n = len(self.pointers) - 1
+        # copies, since zeros are squeezed out in place
+        entries = (values[self.entries], self.rows.copy(), self.pointers.copy())
+        M = sp.csc_array(entries, shape=(n, n))
+        M.eliminate_zeros()
+        return M
+
+
+def mass_pattern(m: Any) -> MassPattern:
+    """The pattern of a model's M, upper triangle included."""
+    i = np.repeat(np.arange(m.nv), m.M_rownnz)
+    j = m.M_colind
+    upper = np.flatnonzero(i != j)
+    rows, columns = np.append(i, j[upper]), np.append(j, i[upper])
+    order = np.lexsort((rows, columns))
+    return MassPattern(
+        entries=np.append(np.arange(len(i)), upper)[order],
+        rows=rows[order].astype(np.int32),
+        pointers=pointers(np.bincount(columns, minlength=m.nv)),
+    )
+
+
+def jacobian(m: Any, d: Any) -> Sparse:
+    """All of MuJoCo's constraint rows (nefc x n), without its explicit zeros."""
+    entries = (d.efc_J.copy(), d.efc_J_colind.copy(), pointers(d.efc_J_rownnz))
+    rows = sp.csr_array(entries, shape=(d.nefc, m.nv))
+    rows.eliminate_zeros()
+    return rows
+
+
+def pointers(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
+    """The row pointers (k + 1) of k rows stored one after the other."""
+    return np.concatenate(([0], np.cumsum(lengths, dtype=np.int64)))
+
+
+def contact_columns(d: Any, rows: Sparse) -> tuple[Sparse, Contacts]:
+    """H (n x 3 nc) and the contacts that give rows: all but those between fixed bodies."""
+    contact = d.contact
+    which = np.flatnonzero(contact.efc_address >= 0)
+    dims = sorted(set(contact.dim[which].tolist()) - {3})
+    if dims:
+        raise UnsupportedSceneError(f"not supported yet: contacts of condim {dims[0]}")
+    friction = contact.friction[which]
+    if np.any(friction[:, 0] != friction[:, 1]):
+        raise UnsupportedSceneError("not supported yet: anisotropic friction (two coefficients)")
+
+    types = mujoco.mjtConstraint
+    known = (types.mjCNSTR_EQUALITY, types.mjCNSTR_CONTACT_ELLIPTIC)
+    for kind in set(d.efc_type.tolist()) - {int(k) for k in known}:
+        raise UnsupportedSceneError(f"not supported yet: constraint {types(kind).name}")
+
+    address = contact.efc_address[which]
+    columns = (address[:, None] + np.arange(3)).ravel()
+    H = rows[columns].T
+    contacts = Contacts(
+        pair=contact.geom[which].astype(np.int64),
+        point=contact.pos[which],
+        frame=contact.frame[which].reshape(-1, 3, 3),
+        gap=contact.dist[which],
+        mu=friction[:, 0].copy(),
+    )
+    return H, contacts
+
+
+def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
+    """G (n x p) and the violation (p) of the equalities.
+
+    Rows that vanish are left out: a loop in a plane has one out of it, which says 0 = 0.
+    """
+    if not d.ne:
+        return sp.csc_array((rows.shape[1], 0)), np.zeros(0)
+    gradients = rows[: d.ne]
+    sizes = np.sqrt(gradients.multiply(gradients).sum(axis=1))
+    kept = np.flatnonzero(sizes > ROUNDING * sizes.max(initial=0.0))
+    return gradients[kept].T, d.efc_pos[: d.ne][kept]

@@ -1,0 +1,158 @@
+"""From a scene to the sequence of its problems, each solved to go on to the next."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib.scenes import Scene
+from fclib.simulate import _mujoco
+from fclib.simulate.moreau_jean import Contacts, MoreauJean, Vector
+from fclib.simulate.mujoco_model import MujocoModel
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step, from time to time + h: its problem and the solution that carried it on."""
+
+    index: int  # 0, 1, ...
+    time: float  # at the start of the step [s]
+    problem: fclib.GlobalProblem  # nc is 0 where nothing touches
+    result: fclib.Result  # its status tells whether the solver reached the tolerance
+    contacts: Contacts  # nc, the active ones, at the start of the step
+    position: Vector  # q (nq) at the start of the step
+    model: MujocoModel  # shared by all steps
+
+
+def simulate(
+    scene: Scene,
+    steps: int,
+    *,
+    solver: str = "nsgs",
+    tol: float = 1e-8,
+    warm_start: bool = True,
+    stabilization: float = 0.2,
+    **options: Any,
+) -> Iterator[Step]:
+    """Yield the steps of a scene, as they are computed.
+
+    steps          number of steps
+    solver, tol    of `fclib.solve`, with its further options
+    warm_start     begin from the impulses that the same pairs of bodies had in the step before
+    stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
+
+    A step whose solver misses the tolerance goes on with what it reached, and says so in
+    `step.result`: later problems then depend on it.
+
+    Raises at once ValueError (bad MJCF, bad parameters) and UnsupportedSceneError; while stepping,
+    FloatingPointError where a velocity is no longer finite, and what `fclib.solve` raises.
+    """
+    if steps < 0:
+        raise ValueError(f"the number of steps must be >= 0, not {steps}")
+    model = MujocoModel(scene)
+    scheme = MoreauJean(
+        h=model.time_step,
+        restitution=scene.restitution,
+        law=scene.law,
+        stabilization=stabilization,
+    )
+    settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
+    return _march(model, scheme, steps, settings)
+
+
+def _march(
+    model: MujocoModel, scheme: MoreauJean, steps: int, settings: dict[str, Any]
+) -> Iterator[Step]:
+    last: Step | None = None
+    for index in range(steps):
+        info = describe(model.scene, scheme, settings, index)
+        problem, contacts = scheme.problem(scheme.assemble(model), model.velocity, info)
+
+        options = dict(settings["options"])
+        if settings["warm_start"] and last is not None and problem.nc:
+            options["guess"] = fclib.Solution(r=carry_over(last, contacts))
+        result = fclib.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
+
+        after = np.asarray(result.solution.v)
+        if not np.isfinite(after).all():
+            raise FloatingPointError(
+                f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
+                f" is not finite ({result.status})"
+            )
+        last = Step(index, index * scheme.h, problem, result, contacts, model.position, model)
+        yield last
+        model.integrate(scheme.h, after)
+
+
+def carry_over(last: Step, contacts: Contacts) -> Vector:
+    """A guess of r (3 nc): the last step's impulses, pair by pair in the order of their points.
+
+    They are carried over in the world and turned into the new frames.
+    """
+    local = np.reshape(last.result.solution.r, (-1, 3))
+    world = np.einsum("cij,ci->cj", last.contacts.frame, local)
+    known: dict[tuple[int, int], list[int]] = {}
+    for i, (first, second) in enumerate(last.contacts.pair.tolist()):
+        known.setdefault((first, second), []).append(i)
+
+    source = np.full(len(contacts), -1)
+    for i, (first, second) in enumerate(contacts.pair.tolist()):
+        candidates = known.get((first, second))
+        if candidates:
+            source[i] = candidates.pop(0)
+    r = np.zeros((len(contacts), 3))
+    found = source >= 0
+    r[found] = np.einsum("cij,cj->ci", contacts.frame[found], world[source[found]])
+    return r.ravel()
+
+
+def describe(
+    scene: Scene, scheme: MoreauJean, settings: dict[str, Any], index: int
+) -> fclib.ProblemInfo:
+    """What travels with a problem: its name, its mathematics, and all that regenerates it.
+
+    The last line of the description is JSON, which `provenance` reads back.
+    """
+    origin = {
+        "generator": "fclib.simulate",
+        "fclib": fclib.__version__,
+        "mujoco": _mujoco.VERSION,
+        "scene": scene.name,
+        "parameters": dict(scene.parameters),
+        "seed": scene.seed,
+        "ignore": list(scene.ignore),
+        "time_step": scheme.h,
+        "restitution": scheme.restitution,
+        "law": scheme.law,
+        "stabilization": scheme.stabilization,
+        **settings,
+        "step": index,
+        "time": index * scheme.h,
+    }
+    law = f"Newton impact e = {scheme.restitution:g}" if scheme.law == "velocity" else "gap law"
+    return fclib.ProblemInfo(
+        title=f"{scene.title or scene.name}, step {index}",
+        description=f"{scene.description}\n{json.dumps(origin, default=str)}".lstrip(),
+        math_info=(
+            f"Moreau-Jean step, theta = 1, h = {scheme.h:g} s; {law}; Coulomb friction;"
+            " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
+            " v in m/s and rad/s, r in N s, components N, T1, T2"
+        ),
+    )
+
+
+def provenance(info: fclib.ProblemInfo) -> dict[str, Any]:
+    """What a simulated problem's info says of its origin. ValueError where it says nothing."""
+    lines = info.description.splitlines()
+    try:
+        origin = json.loads(lines[-1])
+        if origin["generator"] != "fclib.simulate":
+            raise ValueError
+    except (IndexError, KeyError, TypeError, ValueError):
+        raise ValueError(f"{info.title!r} does not say how it was simulated") from None
+    return dict(origin)

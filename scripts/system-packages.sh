@@ -1,0 +1,45 @@
+#!/bin/sh
+# Installs the system packages that building needs: by apt where there is one, else it says which.
+set -eu
+PYTHON=${PYTHON:-python3}
+
+missing=
+need() { # need PACKAGE COMMAND...: COMMAND succeeds where the package is there
+  package=$1
+  shift
+  "$@" >/dev/null 2>&1 || missing="$missing $package"
+}
+
+need g++ sh -c 'command -v ${CXX:-c++}'
+need cmake cmake --version
+need ninja-build ninja --version
+need pkg-config pkg-config --version
+need python3 "$PYTHON" -c 'import sys; sys.exit(sys.version_info < (3, 10))'
+need python3-venv "$PYTHON" -c 'import ensurepip, venv'
+need python3-dev "$PYTHON" -c 'import os, sysconfig as s; os.stat(s.get_path("include") + "/Python.h")'
+need libhdf5-dev sh -c 'pkg-config --exists hdf5 || ls /usr/include/hdf5.h /usr/local/include/hdf5.h'
+need libeigen3-dev sh -c 'pkg-config --exists eigen3 || ls /usr/include/eigen3/Eigen/Core'
+need libgtest-dev sh -c 'pkg-config --exists gtest || ls /usr/include/gtest/gtest.h'
+
+if [ -z "$missing" ]; then
+  echo "== system packages: all there"
+  exit 0
+fi
+echo "== system packages missing:$missing"
+if ! command -v apt-get >/dev/null 2>&1; then
+  echo "   There is no apt here. Install these (Debian's names) with the package manager you have," >&2
+  echo "   then run make again." >&2
+  exit 1
+fi
+sudo=
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null 2>&1; then
+    echo "   Installing them needs root: run  apt-get install$missing  as root, then make again." >&2
+    exit 1
+  fi
+  sudo=sudo
+fi
+echo "== installing them by apt"
+$sudo apt-get update -qq
+# shellcheck disable=SC2086
+$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing

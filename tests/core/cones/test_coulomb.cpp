@@ -1,0 +1,46 @@
+#include "cones/coulomb.hpp"
+
+#include <gtest/gtest.h>
+
+#include "random_data.hpp"
+
+namespace fclib {
+namespace {
+
+/// Moreau's decomposition: x = P_K(x) + z with z in the polar cone, orthogonal to P_K(x).
+template <int D>
+void expect_projection(double mu, testing::RandomData& random) {
+  const double rounding = 1e-15 * (1 + mu);
+  for (int k = 0; k < 1000; ++k) {
+    const ContactVector<D> x = random.vector(D);
+    const ContactVector<D> y = project_on_cone<D>(x, mu);
+    const ContactVector<D> z = x - y;
+    EXPECT_LE(tangential_norm<D>(y), mu * y[0] + rounding);
+    EXPECT_NEAR(y.dot(z), 0, rounding);
+    EXPECT_LE(z[0] + mu * tangential_norm<D>(z), rounding);  // z . k <= 0 for all k in K
+    EXPECT_LT((project_on_cone<D>(y, mu) - y).norm(), rounding);
+  }
+}
+
+TEST(CoulombCone, projection_satisfies_the_decomposition_of_Moreau) {
+  testing::RandomData random(8);
+  for (const double mu : {0.0, 0.1, 0.7, 1.0, 50.0}) {
+    expect_projection<2>(mu, random);
+    expect_projection<3>(mu, random);
+  }
+}
+
+TEST(CoulombCone, natural_map_is_zero_for_each_status_and_not_otherwise) {
+  const double mu = 0.5;
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  EXPECT_EQ(natural_map<3>({0.2, 1, -2}, none, mu).norm(), 0);               // open
+  EXPECT_EQ(natural_map<3>(none, {2, 0.3, -0.4}, mu).norm(), 0);             // stick
+  EXPECT_LT(natural_map<3>({0, 3, 4}, {2, -0.6, -0.8}, mu).norm(), 1e-15);   // slide
+  EXPECT_GT(natural_map<3>({0, 3, 4}, {2, 0.6, 0.8}, mu).norm(), 0.1);       // slides the wrong way
+  EXPECT_GT(natural_map<3>({-0.1, 0, 0}, none, mu).norm(), 0.05);            // penetrates
+  EXPECT_GT(natural_map<3>({0.1, 0, 0}, {2, 0, 0}, mu).norm(), 0.05);        // pulls away under load
+  EXPECT_GT(natural_map<3>(none, {1, 1, 0}, mu).norm(), 0.1);                // outside the cone
+}
+
+}  // namespace
+}  // namespace fclib

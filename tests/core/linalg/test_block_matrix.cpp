@@ -1,0 +1,51 @@
+#include "linalg/block_matrix.hpp"
+
+#include <gtest/gtest.h>
+
+#include "random_data.hpp"
+
+namespace fclib {
+namespace {
+
+template <int D>
+void expect_same(const SparseColumns& source, Storage storage, bool dense) {
+  const Eigen::MatrixXd reference(source);
+  const BlockMatrix a(converted(Matrix::from_eigen(source), storage), D);
+  ASSERT_EQ(a.block_count() * D, reference.rows());
+  EXPECT_EQ(a.dense(), dense);
+  testing::RandomData random(7);
+  const Vector x = random.vector(reference.cols());
+  const Vector q = random.vector(reference.rows());
+  Vector y(reference.rows());
+  a.multiply_add(x, q, y);
+  EXPECT_LT((y - (reference * x + q)).norm(), 1e-13);
+  for (Index k = 0; k < a.block_count(); ++k) {
+    const Eigen::MatrixXd block = reference.block(D * k, D * k, D, D);
+    EXPECT_EQ(Eigen::MatrixXd(a.diagonal_block<D>(k)), block);
+  }
+}
+
+TEST(BlockMatrix, agrees_with_the_matrix_it_is_made_from) {
+  testing::RandomData random(4);
+  for (const Storage storage : {Storage::triplet, Storage::csc, Storage::csr, Storage::dense}) {
+    expect_same<3>(random.sparse(60, 60, 0.02), storage, false);
+    expect_same<2>(random.sparse(60, 60, 0.02), storage, false);
+    expect_same<3>(random.sparse(12, 12, 0.9), storage, true);
+    expect_same<2>(random.sparse(12, 12, 0.9), storage, true);
+  }
+}
+
+TEST(BlockMatrix, a_missing_diagonal_block_is_zero) {
+  const BlockMatrix a(Matrix::from_eigen(SparseColumns(90, 90)), 3);
+  EXPECT_EQ(a.diagonal_block<3>(17).norm(), 0);
+}
+
+TEST(BlockMatrix, no_contact_is_no_trouble) {
+  const BlockMatrix a(Matrix::from_eigen(SparseColumns(0, 0)), 3);
+  Vector y(0);
+  a.multiply_add(Vector(0), Vector(0), y);
+  EXPECT_EQ(a.block_count(), 0);
+}
+
+}  // namespace
+}  // namespace fclib

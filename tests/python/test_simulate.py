@@ -1,0 +1,523 @@
+"""The time stepper against mechanics: what has a closed form is compared with it."""
+
+import importlib
+import math
+import sys
+import types
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from fclib import scenes
+from fclib.scenes import Scene
+
+# MuJoCo has no release for the oldest Python that fclib takes
+mujoco = pytest.importorskip("mujoco")
+
+from fclib.simulate import (  # noqa: E402
+    MoreauJean,
+    MujocoModel,
+    NoRenderer,
+    Step,
+    UnsupportedSceneError,
+    provenance,
+    render,
+    simulate,
+)
+
+G = 9.81  # m/s^2
+H = 5e-3  # s
+
+FLOOR = '<geom name="floor" type="plane" size="0 0 1" friction="{mu}"/>'
+SPHERE = '<body pos="0 0 {z}"><freejoint/><geom size="0.1" mass="2" friction="{mu}" {more}/></body>'
+SLAB = (
+    '<body pos="0 0 0.1"><freejoint/>'
+    '<geom type="mesh" mesh="slab" mass="2" friction="{mu}" {more}/></body>'
+)
+CORNERS = "  ".join(f"{x} {y} {z}" for x in (-1, 1) for y in (-1, 1) for z in (-0.1, 0.1))
+
+# two closed loops: in a plane, and in space; consistent in the positions of the model
+PLANE_LOOP = """
+<body name="a" pos="0 0 2"><joint name="ja" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 0.5" mass="1"/>
+  <body name="b" pos="0 0 0.5"><joint axis="0 1 0"/>
+    <geom type="capsule" size="0.02" fromto="0 0 0 1 0 0.2" mass="1"/></body></body>
+<body name="c" pos="1 0 2"><joint name="jc" axis="0 1 0"/>
+  <geom type="capsule" size="0.02" fromto="0 0 0 0 0 0.7" mass="1"/></body>
+"""
+PLANE_CONNECT = '<equality><connect body1="b" body2="c" anchor="1 0 0.2"/></equality>'
+ARM = """
+<body name="arm" pos="0 0 1"><joint name="shoulder" type="ball"/>
+  <geom type="capsule" size="0.05" fromto="0 0 0 0.6 0 -0.3" mass="1"/>
+  <body name="hand" pos="0.6 0 -0.3"><joint name="elbow" axis="0.2 1 0"/>
+    <geom name="hand" type="capsule" size="0.05" fromto="0 0 0 0.3 0.1 -0.7" mass="0.5"/>
+  </body></body>
+<body name="free" pos="-0.5 0 0.15"><freejoint/>
+  <geom type="box" size="0.3 0.2 0.16" euler="0 0 0.2" mass="3"/></body>
+"""
+
+
+def mjcf(
+    bodies: str, *, floor: bool = True, gravity: str = f"0 0 {-G}", rest: str = "", **values: Any
+) -> str:
+    """An MJCF document; `values` fill the braces, mu = 0.5 and nothing more by default."""
+    values = {"mu": 0.5, "more": "", "z": 1.0} | values
+    return (
+        f'<mujoco><compiler angle="radian"/><option gravity="{gravity}" timestep="{H}"/>'
+        f'<asset><mesh name="slab" vertex="{CORNERS}"/></asset>'
+        f"<worldbody>{FLOOR if floor else ''}{bodies}</worldbody>{rest}</mujoco>"
+    ).format(**values)
+
+
+def start(qpos: str, qvel: str) -> str:
+    return f'<keyframe><key name="start" qpos="{qpos}" qvel="{qvel}"/></keyframe>'
+
+
+def run(xml: str, steps: int, **options: Any) -> list[Step]:
+    scene_options = {k: options.pop(k) for k in ("restitution", "law", "ignore") if k in options}
+    scene = Scene(name="test", xml=xml, **scene_options)
+    return list(simulate(scene, steps, **{"tol": 1e-10, **options}))
+
+
+def velocities(steps: list[Step]) -> Any:
+    """The velocity (steps x n) at the end of each step."""
+    return np.array([step.result.solution.v for step in steps])
+
+
+def energies(scene: Scene, steps: int, **options: Any) -> Iterator[float]:
+    for step in simulate(scene, steps, **options):
+        yield step.model.energy()
+
+
+# ---- motion with a closed form
+
+
+def test_free_fall() -> None:
+    """With theta = 1, v_k = v_0 - k h g, z_k = z_0 + h sum of v_1 ... v_k."""
+    steps = run(mjcf(SPHERE, rest=start("0 0 9 1 0 0 0", "1 0 2 0 0 3")), 50)
+    k = np.arange(50)
+    z = np.array([step.position[2] for step in steps])
+    np.testing.assert_allclose(z, 9 + 2 * H * k - G * H**2 * k * (k + 1) / 2, rtol=0, atol=1e-12)
+    expected = np.tile([1.0, 0, 2, 0, 0, 3], (50, 1))
+    expected[:, 2] -= G * H * (k + 1)
+    np.testing.assert_allclose(velocities(steps), expected, rtol=0, atol=1e-12)
+    assert all(step.problem.nc == 0 for step in steps)
+    np.testing.assert_allclose([step.time for step in steps], H * k)
+
+
+def test_box_at_rest_stays() -> None:
+    steps = run(mjcf(SLAB), 100)
+    assert {step.problem.nc for step in steps} == {4}
+    assert np.abs(velocities(steps)).max() < 1e-8
+    assert min(step.contacts.gap.min() for step in steps) > -1e-7
+    # the floor carries the weight
+    weight = steps[-1].result.solution.r.reshape(-1, 3)[:, 0].sum() / H
+    np.testing.assert_allclose(weight, 2 * G, rtol=1e-7)
+
+
+def test_sliding_box_stops_by_coulomb() -> None:
+    mu, v0 = 0.3, 2.0
+    steps = run(mjcf(SLAB, mu=mu, rest=start("0 0 0.1 1 0 0 0", f"{v0} 0 0 0 0 0")), 160)
+    v = velocities(steps)[:, 0]
+    k = np.arange(1, 161)
+    np.testing.assert_allclose(v, np.maximum(v0 - mu * G * H * k, 0), atol=1e-6)
+    # to the first order in h
+    assert steps[-1].position[0] == pytest.approx(v0**2 / (2 * mu * G), abs=H * v0)
+
+
+@pytest.mark.parametrize(("mu", "slides"), [(0.2, True), (0.6, False)])
+def test_box_on_an_incline(mu: float, slides: bool) -> None:
+    angle = 0.4
+    gravity = f"{G * math.sin(angle)} 0 {-G * math.cos(angle)}"
+    v = velocities(run(mjcf(SLAB, gravity=gravity, mu=mu), 50))[:, 0]
+    along = G * (math.sin(angle) - mu * math.cos(angle)) if slides else 0.0
+    np.testing.assert_allclose(v, along * H * np.arange(1, 51), atol=1e-6)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("body", [SPHERE, SLAB.replace("0 0 0.1", "0 0 {z}", 1)])
+def test_rebound_is_newtons(e: float, body: str) -> None:
+    steps = run(mjcf(body, z=0.4), 60, restitution=e)
+    impact = next(step for step in steps if step.problem.nc)
+    before = steps[impact.index - 1].result.solution.v[2]
+    assert before < -0.5
+    np.testing.assert_allclose(impact.result.solution.v[2], -e * before, atol=1e-9)
+
+
+def test_fast_body_is_caught_before_it_passes() -> None:
+    """A contact is active where g + h/2 u_N <= 0: at 100 m/s, 0.25 m ahead."""
+    steps = run(mjcf(SPHERE, rest=start("0 0 2.8 1 0 0 0", "0 0 -100 0 0 0")), 10)
+    impact = next(step for step in steps if step.problem.nc)
+    assert 0 < impact.contacts.gap[0] <= 0.5 * H * 101
+    assert impact.result.solution.v[2] == pytest.approx(0.0, abs=1e-8)
+
+
+def test_frictionless_contact_is_a_contact_with_mu_zero() -> None:
+    xml = mjcf(SLAB, more='condim="1"', rest=start("0 0 0.1 1 0 0 0", "2 0 0 0 0 0"))
+    steps = run(xml.replace('name="floor"', 'name="floor" condim="1"'), 20)
+    assert steps[0].problem.nc == 4
+    np.testing.assert_array_equal(steps[0].problem.mu, 0.0)
+    np.testing.assert_allclose(velocities(steps)[:, 0], 2.0, atol=1e-8)
+
+
+def test_friction_is_mujocos() -> None:
+    """The larger coefficient of the two geometries, or that of an explicit pair."""
+    xml = mjcf(SLAB, mu=0.3).replace('friction="0.3"', 'friction="0.8"', 1)
+    np.testing.assert_array_equal(run(xml, 1)[0].problem.mu, 0.8)
+    pair = '<contact><pair geom1="floor" geom2="box" condim="3" friction="0.1 0.1"/></contact>'
+    xml = mjcf(SLAB, more='name="box"', rest=pair)
+    np.testing.assert_array_equal(run(xml, 1)[0].problem.mu, 0.1)
+
+
+def test_energy_does_not_grow() -> None:
+    scene = scenes.get("BoxesStack")(boxes=4, gap=0.01).scene(seed=3)
+    energy = np.array(list(energies(scene, 100, tol=1e-10)))
+    assert np.diff(energy).max() < 1e-6 * energy[0]
+    assert energy[-1] < energy[0]
+
+
+# ---- laws
+
+
+def test_gap_law_keeps_bodies_apart() -> None:
+    steps = run(mjcf(SPHERE, z=0.4), 80, law="gap")
+    gaps = [step.contacts.gap.min() for step in steps if step.problem.nc]
+    assert min(gaps) > -1e-4
+    assert steps[-1].position[2] == pytest.approx(0.1, abs=1e-4)
+
+
+def test_gap_law_undoes_a_share_of_a_penetration() -> None:
+    first = run(mjcf(SPHERE, z=0.09), 1, law="gap")[0]
+    np.testing.assert_allclose(first.problem.w, [0.2 * -0.01 / H, 0, 0], rtol=1e-9)
+    assert first.result.solution.v[2] == pytest.approx(0.2 * 0.01 / H, rel=1e-6)
+
+
+def test_only_active_contacts_enter() -> None:
+    boxes = SPHERE.replace("{z}", "0.1") + SPHERE.replace("{z}", "0.31")
+    step = run(mjcf(boxes), 1)[0]
+    assert step.problem.nc == 1
+    np.testing.assert_array_equal(step.contacts.pair, [[0, 1]])
+    # the gap law takes what is within reach, here both
+    xml = mjcf(boxes, rest=start("0 0 0.1 1 0 0 0 0 0 0.31 1 0 0 0", "0 0 0 0 0 0 0 0 -4 0 0 0"))
+    assert run(xml, 1, law="gap")[0].problem.nc == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"h": 0.0}, "time step"),
+        ({"h": H, "restitution": 1.5}, "restitution"),
+        ({"h": H, "stabilization": -1}, "stabilization"),
+        ({"h": H, "law": "force"}, '"velocity" or "gap"'),
+        ({"h": H, "law": "gap", "restitution": 0.5}, "inelastic"),
+    ],
+)
+def test_scheme_refuses_nonsense(options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        MoreauJean(**options)
+
+
+# ---- the terms of the problem
+
+
+def moving_model(xml: str, seed: int = 0) -> MujocoModel:
+    """A model with random velocities."""
+    model = MujocoModel(Scene(name="test", xml=xml))
+    v = np.random.Generator(np.random.PCG64(seed)).normal(size=model.velocity.size)
+    model.integrate(1e-3, v)
+    return model
+
+
+def test_mass_matrix_is_mujocos() -> None:
+    model = moving_model(mjcf(ARM))
+    M = model.assemble(H).M.toarray()
+    full = np.zeros(M.shape)
+    mujoco.mj_fullM(model.model, model.data, full)
+    np.testing.assert_allclose(M, full, rtol=0, atol=1e-14)
+    assert np.abs(M - np.diag(np.diag(M))).max() > 1e-3
+
+
+def test_forces_are_mujocos() -> None:
+    """Springs, dampers, actuators, gyroscopic terms and pushes: v' = v + h a without contact."""
+    bodies = ARM.replace('name="elbow"', 'name="elbow" stiffness="3" damping="0.4" armature="0.1"')
+    rest = (
+        '<tendon><fixed name="cord" stiffness="2" damping="0.3"><joint joint="elbow" coef="1"/>'
+        '</fixed></tendon><actuator><position joint="elbow" kp="5" kv="0.2"/></actuator>'
+    )
+    model = moving_model(mjcf(bodies, floor=False, rest=rest))
+    model.data.ctrl[:] = 0.7
+    model.data.qfrc_applied[:] = np.arange(model.velocity.size)
+    model.data.xfrc_applied[2] = [1, 2, 3, 4, 5, 6]
+    system, v = model.assemble(H), model.velocity
+    acceleration = np.linalg.solve(system.M.toarray(), system.force)
+    mujoco.mj_forward(model.model, model.data)
+    np.testing.assert_allclose(acceleration, model.data.qacc_smooth, rtol=1e-9, atol=1e-9)
+
+    problem, _ = MoreauJean(h=H).problem(system, v)
+    np.testing.assert_allclose(problem.f, system.M @ (v + H * acceleration), rtol=1e-9, atol=1e-9)
+
+
+def test_contact_columns_give_the_velocity_of_contact_points() -> None:
+    """H^T v is the rate of p2 - p1, two points fixed to the bodies, in the frame N, T1, T2."""
+    model = moving_model(mjcf(ARM))
+    system, v = model.assemble(H), model.velocity
+    contacts = system.contacts
+    assert len(set(map(tuple, contacts.pair.tolist()))) >= 2
+
+    body = model.model.geom_bodyid[contacts.pair]
+
+    def in_world(local: Any) -> Any:
+        mujoco.mj_kinematics(model.model, model.data)
+        turn = model.data.xmat.reshape(-1, 3, 3)[body]
+        return model.data.xpos[body] + np.einsum("cbij,cbj->cbi", turn, local)
+
+    mujoco.mj_kinematics(model.model, model.data)
+    turn = model.data.xmat.reshape(-1, 3, 3)[body]
+    arm = contacts.point[:, None, :] - model.data.xpos[body]
+    local = np.einsum("cbji,cbj->cbi", turn, arm)
+
+    step = 1e-6
+    model.integrate(step, v)
+    ahead = in_world(local)
+    model.integrate(-2 * step, v)
+    behind = in_world(local)
+    rate = ((ahead - behind)[:, 1] - (ahead - behind)[:, 0]) / (2 * step)
+    expected = np.einsum("cij,cj->ci", contacts.frame, rate).ravel()
+    np.testing.assert_allclose(system.H.T @ v, expected, rtol=0, atol=1e-8)
+    assert np.abs(expected).max() > 0.1
+    # and N opens the gap
+    np.testing.assert_allclose(np.linalg.det(contacts.frame), 1.0, rtol=1e-12)
+
+
+def test_solution_satisfies_the_kinematics() -> None:
+    for step in run(mjcf(ARM), 10, restitution=0.3):
+        u = step.problem.H.T @ step.result.solution.v + step.problem.w
+        np.testing.assert_allclose(step.result.solution.u, u, atol=1e-9)
+        assert np.count_nonzero(step.problem.H.data) == step.problem.H.nnz
+
+
+# ---- bilateral constraints
+
+
+@pytest.mark.parametrize(
+    ("bodies", "equality"),
+    [
+        (PLANE_LOOP, PLANE_CONNECT),
+        (ARM, '<equality><connect body1="hand" body2="free" anchor="0.3 0.1 -0.7"/></equality>'),
+        (ARM, '<equality><weld body1="hand" body2="free"/></equality>'),
+        (PLANE_LOOP, '<equality><joint joint1="ja" joint2="jc" polycoef="0 2 1 0 0"/></equality>'),
+    ],
+)
+def test_bilateral_columns_give_the_rate_of_the_violation(bodies: str, equality: str) -> None:
+    model = moving_model(mjcf(bodies, floor=False, rest=equality))
+    system, v = model.assemble(H), model.velocity
+    step = 1e-6
+    model.integrate(step, v)
+    ahead = model.assemble(H).violation
+    model.integrate(-2 * step, v)
+    behind = model.assemble(H).violation
+    np.testing.assert_allclose(system.G.T @ v, (ahead - behind) / (2 * step), atol=1e-6)
+    assert np.abs(system.G.T @ v).max() > 1e-2
+
+
+def test_closed_loop_moves_and_stays_closed() -> None:
+    xml = mjcf(PLANE_LOOP, floor=False, gravity=f"2 0 {-G}", rest=PLANE_CONNECT)
+    steps = run(xml, 200)
+    first = steps[0].problem
+    # three rows, of which the one out of the plane says nothing
+    assert first.G.shape == (3, 2)
+    np.testing.assert_allclose(first.b, 0.0, atol=1e-12)
+    for step in steps:
+        v = step.result.solution.v
+        np.testing.assert_allclose(step.problem.G.T @ v + step.problem.b, 0.0, atol=1e-6)
+        # b = 0.2 violation / h
+        assert np.abs(step.problem.b).max() * H / 0.2 < 1e-3
+    assert np.abs(velocities(steps)).max() > 0.5
+
+
+def test_closed_loop_with_contact() -> None:
+    steps = run(mjcf(PLANE_LOOP.replace(' 2"', ' 0.02"'), rest=PLANE_CONNECT), 5)
+    assert steps[-1].problem.nc
+    assert steps[-1].problem.G.shape[1] == 2
+    assert all(step.result.converged for step in steps)
+
+
+# ---- the simulation
+
+
+def arrays(step: Step) -> list[Any]:
+    p = step.problem
+    return [*(p.M.toarray(), p.H.toarray(), p.f, p.w, p.mu), step.result.solution.r, step.position]
+
+
+def test_runs_are_equal_bit_for_bit() -> None:
+    def steps() -> list[Step]:
+        return list(simulate(scenes.get("BoxesStack")(boxes=3, gap=0.005).scene(seed=5), 20))
+
+    for one, other in zip(steps(), steps(), strict=True):
+        for a, b in zip(arrays(one), arrays(other), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+def test_problem_is_regenerated_from_its_description() -> None:
+    scene = scenes.get("BoxesStack")(boxes=2, gap=0.004).scene(seed=11)
+    *_, last = simulate(scene, 12, tol=1e-9, warm_start=False, max_iterations=500)
+    assert last.problem.nc
+    assert "BoxesStack" in last.problem.info.description
+    assert "Moreau-Jean" in last.problem.info.math_info
+    assert "step 11" in last.problem.info.title
+
+    origin = provenance(last.problem.info)
+    assert origin["time"] == last.time
+    assert origin["mujoco"] == mujoco.__version__
+    again = scenes.get(origin["scene"])(**origin["parameters"]).scene(origin["seed"])
+    *_, twin = simulate(
+        again,
+        origin["step"] + 1,
+        solver=origin["solver"],
+        tol=origin["tol"],
+        warm_start=origin["warm_start"],
+        stabilization=origin["stabilization"],
+        **origin["options"],
+    )
+    for a, b in zip(arrays(last), arrays(twin), strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+def test_provenance_of_another_problem_is_an_error() -> None:
+    with pytest.raises(ValueError, match="does not say"):
+        provenance(fclib.ProblemInfo(title="mine", description="by hand"))
+
+
+def test_missed_tolerance_is_seen_and_the_simulation_goes_on() -> None:
+    scene = scenes.get("BoxesStack")(boxes=3, gap=0.0).scene(seed=0)
+    steps = list(simulate(scene, 3, tol=1e-14, max_iterations=1))
+    assert [step.index for step in steps] == [0, 1, 2]
+    assert not steps[-1].result.converged
+    assert str(steps[-1].result.status) != "converged"
+
+
+def test_warm_start_saves_iterations() -> None:
+    scene = scenes.get("BoxesStack")(boxes=3, gap=0.0, offset=0.1).scene(seed=0)
+    counts = [
+        sum(step.result.iterations for step in simulate(scene, 20, warm_start=warm))
+        for warm in (True, False)
+    ]
+    assert counts[0] < counts[1]
+
+
+def test_negative_number_of_steps() -> None:
+    with pytest.raises(ValueError, match="steps"):
+        simulate(Scene(name="test", xml=mjcf(SPHERE)), -1)
+
+
+# ---- any MJCF
+
+
+def test_scene_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "ball.xml"
+    path.write_text(mjcf(SPHERE), encoding="utf-8")
+    scene = Scene.from_file(path, restitution=0.5)
+    steps = list(simulate(scene, 2))
+    origin = provenance(steps[1].problem.info)
+    assert origin["scene"] == "ball"
+    assert origin["time_step"] == H  # the file's own
+    assert origin["restitution"] == 0.5
+    assert len(origin["parameters"]["sha256"]) == 64
+
+
+LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"')
+
+
+@pytest.mark.parametrize(
+    ("xml", "message"),
+    [
+        (mjcf(SPHERE, more='condim="4"'), "condim 4"),
+        (mjcf(SPHERE, more='condim="6"'), "condim 6"),
+        (mjcf(LIMITED), "limits"),
+        (mjcf(ARM.replace('name="elbow"', 'name="elbow" frictionloss="1"')), "dry friction"),
+        (mjcf(SPHERE, more='adhesion="1"'), "adhesion"),
+        (mjcf(SPHERE, more='surfacevel="1 0 0 0 0 0"'), "surfacevel"),
+        (
+            mjcf(
+                ARM,
+                rest='<actuator><general joint="elbow" dyntype="integrator"/></actuator>',
+            ),
+            "actuators with a state",
+        ),
+    ],
+)
+def test_what_is_not_supported_is_named(xml: str, message: str) -> None:
+    with pytest.raises(UnsupportedSceneError, match=f"^test: not supported yet: .*{message}"):
+        simulate(Scene(name="test", xml=xml), 1)
+
+
+def test_anisotropic_friction_is_named() -> None:
+    pair = '<contact><pair geom1="floor" geom2="box" condim="3" friction="0.1 0.2"/></contact>'
+    with pytest.raises(UnsupportedSceneError, match="anisotropic"):
+        run(mjcf(SLAB, more='name="box"', rest=pair), 1)
+
+
+def test_limits_are_left_out_on_demand_and_said() -> None:
+    steps = run(mjcf(LIMITED), 2, ignore=("limits",))
+    assert provenance(steps[0].problem.info)["ignore"] == ["limits"]
+    with pytest.raises(ValueError, match="cannot ignore contacts; only frictionloss, limits"):
+        run(mjcf(LIMITED), 2, ignore=("contacts",))
+
+
+def test_bad_mjcf_is_one_line() -> None:
+    with pytest.raises(ValueError, match=r"^test: MuJoCo refuses the MJCF: [^\n]*balloon[^\n]*$"):
+        simulate(Scene(name="test", xml=mjcf("<balloon/>")), 1)
+
+
+def test_full_memory_is_an_error() -> None:
+    many = "".join(SLAB.replace("0 0 0.1", f"{3 * i} 0 0.1", 1) for i in range(20))
+    xml = mjcf(many).replace("<asset>", '<size memory="24K"/><asset>', 1)
+    with pytest.raises(MemoryError, match="memory"):
+        run(xml, 1)
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [(types.SimpleNamespace(__version__="3.2.1"), "found 3.2.1"), (None, "cannot be imported")],
+)
+def test_another_mujoco_is_refused(
+    monkeypatch: pytest.MonkeyPatch, module: Any, message: str
+) -> None:
+    pinned = importlib.import_module("fclib.simulate._mujoco")
+    monkeypatch.setitem(sys.modules, "mujoco", module)
+    with pytest.raises(ImportError, match=f"{message}.*pip install mujoco==4.0.0"):
+        pinned.load()
+
+
+# ---- pictures
+
+
+def test_picture(tmp_path: Path) -> None:
+    *_, step = simulate(scenes.get("BoxesStack")(boxes=2, gap=0.0).scene(), 2)
+    pictures = {}
+    try:
+        for name, source in (("forces", step), ("bodies", step.model)):
+            render(source, tmp_path / f"{name}.png", size=(120, 160))
+            pictures[name] = (tmp_path / f"{name}.png").read_bytes()
+    except NoRenderer as reason:
+        pytest.skip(str(reason))
+    for content in pictures.values():
+        assert content[:8] == b"\x89PNG\r\n\x1a\n"
+        assert int.from_bytes(content[16:20], "big") == 120
+        assert int.from_bytes(content[20:24], "big") == 160
+    assert pictures["forces"] != pictures["bodies"]
+
+
+def test_no_renderer_says_so_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    module = importlib.import_module("fclib.simulate.render")
+    module.backend.cache_clear()
+    failed = types.SimpleNamespace(returncode=1)
+    monkeypatch.setattr(module.subprocess, "run", lambda *args, **kwargs: failed)
+    with pytest.raises(NoRenderer, match=r"^no picture: [^\n]*install libosmesa6$"):
+        render(MujocoModel(Scene(name="test", xml=mjcf(SPHERE))), tmp_path / "none.png")
+    module.backend.cache_clear()

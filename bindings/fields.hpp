@@ -63,6 +63,10 @@ nb::object get(const Field<Struct, Member>& field, const Struct& self, nb::handl
   if (is_absent(field, member)) return nb::none();
   if constexpr (std::is_same_v<Member, Matrix> || std::is_same_v<Member, Vector>) {
     return to_python(member, owner);
+  } else if constexpr (std::is_same_v<Member, std::string>) {
+    // files hold text of any encoding, and sometimes garbage
+    return nb::steal(PyUnicode_DecodeUTF8(member.data(), static_cast<Py_ssize_t>(member.size()),
+                                          "replace"));
   } else {
     return nb::cast(member);
   }

@@ -109,7 +109,7 @@ void bind_problem(nb::module_& m) {
     std::string text = "<" + name + " " + formulation(p) + ": nc = " + std::to_string(p.size(Dim::nc));
     if (p.size(Dim::n) > 0) text += ", n = " + std::to_string(p.size(Dim::n));
     if (p.size(Dim::p) > 0) text += ", p = " + std::to_string(p.size(Dim::p));
-    return text + (p.info.title.empty() ? "" : ", '" + p.info.title + "'") + ">";
+    return text + ">";
   });
 }
 

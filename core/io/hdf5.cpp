@@ -553,7 +553,7 @@ Problem read_problem(const std::string& path, std::string_view kind) {
     std::string known;
     for (const auto& name : contents.kinds) known += (known.empty() ? "" : ", ") + name;
     if (kind.empty()) {
-      if (contents.kinds.empty()) fail("/", "holds no problem in the FCLIB layout");
+      if (contents.kinds.empty()) fail("/", "holds no problem in a known FCLIB layout");
       if (contents.kinds.size() > 1) fail("/", "holds several problems, name one of: " + known);
     } else if (std::find(contents.kinds.begin(), contents.kinds.end(), kind) == contents.kinds.end()) {
       fail("/", "holds no " + std::string(kind) + " problem" +

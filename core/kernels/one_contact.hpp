@@ -84,21 +84,25 @@ class OneContact {
     constexpr double contraction = 0.9;  // of a step that is accepted
     constexpr double reduction = 2.0 / 3.0;
     constexpr double growth = 1.5;
+    Vec hat = modified_velocity<D>(a_ * r + b, mu_);
     for (int k = 0; k < max_iterations; ++k) {
-      const Vec hat = modified_velocity<D>(a_ * r + b, mu_);
       Vec next;
+      Vec next_hat;
       double ratio = 0;
       double change = 0;
       for (int attempt = 0; attempt < 50; ++attempt) {
         next = project_on_cone<D>(r - rho_ * hat, mu_);
         change = (next - r).norm();
-        if (change == 0) break;
-        ratio = rho_ * (modified_velocity<D>(a_ * next + b, mu_) - hat).norm() / change;
+        if (change <= accuracy * r.norm()) break;
+        next_hat = modified_velocity<D>(a_ * next + b, mu_);
+        ratio = rho_ * (next_hat - hat).norm() / change;
         if (ratio <= contraction) break;
         rho_ *= reduction;
       }
+      const bool settled = change <= accuracy * r.norm();
       r = next;
-      if (change <= accuracy * r.norm()) return;
+      if (settled) return;
+      hat = next_hat;
       if (ratio < 0.3) rho_ *= growth;
     }
   }

@@ -155,4 +155,12 @@ void multiply_transposed_add(const Matrix& a, ConstVectorRef x, VectorRef y) {
   for_each_entry(a, [&](Index row, Index col, double value) { y[col] += value * x[row]; });
 }
 
+double term_size_transposed(const Matrix& a, ConstVectorRef x) {
+  Vector sums = Vector::Zero(a.cols);
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    sums[col] += std::abs(value * x[row]);
+  });
+  return sums.norm();
+}
+
 }  // namespace fclib

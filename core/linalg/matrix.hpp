@@ -91,4 +91,7 @@ void multiply_add(const Matrix& a, ConstVectorRef x, VectorRef y);
 /// y += A^T x, with x of length rows and y of length cols.
 void multiply_transposed_add(const Matrix& a, ConstVectorRef x, VectorRef y);
 
+/// || |A|^T |x| ||_2: the size of the products that A^T x adds up, whatever they cancel to.
+double term_size_transposed(const Matrix& a, ConstVectorRef x);
+
 }  // namespace fclib

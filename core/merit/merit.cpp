@@ -87,7 +87,8 @@ Merit merit(const LocalProblem& problem, const Solution& solution) {
     Vector rl = Vector::Zero(problem.s.size());
     multiply_add(problem.R, solution.l, rl);
     result.bilateral =
-        relative((vr + rl + problem.s).norm(), {vr.norm(), rl.norm(), problem.s.norm()});
+        relative((vr + rl + problem.s).norm(),
+                 {term_size_transposed(problem.V, solution.r), rl.norm(), problem.s.norm()});
   }
   const Vector u = from_r + from_l + problem.q;
   if (solution.u.size() > 0) {
@@ -125,7 +126,9 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
   if (is_mixed(problem)) {
     Vector gv = Vector::Zero(problem.b.size());
     multiply_transposed_add(problem.G, v, gv);
-    result.bilateral = relative((gv + problem.b).norm(), {gv.norm(), problem.b.norm()});
+    // G^T v vanishes where b does, so that its own norm would compare rounding with rounding
+    result.bilateral = relative((gv + problem.b).norm(),
+                                {term_size_transposed(problem.G, v), problem.b.norm()});
   }
 
   // u = H^T v + w

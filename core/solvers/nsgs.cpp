@@ -36,7 +36,7 @@ struct Options {
   double relaxation = 1.0;
   Shuffle shuffle = Shuffle::no;
   std::int64_t seed = 0;
-  std::int64_t local_iterations = 100;
+  std::int64_t local_iterations = 10;
   double local_accuracy = 1e-14;
   std::int64_t error_interval = 0;
 

@@ -1,5 +1,5 @@
 """The bench: solvers are run here, and judged by the merit, never by themselves."""
 
-from fclib.bench.run import Run, run
+from fclib.bench.run import COLUMNS, Run, run
 
-__all__ = ["Run", "run"]
+__all__ = ["COLUMNS", "Run", "run"]

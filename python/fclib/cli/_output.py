@@ -18,8 +18,12 @@ from rich.text import Text
 
 import fclib
 
-out = Console(soft_wrap=True)
+out = Console()
+if not out.is_terminal:
+    out = Console(width=240)  # nothing is folded on its way into a file or a pipe
 err = Console(stderr=True, soft_wrap=True)
+
+WRAPPED = ("problem", "title", "meaning")  # columns that may be folded to fit the terminal
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
@@ -90,14 +94,13 @@ def format_value(value: object) -> str:
 def make_table(records: Sequence[dict[str, Any]], title: str | None = None) -> Table:
     """A table with a column a key; statuses and verdicts in colour."""
     table = Table(title=title, title_justify="left", box=None, header_style="bold", pad_edge=False)
-    for key in records[0]:
-        numeric = any(isinstance(r[key], (int, float)) for r in records if not isinstance(r[key], bool))
-        wraps = isinstance(records[0][key], str) and key in ("problem", "title")
+    for key, first in records[0].items():
+        numeric = isinstance(first, (int, float)) and not isinstance(first, bool)
         table.add_column(
             key,
             justify="right" if numeric else "left",
-            no_wrap=not wraps,
-            overflow="fold" if wraps else "ellipsis",
+            no_wrap=key not in WRAPPED,
+            overflow="fold",
         )
     for record in records:
         cells = [Text(format_value(value)) for value in record.values()]
@@ -139,18 +142,20 @@ class Report:
     def finish(self) -> NoReturn:
         """Print the table, and exit with the status."""
         if self.records and not self.as_json:
-            shown = [
-                {key: value for key, value in record.items() if key not in self.hidden}
-                for record in self.records
-            ]
-            print_table(make_table(shown))
+            paths = [record["problem"] for record in self.records]
+            names = [Path(path).name for path in paths]
+            # the folder is left out where the name says enough
+            shortest = names if len(set(names)) == len(set(paths)) else paths
+            out.print(
+                make_table(
+                    [
+                        {key: value for key, value in record.items() if key not in self.hidden}
+                        | {"problem": name}
+                        for record, name in zip(self.records, shortest, strict=True)
+                    ]
+                )
+            )
         raise typer.Exit(int(self.failed))
-
-
-def print_table(table: Table) -> None:
-    """Print a table, whole even where the output is no terminal."""
-    width = None if out.is_terminal else 200
-    out.print(table, width=width)
 
 
 def each_file(files: Iterable[Path], what: str, report: Report) -> Iterator[Path]:

@@ -1,5 +1,91 @@
-"""``fclib demo``: placeholder until written below."""
+"""``fclib demo``: the main job, end to end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fclib import bench, demo
+from fclib.cli._output import Json, Report, Tolerance, advance, err, make_table, out, progress_bar
+
+TABLE_ROWS = 24  # the CSV has them all
 
 
-def command() -> None:
-    """Run the main job."""
+def summarize(runs: list[bench.Run]) -> list[dict[str, Any]]:
+    """A row for each solver: what it solved, and at what cost."""
+    rows = []
+    for solver in dict.fromkeys(run.solver for run in runs):
+        own = [run for run in runs if run.solver == solver]
+        rows.append(
+            {
+                "solver": solver,
+                "problems": len(own),
+                "solved": sum(run.status == "converged" for run in own),
+                "iterations": sum(run.iterations for run in own),
+                "cpu_s": sum(run.cpu_s for run in own),
+                "largest error": max(run.error for run in own),
+            }
+        )
+    return rows
+
+
+def command(
+    out_dir: Annotated[Path, typer.Option("--out", help="Folder of what is made.")] = Path("demo"),
+    boxes: Annotated[int, typer.Option(help="Boxes of the stack.", min=1)] = 6,
+    steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 50,
+    tol: Tolerance = 1e-8,
+    as_json: Json = False,
+) -> None:
+    """Simulate a falling stack, store its problems, solve and judge them."""
+    try:
+        from fclib.simulate import NoRenderer
+    except ImportError as error:
+        err.print(f"fclib: {error}", style="red", markup=False, highlight=False)
+        raise typer.Exit(1) from None
+
+    say = err if as_json else out
+    say.print(f"Simulating {boxes} boxes that fall on the ground, {steps} steps ...")
+    paths: list[Path] = []
+    picture: Path | None = out_dir / "stack.png"
+    with progress_bar("simulating", steps) as progress:
+        try:
+            for stored in demo.simulate(out_dir, boxes, steps, picture):
+                paths += [stored.global_path, stored.local_path]
+                advance(progress, "simulating")
+        except NoRenderer as error:
+            picture = None
+            say.print(f"No picture: {error}")
+
+    say.print(f"Solving {len(paths)} problems, each in {len(demo.CONFIGURATIONS)} ways ...")
+    runs: list[bench.Run] = []
+    with progress_bar("solving", len(paths)) as progress:
+        for path in paths:
+            runs += demo.solve(path, tol)
+            advance(progress, "solving")
+    table = out_dir / "runs.csv"
+    demo.write_csv(table, runs)
+
+    report = Report(as_json)
+    for run in runs:
+        report.add(run.record, run.status == "converged")
+    if not as_json:
+        # whole steps, from the first contact to the last one, evenly thinned
+        touching = [run for run in runs if run.nc > 0]
+        group = 2 * len(demo.CONFIGURATIONS)
+        stride = max(1, -(-len(touching) // TABLE_ROWS))
+        starts = list(range(0, len(touching), group))
+        shown = [run for k in starts[::-1][::stride][::-1] for run in touching[k : k + group]]
+        out.print()
+        out.print(make_table([run.record for run in shown or runs[:TABLE_ROWS]]))
+        out.print()
+        out.print(make_table(summarize(runs)))
+        out.print()
+        out.print(f"All {len(runs)} runs:  {table}")
+        out.print(f"The problems:  {out_dir}/stack-*.hdf5  (try: fclib check {paths[-1]})")
+        if picture is not None:
+            out.print(f"The picture:   {picture}")
+    raise typer.Exit(int(report.failed))
+
+

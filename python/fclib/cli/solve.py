@@ -24,10 +24,10 @@ def command(
     solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "nsgs",
     tol: Tolerance = 1e-8,
     time_limit: Annotated[
-        float | None, typer.Option(help="[s] wall clock for each problem.", min=0.0)
+        float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.0)
     ] = None,
     write: Annotated[
-        bool, typer.Option("--write", help="Store the solution in the file, if it is one.")
+        bool, typer.Option("--write", help="Store solutions that converged in their files.")
     ] = False,
     option: Annotated[
         list[str] | None, typer.Option(help="An option of the solver, name=value.")

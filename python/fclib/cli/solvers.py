@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 import fclib
-from fclib.cli._output import Json, Report, make_table, out, print_table
+from fclib.cli._output import Json, Report, make_table, out
 
 
 def describe(option: fclib.OptionInfo) -> dict[str, Any]:
     """The record of an option."""
     return {
         "option": option.name,
-        "type": "|".join(option.choices) or option.type,
+        "type": " | ".join(option.choices) or option.type,
         "default": option.default,
         "unit": option.unit,
         "meaning": option.doc,
@@ -39,4 +39,4 @@ def command(as_json: Json = False) -> None:
         takes = ", ".join(f"{d}D" for d in solver.dimensions)
         out.print(f"[bold]{solver.name}[/]  {solver.title} ({solver.family}; {takes})")
         out.print(f"  {solver.citation}\n", highlight=False)
-        print_table(make_table(options))
+        out.print(make_table(options))

@@ -18,10 +18,9 @@ class BoxesStack:
     A tall stack is hard for a first-order method: a reaction at the bottom carries the weight of
     all that is above, and information climbs one box a sweep.
 
-    After the family BoxesStack of V. Acary, M. Bremond and O. Huber, On solving contact problems
-    with Coulomb friction: formulations and numerical comparisons, in Advanced Topics in Nonsmooth
-    Dynamics, Springer, 2018 (Inria report RT-0444). The original scene is not public: sizes,
-    masses and friction are its own, the gaps and offsets are chosen here.
+    After the family BoxesStack of V. Acary, M. Bremond, T. Koziara and F. Perignon, FCLIB: a
+    collection of discrete 3D Frictional Contact problems, Inria report RT-0444, 2014. Sizes,
+    masses and friction are its own; the gaps, offsets and rotations are chosen here.
     """
 
     title: ClassVar[str] = "Stack of boxes"
@@ -29,7 +28,7 @@ class BoxesStack:
         "Equal cubes dropped one upon another on a horizontal floor, under gravity."
     )
     application: ClassVar[str] = "multibody systems, masonry"
-    authors: ClassVar[str] = "V. Acary, M. Bremond, O. Huber"
+    authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
 
     boxes: int = parameter(50, "1", "number of boxes, at least 1")

@@ -7,6 +7,7 @@ equal bit for bit only with the version pinned here. Its soft contact solver is 
 from __future__ import annotations
 
 import importlib
+import logging
 from typing import Any
 
 VERSION = "4.0.0"
@@ -24,6 +25,9 @@ def load() -> Any:
     found = getattr(mujoco, "__version__", "of unknown version")
     if found != VERSION:
         raise ImportError(f"fclib.simulate needs MuJoCo {VERSION}, found {found}; {remedy}")
+    if mujoco.get_mju_user_warning() is None:
+        # without a handler MuJoCo writes its warnings to MUJOCO_LOG.TXT in the current folder
+        mujoco.set_mju_user_warning(logging.getLogger(__package__).warning)
     return mujoco
 
 

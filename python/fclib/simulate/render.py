@@ -4,7 +4,7 @@ MuJoCo draws offscreen through OpenGL: EGL (a GPU, or Mesa in software) or OSMes
 works is found out once, in a process of its own: a missing library, a driver that crashes and an
 environment variable read at import all stay there.
 
-On Debian and Ubuntu, libosmesa6 alone suffices, or libegl1 with libgl1-mesa-dri.
+On Debian and Ubuntu libosmesa6 suffices; for EGL, libegl1, libopengl0 and libgl1-mesa-dri.
 """
 
 from __future__ import annotations

@@ -1,0 +1,73 @@
+"""The main job, end to end: simulate a scene, store its problems, solve them, judge the solutions.
+
+    scene -> simulate -> FCLIB files -> read -> solve -> merit -> table, CSV, picture
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import fclib
+from fclib import bench
+
+CONFIGURATIONS: tuple[dict[str, str], ...] = (
+    {"solver": "nsgs"},
+    {"solver": "nsgs", "local_solver": "projection"},
+)
+
+
+@dataclass(frozen=True)
+class Stored:
+    """The two files of a step."""
+
+    global_path: Path
+    local_path: Path
+
+
+def simulate(folder: Path, boxes: int, steps: int, picture: Path | None) -> Iterator[Stored]:
+    """Drop a stack of boxes, and store the global and the local form of every step.
+
+    The global file holds the solution that carried the simulation on. After the last step the
+    scene is drawn to `picture`, where that is not None.
+
+    Raises:
+        ImportError: MuJoCo is not there in the pinned version.
+        fclib.simulate.NoRenderer: all is stored, but nothing can draw the picture.
+        fclib.FileError: a file cannot be written.
+    """
+    from fclib import scenes
+    from fclib import simulate as simulation
+
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = scenes.get("BoxesStack")(boxes=boxes, gap=0.01).scene(seed=0)
+    step = None
+    for step in simulation.simulate(scene, steps):
+        stored = Stored(
+            folder / f"stack-{step.index:03d}-global.hdf5",
+            folder / f"stack-{step.index:03d}-local.hdf5",
+        )
+        fclib.write(stored.global_path, step.problem, step.result.solution)
+        fclib.write(stored.local_path, step.problem.condense())
+        yield stored
+    if step is not None and picture is not None:
+        simulation.render(step, picture)
+
+
+def solve(path: Path, tol: float) -> list[bench.Run]:
+    """Solve the problem of a file in each configuration, and store the most accurate solution."""
+    problem = fclib.read(path)
+    runs = [bench.run(path.stem, problem, tol=tol, **options) for options in CONFIGURATIONS]
+    best = min(runs, key=lambda run: run.error)
+    fclib.write_solution(path, best.result.solution)
+    return runs
+
+
+def write_csv(path: Path, runs: Sequence[bench.Run]) -> None:
+    """All runs, a row each."""
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, bench.COLUMNS)
+        writer.writeheader()
+        writer.writerows(run.record for run in runs)

@@ -66,7 +66,8 @@ nb::object to_python(const Vector& vector, nb::handle owner) {
 nb::object to_python(const Matrix& a, nb::handle owner) {
   if (a.storage == Storage::dense) {
     static const double nothing{};
-    const std::size_t shape[2] = {static_cast<std::size_t>(a.rows), static_cast<std::size_t>(a.cols)};
+    const std::size_t shape[2] = {static_cast<std::size_t>(a.rows),
+                                  static_cast<std::size_t>(a.cols)};
     return nb::cast(nb::ndarray<nb::numpy, const double, nb::ndim<2>, nb::f_contig>(
         a.x.empty() ? &nothing : a.x.data(), 2, shape, owner, nullptr, nb::dtype<double>(),
         nb::device::cpu::value, 0, 'F'));
@@ -82,8 +83,7 @@ nb::object to_python(const Matrix& a, nb::handle owner) {
   }
   const bool canonical = is_canonical(a);
   const nb::object result = sparse.attr(a.storage == Storage::csc ? "csc_array" : "csr_array")(
-      nb::make_tuple(values, inner, outer), nb::arg("shape") = shape,
-      nb::arg("copy") = !canonical);
+      nb::make_tuple(values, inner, outer), nb::arg("shape") = shape, nb::arg("copy") = !canonical);
   if (canonical) {
     result.attr("has_sorted_indices") = true;
     result.attr("has_canonical_format") = true;

@@ -18,8 +18,8 @@ template <class Number>
 nb::object view(const Number* data, std::size_t size, nb::handle owner) {
   static const Number nothing{};  // NumPy wants an address for an empty array too
   const std::size_t shape[1] = {size};
-  return nb::cast(nb::ndarray<nb::numpy, const Number, nb::ndim<1>>(
-      size > 0 ? data : &nothing, 1, shape, owner));
+  return nb::cast(nb::ndarray<nb::numpy, const Number, nb::ndim<1>>(size > 0 ? data : &nothing, 1,
+                                                                    shape, owner));
 }
 
 nb::object to_python(const Vector& vector, nb::handle owner);

@@ -65,8 +65,8 @@ nb::object get(const Field<Struct, Member>& field, const Struct& self, nb::handl
     return to_python(member, owner);
   } else if constexpr (std::is_same_v<Member, std::string>) {
     // files hold text of any encoding, and sometimes garbage
-    return nb::steal(PyUnicode_DecodeUTF8(member.data(), static_cast<Py_ssize_t>(member.size()),
-                                          "replace"));
+    return nb::steal(
+        PyUnicode_DecodeUTF8(member.data(), static_cast<Py_ssize_t>(member.size()), "replace"));
   } else {
     return nb::cast(member);
   }
@@ -175,11 +175,16 @@ void def_construction(nb::class_<Struct>& cls) {
         fill(*self, nb::borrow<nb::dict>(values));
       },
       nb::sig(signature_of_init<Struct>().c_str()));
-  cls.def("__getstate__", [](nb::handle self) { return to_dict<Struct>(self); });
-  cls.def("__setstate__", [](Struct& self, const nb::dict& values) {
-    new (&self) Struct();
-    fill(self, values);
-  });
+  cls.def(
+      "__getstate__", [](nb::handle self) { return to_dict<Struct>(self); },
+      nb::sig("def __getstate__(self) -> dict[str, object]"));
+  cls.def(
+      "__setstate__",
+      [](Struct& self, const nb::dict& values) {
+        new (&self) Struct();
+        fill(self, values);
+      },
+      nb::sig("def __setstate__(self, values: dict[str, object], /) -> None"));
 }
 
 }  // namespace fclib::bindings

@@ -46,7 +46,7 @@ void translate(const std::exception_ptr& pointer, void*) {
 
 void bind_errors(nb::module_& m) {
   const auto define = [&](const char* name, nb::handle bases, const char* doc) {
-    const std::string full = "fclib." + std::string(name);
+    const std::string full = nb::cast<std::string>(m.attr("__name__")) + "." + name;
     const nb::object type =
         nb::steal(PyErr_NewExceptionWithDoc(full.c_str(), doc, bases.ptr(), nullptr));
     m.attr(name) = type;
@@ -99,14 +99,18 @@ void bind_problem(nb::module_& m) {
   def_size("m", Dim::m, "local unknowns, spacedim * nc");
   def_size("p", Dim::p, "bilateral constraints");
   def_size("nc", Dim::nc, "contacts");
-  cls.def_prop_ro("formulation", [](const P& p) { return formulation(p); },
-                  "the name of the formulation in RT-0444: 3DFC, GM3DFC, ...");
-  cls.def_prop_ro("kind", [](const P&) { return std::string(P::kind); },
-                  "the kind of the problem, which names its class and its group in a file");
-  cls.def("validate", [](const P& p) { validate(p); }, nb::call_guard<Unlocked>(),
-          "Raises ProblemError at the first thing wrong with the data.");
+  cls.def_prop_ro(
+      "formulation", [](const P& p) { return formulation(p); },
+      "the name of the formulation in RT-0444: 3DFC, GM3DFC, ...");
+  cls.def_prop_ro(
+      "kind", [](const P&) { return std::string(P::kind); },
+      "the kind of the problem, which names its class and its group in a file");
+  cls.def(
+      "validate", [](const P& p) { validate(p); }, nb::call_guard<Unlocked>(),
+      "Raises ProblemError at the first thing wrong with the data.");
   cls.def("__repr__", [name](const P& p) {
-    std::string text = "<" + name + " " + formulation(p) + ": nc = " + std::to_string(p.size(Dim::nc));
+    std::string text =
+        "<" + name + " " + formulation(p) + ": nc = " + std::to_string(p.size(Dim::nc));
     if (p.size(Dim::n) > 0) text += ", n = " + std::to_string(p.size(Dim::n));
     if (p.size(Dim::p) > 0) text += ", p = " + std::to_string(p.size(Dim::p));
     return text + ">";
@@ -189,16 +193,21 @@ void bind_solvers(nb::module_& m) {
       .def_prop_ro("citation", [](const Solver& s) { return std::string(s.citation); })
       .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
       .def_ro("options", &Solver::options);
-  m.def("solvers", [] {
-    nb::list result;
-    for (const Solver* solver : solvers()) result.append(nb::cast(solver, nb::rv_policy::reference));
-    return result;
-  }, nb::sig("def solvers() -> list[SolverInfo]"), "All solvers, by name.");
+  m.def(
+      "solvers",
+      [] {
+        nb::list result;
+        for (const Solver* solver : solvers())
+          result.append(nb::cast(solver, nb::rv_policy::reference));
+        return result;
+      },
+      nb::sig("def solvers() -> list[SolverInfo]"), "All solvers, by name.");
 
   nb::class_<Result>(m, "Result", "What fclib.solve returns.")
       .def_ro("solution", &Result::solution)
-      .def_prop_ro("status", [](const Result& r) { return std::string(name_of(r.status)); },
-                   "converged, iteration_limit, time_limit, diverged, inaccurate or interrupted")
+      .def_prop_ro(
+          "status", [](const Result& r) { return std::string(name_of(r.status)); },
+          "converged, iteration_limit, time_limit, diverged, inaccurate or interrupted")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
       .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
@@ -216,6 +225,21 @@ void bind_solvers(nb::module_& m) {
 
 // ---- files
 
+constexpr const char* path_type = "path: str | os.PathLike[str]";
+
+std::string signature(const std::string& name, const std::string& rest, const std::string& result) {
+  return "def " + name + "(" + path_type + rest + ") -> " + result;
+}
+
+/// "GlobalProblem | LocalProblem"
+std::string problem_union() {
+  std::string names;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    names += (names.empty() ? "" : " | ") + class_name(P::kind);
+  });
+  return names;
+}
+
 void bind_files(nb::module_& m) {
   m.def(
       "read",
@@ -227,12 +251,13 @@ void bind_files(nb::module_& m) {
         return std::visit([](auto& p) { return nb::cast(std::move(p)); }, problem);
       },
       "path"_a, "kind"_a = nb::none(),
-      nb::sig("def read(path: str | os.PathLike[str], kind: str | None = None) -> Problem"),
+      nb::sig(signature("read", ", kind: str | None = None", problem_union()).c_str()),
       "The problem in an FCLIB file, validated. `kind` (\"local\", \"global\") chooses where the "
       "file holds several.\n\nRaises FileError, or ProblemError, naming file and dataset.");
   m.def(
       "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
-      nb::call_guard<Unlocked>(), "The stored solution of a file, or None. Raises FileError.");
+      nb::sig(signature("read_solution", "", "Solution | None").c_str()), nb::call_guard<Unlocked>(),
+      "The stored solution of a file, or None. Raises FileError.");
   m.def(
       "contents",
       [](const fs::path& path) {
@@ -240,13 +265,17 @@ void bind_files(nb::module_& m) {
         if (contents.solution) contents.kinds.emplace_back("solution");
         return contents.kinds;
       },
-      "path"_a, nb::call_guard<Unlocked>(),
-      "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
+      "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()),
+      nb::call_guard<Unlocked>(), "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
   m.def(
       "write_solution",
-      [](const fs::path& path, const Solution& solution) { write_solution(path.string(), solution); },
-      "path"_a, "solution"_a, nb::call_guard<Unlocked>(),
-      "Puts a solution into a file that has its problem, in place of the one it had, atomically.\n\n"
+      [](const fs::path& path, const Solution& solution) {
+        write_solution(path.string(), solution);
+      },
+      "path"_a, "solution"_a,
+      nb::sig(signature("write_solution", ", solution: Solution", "None").c_str()),
+      nb::call_guard<Unlocked>(), "Puts a solution into a file that has its problem, in place of the one it had, "
+      "atomically.\n\n"
       "Raises FileError, or ProblemError where the sizes disagree.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
@@ -254,7 +283,13 @@ void bind_files(nb::module_& m) {
         [](const fs::path& path, const P& problem, const Solution* solution) {
           write_file(path.string(), &problem, solution);
         },
-        "path"_a, "problem"_a, "solution"_a.none() = nb::none(), nb::call_guard<Unlocked>(),
+        "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
+        nb::sig(signature("write",
+                          ", problem: " + class_name(P::kind) +
+                              ", solution: Solution | None = None",
+                          "None")
+                    .c_str()),
+        nb::call_guard<Unlocked>(),
         "Writes an FCLIB file, or replaces the old one whole, atomically.\n\n"
         "Raises FileError, or ProblemError where the data is not valid.");
   });
@@ -264,7 +299,7 @@ void bind_files(nb::module_& m) {
 
 NB_MODULE(_core, m) {
   m.doc() = "The core of fclib, in C++.";
-  m.attr("__version__") = version;
+  m.attr("version") = version;
   bind_errors(m);
 
   nb::class_<ProblemInfo> info(m, "ProblemInfo", "What a file says about its problem in words.");
@@ -281,10 +316,11 @@ NB_MODULE(_core, m) {
   bind_solvers(m);
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     bind_solve<P>(m);
-    m.def("merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
-          "solution"_a, nb::call_guard<Unlocked>(),
-          "The merit of a solution. A missing v is computed, a missing u is not judged.\n\n"
-          "Raises ProblemError where problem or solution are not valid.");
+    m.def(
+        "merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
+        "solution"_a, nb::call_guard<Unlocked>(),
+        "The merit of a solution. A missing v is computed, a missing u is not judged.\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
   });
   bind_files(m);
 }

@@ -29,7 +29,9 @@ class Error : public std::runtime_error {
         file(std::move(file)) {}
 
   /// The same error, seen from the file it was found in.
-  [[nodiscard]] Error in_file(const std::string& path) const { return {kind, message, where, path}; }
+  [[nodiscard]] Error in_file(const std::string& path) const {
+    return {kind, message, where, path};
+  }
 
   ErrorKind kind;
   std::string message;

@@ -17,11 +17,16 @@ enum class Dim { one, n, m, p, nc };
 
 constexpr std::string_view name_of(Dim dim) {
   switch (dim) {
-    case Dim::one: return "1";
-    case Dim::n: return "n";
-    case Dim::m: return "m";
-    case Dim::p: return "p";
-    case Dim::nc: return "nc";
+    case Dim::one:
+      return "1";
+    case Dim::n:
+      return "n";
+    case Dim::m:
+      return "m";
+    case Dim::p:
+      return "p";
+    case Dim::nc:
+      return "nc";
   }
   return "?";
 }

@@ -185,7 +185,8 @@ std::string read_text(const Group& group, const std::string& name) {
   }
   const std::size_t length = H5Tget_size(type.id());
   if (length > small_dataset && length > H5Dget_storage_size(dataset.id())) {
-    fail(path, "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
+    fail(path,
+         "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
   }
   std::string text(length, '\0');
   if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) < 0) {
@@ -198,8 +199,8 @@ std::string read_text(const Group& group, const std::string& name) {
 template <class Number>
 void shorten(std::vector<Number>& values, std::size_t length, const std::string& where) {
   if (values.size() < length) {
-    fail(where, "has " + std::to_string(values.size()) + " entries, expected " +
-                    std::to_string(length));
+    fail(where,
+         "has " + std::to_string(values.size()) + " entries, expected " + std::to_string(length));
   }
   values.resize(length);
 }
@@ -242,8 +243,9 @@ Matrix read_matrix(const Group& parent, const std::string& name) {
       if (a.p.empty() || a.p.back() < 0) fail(group.child("p"), "has no valid last pointer");
       entries = static_cast<std::size_t>(a.p.back());
     } else {
-      fail(group.child("nz"), std::to_string(nz) + " is no storage: expected the number of triplets, "
-                              "-1 (CSC), -2 (CSR) or -3 (dense)");
+      fail(group.child("nz"), std::to_string(nz) +
+                                  " is no storage: expected the number of triplets, "
+                                  "-1 (CSC), -2 (CSR) or -3 (dense)");
     }
     // nzmax may leave room at the end
     shorten(a.i, entries, group.child("i"));
@@ -338,7 +340,8 @@ void check(herr_t status, const std::string& where) {
 }
 
 Handle create_group(const Group& parent, const std::string& name) {
-  Handle group(H5Gcreate2(parent.id, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  Handle group(H5Gcreate2(parent.id, name.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+               H5Gclose);
   if (!group.ok()) fail(parent.child(name), "cannot be created");
   return group;
 }
@@ -414,10 +417,14 @@ void write_matrix(const Group& parent, const std::string& name, const Matrix& a)
   const auto nnz = static_cast<Index>(a.nnz());
   const auto nz = [&]() -> Index {
     switch (a.storage) {
-      case Storage::triplet: return nnz;
-      case Storage::csc: return nz_csc;
-      case Storage::csr: return nz_csr;
-      case Storage::dense: return nz_dense;
+      case Storage::triplet:
+        return nnz;
+      case Storage::csc:
+        return nz_csc;
+      case Storage::csr:
+        return nz_csr;
+      case Storage::dense:
+        return nz_dense;
     }
     return nnz;
   }();
@@ -555,7 +562,8 @@ Problem read_problem(const std::string& path, std::string_view kind) {
     if (kind.empty()) {
       if (contents.kinds.empty()) fail("/", "holds no problem in a known FCLIB layout");
       if (contents.kinds.size() > 1) fail("/", "holds several problems, name one of: " + known);
-    } else if (std::find(contents.kinds.begin(), contents.kinds.end(), kind) == contents.kinds.end()) {
+    } else if (std::find(contents.kinds.begin(), contents.kinds.end(), kind) ==
+               contents.kinds.end()) {
       fail("/", "holds no " + std::string(kind) + " problem" +
                     (known.empty() ? "" : "; it holds: " + known));
     }

@@ -35,7 +35,8 @@ Problem read_problem(const std::string& path, std::string_view kind = {});
 std::optional<Solution> read_solution(const std::string& path);
 
 /// Writes a new file, or replaces the old one whole.
-void write_file(const std::string& path, ProblemPointer problem, const Solution* solution = nullptr);
+void write_file(const std::string& path, ProblemPointer problem,
+                const Solution* solution = nullptr);
 
 /// Puts a solution into a file that has its problem, in place of the one it had.
 void write_solution(const std::string& path, const Solution& solution);

@@ -178,16 +178,16 @@ class OneContact {
 
   Mat a_ = Mat::Zero();
   double mu_ = 0;
-  double normal_ = 0;            // A_NN
+  double normal_ = 0;  // A_NN
   double trace_ = 0;
-  bool solvable_ = false;        // A_NN > 0
-  bool sticks_ = false;          // S is regular
+  bool solvable_ = false;                       // A_NN > 0
+  bool sticks_ = false;                         // S is regular
   TangentVec to_normal_ = TangentVec::Zero();   // A_NT / A_NN
   TangentVec to_tangent_ = TangentVec::Zero();  // A_TN / A_NN
   TangentMat schur_ = TangentMat::Zero();       // S
   TangentMat inverse_ = TangentMat::Zero();     // S^-1
-  double alpha_ = 0;             // root of the last slip, a warm start
-  double rho_ = 1;               // step of the last projection
+  double alpha_ = 0;                            // root of the last slip, a warm start
+  double rho_ = 1;                              // step of the last projection
 };
 
 }  // namespace fclib

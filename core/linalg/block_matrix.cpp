@@ -55,8 +55,8 @@ void BlockMatrix::fill(const Matrix& a) {
       });
     }
     std::sort(row_.begin() + static_cast<std::ptrdiff_t>(first), row_.end());
-    const auto at = std::lower_bound(row_.begin() + static_cast<std::ptrdiff_t>(first), row_.end(),
-                                     contact);
+    const auto at =
+        std::lower_bound(row_.begin() + static_cast<std::ptrdiff_t>(first), row_.end(), contact);
     diagonal_[contact] = static_cast<std::size_t>(at - row_.begin());
     column_.push_back(row_.size());
   }

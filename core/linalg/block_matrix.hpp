@@ -48,14 +48,15 @@ class BlockMatrix {
   int d_ = 3;
   Index nc_ = 0;
   bool dense_ = false;
-  std::vector<std::size_t> column_;   // first block of each column (nc + 1)
-  std::vector<Index> row_;            // block row of each block
-  std::vector<std::size_t> diagonal_; // position of each diagonal block (nc)
+  std::vector<std::size_t> column_;    // first block of each column (nc + 1)
+  std::vector<Index> row_;             // block row of each block
+  std::vector<std::size_t> diagonal_;  // position of each diagonal block (nc)
   std::vector<double> values_;
 };
 
 template <int D>
-inline void BlockMatrix::add_column(Index contact, const double* delta, double* __restrict y) const {
+inline void BlockMatrix::add_column(Index contact, const double* delta,
+                                    double* __restrict y) const {
   double x[D];
   for (int c = 0; c < D; ++c) x[c] = delta[c];
   if (dense_) {

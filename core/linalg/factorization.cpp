@@ -62,13 +62,16 @@ SparseColumns Factorization::half_solve(const SparseColumns& b) const {
   // parent in the elimination tree: the first entry below the diagonal of each column of L
   std::vector<Index> parent(n, -1);
   for (std::size_t col = 0; col < n; ++col) {
-    for (SparseColumns::InnerIterator entry(lower, static_cast<Eigen::Index>(col)); entry; ++entry) {
+    for (SparseColumns::InnerIterator entry(lower, static_cast<Eigen::Index>(col)); entry;
+         ++entry) {
       const auto row = static_cast<Index>(entry.row());
-      if (row > static_cast<Index>(col) && (parent[col] < 0 || row < parent[col])) parent[col] = row;
+      if (row > static_cast<Index>(col) && (parent[col] < 0 || row < parent[col]))
+        parent[col] = row;
     }
   }
 
-  // each column: its pattern is what the tree reaches from the right-hand side's (Gilbert & Peierls)
+  // each column: its pattern is what the tree reaches from the right-hand side's (Gilbert &
+  // Peierls)
   std::vector<double> work(n, 0.0);
   std::vector<Index> visited(n, -1);
   std::vector<Index> reach;

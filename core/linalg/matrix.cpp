@@ -24,15 +24,16 @@ void require_length(std::size_t actual, std::size_t expected, const std::string&
 void require_indices(const std::vector<Index>& indices, Index bound, const std::string& where) {
   for (std::size_t k = 0; k < indices.size(); ++k) {
     if (indices[k] < 0 || indices[k] >= bound) {
-      invalid(where + "[" + std::to_string(k) + "]", "index " + std::to_string(indices[k]) +
-                                                         " is outside 0.." +
-                                                         std::to_string(bound - 1));
+      invalid(
+          where + "[" + std::to_string(k) + "]",
+          "index " + std::to_string(indices[k]) + " is outside 0.." + std::to_string(bound - 1));
     }
   }
 }
 
 void require_pointers(const Matrix& a, Index count, const std::string& where) {
-  require_length(a.p.size(), static_cast<std::size_t>(count) + 1, where + "/p", "the pointer array");
+  require_length(a.p.size(), static_cast<std::size_t>(count) + 1, where + "/p",
+                 "the pointer array");
   if (a.p.front() != 0) invalid(where + "/p[0]", "the first pointer must be 0");
   for (std::size_t k = 1; k < a.p.size(); ++k) {
     if (a.p[k] < a.p[k - 1]) {
@@ -63,7 +64,8 @@ void validate(const Matrix& a, const std::string& where) {
       require_indices(a.i, a.cols, where + "/i");
       break;
     case Storage::dense:
-      require_length(a.x.size(), static_cast<std::size_t>(a.rows) * static_cast<std::size_t>(a.cols),
+      require_length(a.x.size(),
+                     static_cast<std::size_t>(a.rows) * static_cast<std::size_t>(a.cols),
                      where + "/x", "the value array");
       break;
   }
@@ -89,7 +91,8 @@ SparseColumns to_eigen(const Matrix& a) {
   SparseColumns result(a.rows, a.cols);
   std::vector<Eigen::Triplet<double, Index>> entries;
   entries.reserve(a.nnz());
-  for_each_entry(a, [&](Index row, Index col, double value) { entries.emplace_back(row, col, value); });
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { entries.emplace_back(row, col, value); });
   result.setFromTriplets(entries.begin(), entries.end());
   return result;
 }
@@ -111,7 +114,9 @@ Matrix converted(const Matrix& a, Storage storage) {
   if (a.storage == storage) return a;
   Matrix result;
   switch (storage) {
-    case Storage::csc: result = Matrix::from_eigen(to_eigen(a)); break;
+    case Storage::csc:
+      result = Matrix::from_eigen(to_eigen(a));
+      break;
     case Storage::csr: {
       result = Matrix::from_eigen(to_eigen(a).transpose());
       result.storage = Storage::csr;
@@ -157,9 +162,8 @@ void multiply_transposed_add(const Matrix& a, ConstVectorRef x, VectorRef y) {
 
 double term_size_transposed(const Matrix& a, ConstVectorRef x) {
   Vector sums = Vector::Zero(a.cols);
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    sums[col] += std::abs(value * x[row]);
-  });
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { sums[col] += std::abs(value * x[row]); });
   return sums.norm();
 }
 

@@ -48,8 +48,7 @@ void judge_contacts(const Vector& mu, const Vector& q, const Vector& u, const Ve
   }
   const double norm_q = q.norm();
   result.natural = std::sqrt(squares) / (norm_q > 0 ? norm_q : 1.0);
-  result.scaled_natural =
-      std::sqrt(scaled_squares) / (scaled_q > 0 ? std::sqrt(scaled_q) : 1.0);
+  result.scaled_natural = std::sqrt(scaled_squares) / (scaled_q > 0 ? std::sqrt(scaled_q) : 1.0);
 }
 
 void judge_contacts(int spacedim, const Vector& mu, const Vector& q, const Vector& u,
@@ -59,8 +58,7 @@ void judge_contacts(int spacedim, const Vector& mu, const Vector& q, const Vecto
   } else {
     judge_contacts<3>(mu, q, u, r, scale, result);
   }
-  result.error =
-      std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
+  result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
@@ -92,8 +90,8 @@ Merit merit(const LocalProblem& problem, const Solution& solution) {
   }
   const Vector u = from_r + from_l + problem.q;
   if (solution.u.size() > 0) {
-    result.kinematics = relative((solution.u - u).norm(),
-                                 {solution.u.norm(), from_r.norm(), from_l.norm(), problem.q.norm()});
+    result.kinematics = relative((solution.u - u).norm(), {solution.u.norm(), from_r.norm(),
+                                                           from_l.norm(), problem.q.norm()});
   }
 
   Vector scale = Vector::Zero(problem.mu.size());
@@ -127,8 +125,8 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
     Vector gv = Vector::Zero(problem.b.size());
     multiply_transposed_add(problem.G, v, gv);
     // G^T v vanishes where b does, so that its own norm would compare rounding with rounding
-    result.bilateral = relative((gv + problem.b).norm(),
-                                {term_size_transposed(problem.G, v), problem.b.norm()});
+    result.bilateral =
+        relative((gv + problem.b).norm(), {term_size_transposed(problem.G, v), problem.b.norm()});
   }
 
   // u = H^T v + w
@@ -136,8 +134,8 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
   multiply_transposed_add(problem.H, v, hv);
   const Vector u = hv + problem.w;
   if (solution.u.size() > 0) {
-    result.kinematics = relative((solution.u - u).norm(),
-                                 {solution.u.norm(), hv.norm(), problem.w.norm()});
+    result.kinematics =
+        relative((solution.u - u).norm(), {solution.u.norm(), hv.norm(), problem.w.norm()});
   }
 
   Vector q = problem.w;
@@ -146,7 +144,8 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
   const SparseColumns h = to_eigen(problem.H);
   const SparseColumns y = mass.is_cholesky() ? mass.half_solve(h) : mass.solve(h);
   for (Eigen::Index col = 0; col < y.cols(); ++col) {
-    const double diagonal = mass.is_cholesky() ? y.col(col).squaredNorm() : h.col(col).dot(y.col(col));
+    const double diagonal =
+        mass.is_cholesky() ? y.col(col).squaredNorm() : h.col(col).dot(y.col(col));
     scale[col / problem.spacedim] += diagonal / problem.spacedim;
   }
   judge_contacts(problem.spacedim, problem.mu, q, u, solution.r, scale, result);

@@ -45,8 +45,9 @@ struct Merit {
                          .doc = "||M v - H r - G lambda - f|| over its largest term"},
         Field<M, double>{.name = "bilateral",
                          .member = &M::bilateral,
-                         .doc = "||G^T v + b|| (or ||V^T r + R lambda + s||) over its largest term, "
-                                "the products of G^T v and V^T r taken without cancellation"},
+                         .doc =
+                             "||G^T v + b|| (or ||V^T r + R lambda + s||) over its largest term, "
+                             "the products of G^T v and V^T r taken without cancellation"},
         Field<M, double>{.name = "kinematics",
                          .member = &M::kinematics,
                          .doc = "distance of the solution's u from the recomputed one, over the "
@@ -63,10 +64,8 @@ struct Merit {
                          .member = &M::complementarity,
                          .unit = "J",
                          .doc = "largest |r . u^| of a contact"},
-        Field<M, Index>{.name = "open",
-                        .member = &M::open,
-                        .unit = "1",
-                        .doc = "contacts without a reaction"},
+        Field<M, Index>{
+            .name = "open", .member = &M::open, .unit = "1", .doc = "contacts without a reaction"},
         Field<M, Index>{.name = "stick",
                         .member = &M::stick,
                         .unit = "1",
@@ -82,7 +81,8 @@ struct Merit {
 /// The merit of (solution, problem). r is required, and l where there are bilateral constraints;
 /// a missing v follows from them, a missing u is not judged.
 ///
-/// Throws Error (problem) where problem or solution are not valid, (unsuitable) where M is singular.
+/// Throws Error (problem) where problem or solution are not valid, (unsuitable) where M is
+/// singular.
 Merit merit(const LocalProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
 

@@ -22,8 +22,8 @@ namespace fclib {
 
 struct GlobalProblem {
   static constexpr std::string_view kind = "global";  // the group /fclib_global
-  static constexpr std::string_view prefix = "G";  // of the formulation's name
-  static constexpr bool triplets_on_disk = true;   // the one storage that Siconos reads
+  static constexpr std::string_view prefix = "G";     // of the formulation's name
+  static constexpr bool triplets_on_disk = true;      // the one storage that Siconos reads
 
   Index spacedim = 3;
   Matrix M;
@@ -88,11 +88,16 @@ struct GlobalProblem {
 
   [[nodiscard]] Index size(Dim dim) const {
     switch (dim) {
-      case Dim::one: return 1;
-      case Dim::n: return M.rows;
-      case Dim::m: return spacedim * static_cast<Index>(mu.size());
-      case Dim::p: return G.cols;
-      case Dim::nc: return static_cast<Index>(mu.size());
+      case Dim::one:
+        return 1;
+      case Dim::n:
+        return M.rows;
+      case Dim::m:
+        return spacedim * static_cast<Index>(mu.size());
+      case Dim::p:
+        return G.cols;
+      case Dim::nc:
+        return static_cast<Index>(mu.size());
     }
     return 0;
   }

@@ -24,8 +24,8 @@ namespace fclib {
 
 struct LocalProblem {
   static constexpr std::string_view kind = "local";  // the group /fclib_local
-  static constexpr std::string_view prefix = "";  // of the formulation's name
-  static constexpr bool triplets_on_disk = false;   // W keeps its storage
+  static constexpr std::string_view prefix = "";     // of the formulation's name
+  static constexpr bool triplets_on_disk = false;    // W keeps its storage
 
   Index spacedim = 3;
   Matrix W;
@@ -85,11 +85,16 @@ struct LocalProblem {
 
   [[nodiscard]] Index size(Dim dim) const {
     switch (dim) {
-      case Dim::one: return 1;
-      case Dim::n: return 0;
-      case Dim::m: return spacedim * static_cast<Index>(mu.size());
-      case Dim::p: return R.rows;
-      case Dim::nc: return static_cast<Index>(mu.size());
+      case Dim::one:
+        return 1;
+      case Dim::n:
+        return 0;
+      case Dim::m:
+        return spacedim * static_cast<Index>(mu.size());
+      case Dim::p:
+        return R.rows;
+      case Dim::nc:
+        return static_cast<Index>(mu.size());
     }
     return 0;
   }

@@ -46,7 +46,8 @@ Result run(const LocalProblem& plain, const Request& request, const Solution& gu
     }
     result.solution.r = r;
     result.error = judge(result.solution);
-    if (result.status != Status::converged || result.error <= request.settings.tolerance) return result;
+    if (result.status != Status::converged || result.error <= request.settings.tolerance)
+      return result;
     result.status = Status::inaccurate;
     if (correction == max_corrections) return result;
     settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
@@ -104,7 +105,8 @@ const Solver& find_solver(std::string_view name) {
     if (solver->name == name) return *solver;
     known += (known.empty() ? "" : ", ") + std::string(solver->name);
   }
-  throw Error(ErrorKind::option, "unknown; there is: " + known, "solver '" + std::string(name) + "'");
+  throw Error(ErrorKind::option, "unknown; there is: " + known,
+              "solver '" + std::string(name) + "'");
 }
 
 Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings,

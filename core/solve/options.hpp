@@ -83,7 +83,8 @@ Value parse_option(const OptionField<Options, Value>& field, const OptionValue& 
       if (field.choices[k] == text) return static_cast<Value>(k);
     }
     std::string known;
-    for (const auto choice : field.choices) known += (known.empty() ? "" : ", ") + std::string(choice);
+    for (const auto choice : field.choices)
+      known += (known.empty() ? "" : ", ") + std::string(choice);
     bad_option(field.name, "'" + text + "' is not one of: " + known);
   } else if constexpr (std::is_same_v<Value, bool>) {
     if (text == "true" || text == "1") return true;
@@ -165,7 +166,9 @@ std::vector<OptionInfo> describe_options() {
   std::vector<OptionInfo> result;
   const Options defaults;
   std::apply(
-      [&](const auto&... field) { (result.push_back(detail::describe_option(field, defaults)), ...); },
+      [&](const auto&... field) {
+        (result.push_back(detail::describe_option(field, defaults)), ...);
+      },
       Options::fields());
   return result;
 }

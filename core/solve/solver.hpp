@@ -31,12 +31,18 @@ enum class Status {
 
 constexpr std::string_view name_of(Status status) {
   switch (status) {
-    case Status::converged: return "converged";
-    case Status::iteration_limit: return "iteration_limit";
-    case Status::time_limit: return "time_limit";
-    case Status::diverged: return "diverged";
-    case Status::inaccurate: return "inaccurate";
-    case Status::interrupted: return "interrupted";
+    case Status::converged:
+      return "converged";
+    case Status::iteration_limit:
+      return "iteration_limit";
+    case Status::time_limit:
+      return "time_limit";
+    case Status::diverged:
+      return "diverged";
+    case Status::inaccurate:
+      return "inaccurate";
+    case Status::interrupted:
+      return "interrupted";
   }
   return "?";
 }
@@ -50,8 +56,8 @@ struct Progress {
 
 /// What a caller asks of any solver.
 struct Settings {
-  double tolerance = 1e-8;         ///< on Merit::error
-  std::int64_t max_iterations = 0; ///< 0: the solver's own default
+  double tolerance = 1e-8;                                      ///< on Merit::error
+  std::int64_t max_iterations = 0;                              ///< 0: the solver's own default
   double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s]
   std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
   std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or

@@ -101,7 +101,8 @@ class Schedule {
     if (interval_ == 0) {
       step = std::max<std::int64_t>(1, sweep / 4);
       if (error < last_error_ && tolerance_ > 0) {
-        const double rate = std::log(last_error_ / error) / static_cast<double>(sweep - last_sweep_);
+        const double rate =
+            std::log(last_error_ / error) / static_cast<double>(sweep - last_sweep_);
         const double left = std::log(error / tolerance_) / rate;
         if (left < static_cast<double>(step)) step = std::max<std::int64_t>(1, std::llround(left));
       }

@@ -20,7 +20,6 @@ from fclib._core import (
     Solution,
     SolverInfo,
     UnsuitableError,
-    __version__,
     contents,
     merit,
     read,
@@ -29,6 +28,7 @@ from fclib._core import (
     write,
     write_solution,
 )
+from fclib._core import version as __version__
 from fclib._solve import Problem, solve
 
 __all__ = [
@@ -56,3 +56,8 @@ __all__ = [
     "write",
     "write_solution",
 ]
+
+# messages and tracebacks show the names that users import
+for _error in (Error, FileError, OptionError, ProblemError, UnsuitableError):
+    _error.__module__ = __name__
+del _error

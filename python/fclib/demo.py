@@ -1,6 +1,6 @@
 """The main job, end to end: simulate a scene, store its problems, solve them, judge the solutions.
 
-    scene -> simulate -> FCLIB files -> read -> solve -> merit -> table, CSV, picture
+scene -> simulate -> FCLIB files -> read -> solve -> merit -> table, CSV, picture
 """
 
 from __future__ import annotations
@@ -9,11 +9,12 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import fclib
 from fclib import bench
 
-CONFIGURATIONS: tuple[dict[str, str], ...] = (
+CONFIGURATIONS: tuple[dict[str, Any], ...] = (
     {"solver": "nsgs"},
     {"solver": "nsgs", "local_solver": "projection"},
 )

@@ -48,7 +48,7 @@ def run(
     solver: str = "nsgs",
     tol: float = 1e-8,
     time_limit: float | None = None,
-    **options: bool | int | float | str,
+    **options: Any,
 ) -> Run:
     """Solve a problem and judge the solution.
 

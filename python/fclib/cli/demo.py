@@ -87,5 +87,3 @@ def command(
         if picture is not None:
             out.print(f"The picture:   {picture}")
     raise typer.Exit(int(report.failed))
-
-

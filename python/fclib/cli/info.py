@@ -11,7 +11,7 @@ from fclib.cli._output import Files, Json, Report, each_file
 MATRICES = ("M", "H", "G", "W", "V", "R")
 
 
-def describe(path: Path, kind: str) -> dict[str, Any]:
+def describe(path: Path, kind: str | None) -> dict[str, Any]:
     """The record of one problem of a file.
 
     Raises:
@@ -19,9 +19,7 @@ def describe(path: Path, kind: str) -> dict[str, Any]:
     """
     problem = fclib.read(path, kind)
     stored = {name: getattr(problem, name, None) for name in MATRICES}
-    nnz = {
-        name: int(getattr(a, "nnz", a.size)) for name, a in stored.items() if a is not None
-    }
+    nnz = {name: int(getattr(a, "nnz", a.size)) for name, a in stored.items() if a is not None}
     return {
         "problem": str(path),
         "formulation": problem.formulation,
@@ -47,7 +45,7 @@ def command(files: Files, as_json: Json = False) -> None:
     for path in each_file(files, "reading", report):
         try:
             kinds = [kind for kind in fclib.contents(path) if kind != "solution"]
-            for kind in kinds or [None]:
+            for kind in kinds or (None,):  # None: reading says what is wrong
                 report.add(describe(path, kind))
         except fclib.Error as error:
             report.error(path, error)

@@ -20,7 +20,8 @@ TEST(Factorization, solves_symmetric_and_other_systems) {
     const Vector b = random.vector(20);
     EXPECT_LT((a * factorization.solve(b) - b).norm(), 1e-12);
     const SparseColumns many = random.sparse(20, 6, 0.2);
-    EXPECT_LT((Eigen::MatrixXd(a * factorization.solve(many)) - Eigen::MatrixXd(many)).norm(), 1e-12);
+    EXPECT_LT((Eigen::MatrixXd(a * factorization.solve(many)) - Eigen::MatrixXd(many)).norm(),
+              1e-12);
   }
 }
 

@@ -32,7 +32,13 @@ TEST(Matrix, every_storage_converts_to_every_other) {
 }
 
 TEST(Matrix, triplets_add_up) {
-  const Matrix a{.storage = Storage::triplet, .rows = 2, .cols = 2, .p = {1, 1}, .i = {0, 0}, .x = {1, 2}, .info = {}};
+  const Matrix a{.storage = Storage::triplet,
+                 .rows = 2,
+                 .cols = 2,
+                 .p = {1, 1},
+                 .i = {0, 0},
+                 .x = {1, 2},
+                 .info = {}};
   EXPECT_EQ(dense_of(converted(a, Storage::csr))(0, 1), 3);
   EXPECT_EQ(to_eigen(a).nonZeros(), 1);
 }
@@ -67,7 +73,13 @@ TEST(Matrix, validation_names_the_entry) {
 }
 
 TEST(Matrix, an_unsorted_matrix_is_not_canonical) {
-  Matrix a{.storage = Storage::csr, .rows = 1, .cols = 3, .p = {0, 2}, .i = {0, 2}, .x = {1, 2}, .info = {}};
+  Matrix a{.storage = Storage::csr,
+           .rows = 1,
+           .cols = 3,
+           .p = {0, 2},
+           .i = {0, 2},
+           .x = {1, 2},
+           .info = {}};
   EXPECT_TRUE(is_canonical(a));
   a.i = {2, 0};
   EXPECT_FALSE(is_canonical(a));

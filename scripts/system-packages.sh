@@ -4,6 +4,7 @@ set -eu
 PYTHON=${PYTHON:-python3}
 
 missing=
+optional=
 need() { # need PACKAGE COMMAND...: COMMAND succeeds where the package is there
   package=$1
   shift
@@ -21,11 +22,18 @@ need libhdf5-dev sh -c 'pkg-config --exists hdf5 || ls /usr/include/hdf5.h /usr/
 need libeigen3-dev sh -c 'pkg-config --exists eigen3 || ls /usr/include/eigen3/Eigen/Core'
 need libgtest-dev sh -c 'pkg-config --exists gtest || ls /usr/include/gtest/gtest.h'
 
-if [ -z "$missing" ]; then
+# draws the picture of the demo, which goes without where it is not
+if ! { ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional=" libosmesa6"; fi
+
+if [ -z "$missing$optional" ]; then
   echo "== system packages: all there"
   exit 0
 fi
-echo "== system packages missing:$missing"
+echo "== system packages missing:$missing$optional"
+if [ -z "$missing" ] && ! { command -v apt-get && [ "$(id -u)" -eq 0 ]; } >/dev/null 2>&1; then
+  echo "   Nothing that is needed; they are left out."
+  exit 0
+fi
 if ! command -v apt-get >/dev/null 2>&1; then
   echo "   There is no apt here. Install these (Debian's names) with the package manager you have," >&2
   echo "   then run make again." >&2
@@ -34,7 +42,7 @@ fi
 sudo=
 if [ "$(id -u)" -ne 0 ]; then
   if ! command -v sudo >/dev/null 2>&1; then
-    echo "   Installing them needs root: run  apt-get install$missing  as root, then make again." >&2
+    echo "   Installing them needs root: run  apt-get install$missing$optional  as root, then make again." >&2
     exit 1
   fi
   sudo=sudo
@@ -42,4 +50,4 @@ fi
 echo "== installing them by apt"
 $sudo apt-get update -qq
 # shellcheck disable=SC2086
-$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing
+$sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing $optional

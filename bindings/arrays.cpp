@@ -20,10 +20,16 @@ using Contiguous = nb::ndarray<const Number, nb::ndim<1>, nb::c_contig, nb::devi
 
 /// The object as a contiguous NumPy array of a type; a copy only where it is not one already.
 nb::object as_array(nb::handle object, const char* type, const char* what) {
+  const nb::module_ numpy = nb::module_::import_("numpy");
   try {
-    return nb::module_::import_("numpy").attr("ascontiguousarray")(object, type);
-  } catch (const nb::python_error& error) {
-    unfit(what, std::string("is not an array of numbers: ") + error.what());
+    const nb::object array = numpy.attr("asarray")(object);
+    const auto kind = nb::cast<std::string>(array.attr("dtype").attr("kind"));
+    if (kind.find_first_of("biuf") == std::string::npos) {
+      unfit(what, "is not an array of real numbers");
+    }
+    return numpy.attr("ascontiguousarray")(array, type);
+  } catch (const nb::python_error&) {
+    unfit(what, "is not an array of numbers");
   }
 }
 

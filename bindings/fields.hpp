@@ -79,8 +79,8 @@ void set(const Field<Struct, Member>& field, Struct& self, nb::handle value) {
     self.*field.member = matrix_from(value, name.c_str());
   } else if constexpr (std::is_same_v<Member, Vector>) {
     self.*field.member = vector_from(value, name.c_str());
-  } else {
-    self.*field.member = nb::cast<Member>(value);
+  } else if (!nb::try_cast<Member>(value, self.*field.member)) {
+    throw nb::type_error((name + " must be of type " + type_name<Member>(true)).c_str());
   }
 }
 
@@ -108,7 +108,9 @@ void fill(Struct& self, const nb::dict& values) {
   if constexpr (requires { self.info; }) {
     if (values.contains("info")) {
       ++used;
-      self.info = nb::cast<ProblemInfo>(values["info"]);
+      if (!nb::try_cast<ProblemInfo>(values["info"], self.info)) {
+        throw nb::type_error("info must be of type ProblemInfo");
+      }
     }
   }
   if (used < values.size()) {

@@ -40,7 +40,11 @@ void translate(const std::exception_ptr& pointer, void*) {
   try {
     std::rethrow_exception(pointer);
   } catch (const Error& error) {
-    PyErr_SetString(exception_of[static_cast<int>(error.kind)], error.what());
+    // a path need not be valid UTF-8
+    const std::string text = error.what();
+    const nb::object message = nb::steal(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace"));
+    PyErr_SetObject(exception_of[static_cast<int>(error.kind)], message.ptr());
   }
 }
 
@@ -192,7 +196,12 @@ void bind_solvers(nb::module_& m) {
       .def_prop_ro("title", [](const Solver& s) { return std::string(s.title); })
       .def_prop_ro("citation", [](const Solver& s) { return std::string(s.citation); })
       .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
-      .def_ro("options", &Solver::options);
+      .def_ro("options", &Solver::options)
+      .def(
+          "check_options",
+          [](const Solver& s, const OptionValues& options) { s.check_options(options); },
+          "options"_a,
+          "Raises OptionError at the first option that is unknown or has a wrong value.");
   m.def(
       "solvers",
       [] {
@@ -202,6 +211,10 @@ void bind_solvers(nb::module_& m) {
         return result;
       },
       nb::sig("def solvers() -> list[SolverInfo]"), "All solvers, by name.");
+  m.def(
+      "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
+      nb::rv_policy::reference,
+      "The solver of this name. Raises OptionError, with the known names, where there is none.");
 
   nb::class_<Result>(m, "Result", "What fclib.solve returns.")
       .def_ro("solution", &Result::solution)
@@ -299,6 +312,7 @@ void bind_files(nb::module_& m) {
 
 NB_MODULE(_core, m) {
   m.doc() = "The core of fclib, in C++.";
+  nb::set_leak_warnings(false);  // module-level references at exit are the interpreter's own business
   m.attr("version") = version;
   bind_errors(m);
 

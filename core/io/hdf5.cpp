@@ -1,17 +1,16 @@
 #include "io/hdf5.hpp"
 
-#include <fcntl.h>
 #include <hdf5.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <limits>
 #include <mutex>
 
@@ -64,8 +63,6 @@ class Handle {
   }
   [[nodiscard]] hid_t id() const { return id_; }
   [[nodiscard]] bool ok() const { return id_ >= 0; }
-  /// Closes now, and says whether that went well (a full disk shows here).
-  bool close() { return close_(std::exchange(id_, -1)) >= 0; }
 
  private:
   hid_t id_;
@@ -295,14 +292,19 @@ P read_fields(const Group& root) {
   return problem;
 }
 
-Handle open_file(const std::string& path, unsigned flags) {
+void require_regular(const fs::file_status& status) {
+  if (fs::is_directory(status)) fail("", "is a directory, expected an FCLIB file");
+  if (fs::exists(status) && !fs::is_regular_file(status)) fail("", "is not a regular file");
+}
+
+Handle open_file(const std::string& path) {
   std::error_code error;
   const auto status = fs::status(path, error);
   if (!fs::exists(status)) fail("", "there is no such file");
-  if (fs::is_directory(status)) fail("", "is a directory, expected an FCLIB file");
+  require_regular(status);
   if (access(path.c_str(), R_OK) != 0) fail("", "cannot be opened: " + system_message());
   if (H5Fis_hdf5(path.c_str()) <= 0) fail("", "is not an HDF5 file");
-  Handle file(H5Fopen(path.c_str(), flags, H5P_DEFAULT), H5Fclose);
+  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file.ok()) fail("", "cannot be opened by HDF5 (the file is damaged or cut short)");
   return file;
 }
@@ -336,7 +338,7 @@ constexpr std::size_t chunk_entries = std::size_t{1} << 16;
 constexpr unsigned deflate_level = 4;
 
 void check(herr_t status, const std::string& where) {
-  if (status < 0) fail(where, "cannot be written (disk full?)");
+  if (status < 0) fail(where, "cannot be written by HDF5");
 }
 
 Handle create_group(const Group& parent, const std::string& name) {
@@ -481,64 +483,113 @@ void write_solution_group(const Group& root, const Solution& solution) {
   });
 }
 
-/// A file beside the final one, that takes its place on commit() or vanishes.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& target) : target_(target) {
-    std::error_code error;
-    // what a link points to is replaced, the link stays
-    if (const auto real = fs::canonical(target, error); !error) target_ = real.string();
-    if (fs::is_directory(target_, error)) fail("", "is a directory, expected an FCLIB file");
-    struct stat existing{};
-    mode_t mode = 0;
-    if (stat(target_.c_str(), &existing) == 0) {
-      if (access(target_.c_str(), W_OK) != 0) fail("", "cannot be written: " + system_message());
-      mode = existing.st_mode & 07777U;
-    } else {
-      mode = ::umask(0);
-      ::umask(mode);
-      mode = 0666U & ~mode;
-    }
-    path_ = target_ + ".XXXXXX";
-    const int file = mkstemp(path_.data());
-    if (file < 0) {
-      const std::string reason = system_message();
-      path_.clear();
-      fail("", "cannot be written: " + reason);
-    }
-    fchmod(file, mode);
-    ::close(file);
+/// Where a path leads to, through links; the last one may point to a file that is not there yet.
+std::string resolve(const std::string& path) {
+  fs::path target(path);
+  std::error_code error;
+  for (int hops = 0; hops < 40 && fs::is_symlink(target, error); ++hops) {
+    target = target.parent_path() / fs::read_symlink(target, error);
   }
-  ~TemporaryFile() {
-    if (!path_.empty()) ::unlink(path_.c_str());
+  return target.string();
+}
+
+/// Writes all bytes, or says why not.
+void write_bytes(int file, const std::vector<char>& bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count = ::write(file, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail("", "cannot be written: " + system_message());
+    done += static_cast<std::size_t>(count);
   }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  if (::fsync(file) != 0) fail("", "cannot be written: " + system_message());
+}
 
-  [[nodiscard]] const std::string& path() const { return path_; }
-
-  void commit() {
-    const int file = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC);
-    const bool flushed = file >= 0 && ::fsync(file) == 0;
-    const std::string reason = system_message();
-    if (file >= 0) ::close(file);
-    if (!flushed) fail("", "cannot be written: " + reason);
-    if (::rename(path_.c_str(), target_.c_str()) != 0) {
+/// Puts the bytes in the place of the file, all or none: they go into a file beside it, which is
+/// renamed over it.
+void replace_file(const std::string& path, const std::vector<char>& bytes) {
+  const std::string target = resolve(path);
+  std::error_code error;
+  const auto status = fs::status(target, error);
+  require_regular(status);
+  mode_t mode = 0;
+  if (fs::exists(status)) {
+    if (access(target.c_str(), W_OK) != 0) fail("", "cannot be written: " + system_message());
+    mode = static_cast<mode_t>(status.permissions());
+  } else {
+    mode = ::umask(0);
+    ::umask(mode);
+    mode = 0666U & ~mode;
+  }
+  std::string temporary = target + ".XXXXXX";
+  const int file = ::mkstemp(temporary.data());
+  if (file < 0) fail("", "cannot be written: " + system_message());
+  try {
+    ::fchmod(file, mode);
+    write_bytes(file, bytes);
+    if (::rename(temporary.c_str(), target.c_str()) != 0) {
       fail("", "cannot be written: " + system_message());
     }
-    path_.clear();
+  } catch (...) {
+    ::close(file);
+    ::unlink(temporary.c_str());
+    throw;
+  }
+  ::close(file);
+}
+
+/// An HDF5 file in memory. HDF5 never writes to a disk itself: what fails there (a full disk) it
+/// does not survive in good order.
+class MemoryFile {
+ public:
+  /// An empty file.
+  MemoryFile() : access_(core_driver()), file_(create(access_.id())) {}
+  /// The file that these bytes are.
+  explicit MemoryFile(const std::vector<char>& bytes)
+      : access_(core_driver()), file_(open(access_.id(), bytes)) {}
+
+  [[nodiscard]] Group root() const { return {file_.id(), "/"}; }
+
+  [[nodiscard]] std::vector<char> bytes() const {
+    check(H5Fflush(file_.id(), H5F_SCOPE_LOCAL), "");
+    const ssize_t size = H5Fget_file_image(file_.id(), nullptr, 0);
+    if (size <= 0) fail("", "cannot be put together by HDF5");
+    std::vector<char> result(static_cast<std::size_t>(size));
+    if (H5Fget_file_image(file_.id(), result.data(), result.size()) != size) {
+      fail("", "cannot be put together by HDF5");
+    }
+    return result;
   }
 
  private:
-  std::string target_;
-  std::string path_;
+  static Handle core_driver() {
+    constexpr std::size_t increment = std::size_t{1} << 20;
+    Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+    check(H5Pset_fapl_core(access.id(), increment, false), "");
+    return access;
+  }
+  static Handle create(hid_t access) {
+    Handle file(H5Fcreate("new", H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
+    if (!file.ok()) fail("", "cannot be created by HDF5");
+    return file;
+  }
+  static Handle open(hid_t access, const std::vector<char>& bytes) {
+    std::vector<char> copy = bytes;
+    check(H5Pset_file_image(access, copy.data(), copy.size()), "");
+    Handle file(H5Fopen("image", H5F_ACC_RDWR, access), H5Fclose);
+    if (!file.ok()) fail("", "cannot be opened by HDF5 (the file is damaged or cut short)");
+    return file;
+  }
+
+  Handle access_;
+  Handle file_;
 };
 
-void finish(Handle& file, TemporaryFile& temporary) {
-  if (H5Fflush(file.id(), H5F_SCOPE_LOCAL) < 0 || !file.close()) {
-    fail("", "cannot be written (disk full?)");
-  }
-  temporary.commit();
+std::vector<char> read_bytes(const std::string& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
+  if (!stream) fail("", "cannot be read: " + system_message());
+  return bytes;
 }
 
 }  // namespace
@@ -546,7 +597,7 @@ void finish(Handle& file, TemporaryFile& temporary) {
 Contents read_contents(const std::string& path) {
   const Session session;
   return in_file(path, [&] {
-    const Handle file = open_file(path, H5F_ACC_RDONLY);
+    const Handle file = open_file(path);
     return contents_of({file.id(), "/"});
   });
 }
@@ -554,7 +605,7 @@ Contents read_contents(const std::string& path) {
 Problem read_problem(const std::string& path, std::string_view kind) {
   const Session session;
   return in_file(path, [&] {
-    const Handle file = open_file(path, H5F_ACC_RDONLY);
+    const Handle file = open_file(path);
     const Group root{file.id(), "/"};
     const Contents contents = contents_of(root);
     std::string known;
@@ -582,7 +633,7 @@ Problem read_problem(const std::string& path, std::string_view kind) {
 std::optional<Solution> read_solution(const std::string& path) {
   const Session session;
   return in_file(path, [&]() -> std::optional<Solution> {
-    const Handle file = open_file(path, H5F_ACC_RDONLY);
+    const Handle file = open_file(path);
     const Group root{file.id(), "/"};
     if (!root.has("solution")) return std::nullopt;
     const Handle handle = open_group(root, "solution");
@@ -607,16 +658,13 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
           if (solution != nullptr) validate(*solution, *p);
         },
         problem);
-    TemporaryFile temporary(path);
-    Handle file(H5Fcreate(temporary.path().c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
-                H5Fclose);
-    if (!file.ok()) fail("", "cannot be created by HDF5");
-    const Group root{file.id(), "/"};
+    const MemoryFile file;
+    const Group root = file.root();
     write_text_attribute(root, "format", format_version);
     write_text_attribute(root, "generator", "fclib " + std::string(version));
     std::visit([&](const auto* p) { write_fields(root, *p); }, problem);
     if (solution != nullptr) write_solution_group(root, *solution);
-    finish(file, temporary);
+    replace_file(path, file.bytes());
   });
 }
 
@@ -625,13 +673,9 @@ void write_solution(const std::string& path, const Solution& solution) {
   const Session session;
   in_file(path, [&] {
     std::visit([&](const auto& p) { validate(solution, p); }, problem);
-    TemporaryFile temporary(path);
-    std::error_code error;
-    fs::copy_file(path, temporary.path(), fs::copy_options::overwrite_existing, error);
-    if (error) fail("", "cannot be copied beside itself: " + error.message());
-    Handle file = open_file(temporary.path(), H5F_ACC_RDWR);
-    write_solution_group({file.id(), "/"}, solution);
-    finish(file, temporary);
+    const MemoryFile file(read_bytes(path));
+    write_solution_group(file.root(), solution);
+    replace_file(path, file.bytes());
   });
 }
 

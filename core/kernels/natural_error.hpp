@@ -13,8 +13,9 @@ template <int D>
 double natural_map_squared(const Vector& u, const Vector& r, const Vector& mu) {
   double sum = 0;
   for (Eigen::Index contact = 0; contact < mu.size(); ++contact) {
-    sum += natural_map<D>(u.segment<D>(D * contact), r.segment<D>(D * contact), mu[contact])
-               .squaredNorm();
+    const ContactVector<D> velocity = u.segment<D>(D * contact);
+    const ContactVector<D> reaction = r.segment<D>(D * contact);
+    sum += natural_map<D>(velocity, reaction, mu[contact]).squaredNorm();
   }
   return sum;
 }

@@ -84,17 +84,17 @@ class OneContact {
     constexpr double contraction = 0.9;  // of a step that is accepted
     constexpr double reduction = 2.0 / 3.0;
     constexpr double growth = 1.5;
-    Vec hat = modified_velocity<D>(a_ * r + b, mu_);
+    Vec hat = modified_velocity<D>(Vec(a_ * r + b), mu_);
     for (int k = 0; k < max_iterations; ++k) {
-      Vec next;
-      Vec next_hat;
+      Vec next = r;
+      Vec next_hat = hat;
       double ratio = 0;
       double change = 0;
       for (int attempt = 0; attempt < 50; ++attempt) {
-        next = project_on_cone<D>(r - rho_ * hat, mu_);
+        next = project_on_cone<D>(Vec(r - rho_ * hat), mu_);
         change = (next - r).norm();
         if (change <= accuracy * r.norm()) break;
-        next_hat = modified_velocity<D>(a_ * next + b, mu_);
+        next_hat = modified_velocity<D>(Vec(a_ * next + b), mu_);
         ratio = rho_ * (next_hat - hat).norm() / change;
         if (ratio <= contraction) break;
         rho_ *= reduction;

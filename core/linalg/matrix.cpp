@@ -152,19 +152,4 @@ Matrix converted(const Matrix& a, Storage storage) {
   return result;
 }
 
-void multiply_add(const Matrix& a, ConstVectorRef x, VectorRef y) {
-  for_each_entry(a, [&](Index row, Index col, double value) { y[row] += value * x[col]; });
-}
-
-void multiply_transposed_add(const Matrix& a, ConstVectorRef x, VectorRef y) {
-  for_each_entry(a, [&](Index row, Index col, double value) { y[col] += value * x[row]; });
-}
-
-double term_size_transposed(const Matrix& a, ConstVectorRef x) {
-  Vector sums = Vector::Zero(a.cols);
-  for_each_entry(
-      a, [&](Index row, Index col, double value) { sums[col] += std::abs(value * x[row]); });
-  return sums.norm();
-}
-
 }  // namespace fclib

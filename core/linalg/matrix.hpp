@@ -13,7 +13,6 @@ namespace fclib {
 using Index = std::int32_t;
 using Vector = Eigen::VectorXd;
 using ConstVectorRef = Eigen::Ref<const Vector>;
-using VectorRef = Eigen::Ref<Vector>;
 using SparseColumns = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
 
 enum class Storage {
@@ -86,12 +85,21 @@ Matrix converted(const Matrix& a, Storage storage);
 
 SparseColumns to_eigen(const Matrix& a);
 
-/// y += A x, with x of length cols and y of length rows.
-void multiply_add(const Matrix& a, ConstVectorRef x, VectorRef y);
-/// y += A^T x, with x of length rows and y of length cols.
-void multiply_transposed_add(const Matrix& a, ConstVectorRef x, VectorRef y);
-
-/// || |A|^T |x| ||_2: the size of the products that A^T x adds up, whatever they cancel to.
-double term_size_transposed(const Matrix& a, ConstVectorRef x);
+/// y += A x, with x of length cols and y of length rows, in the precision of y.
+template <class X, class Y>
+void multiply_add(const Matrix& a, const X& x, Y& y) {
+  using Real = typename Y::Scalar;
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[row] += Real(value) * Real(x[col]);
+  });
+}
+/// y += A^T x, with x of length rows and y of length cols, in the precision of y.
+template <class X, class Y>
+void multiply_transposed_add(const Matrix& a, const X& x, Y& y) {
+  using Real = typename Y::Scalar;
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[col] += Real(value) * Real(x[row]);
+  });
+}
 
 }  // namespace fclib

@@ -2,7 +2,7 @@
 //
 // The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
 // error = ||F||_2 / ||q||_2, absolute where q is zero. u is recomputed: W r + V lambda + q, or
-// H^T v + w, never taken from the solution.
+// H^T v + w, never taken from the solution. All sums are made in extended precision.
 #pragma once
 
 #include <string_view>

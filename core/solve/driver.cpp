@@ -1,5 +1,6 @@
 #include "solve/driver.hpp"
 
+#include <chrono>
 #include <ctime>
 
 #include "convert/condense.hpp"
@@ -8,6 +9,8 @@
 namespace fclib {
 
 namespace {
+
+using Clock = std::chrono::steady_clock;
 
 double cpu_time() {
   timespec now{};
@@ -34,6 +37,9 @@ Result run(const LocalProblem& plain, const Request& request, const Solution& gu
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
+  if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
+  const std::int64_t max_iterations = settings.max_iterations;
+  const auto first_start = Clock::now();
   for (int correction = 0;; ++correction) {
     const double start = cpu_time();
     const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
@@ -48,8 +54,14 @@ Result run(const LocalProblem& plain, const Request& request, const Solution& gu
     result.error = judge(result.solution);
     if (result.status != Status::converged || result.error <= request.settings.tolerance)
       return result;
-    result.status = Status::inaccurate;
-    if (correction == max_corrections) return result;
+    // the limits hold for all the attempts together
+    settings.max_iterations = max_iterations - result.iterations;
+    const std::chrono::duration<double> elapsed = Clock::now() - first_start;
+    settings.time_limit = request.settings.time_limit - elapsed.count();
+    result.status = settings.max_iterations <= 0 ? Status::iteration_limit
+                    : settings.time_limit <= 0   ? Status::time_limit
+                                                 : Status::inaccurate;
+    if (correction == max_corrections || result.status != Status::inaccurate) return result;
     settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
   }
 }

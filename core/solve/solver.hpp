@@ -77,13 +77,10 @@ struct Delassus {
 /// Watches over a solver: it reports its iterates, and learns whether to stop.
 class Monitor {
  public:
-  Monitor(const Settings& settings, std::int64_t default_iterations)
-      : settings_(settings),
-        max_iterations_(settings.max_iterations > 0 ? settings.max_iterations
-                                                    : default_iterations) {}
+  explicit Monitor(const Settings& settings) : settings_(settings) {}
 
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
-  [[nodiscard]] std::int64_t max_iterations() const { return max_iterations_; }
+  [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
 
   /// The reason to stop at this iterate, if there is one.
   std::optional<Status> report(std::int64_t iteration, double error) {
@@ -92,7 +89,7 @@ class Monitor {
       return Status::interrupted;
     }
     if (error <= settings_.tolerance) return Status::converged;
-    if (iteration >= max_iterations_) return Status::iteration_limit;
+    if (iteration >= settings_.max_iterations) return Status::iteration_limit;
     if (settings_.time_limit < std::numeric_limits<double>::infinity() &&
         elapsed() > settings_.time_limit) {
       return Status::time_limit;
@@ -119,7 +116,6 @@ class Monitor {
   }
 
   const Settings& settings_;
-  std::int64_t max_iterations_;
   Clock::time_point start_ = Clock::now();
   Clock::time_point last_poll_ = start_;
 };
@@ -138,6 +134,9 @@ struct Solver {
   std::string_view citation;
   std::vector<int> dimensions;  ///< the spacedims it takes
   std::vector<OptionInfo> options;
+  std::int64_t max_iterations = 0;  ///< where the caller sets none
+  /// Throws Error (option) at the first option that is unknown or has a wrong value.
+  void (*check_options)(const OptionValues& options);
   /// Solves from the guess in r (length m), and leaves its best iterate there.
   Outcome (*solve)(const Delassus& problem, const OptionValues& options, const Settings& settings,
                    Vector& r);

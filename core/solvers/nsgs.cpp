@@ -164,7 +164,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
                                     static_cast<int>(options.local_iterations), next);
       }
       if (options.relaxation != 1.0) {
-        next = project_on_cone<D>(options.relaxation * next + (1.0 - options.relaxation) * old,
+        next = project_on_cone<D>(ContactVector<D>(options.relaxation * next + (1.0 - options.relaxation) * old),
                                   problem.mu[a]);
       }
       const ContactVector<D> delta = next - old;
@@ -190,7 +190,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
 Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  Monitor monitor(settings, 1'000'000);
+  Monitor monitor(settings);
   return problem.d() == 2 ? iterate<2>(problem, options, monitor, r)
                           : iterate<3>(problem, options, monitor, r);
 }
@@ -205,6 +205,8 @@ const Solver& solver() {
       .citation = "Jean & Moreau 1992; Jourdan, Alart & Jean 1998; Acary, Bremond & Huber 2018",
       .dimensions = {2, 3},
       .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
       .solve = solve,
   };
   return entry;

@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from typing import TypeAlias
 
+import numpy as np
+
 from fclib import _core
 
 Problem: TypeAlias = _core.LocalProblem | _core.GlobalProblem
@@ -50,13 +52,25 @@ def solve(
         raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
     if time_limit is not None and not time_limit > 0:
         raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    values = {name: _plain(name, value) for name, value in options.items()}
     return _core.solve(
         problem,
         solver,
         tol,
         max_iterations or 0,
         math.inf if time_limit is None else time_limit,
-        options,
+        values,
         guess,
         callback,
     )
+
+
+def _plain(name: str, value: object) -> bool | int | float | str:
+    """An option's value as a Python scalar; NumPy's scalars are taken too."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, (bool, float, str)):
+        return value
+    if isinstance(value, int) and -(2**63) <= value < 2**63:
+        return value
+    raise _core.OptionError(f"option {name}: {value!r} is not a truth value, a number or a text")

@@ -14,9 +14,10 @@ from typing import Any
 import fclib
 from fclib import bench
 
-CONFIGURATIONS: tuple[dict[str, Any], ...] = (
-    {"solver": "nsgs"},
-    {"solver": "nsgs", "local_solver": "projection"},
+# solvers with their options
+CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("nsgs", {}),
+    ("nsgs", {"local_solver": "projection"}),
 )
 
 
@@ -60,7 +61,10 @@ def simulate(folder: Path, boxes: int, steps: int, picture: Path | None) -> Iter
 def solve(path: Path, tol: float) -> list[bench.Run]:
     """Solve the problem of a file in each configuration, and store the most accurate solution."""
     problem = fclib.read(path)
-    runs = [bench.run(path.stem, problem, tol=tol, **options) for options in CONFIGURATIONS]
+    runs = [
+        bench.run(path.stem, problem, solver, tol, options=options)
+        for solver, options in CONFIGURATIONS
+    ]
     best = min(runs, key=lambda run: run.error)
     fclib.write_solution(path, best.result.solution)
     return runs

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import fclib
@@ -48,7 +50,7 @@ def run(
     solver: str = "nsgs",
     tol: float = 1e-8,
     time_limit: float | None = None,
-    **options: Any,
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> Run:
     """Solve a problem and judge the solution.
 
@@ -58,7 +60,7 @@ def run(
         solver: a name of ``fclib.solvers()``.
         tol: bound on the merit.
         time_limit: [s] wall clock.
-        **options: the solver's own.
+        options: the solver's own.
 
     Raises:
         fclib.Error: as ``fclib.solve`` does.

@@ -36,14 +36,16 @@ def command(
 ) -> None:
     """Solve problems, and judge the solutions."""
     options = parse_options(option or [])
+    try:
+        fclib.find_solver(solver).check_options(options)
+    except fclib.OptionError as error:
+        usage_error(error)
     report = Report(as_json)
     for path in each_file(files, "solving", report):
         try:
-            run = bench.run(str(path), fclib.read(path), solver, tol, time_limit, **options)
+            run = bench.run(str(path), fclib.read(path), solver, tol, time_limit, options)
             if write and run.status == "converged":
                 fclib.write_solution(path, run.result.solution)
-        except fclib.OptionError as error:
-            usage_error(error)
         except fclib.Error as error:
             named = str(error).startswith(str(path))
             report.error(path, error if named else fclib.Error(f"{path}: {error}"))

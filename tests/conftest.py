@@ -1,0 +1,32 @@
+"""What all tests share: the folder of real problems, and the settings of Hypothesis."""
+
+import os
+import sys
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+TESTS = Path(__file__).parent
+sys.path.insert(0, str(TESTS))  # for helpers.py, which --import-mode=importlib does not find
+pytest.register_assert_rewrite("helpers")
+
+# the same examples every time, and no deadline: machines differ
+hypothesis.settings.register_profile("fclib", deadline=None, derandomize=True)
+hypothesis.settings.load_profile("fclib")
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    """The root of the repository."""
+    return TESTS.parent
+
+
+@pytest.fixture(scope="session")
+def real_data() -> Path:
+    """The folder of real problems: $FCLIB_DATA, or shared/data/real beside the repository."""
+    default = TESTS.parent.parent / "shared" / "data" / "real"
+    folder = Path(os.environ.get("FCLIB_DATA", default))
+    if not folder.is_dir():
+        pytest.skip(f"there are no real problems in {folder}; FCLIB_DATA names another folder")
+    return folder

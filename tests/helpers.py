@@ -1,0 +1,302 @@
+"""Problems whose solution is known, and a judge of solutions that shares no code with the core."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+import fclib
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+STORAGES = ("csr", "csc", "coo", "dense")
+
+
+# ---- the judge: the equations, in NumPy
+
+
+def project(x: Array, mu: Array) -> Array:
+    """The projection of each row on { ||x_T|| <= mu x_N }: x itself, or its part along a ray."""
+    norm = np.linalg.norm(x[:, 1:], axis=1)
+    directions = x[:, 1:] / np.where(norm > 0, norm, 1)[:, None]
+    rays = np.column_stack([np.ones_like(mu), mu[:, None] * directions])
+    rays /= np.sqrt(1 + mu**2)[:, None]
+    along = np.maximum(np.sum(rays * x, axis=1), 0)
+    return np.where((norm <= mu * x[:, 0])[:, None], x, along[:, None] * rays)
+
+
+def modified(u: Array, mu: Array) -> Array:
+    """u^ = u + [mu ||u_T||, 0, 0] of each row."""
+    result = u.copy()
+    result[:, 0] += mu * np.linalg.norm(u[:, 1:], axis=1)
+    return result
+
+
+def natural_map(r: Array, hat: Array, mu: Array) -> Array:
+    """The map r - P_K(r - u^) of each row, without the difference of two large numbers.
+
+    It is u^ plus the part of y = r - u^ in the polar cone: nothing where y is in K, y itself where
+    P_K(y) = 0, and along the normal of the cone's boundary elsewhere.
+    """
+    y = r - hat
+    norm = np.linalg.norm(y[:, 1:], axis=1)
+    directions = y[:, 1:] / np.where(norm > 0, norm, 1)[:, None]
+    gap = norm - mu * y[:, 0]
+    normal = (gap / (1 + mu**2))[:, None] * np.column_stack([-mu, directions])
+    result = np.where((gap <= 0)[:, None], hat, hat + normal)
+    return np.where((mu * norm <= -y[:, 0])[:, None], r, result)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What fclib.merit should say."""
+
+    natural: float
+    scaled_natural: float
+    dynamics: float
+    bilateral: float
+    kinematics: float
+    cone: float
+    dual_cone: float
+    complementarity: float
+    open: int
+    stick: int
+    slide: int
+    u: Array = field(repr=False)
+
+    @property
+    def error(self) -> float:
+        """The bound of every tolerance."""
+        return max(self.natural, self.dynamics, self.bilateral, self.kinematics)
+
+
+def relative(residual: Array, *terms: Array) -> float:
+    """The norm of a residual over that of its largest term."""
+    largest = max(float(np.linalg.norm(term)) for term in terms)
+    return float(np.linalg.norm(residual)) / (largest or 1.0)
+
+
+def columns(a: Any) -> Any:
+    """Any matrix as csc_array, duplicates added up."""
+    result = sp.csc_array(a)
+    result.sum_duplicates()
+    return result
+
+
+def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
+    """Judge a solution by the equations of its formulation."""
+    d, mu, r = problem.spacedim, problem.mu, solution.r
+    dynamics = bilateral = kinematics = 0.0
+    if isinstance(problem, fclib.LocalProblem):
+        q = problem.q
+        terms = [columns(problem.W) @ r]
+        if problem.V is not None:
+            V, R, lam, s = columns(problem.V), columns(problem.R), solution.l, problem.s
+            assert lam is not None
+            assert s is not None
+            terms.append(V @ lam)
+            bilateral = relative(V.T @ r + R @ lam + s, abs(V).T @ abs(r), R @ lam, s)
+        u = np.sum(terms, axis=0) + q
+        velocity_terms = [*terms, q]
+        diagonal = columns(problem.W).diagonal()
+    else:
+        M, H, f, w = columns(problem.M), columns(problem.H), problem.f, problem.w
+        solve = splu(M).solve if problem.n else np.copy
+        impulses = [H @ r, f]
+        if problem.G is not None:
+            assert solution.l is not None
+            impulses.append(columns(problem.G) @ solution.l)
+        v = solution.v
+        if v is None:
+            v = solve(np.sum(impulses, axis=0))
+        else:
+            dynamics = relative(M @ v - np.sum(impulses, axis=0), M @ v, *impulses)
+        if problem.G is not None:
+            G, b = columns(problem.G), problem.b
+            assert b is not None
+            bilateral = relative(G.T @ v + b, abs(G).T @ abs(v), b)
+        u = H.T @ v + w
+        velocity_terms = [H.T @ v, w]
+        q = H.T @ solve(f) + w
+        y = solve(H.toarray()) if problem.n and problem.m else np.zeros(H.shape)
+        diagonal = np.sum(H.toarray() * y, axis=0)
+    if solution.u is not None:
+        kinematics = relative(solution.u - u, solution.u, *velocity_terms)
+
+    contacts, reactions = u.reshape(-1, d), r.reshape(-1, d)
+    hat = modified(contacts, mu)
+    trace = diagonal.reshape(-1, d).mean(axis=1)
+    rho = (1 / np.where(trace > 0, trace, 1))[:, None]
+    scaled = reactions - rho * hat
+    projected = project(scaled, mu)
+    is_open = ~projected.any(axis=1)
+    is_stick = ~is_open & (projected == scaled).all(axis=1)
+    norms = np.linalg.norm
+    return Verdict(
+        natural=float(norms(natural_map(reactions, hat, mu)) / (norms(q) or 1.0)),
+        scaled_natural=float(
+            norms(natural_map(reactions, rho * hat, mu)) / (norms(rho * q.reshape(-1, d)) or 1.0)
+        ),
+        dynamics=dynamics,
+        bilateral=bilateral,
+        kinematics=kinematics,
+        cone=float(norms(reactions - project(reactions, mu), axis=1).max(initial=0)),
+        dual_cone=float(norms(project(-hat, mu), axis=1).max(initial=0)),
+        complementarity=float(np.abs(np.sum(reactions * hat, axis=1)).max(initial=0)),
+        open=int(is_open.sum()),
+        stick=int(is_stick.sum()),
+        slide=int((~is_open & ~is_stick).sum()),
+        u=u,
+    )
+
+
+# ---- matrices in every storage
+
+
+def stored(a: npt.ArrayLike, storage: str, rng: np.random.Generator) -> Any:
+    """The matrix in a storage: entries in random order, triplets with duplicates."""
+    a = np.asarray(a, dtype=float)
+    if storage == "dense":
+        return a
+    rows, cols = np.nonzero(a)
+    values = a[rows, cols]
+    if storage == "coo" and values.size:
+        rows, cols = np.append(rows, rows[0]), np.append(cols, cols[0])
+        values = np.append(values, values[0] / 2)
+        values[0] /= 2
+    order = rng.permutation(values.size)
+    rows, cols, values = rows[order], cols[order], values[order]
+    if storage == "coo":
+        return sp.coo_array((values, (rows, cols)), shape=a.shape)
+    outer, inner = (rows, cols) if storage == "csr" else (cols, rows)
+    count = a.shape[0] if storage == "csr" else a.shape[1]
+    by_outer = np.argsort(outer, kind="stable")
+    pointers = np.concatenate([[0], np.cumsum(np.bincount(outer, minlength=count))])
+    make = sp.csr_array if storage == "csr" else sp.csc_array
+    return make((values[by_outer], inner[by_outer], pointers), shape=a.shape)
+
+
+# ---- problems built backwards from their solution
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A problem, a solution of it, and how many contacts are open, stick and slide."""
+
+    problem: fclib.Problem
+    solution: fclib.Solution
+    statuses: tuple[int, int, int]
+
+
+def contact_states(
+    rng: np.random.Generator, d: int, mu: Array
+) -> tuple[Array, Array, tuple[int, int, int]]:
+    """Velocities and reactions (nc, d) that obey Coulomb's law, open, sticking and sliding."""
+    nc = mu.size
+    u, r = np.zeros((nc, d)), np.zeros((nc, d))
+    counts = [0, 0, 0]
+    for contact in range(nc):
+        status = contact % 3
+        if mu[contact] == 0 and status == 1:
+            status = 2  # without friction there is no sticking
+        counts[status] += 1
+        tangent = rng.standard_normal(d - 1)
+        tangent /= np.linalg.norm(tangent)
+        if status == 0:
+            u[contact] = [rng.uniform(0.1, 1), *rng.uniform(-1, 1, d - 1)]
+            continue
+        normal = rng.uniform(0.5, 2)
+        if status == 1:
+            r[contact] = [normal, *(rng.uniform(0, 0.9) * mu[contact] * normal * tangent)]
+        else:
+            r[contact] = [normal, *(mu[contact] * normal * tangent)]
+            u[contact] = [0, *(-rng.uniform(0.1, 1) * tangent)]
+    return u, r, (counts[0], counts[1], counts[2])
+
+
+def planted_global(
+    seed: int,
+    d: int = 3,
+    nc: int = 6,
+    p: int = 0,
+    mu: float | None = None,
+    storage: str = "csr",
+) -> Planted:
+    """A global problem, mixed where p > 0, with its solution."""
+    rng = np.random.default_rng(seed)
+    n = 2 * (d * nc + p) + 1
+    root = rng.standard_normal((n, n)) * (rng.uniform(size=(n, n)) < 0.2)
+    M = root @ root.T / n + np.eye(n)
+    H = np.eye(n, d * nc) + 0.1 * rng.standard_normal((n, d * nc))
+    G = np.eye(n, p, -d * nc) + 0.1 * rng.standard_normal((n, p))
+    coefficients = rng.uniform(0.1, 0.6, nc) if mu is None else np.full(nc, mu)
+    u, r, statuses = contact_states(rng, d, coefficients)
+    lam, f = rng.standard_normal(p), rng.standard_normal(n)
+    v = np.linalg.solve(M, H @ r.ravel() + G @ lam + f)
+    mixed = {"G": stored(G, storage, rng), "b": -G.T @ v} if p else {}
+    problem = fclib.GlobalProblem(
+        spacedim=d,
+        M=stored(M, storage, rng),
+        H=stored(H, storage, rng),
+        f=f,
+        w=u.ravel() - H.T @ v,
+        mu=coefficients,
+        **mixed,
+    )
+    solution = fclib.Solution(v=v, u=u.ravel(), r=r.ravel(), l=lam if p else None)
+    return Planted(problem, solution, statuses)
+
+
+def planted_local(
+    seed: int,
+    d: int = 3,
+    nc: int = 6,
+    p: int = 0,
+    mu: float | None = None,
+    storage: str = "csr",
+    skew: float = 0.0,
+) -> Planted:
+    """A local problem, mixed where p > 0, with its solution; skew > 0 makes W asymmetric."""
+    rng = np.random.default_rng(seed)
+    m = d * nc
+    root = np.eye(m + p) + 0.3 * rng.standard_normal((m + p, m + p)) / np.sqrt(max(1, m + p))
+    whole = root @ root.T
+    asymmetric = rng.standard_normal((m, m))
+    W = whole[:m, :m] + skew * (asymmetric - asymmetric.T) / max(1, m)
+    V, R = whole[:m, m:], whole[m:, m:]
+    coefficients = rng.uniform(0.1, 0.6, nc) if mu is None else np.full(nc, mu)
+    u, r, statuses = contact_states(rng, d, coefficients)
+    lam = rng.standard_normal(p)
+    mixed = {}
+    if p:
+        mixed = {
+            "V": stored(V, storage, rng),
+            "R": stored(R, storage, rng),
+            "s": -V.T @ r.ravel() - R @ lam,
+        }
+    problem = fclib.LocalProblem(
+        spacedim=d,
+        W=stored(W, storage, rng),
+        q=u.ravel() - W @ r.ravel() - V @ lam,
+        mu=coefficients,
+        **mixed,
+    )
+    solution = fclib.Solution(u=u.ravel(), r=r.ravel(), l=lam if p else None)
+    return Planted(problem, solution, statuses)
+
+
+def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fclib.LocalProblem:
+    """A local problem from a dense W; its spacedim follows from the sizes."""
+    q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)
+    d = q.size // mu.size if mu.size else 3
+    return fclib.LocalProblem(spacedim=d, W=sp.csr_array(np.asarray(W, float)), q=q, mu=mu)
+
+
+def dense(a: Any) -> Array:
+    """Any matrix as a dense array."""
+    return np.asarray(a.toarray() if sp.issparse(a) else a, dtype=float)

@@ -1,0 +1,313 @@
+"""The commands: what they print, what they write, and their exit status."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from helpers import judge, planted_global, planted_local
+
+SOLVE_KEYS = [
+    "problem",
+    "formulation",
+    "n",
+    "nc",
+    "solver",
+    "status",
+    "iterations",
+    "cpu_s",
+    "error",
+]
+
+
+def run(*arguments: object, module: bool = True) -> subprocess.CompletedProcess[str]:
+    script = Path(sys.executable).with_name("fclib")
+    program = [sys.executable, "-m", "fclib"] if module else [str(script)]
+    return subprocess.run([*program, *map(str, arguments)], capture_output=True, text=True)
+
+
+def records(result: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in result.stdout.splitlines()]
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """Four good files of all formulations, with their exact solutions."""
+    cases = {
+        "local": planted_local(1, nc=5),
+        "mixed": planted_local(2, d=2, nc=4, p=2),
+        "global": planted_global(3, nc=3),
+        "global-mixed": planted_global(4, nc=3, p=2),
+    }
+    paths = []
+    for name, case in cases.items():
+        paths.append(tmp_path / f"{name}.hdf5")
+        fclib.write(paths[-1], case.problem, case.solution)
+    return paths
+
+
+@pytest.fixture
+def bad(tmp_path: Path) -> Path:
+    path = tmp_path / "bad.hdf5"
+    path.write_text("no problem")
+    return path
+
+
+# ---- info
+
+
+def test_info_prints_the_sizes(files: list[Path]) -> None:
+    result = run("info", "--json", *files)
+    assert result.returncode == 0
+    assert result.stderr == ""
+    for record, path in zip(records(result), files, strict=True):
+        problem = fclib.read(path)
+        assert record["problem"] == str(path)
+        assert record["solution"] is True
+        for name in ("formulation", "spacedim", "n", "m", "p", "nc"):
+            assert record[name] == getattr(problem, name), name
+        assert record["mu_min"] == problem.mu.min()
+        assert record["mu_max"] == problem.mu.max()
+
+
+def test_info_as_a_table_names_every_file_on_one_line(files: list[Path]) -> None:
+    result = run("info", *files)
+    assert result.returncode == 0
+    lines = result.stdout.splitlines()
+    for path, formulation in zip(files, ["3DFC", "M2DFC", "G3DFC", "GM3DFC"], strict=True):
+        assert sum(path.name in line.split() and formulation in line.split() for line in lines) == 1
+
+
+def test_info_shows_each_problem_of_a_file(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    path, other = tmp_path / "both.hdf5", tmp_path / "other.hdf5"
+    fclib.write(path, planted_local(1).problem)
+    fclib.write(other, planted_global(1).problem)
+    with h5py.File(path, "a") as file, h5py.File(other) as source:
+        source.copy("fclib_global", file)
+    result = run("info", "--json", path)
+    assert result.returncode == 0
+    assert {record["formulation"] for record in records(result)} == {"3DFC", "G3DFC"}
+
+
+def test_info_of_a_problem_without_contacts_is_json(tmp_path: Path) -> None:
+    path = tmp_path / "empty.hdf5"
+    fclib.write(path, planted_global(1, nc=0).problem)
+    (record,) = records(run("info", "--json", path))
+    assert record["nc"] == 0
+    assert record["mu_min"] is None
+    assert run("info", path).returncode == 0
+
+
+# ---- solve
+
+
+def test_solve_prints_exactly_the_agreed_keys(files: list[Path]) -> None:
+    result = run("solve", "--json", *files)
+    assert result.returncode == 0
+    assert result.stderr == ""
+    found = records(result)
+    assert [record["problem"] for record in found] == [str(path) for path in files]
+    for record, path in zip(found, files, strict=True):
+        assert list(record) == SOLVE_KEYS
+        problem = fclib.read(path)
+        for name in ("formulation", "n", "nc"):
+            assert record[name] == getattr(problem, name)
+        assert record["solver"] == "nsgs"
+        assert record["status"] == "converged"
+        assert record["error"] <= 1e-8
+        assert record["cpu_s"] >= 0
+        assert isinstance(record["iterations"], int)
+
+
+def test_solve_keeps_its_tolerance_and_its_options(files: list[Path]) -> None:
+    options = ["--option", "relaxation=1.2", "--option", "shuffle=once", "--tol", "1e-4"]
+    result = run("solve", "--json", "--solver", "nsgs", *options, *files)
+    assert result.returncode == 0
+    tight = records(run("solve", "--json", "--tol", "1e-12", *files))
+    for record, other in zip(records(result), tight, strict=True):
+        assert record["solver"] == "nsgs relaxation=1.2 shuffle=once"
+        assert other["error"] <= 1e-12 < record["error"] <= 1e-4
+
+
+def test_solve_writes_what_it_found(files: list[Path]) -> None:
+    for path in files:
+        problem = fclib.read(path)
+        start = fclib.Solution(r=np.zeros(problem.m), l=np.zeros(problem.p) if problem.p else None)
+        fclib.write(path, problem, start)
+    assert run("check", *files).returncode == 1
+    assert run("solve", *files).returncode == 0
+    assert run("check", *files).returncode == 1, "without --write nothing is written"
+    assert run("solve", "--write", *files).returncode == 0
+    assert run("check", *files).returncode == 0
+    for path in files:
+        solution = fclib.read_solution(path)
+        assert solution is not None
+        assert judge(fclib.read(path), solution).error <= 1e-8
+
+
+def endless(path: Path) -> Path:
+    W = np.kron([[1, -1], [-1, 1]], np.eye(3))
+    fclib.write(path, fclib.LocalProblem(W=W, q=[-1, 0, 0] * 2, mu=[0.5] * 2))
+    return path
+
+
+def test_what_is_not_solved_fails_and_is_not_written(tmp_path: Path, files: list[Path]) -> None:
+    path = endless(tmp_path / "endless.hdf5")
+    result = run("solve", "--write", "--json", "--time-limit", "0.2", path, *files)
+    assert result.returncode == 1
+    found = records(result)
+    assert found[0]["status"] in {"time_limit", "iteration_limit"}
+    assert found[0]["error"] > 0.1
+    assert [record["status"] for record in found[1:]] == ["converged"] * len(files)
+    assert fclib.read_solution(path) is None
+
+
+# ---- check
+
+
+def test_check_judges_stored_solutions(files: list[Path]) -> None:
+    result = run("check", "--json", *files)
+    assert result.returncode == 0
+    for record, path in zip(records(result), files, strict=True):
+        solution = fclib.read_solution(path)
+        assert solution is not None
+        merit = fclib.merit(fclib.read(path), solution)
+        assert record["error"] == merit.error < 1e-13
+        for name in ("natural", "dynamics", "bilateral", "cone", "open", "stick", "slide"):
+            assert record[name] == getattr(merit, name), name
+
+
+def test_check_finds_the_wrong_one(files: list[Path]) -> None:
+    solution = fclib.read_solution(files[0])
+    assert solution is not None
+    fclib.write_solution(files[0], fclib.Solution(r=solution.r + 1e-5))
+    result = run("check", "--json", *files)
+    assert result.returncode == 1
+    assert [record["error"] <= 1e-8 for record in records(result)] == [False, True, True, True]
+    assert run("check", "--tol", "1e-3", *files).returncode == 0
+
+
+def test_check_without_a_solution_fails(tmp_path: Path) -> None:
+    path = tmp_path / "unsolved.hdf5"
+    fclib.write(path, planted_local(1).problem)
+    result = run("check", path)
+    assert result.returncode == 1
+    assert result.stderr.startswith(f"fclib: {path}: /solution")
+    assert len(result.stderr.splitlines()) == 1
+
+
+# ---- solvers
+
+
+def test_solvers_lists_them_with_their_options() -> None:
+    result = run("solvers", "--json")
+    assert result.returncode == 0
+    for record, solver in zip(records(result), fclib.solvers(), strict=True):
+        for name in ("family", "title", "citation", "dimensions"):
+            assert record[name] == getattr(solver, name)
+        assert record["solver"] == solver.name
+        for shown, option in zip(record["options"], solver.options, strict=True):
+            assert shown["option"] == option.name
+            assert shown["default"] == option.default
+            assert shown["meaning"] == option.doc
+            assert shown["unit"] == option.unit
+    table = run("solvers")
+    assert table.returncode == 0
+    for solver in fclib.solvers():
+        for text in (solver.name, solver.citation, *(option.name for option in solver.options)):
+            assert text in table.stdout
+
+
+# ---- errors and usage
+
+
+@pytest.mark.parametrize("command", ["info", "solve", "check"])
+def test_a_bad_file_does_not_stop_the_others(command: str, files: list[Path], bad: Path) -> None:
+    missing = bad.with_name("missing.hdf5")
+    result = run(command, "--json", files[0], bad, files[1], missing, files[2])
+    assert result.returncode == 1
+    lines = result.stderr.splitlines()
+    assert len(lines) == 2
+    assert str(bad) in lines[0]
+    assert str(missing) in lines[1]
+    good = [record for record in records(result) if "formulation" in record]
+    assert [record["problem"] for record in good] == [str(path) for path in files[:3]]
+    told = [record for record in records(result) if "formulation" not in record]
+    assert [record["problem"] for record in told] == [str(bad), str(missing)]
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["unknown"],
+        ["info"],
+        ["solve"],
+        ["check"],
+        ["info", "--unknown", "FILE"],
+        ["solve", "--tol", "small", "FILE"],
+        ["solve", "--tol", "-1", "FILE"],
+        ["solve", "--tol", "nan", "FILE"],
+        ["solve", "--time-limit", "soon", "FILE"],
+        ["solve", "--time-limit", "-1", "FILE"],
+        ["solve", "--solver", "unknown", "FILE"],
+        ["solve", "--solver", "unknown", "MISSING"],
+        ["solve", "--option", "relaxation", "FILE"],
+        ["solve", "--option", "=1", "FILE"],
+        ["solve", "--option", "relaxation=", "FILE"],
+        ["solve", "--option", "unknown=1", "FILE"],
+        ["solve", "--option", "unknown=1", "MISSING"],
+        ["solve", "--option", "relaxation=fast", "FILE"],
+        ["solve", "--option", "relaxation=5", "FILE"],
+        ["solve", "--option", "tol=1", "FILE"],
+        ["solve", "--option", "problem=1", "FILE"],
+        ["solve", "--option", "guess=1", "FILE"],
+        ["solve", "--option", "max_iterations=many", "FILE"],
+        ["solvers", "FILE"],
+    ],
+    ids=" ".join,
+)
+def test_a_usage_error_is_2_and_no_traceback(arguments: list[str], files: list[Path]) -> None:
+    stand_ins = {"FILE": str(files[0]), "MISSING": str(files[0].with_name("missing.hdf5"))}
+    result = run(*(stand_ins.get(argument, argument) for argument in arguments))
+    assert "Traceback" not in result.stderr
+    assert result.returncode == 2, result.stderr
+
+
+def test_version_and_help() -> None:
+    for module in (True, False):
+        result = run("--version", module=module)
+        assert result.returncode == 0
+        assert result.stdout == f"fclib {fclib.__version__}\n"
+    for command in ([], ["info"], ["solve"], ["check"], ["solvers"]):
+        for flag in ("--help", "-h"):
+            result = run(*command, flag)
+            assert result.returncode == 0
+            assert "Usage" in result.stdout
+
+
+def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:
+    for command in ("info", "solve", "check"):
+        result = run(command, *files)
+        assert result.stderr == ""
+        assert "\x1b" not in result.stdout
+
+
+def test_a_closed_pipe_is_no_traceback(files: list[Path]) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-m", "fclib", "info", "--json", *map(str, files * 2000)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert "Traceback" not in process.stderr.read()

@@ -1,0 +1,488 @@
+"""A wrong file gives one clear line that names the file and the dataset, and nothing worse.
+
+Each case takes a good mixed local file, or a global one, and spoils one thing.
+"""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fclib
+from helpers import planted_global, planted_local
+
+ROOT = "fclib_local"
+Spoil = Callable[[h5py.File], None]
+
+
+def replace(name: str, value: object) -> Spoil:
+    """Put another value in place of a dataset or a group."""
+
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+        file[name] = value
+
+    return spoil
+
+
+def remove(name: str) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+
+    return spoil
+
+
+def change(name: str, index: int, value: float) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        file[name][index] = value
+
+    return spoil
+
+
+def resize(name: str, by: int) -> Spoil:
+    """Cut entries off a dataset, or repeat its last one."""
+
+    def spoil(file: h5py.File) -> None:
+        values = file[name][()]
+        del file[name]
+        file[name] = values[:by] if by < 0 else np.append(values, [values[-1]] * by)
+
+    return spoil
+
+
+def reshape(name: str) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        values = file[name][()]
+        del file[name]
+        file[name] = values.reshape(1, -1)
+
+    return spoil
+
+
+def declare(name: str, dtype: str, size: int = 10**12) -> Spoil:
+    """A dataset of a size that nobody stored."""
+
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, shape=(size,), dtype=dtype, chunks=(2**20,))
+
+    return spoil
+
+
+def declare_sparsely(file: h5py.File) -> None:
+    """One chunk of many is there."""
+    declare(f"{ROOT}/vectors/q", "<f8")(file)
+    file[f"{ROOT}/vectors/q"][:10] = 1.0
+
+
+def declare_text(name: str) -> Spoil:
+    """A text of a length that nobody stored."""
+
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+        file.create_dataset(name, shape=(), dtype="S1000000000")
+
+    return spoil
+
+
+def make_group(name: str) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        del file[name]
+        file.create_group(name)
+
+    return spoil
+
+
+def cycle(file: h5py.File) -> None:
+    """A group that contains itself in place of a dataset."""
+    del file[f"{ROOT}/W/x"]
+    file[f"{ROOT}/W/x"] = file[f"{ROOT}/W"]
+
+
+def triplets(index: int, row: int, col: int) -> Spoil:
+    """R as triplets, one of which is out of place."""
+
+    def spoil(file: h5py.File) -> None:
+        group = file[f"{ROOT}/R"]
+        for name in ("nz", "p", "i", "x", "nzmax"):
+            del group[name]
+        rows, cols = np.array([0, 1]), np.array([0, 1])
+        rows[index], cols[index] = row, col
+        group["nz"], group["nzmax"] = np.array([2]), np.array([2])
+        group["i"], group["p"], group["x"] = rows, cols, np.ones(2)
+
+    return spoil
+
+
+def dense_of_wrong_size(file: h5py.File) -> None:
+    resize(f"{ROOT}/W/x", -1)(file)
+    file[f"{ROOT}/W/nz"][0] = -3
+
+
+def rename(old: str, new: str) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        file.move(old, new)
+
+    return spoil
+
+
+LOCAL_NAMES = [
+    "spacedim",
+    "W",
+    *(f"{matrix}/{name}" for matrix in "WVR" for name in ("m", "n", "nz", "p", "i", "x")),
+    "vectors",
+    *(f"vectors/{name}" for name in ("q", "mu", "s")),
+]
+GLOBAL_NAMES = [
+    *("M", "M/x", "H", "H/p", "H/nz"),
+    *(f"vectors/{name}" for name in ("f", "w", "mu", "b")),
+]
+
+# case: how to spoil the file, and what the message must name
+LOCAL: dict[str, tuple[Spoil, str]] = {
+    # something is missing
+    **{f"no {name}": (remove(f"{ROOT}/{name}"), f"{ROOT}/{name}") for name in LOCAL_NAMES},
+    "no V": (remove(f"{ROOT}/V"), f"{ROOT}/V"),
+    "no R": (remove(f"{ROOT}/R"), f"{ROOT}/V"),
+    "no problem": (remove(ROOT), ": /:"),
+    "another layout": (rename(ROOT, "experiment"), ": /:"),
+    # of the wrong type
+    **{
+        f"text in {name}": (replace(f"{ROOT}/{name}", "some text"), f"{ROOT}/{name}")
+        for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q", "vectors/mu")
+    },
+    **{
+        f"real numbers in {name}": (replace(f"{ROOT}/{name}", [3.0]), f"{ROOT}/{name}")
+        for name in ("spacedim", "W/n", "W/nz", "W/p", "W/i")
+    },
+    "complex numbers": (replace(f"{ROOT}/vectors/q", np.ones(18) * 1j), f"{ROOT}/vectors/q"),
+    "truth values": (replace(f"{ROOT}/vectors/q", np.ones(18, bool)), f"{ROOT}/vectors/q"),
+    "nothing": (replace(f"{ROOT}/vectors/q", h5py.Empty("f8")), f"{ROOT}/vectors/q"),
+    "numbers in title": (replace(f"{ROOT}/info/title", [1, 2]), f"{ROOT}/info/title"),
+    "texts in title": (replace(f"{ROOT}/info/title", ["a", "b"]), f"{ROOT}/info/title"),
+    # of the wrong shape
+    **{
+        f"two dimensions in {name}": (reshape(f"{ROOT}/{name}"), f"{ROOT}/{name}")
+        for name in ("W/x", "W/i", "vectors/q", "vectors/mu")
+    },
+    **{
+        f"{name} {'short' if by < 0 else 'long'}": (resize(f"{ROOT}/{name}", by), f"{ROOT}/{names}")
+        for name, by, names in (
+            ("W/p", -1, "W"),
+            ("W/p", 1, "W/p"),
+            ("W/i", -1, "W/i"),
+            ("W/x", -1, "W/x"),
+            ("R/x", -2, "R/x"),
+            ("vectors/q", -1, "vectors/q"),
+            ("vectors/q", 1, "vectors/q"),
+            ("vectors/mu", -1, "W"),
+            ("vectors/mu", 1, "W"),
+            ("vectors/s", -1, "vectors/s"),
+            ("spacedim", 1, "spacedim"),
+            ("W/nz", 1, "W/nz"),
+        )
+    },
+    "more rows than contacts": (change(f"{ROOT}/W/m", 0, 21), f"{ROOT}/W"),
+    "more columns than contacts": (change(f"{ROOT}/W/n", 0, 21), f"{ROOT}/W"),
+    "V of other columns": (change(f"{ROOT}/V/n", 0, 3), f"{ROOT}/V"),
+    "a negative size": (change(f"{ROOT}/W/m", 0, -18), f"{ROOT}/W/m"),
+    "a huge size": (change(f"{ROOT}/W/m", 0, 2**31 - 1), f"{ROOT}/W"),
+    "dense without its numbers": (dense_of_wrong_size, f"{ROOT}/W/x"),
+    # wrong values
+    **{
+        f"{value} in {name}": (change(f"{ROOT}/{name}", 3, value), f"{ROOT}/{name}[3]")
+        for name in ("W/x", "V/x", "R/x", "vectors/q", "vectors/mu")
+        for value in (np.nan, np.inf, -np.inf)
+    },
+    "nan in s": (change(f"{ROOT}/vectors/s", 1, np.nan), f"{ROOT}/vectors/s[1]"),
+    "negative mu": (change(f"{ROOT}/vectors/mu", 2, -0.1), f"{ROOT}/vectors/mu[2]"),
+    "index out of range": (change(f"{ROOT}/W/i", 5, 18), f"{ROOT}/W/i[5]"),
+    "huge index": (change(f"{ROOT}/W/i", 5, 2**31 - 1), f"{ROOT}/W/i[5]"),
+    "negative index": (change(f"{ROOT}/W/i", 0, -1), f"{ROOT}/W/i[0]"),
+    "index beyond 32 bits": (
+        replace(f"{ROOT}/W/i", np.full(324, 2**32, dtype=np.int64)),
+        f"{ROOT}/W/i[0]",
+    ),
+    "index beyond 63 bits": (
+        replace(f"{ROOT}/W/i", np.full(324, 2**64 - 1, dtype=np.uint64)),
+        f"{ROOT}/W/i[0]",
+    ),
+    "triplet of a row out of range": (triplets(1, 2, 1), f"{ROOT}/R/i[1]"),
+    "triplet of a column out of range": (triplets(1, 1, 2), f"{ROOT}/R/p[1]"),
+    "triplet of a negative row": (triplets(0, -1, 1), f"{ROOT}/R/i[0]"),
+    "decreasing pointers": (change(f"{ROOT}/W/p", 4, 1), f"{ROOT}/W/p[4]"),
+    "first pointer not 0": (change(f"{ROOT}/W/p", 0, 1), f"{ROOT}/W/p[0]"),
+    "negative first pointer": (change(f"{ROOT}/W/p", 0, -1), f"{ROOT}/W/p[0]"),
+    "negative last pointer": (change(f"{ROOT}/W/p", 18, -1), f"{ROOT}/W/p"),
+    "huge last pointer": (change(f"{ROOT}/W/p", 18, 2**31 - 1), f"{ROOT}/W/i"),
+    "huge inner pointer": (change(f"{ROOT}/W/p", 3, 2**31 - 1), f"{ROOT}/W/p"),
+    "no pointers": (replace(f"{ROOT}/W/p", np.zeros(0, np.int32)), f"{ROOT}/W/p"),
+    **{
+        f"spacedim {value}": (change(f"{ROOT}/spacedim", 0, value), f"{ROOT}/spacedim")
+        for value in (1, 4, -3, 0, 5, 2**31 - 1)
+    },
+    "another spacedim": (change(f"{ROOT}/spacedim", 0, 2), f"{ROOT}/W"),
+    "unknown storage": (change(f"{ROOT}/W/nz", 0, -4), f"{ROOT}/W/nz"),
+    "more triplets than there are": (change(f"{ROOT}/W/nz", 0, 10**6), f"{ROOT}/W/p"),
+    # sizes that the file does not hold
+    **{
+        f"a huge {name}": (declare(f"{ROOT}/{name}", dtype), f"{ROOT}/{name}: declares")
+        for name, dtype in (
+            ("W/x", "<f8"),
+            ("W/p", "<i4"),
+            ("W/i", "<i4"),
+            ("vectors/q", "<f8"),
+            ("vectors/mu", "<f8"),
+            ("spacedim", "<i4"),
+            ("W/nz", "<i4"),
+        )
+    },
+    "a huge q with a little in it": (declare_sparsely, f"{ROOT}/vectors/q: declares"),
+    "a size beyond all memory": (
+        declare(f"{ROOT}/W/x", "<f8", 2**60),
+        f"{ROOT}/W/x: declares",
+    ),
+    "a huge title": (
+        declare_text(f"{ROOT}/info/title"),
+        f"{ROOT}/info/title",
+    ),
+    # links
+    "a dangling soft link": (
+        replace(f"{ROOT}/vectors/q", h5py.SoftLink("/nowhere")),
+        f"{ROOT}/vectors/q",
+    ),
+    "a dangling soft link in place of a group": (
+        replace(f"{ROOT}/W", h5py.SoftLink("/nowhere")),
+        f"{ROOT}/W",
+    ),
+    "an external link to nothing": (
+        replace(f"{ROOT}/vectors/mu", h5py.ExternalLink("nothing.hdf5", "/mu")),
+        f"{ROOT}/vectors/mu",
+    ),
+    "a soft link to itself": (
+        replace(f"{ROOT}/W", h5py.SoftLink(f"/{ROOT}/W")),
+        f"{ROOT}/W",
+    ),
+    "a soft link to the root": (replace(f"{ROOT}/W", h5py.SoftLink("/")), f"{ROOT}/W/m"),
+    "a group that holds itself": (cycle, f"{ROOT}/W/x"),
+    # the wrong kind of thing
+    **{
+        f"a dataset in place of {name or ROOT}": (
+            replace(f"{ROOT}/{name}".rstrip("/"), [1.0]),
+            f"{ROOT}/{name}".rstrip("/"),
+        )
+        for name in ("", "W", "V", "vectors", "info")
+    },
+    **{
+        f"a group in place of {name}": (make_group(f"{ROOT}/{name}"), f"{ROOT}/{name}")
+        for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q", "info/title")
+    },
+    "a type in place of q": (
+        replace(f"{ROOT}/vectors/q", np.dtype("f8")),
+        f"{ROOT}/vectors/q",
+    ),
+}
+
+GLOBAL: dict[str, tuple[Spoil, str]] = {
+    **{
+        f"global, no {name}": (remove(f"fclib_global/{name}"), f"fclib_global/{name}")
+        for name in GLOBAL_NAMES
+    },
+    "global, no G": (remove("fclib_global/G"), "fclib_global/vectors/b"),
+    "global, f short": (resize("fclib_global/vectors/f", -1), "fclib_global/vectors/f"),
+    "global, w long": (resize("fclib_global/vectors/w", 1), "fclib_global/vectors/w"),
+    "global, H of other rows": (change("fclib_global/H/m", 0, 3), "fclib_global/H"),
+    "global, M not square": (change("fclib_global/M/n", 0, 3), "fclib_global/M"),
+    "global, a row of H out of range": (change("fclib_global/H/i", 2, 999), "fclib_global/H/i[2]"),
+    "global, a column of H out of range": (
+        change("fclib_global/H/p", 2, 18),
+        "fclib_global/H/p[2]",
+    ),
+    "global, nan in M": (change("fclib_global/M/x", 0, np.nan), "fclib_global/M/x[0]"),
+    "global, too many triplets": (change("fclib_global/M/nz", 0, 2**31 - 1), "fclib_global/M/p"),
+}
+
+CASES = LOCAL | GLOBAL
+
+
+@pytest.fixture(scope="module")
+def corpus(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a file for each case, and good.hdf5."""
+    folder = tmp_path_factory.mktemp("malformed")
+    good, whole = folder / "good.hdf5", folder / "whole.hdf5"
+    fclib.write(good, planted_local(1, p=2).problem, planted_local(1, p=2).solution)
+    fclib.write(whole, planted_global(1, p=2).problem)
+    for source, cases in ((good, LOCAL), (whole, GLOBAL)):
+        for case, (spoil, _) in cases.items():
+            path = path_of(folder, case)
+            path.write_bytes(source.read_bytes())
+            with h5py.File(path, "a") as file:
+                spoil(file)
+    return folder
+
+
+def path_of(folder: Path, case: str) -> Path:
+    return folder / (case.replace("/", ".").replace(" ", "-") + ".hdf5")
+
+
+def test_the_unspoilt_files_are_good(corpus: Path) -> None:
+    assert fclib.read(corpus / "good.hdf5").formulation == "M3DFC"
+    assert fclib.read(corpus / "whole.hdf5").formulation == "GM3DFC"
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_spoilt_file_is_refused_and_the_dataset_named(corpus: Path, case: str) -> None:
+    path = path_of(corpus, case)
+    with pytest.raises((fclib.FileError, fclib.ProblemError)) as caught:
+        fclib.read(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert CASES[case][1] in message.removeprefix(str(path))
+    assert "\n" not in message
+    assert len(message) < len(str(path)) + 200
+
+
+@pytest.mark.parametrize("command", [["info"], ["solve"], ["check"], ["solve", "--write"]])
+def test_the_commands_say_one_line_for_each_spoilt_file(corpus: Path, command: list[str]) -> None:
+    paths = [str(path_of(corpus, case)) for case in CASES]
+    before = {path: Path(path).read_bytes() for path in paths}
+    arguments = [*command, "--json", *paths, str(corpus / "good.hdf5")]
+    run = subprocess.run(
+        [sys.executable, "-m", "fclib", *arguments], capture_output=True, text=True
+    )
+    assert run.returncode == 1
+    lines = run.stderr.splitlines()
+    assert len(lines) == len(paths), run.stderr
+    for line, path in zip(lines, paths, strict=True):
+        assert line.startswith(f"fclib: {path}: ")
+    records = [json.loads(line) for line in run.stdout.splitlines()]
+    assert [record["problem"] for record in records if "error" in record][: len(paths)] == paths
+    assert "formulation" in records[-1]
+    assert {path: Path(path).read_bytes() for path in paths} == before
+
+
+# ---- files that are not what they seem from their first byte on
+
+
+def bad_bytes(corpus: Path) -> dict[str, bytes]:
+    good = (corpus / "good.hdf5").read_bytes()
+    rng = np.random.default_rng(1)
+    return {
+        "empty": b"",
+        "text": b"nz = -2\nm = 3\n",
+        "noise": rng.bytes(10_000),
+        "zeros": bytes(10_000),
+        "a signature alone": good[:8],
+        "a signature and text": good[:8] + b"some text" * 100,
+        "another archive": b"PK\x03\x04" + bytes(1000),
+        **{f"cut after {part} %": good[: len(good) * part // 100] for part in range(1, 100, 7)},
+        "cut by one byte": good[:-1],
+    }
+
+
+BAD_BYTES = [
+    "empty",
+    "text",
+    "noise",
+    "zeros",
+    "a signature alone",
+    "a signature and text",
+    "another archive",
+    *(f"cut after {part} %" for part in range(1, 100, 7)),
+    "cut by one byte",
+]
+
+
+@pytest.mark.parametrize("case", BAD_BYTES)
+def test_what_is_no_whole_file_is_refused(corpus: Path, tmp_path: Path, case: str) -> None:
+    path = tmp_path / "bad.hdf5"
+    path.write_bytes(bad_bytes(corpus)[case])
+    for action in (
+        lambda: fclib.read(path),
+        lambda: fclib.read_solution(path),
+        lambda: fclib.contents(path),
+        lambda: fclib.write_solution(path, fclib.Solution(r=np.zeros(18))),
+    ):
+        with pytest.raises(fclib.FileError) as caught:
+            action()
+        assert str(caught.value).startswith(f"{path}: ")
+        assert "\n" not in str(caught.value)
+    assert path.read_bytes() == bad_bytes(corpus)[case]
+
+
+def test_flipped_bytes_never_do_worse_than_an_error(corpus: Path, tmp_path: Path) -> None:
+    """In a process of its own: what reads beyond its memory ends the process."""
+    code = (
+        "import sys, numpy as np, fclib\n"
+        "good = open(sys.argv[1], 'rb').read()\n"
+        "rng = np.random.default_rng(7)\n"
+        "refused = 0\n"
+        "for _ in range(1500):\n"
+        "    data = bytearray(good)\n"
+        "    for k in rng.integers(0, len(data), rng.integers(1, 9)):\n"
+        "        data[k] = rng.choice([0, 1, 127, 128, 255, data[k] ^ (1 << rng.integers(0, 8))])\n"
+        "    open(sys.argv[2], 'wb').write(data)\n"
+        "    try:\n"
+        "        problem = fclib.read(sys.argv[2])\n"
+        "        problem.validate()\n"
+        "        fclib.read_solution(sys.argv[2])\n"
+        "    except (fclib.FileError, fclib.ProblemError) as error:\n"
+        "        assert str(error).startswith(sys.argv[2] + ': '), error\n"
+        "        refused += 1\n"
+        "print(refused)\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code, corpus / "good.hdf5", tmp_path / "flipped.hdf5"],
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr[-2000:]
+    assert int(run.stdout) > 100
+    assert run.stderr == ""
+
+
+# ---- solutions
+
+
+SOLUTIONS: dict[str, tuple[Spoil, str]] = {
+    "no r": (remove("solution/r"), "/solution/r"),
+    "no l": (remove("solution/l"), "/solution/l"),
+    "r short": (resize("solution/r", -1), "/solution/r"),
+    "r long": (resize("solution/r", 1), "/solution/r"),
+    "u short": (resize("solution/u", -1), "/solution/u"),
+    "l long": (resize("solution/l", 3), "/solution/l"),
+    "nan in r": (change("solution/r", 2, np.nan), "/solution/r[2]"),
+    "inf in u": (change("solution/u", 0, np.inf), "/solution/u[0]"),
+    "text in r": (replace("solution/r", "text"), "/solution/r"),
+    "two dimensions in r": (reshape("solution/r"), "/solution/r"),
+    "a huge r": (declare("solution/r", "<f8"), "/solution/r"),
+    "a dataset in place of the solution": (replace("solution", [1.0]), "/solution"),
+    "a dangling link in place of l": (
+        replace("solution/l", h5py.SoftLink("/nowhere")),
+        "/solution/l",
+    ),
+}
+
+
+def test_check_names_what_is_wrong_with_a_solution(corpus: Path, tmp_path: Path) -> None:
+    paths = {case: path_of(tmp_path, case) for case in SOLUTIONS}
+    for case, path in paths.items():
+        path.write_bytes((corpus / "good.hdf5").read_bytes())
+        with h5py.File(path, "a") as file:
+            SOLUTIONS[case][0](file)
+    run = subprocess.run(
+        [sys.executable, "-m", "fclib", "check", *map(str, paths.values())],
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 1
+    lines = run.stderr.splitlines()
+    assert len(lines) == len(paths), run.stderr
+    for line, (case, path) in zip(lines, paths.items(), strict=True):
+        assert line.startswith(f"fclib: {path}: "), line
+        assert SOLUTIONS[case][1] in line.removeprefix(f"fclib: {path}"), line

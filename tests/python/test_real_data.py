@@ -1,0 +1,184 @@
+"""The problems that other programs wrote: they read, come back, and are solved."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import fclib
+from helpers import columns, judge
+
+KINDS = ("local3d", "global3d", "local2d", "global2d", "condensed3d")
+EXACT = 1e-12
+TIME_LIMIT = 5.0  # seconds a problem
+
+
+def folder() -> Path:
+    """As the fixture real_data, for what is collected before fixtures run."""
+    default = Path(__file__).parents[3] / "shared" / "data" / "real"
+    return Path(os.environ.get("FCLIB_DATA", default))
+
+
+def files(*kinds: str) -> list[Path]:
+    return [path for kind in kinds for path in sorted((folder() / kind).glob("*.hdf5"))]
+
+
+def name_of(path: Path) -> str:
+    return f"{path.parent.name}/{path.stem}"
+
+
+ALL = [pytest.param(path, id=name_of(path)) for path in files(*KINDS)]
+needs_data = pytest.mark.skipif(not ALL, reason=f"there are no real problems in {folder()}")
+
+
+@pytest.fixture(scope="module")
+def index(real_data: Path) -> dict[str, dict[str, str]]:
+    with (real_data / "INDEX.csv").open() as file:
+        return {f"{row['kind']}/{row['name']}": row for row in csv.DictReader(file)}
+
+
+def stored_entries(problem: fclib.Problem) -> int:
+    """Entries of the matrices as they stand in the file, duplicates and zeros too."""
+    names = "W" if isinstance(problem, fclib.LocalProblem) else "MH"
+    matrices = [getattr(problem, name) for name in names]
+    return sum(a.size if isinstance(a, np.ndarray) else a.data.size for a in matrices)
+
+
+@needs_data
+@pytest.mark.parametrize("path", ALL)
+def test_sizes_are_those_of_the_index(path: Path, index: dict[str, dict[str, str]]) -> None:
+    problem = fclib.read(path)
+    name = name_of(path).replace("condensed3d", "global3d").replace("-gcondensed", "")
+    if path.parent.name == "condensed3d":
+        # its source is listed, and it has the contacts of its source
+        row = index[name.removesuffix("-condensed")]
+        assert isinstance(problem, fclib.LocalProblem)
+    else:
+        row = index[name]
+        assert stored_entries(problem) == int(row["nnz"])
+        assert problem.n == int(row["n"] or 0)
+    assert problem.spacedim == int(row["spacedim"])
+    assert problem.m == int(row["m"])
+    assert problem.nc == int(row["nc"])
+    if problem.nc:
+        assert problem.mu.min() == pytest.approx(float(row["mu_min"]), rel=1e-6)
+        assert problem.mu.max() == pytest.approx(float(row["mu_max"]), rel=1e-6)
+
+
+def test_info_prints_the_sizes_of_the_index(index: dict[str, dict[str, str]]) -> None:
+    paths = files("local3d", "global3d", "local2d", "global2d")
+    run = subprocess.run(
+        [sys.executable, "-m", "fclib", "info", "--json", *map(str, paths)],
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr
+    for line, path in zip(run.stdout.splitlines(), paths, strict=True):
+        record, row = json.loads(line), index[name_of(path)]
+        for key in ("spacedim", "n", "m", "nc", "nnz"):
+            assert record[key] == int(row[key] or 0), (path.name, key)
+
+
+@needs_data
+@pytest.mark.parametrize("path", ALL)
+def test_rewriting_and_reading_back_is_equal(path: Path, tmp_path: Path) -> None:
+    problem, solution = fclib.read(path), fclib.read_solution(path)
+    copy = tmp_path / "copy.hdf5"
+    fclib.write(copy, problem, solution)
+    again, solution_again = fclib.read(copy), fclib.read_solution(copy)
+    assert again.formulation == problem.formulation
+    for name in ("title", "description", "math_info"):
+        assert getattr(again.info, name) == getattr(problem.info, name)
+    local = isinstance(problem, fclib.LocalProblem)
+    for name in ("q", "mu") if local else ("f", "w", "mu"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(problem, name))
+    for name in ("W",) if local else ("M", "H"):
+        first, second = columns(getattr(problem, name)), columns(getattr(again, name))
+        assert first.shape == second.shape
+        assert (first != second).nnz == 0
+    assert (solution is None) == (solution_again is None)
+    if solution is not None and solution_again is not None:
+        for name in ("v", "u", "r", "l"):
+            np.testing.assert_array_equal(getattr(solution, name), getattr(solution_again, name))
+
+
+def test_most_3d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
+    paths = files("local3d", "global3d")
+    assert len(paths) >= 30
+    solved = []
+    for path in paths:
+        problem = fclib.read(path)
+        result = fclib.solve(problem, "nsgs", 1e-8, time_limit=TIME_LIMIT)
+        assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
+        assert result.converged == (result.error <= 1e-8)
+        if result.converged:
+            solved.append(path.name)
+    assert len(solved) >= 0.8 * len(paths), sorted({path.name for path in paths} - set(solved))
+
+
+def test_2d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
+    paths = files("local2d", "global2d")
+    solved = 0
+    for path in paths:
+        problem = fclib.read(path)
+        result = fclib.solve(problem, "nsgs", 1e-8, time_limit=TIME_LIMIT)
+        assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
+        solved += result.converged
+    assert solved >= 0.8 * len(paths)
+
+
+def test_condensation_agrees_with_that_of_the_index(real_data: Path) -> None:
+    pairs = 0
+    for path in files("global3d"):
+        for suffix in ("-condensed", "-gcondensed"):
+            other = real_data / "condensed3d" / f"{path.stem}{suffix}.hdf5"
+            if not other.is_file():
+                continue
+            pairs += 1
+            whole, expected = fclib.read(path), fclib.read(other)
+            assert isinstance(whole, fclib.GlobalProblem)
+            assert isinstance(expected, fclib.LocalProblem)
+            local = whole.condense()
+            difference = abs(columns(local.W) - columns(expected.W)).max()
+            assert difference <= 1e-10 * abs(columns(expected.W)).max(), path.name
+            scale = np.abs(expected.q).max()
+            np.testing.assert_allclose(local.q, expected.q, atol=1e-10 * scale, rtol=1e-10)
+    assert pairs >= 5
+
+
+def test_stored_solutions_are_not_believed(real_data: Path) -> None:
+    judged = 0
+    for path in files(*KINDS):
+        solution = fclib.read_solution(path)
+        if solution is None:
+            continue
+        problem = fclib.read(path)
+        merit = fclib.merit(problem, solution)
+        judged += 1
+        assert abs(merit.error - judge(problem, solution).error) <= EXACT * max(1, merit.error)
+    assert judged > 0
+
+
+def test_texts_are_those_of_the_file_and_end_where_they_end(real_data: Path) -> None:
+    for path in files(*KINDS):
+        problem = fclib.read(path)
+        with h5py.File(path) as file:
+            group = file[f"fclib_{problem.kind}"].get("info", {})
+            for name in ("title", "description", "math_info"):
+                stored = group[name][()].split(b"\0")[0] if name in group else b""
+                assert getattr(problem.info, name) == stored.decode(errors="replace"), path.name
+
+
+def test_layouts_that_are_not_known_yet_are_refused_in_one_line(real_data: Path) -> None:
+    for path in files("rolling", "rolling_local"):
+        if any(kind != "solution" for kind in fclib.contents(path)):
+            continue
+        with pytest.raises(fclib.FileError, match="holds no problem") as caught:
+            fclib.read(path)
+        assert str(path) in str(caught.value)

@@ -1,0 +1,487 @@
+"""The default solver solves what can be solved, and says honestly when it could not."""
+
+import itertools
+import signal
+import subprocess
+import sys
+import threading
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from helpers import (
+    STORAGES,
+    dense,
+    judge,
+    local_problem,
+    planted_global,
+    planted_local,
+)
+
+
+def endless() -> fclib.LocalProblem:
+    """Without a solution: two contacts push each other away, and the reactions grow."""
+    W = np.kron([[1, -1], [-1, 1]], np.eye(3))
+    return local_problem(W, [-1, 0, 0, -1, 0, 0], [0.5, 0.5])
+
+
+def hard() -> fclib.LocalProblem:
+    """Many iterations from a solution."""
+    problem = planted_local(1, nc=30).problem
+    assert isinstance(problem, fclib.LocalProblem)
+    return problem
+
+
+def assert_solved(problem: fclib.Problem, result: fclib.Result, tol: float = 1e-8) -> None:
+    assert result.status == "converged"
+    assert result.converged
+    assert result.error <= tol
+    assert judge(problem, result.solution).error <= tol * (1 + 1e-6)
+
+
+# ---- problems with known solutions
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize("mixed", [0, 3])
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("kind", ["local", "global"])
+def test_planted_problems_are_solved(kind: str, d: int, mixed: int, storage: str) -> None:
+    make = planted_local if kind == "local" else planted_global
+    for seed in range(5):
+        case = make(seed, d=d, nc=8, p=mixed, storage=storage)
+        result = fclib.solve(case.problem)
+        assert_solved(case.problem, result)
+        assert (result.solution.v is None) == (kind == "local")
+        assert result.solution.u is not None
+        # contacts weakly coupled, friction moderate: the solution is unique
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-5)
+        merit = fclib.merit(case.problem, result.solution)
+        assert (merit.open, merit.stick, merit.slide) == case.statuses
+
+
+@pytest.mark.parametrize("tol", [1e-2, 1e-4, 1e-12])
+def test_the_tolerance_is_kept(tol: float) -> None:
+    for make in (planted_local, planted_global):
+        case = make(3, nc=10)
+        assert_solved(case.problem, fclib.solve(case.problem, tol=tol), tol)
+
+
+@pytest.mark.parametrize(("d", "kind"), itertools.product([2, 3], ["local", "global"]))
+def test_bilateral_constraints_hold(d: int, kind: str) -> None:
+    make = planted_local if kind == "local" else planted_global
+    problem = make(7, d=d, nc=5, p=4).problem
+    solution = fclib.solve(problem, tol=1e-10).solution
+    r, lam = solution.r, solution.l
+    assert lam is not None
+    if isinstance(problem, fclib.LocalProblem):
+        assert problem.s is not None
+        residual = dense(problem.V).T @ r + dense(problem.R) @ lam + problem.s
+    else:
+        v = solution.v
+        assert v is not None
+        assert problem.b is not None
+        residual = dense(problem.G).T @ v + problem.b
+        dynamics = dense(problem.M) @ v - dense(problem.H) @ r - dense(problem.G) @ lam - problem.f
+        assert np.abs(dynamics).max() < 1e-9
+    assert np.abs(residual).max() < 1e-9
+
+
+def test_an_asymmetric_matrix_is_not_taken_for_a_symmetric_one() -> None:
+    for seed, d in itertools.product(range(5), [2, 3]):
+        case = planted_local(seed, d=d, nc=8, skew=1.0)
+        W = dense(case.problem.W) if isinstance(case.problem, fclib.LocalProblem) else None
+        assert W is not None
+        assert np.abs(W - W.T).max() > 0.05
+        assert_solved(case.problem, fclib.solve(case.problem))
+
+
+def test_an_asymmetric_mass_is_not_taken_for_a_symmetric_one() -> None:
+    rng = np.random.default_rng(1)
+    M = np.eye(9) + 0.2 * rng.standard_normal((9, 9))
+    problem = fclib.GlobalProblem(
+        M=M, H=np.eye(9), f=rng.standard_normal(9), w=np.zeros(9), mu=[0.3, 0.2, 0.1]
+    )
+    result = fclib.solve(problem)
+    assert_solved(problem, result)
+    assert result.solution.v is not None
+    np.testing.assert_allclose(M @ result.solution.v, result.solution.r + problem.f, atol=1e-12)
+
+
+# ---- small cases, known by hand
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize(
+    ("q", "mu", "r"),
+    [
+        ([1, 2], 0.5, [0, 0]),  # it leaves
+        ([-1, 0.2], 0.5, [1, -0.2]),  # it sticks
+        ([-1, 2], 0.5, [1, -0.5]),  # it slides
+        ([-1, -2], 0.5, [1, 0.5]),
+        ([-1, 2], 0, [1, 0]),  # it slides without friction
+        ([-1, 2], 1e3, [1, -2]),  # it cannot but stick
+        ([0, 0], 0.5, [0, 0]),
+        ([0, 1], 0.5, [0, 0]),  # it grazes
+    ],
+)
+def test_one_contact(d: int, q: list[float], mu: float, r: list[float]) -> None:
+    problem = local_problem(np.eye(d), [*q, 0.0][:d], [mu])
+    result = fclib.solve(problem, tol=1e-12)
+    assert_solved(problem, result, 1e-12)
+    np.testing.assert_allclose(result.solution.r, [*r, 0.0][:d], atol=1e-11)
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-6, 1e3])
+def test_extreme_friction(mu: float) -> None:
+    for d in (2, 3):
+        case = planted_local(2, d=d, nc=6, mu=mu)
+        assert_solved(case.problem, fclib.solve(case.problem))
+
+
+def test_a_contact_without_compliance() -> None:
+    for q in ([1, 0.5, 0], [0, 0, 0], [1, 0, 0]):
+        case = planted_local(4, nc=2)
+        assert isinstance(case.problem, fclib.LocalProblem)
+        W = np.zeros((9, 9))
+        W[3:, 3:] = dense(case.problem.W)
+        problem = local_problem(W, [*q, *case.problem.q], [0.5, *case.problem.mu])
+        result = fclib.solve(problem)
+        assert_solved(problem, result)
+        np.testing.assert_allclose(result.solution.r[3:], case.solution.r, atol=1e-6)
+
+
+def test_no_compliance_at_all() -> None:
+    problem = local_problem(np.zeros((6, 6)), [1, 0.5, 0, 0, 0, 0], [0.5, 0.5])
+    result = fclib.solve(problem)
+    assert_solved(problem, result)
+    assert not result.solution.r[:3].any()
+
+
+def test_no_contact_at_all() -> None:
+    for d in (2, 3):
+        problem = fclib.LocalProblem(spacedim=d, W=np.zeros((0, 0)), q=[], mu=[])
+        result = fclib.solve(problem)
+        assert_solved(problem, result)
+        assert result.solution.r.shape == (0,)
+        case = planted_global(1, d=d, nc=0, p=2)
+        result = fclib.solve(case.problem)
+        assert_solved(case.problem, result)
+        assert result.solution.v is not None
+        assert case.solution.v is not None
+        np.testing.assert_allclose(result.solution.v, case.solution.v, atol=1e-12)
+
+
+# ---- units
+
+
+def scaled(problem: fclib.LocalProblem, mass: float, speed: float) -> fclib.LocalProblem:
+    """The same problem in a unit of mass 1/mass, and of speed 1/speed."""
+    return fclib.LocalProblem(
+        spacedim=problem.spacedim, W=problem.W / mass, q=problem.q * speed, mu=problem.mu
+    )
+
+
+@pytest.mark.parametrize("speed", [1e-6, 1e-3, 1e3, 1e6])
+def test_units_of_length_and_time_change_nothing(speed: float) -> None:
+    for seed in range(3):
+        problem = planted_local(seed, nc=10).problem
+        assert isinstance(problem, fclib.LocalProblem)
+        first, second = fclib.solve(problem), fclib.solve(scaled(problem, 1, speed))
+        assert second.converged
+        assert abs(first.iterations - second.iterations) <= 1
+        np.testing.assert_allclose(second.solution.r / speed, first.solution.r, atol=1e-7)
+
+
+@pytest.mark.parametrize("mass", [1e-6, 1e-3, 1e3, 1e6])
+def test_units_of_mass_do_not_change_the_iterates(mass: float) -> None:
+    # the error does change: it adds impulses and velocities
+    for seed in range(3):
+        problem = planted_local(seed, nc=10).problem
+        assert isinstance(problem, fclib.LocalProblem)
+        first = fclib.solve(problem, tol=0, max_iterations=6)
+        second = fclib.solve(scaled(problem, mass, 1), tol=0, max_iterations=6)
+        assert first.iterations == second.iterations == 6
+        np.testing.assert_allclose(second.solution.r / mass, first.solution.r, atol=1e-10)
+
+
+@pytest.mark.parametrize("mass", [1e-6, 1e-3, 1e3, 1e6])
+def test_problems_in_any_unit_of_mass_are_solved(mass: float) -> None:
+    for seed in range(3):
+        problem = planted_local(seed, nc=10).problem
+        assert isinstance(problem, fclib.LocalProblem)
+        other = scaled(problem, mass, 1)
+        # impulses of the size of mass round to 1e-16 of it
+        tol = 1e-8 * max(1, mass)
+        assert_solved(other, fclib.solve(other, tol=tol), tol)
+
+
+# ---- limits, callback, warm start
+
+
+def test_the_iteration_limit_is_kept_and_said() -> None:
+    for limit in (1, 2, 7):
+        result = fclib.solve(hard(), tol=1e-14, max_iterations=limit)
+        assert result.status == "iteration_limit"
+        assert not result.converged
+        assert result.iterations == limit
+        assert result.error > 1e-14
+        assert result.error == pytest.approx(judge(hard(), result.solution).error, rel=1e-9)
+
+
+def test_the_limit_holds_for_all_runs_of_the_solver_together() -> None:
+    """The merit of a badly scaled global problem sends the solver back to work."""
+    for seed in range(10):
+        case = planted_global(seed, nc=5, p=3)
+        for tol, limit in itertools.product([1e-13, 1e-15, 1e-16], [5, 50]):
+            result = fclib.solve(case.problem, tol=tol, max_iterations=limit)
+            assert result.iterations <= limit
+            assert result.converged == (result.error <= tol)
+
+
+def test_the_time_limit_is_kept_and_said() -> None:
+    result = fclib.solve(endless(), max_iterations=10**15, time_limit=0.2)
+    assert result.status == "time_limit"
+    assert not result.converged
+    assert result.error > 0.1
+    assert result.iterations > 0
+
+
+@pytest.mark.parametrize("limit", [5, 50, 500])
+def test_a_problem_without_a_solution_is_not_solved(limit: int) -> None:
+    penetrating = local_problem(np.zeros((3, 3)), [-1, 0, 0], [0.5])
+    for problem in (endless(), penetrating):
+        result = fclib.solve(problem, max_iterations=limit)
+        assert result.status != "converged"
+        assert result.error > 0.1
+        assert result.error == pytest.approx(judge(problem, result.solution).error)
+
+
+def test_the_callback_follows_the_iterations() -> None:
+    history: list[tuple[int, float, float]] = []
+    result = fclib.solve(hard(), callback=lambda *progress: history.append(progress))
+    assert result.converged
+    iterations, errors, times = zip(*history, strict=True)
+    assert iterations[0] == 0
+    assert iterations[-1] == result.iterations
+    assert list(iterations) == sorted(set(iterations))
+    assert list(times) == sorted(times)
+    assert errors[-1] == pytest.approx(result.error, rel=1e-6)
+    assert errors[0] > errors[-1]
+
+
+def test_the_callback_stops_the_solver() -> None:
+    result = fclib.solve(hard(), tol=1e-14, callback=lambda iteration, *_: iteration < 3)
+    assert result.status == "interrupted"
+    assert not result.converged
+    assert 3 <= result.iterations < 6
+    assert result.error == pytest.approx(judge(hard(), result.solution).error, rel=1e-9)
+
+
+def test_an_error_of_the_callback_comes_through() -> None:
+    def fail(*_: object) -> None:
+        raise LookupError("from the callback")
+
+    with pytest.raises(LookupError, match="from the callback"):
+        fclib.solve(hard(), callback=fail)
+
+
+def test_a_guess_at_the_solution_needs_no_work() -> None:
+    for case in (
+        planted_local(1, nc=10),
+        planted_local(1, nc=10, p=2),
+        planted_global(1, nc=10),
+        planted_global(1, d=2, nc=10, p=2),
+    ):
+        result = fclib.solve(case.problem, guess=case.solution)
+        assert_solved(case.problem, result)
+        assert result.iterations <= 1
+        assert fclib.solve(case.problem).iterations > 1
+
+
+def test_a_guess_that_does_not_fit_is_an_error() -> None:
+    problem = hard()
+    for r in (np.zeros(problem.m - 1), np.zeros(3), np.full(problem.m, np.nan)):
+        with pytest.raises(fclib.ProblemError, match="guess"):
+            fclib.solve(problem, guess=fclib.Solution(r=r))
+
+
+def test_the_same_call_gives_the_same_bits() -> None:
+    for case in (planted_local(1, nc=20), planted_global(2, nc=6, p=2)):
+        first, second = fclib.solve(case.problem), fclib.solve(case.problem)
+        assert first.iterations == second.iterations
+        assert first.error == second.error
+        np.testing.assert_array_equal(first.solution.r, second.solution.r)
+
+
+def test_invalid_problems_are_not_solved() -> None:
+    for problem in (
+        local_problem(np.eye(3), [np.nan, 0, 0], [1.0]),
+        local_problem(np.eye(3), [0, 0, 0], [-1.0]),
+        fclib.LocalProblem(W=np.eye(3), q=np.zeros(6), mu=[1.0, 1.0]),
+    ):
+        with pytest.raises(fclib.ProblemError):
+            fclib.solve(problem)
+
+
+def test_singular_bilateral_constraints_are_unsuitable() -> None:
+    G = np.ones((9, 2))  # the same constraint twice
+    rng = np.random.default_rng(1)
+    problem = fclib.GlobalProblem(
+        M=np.eye(9),
+        H=np.eye(9, 3),
+        G=G,
+        f=rng.standard_normal(9),
+        w=np.zeros(3),
+        mu=[0.5],
+        b=[0, 0],
+    )
+    with pytest.raises(fclib.UnsuitableError, match="R"):
+        fclib.solve(problem)
+
+
+# ---- options
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ({"solver": "no such solver"}, "no such solver"),
+        ({"solver": ""}, "solver"),
+        ({"no_such_option": 1}, "no_such_option"),
+        ({"relaxation": "fast"}, "relaxation"),
+        ({"relaxation": True}, "relaxation"),
+        ({"relaxation": 0.0}, "relaxation"),
+        ({"relaxation": 2.0}, "relaxation"),
+        ({"relaxation": float("nan")}, "relaxation"),
+        ({"relaxation": ""}, "relaxation"),
+        ({"relaxation": [1.0]}, "relaxation"),
+        ({"relaxation": None}, "relaxation"),
+        ({"seed": 1.5}, "seed"),
+        ({"seed": -1}, "seed"),
+        ({"seed": 2**64}, "seed"),
+        ({"shuffle": "sometimes"}, "shuffle"),
+        ({"shuffle": 1}, "shuffle"),
+        ({"tol": -1e-8}, "tol"),
+        ({"tol": float("nan")}, "tol"),
+        ({"max_iterations": 0}, "max_iterations"),
+        ({"max_iterations": -5}, "max_iterations"),
+        ({"time_limit": 0.0}, "time_limit"),
+        ({"time_limit": float("nan")}, "time_limit"),
+    ],
+    ids=str,
+)
+def test_a_wrong_option_is_named(arguments: dict[str, Any], named: str) -> None:
+    with pytest.raises(fclib.OptionError, match=named) as caught:
+        fclib.solve(hard(), **arguments)
+    assert "\n" not in str(caught.value)
+    assert isinstance(caught.value, ValueError)
+
+
+def test_an_unknown_name_comes_with_the_known_ones() -> None:
+    with pytest.raises(fclib.OptionError, match="nsgs"):
+        fclib.solve(hard(), "nsgz")
+    with pytest.raises(fclib.OptionError, match="relaxation"):
+        fclib.solve(hard(), relax=1.0)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"relaxation": 1},
+        {"relaxation": np.float64(1.2)},
+        {"relaxation": "1.2"},
+        {"seed": np.int64(3), "shuffle": "once"},
+        {"shuffle": "always", "seed": "7"},
+        {"local_solver": "projection"},
+        {"local_solver": "projection", "shuffle": "always", "relaxation": 0.8},
+        {"error_interval": 5},
+    ],
+    ids=str,
+)
+def test_every_configuration_solves(options: dict[str, Any]) -> None:
+    for make, d, p in itertools.product([planted_local, planted_global], [2, 3], [0, 2]):
+        case = make(5, d=d, nc=8, p=p)
+        assert_solved(case.problem, fclib.solve(case.problem, **options))
+
+
+def test_the_seed_chooses_the_order() -> None:
+    def iterate(seed: int) -> Any:
+        return fclib.solve(hard(), tol=0, max_iterations=3, shuffle="always", seed=seed).solution.r
+
+    np.testing.assert_array_equal(iterate(1), iterate(1))
+    assert np.abs(iterate(1) - iterate(2)).max() > 1e-6
+
+
+# ---- signals and threads
+
+
+def test_ctrl_c_stops_a_long_solve() -> None:
+    code = (
+        "import numpy as np, fclib\n"
+        "W = np.kron([[1, -1], [-1, 1]], np.eye(3))\n"
+        "problem = fclib.LocalProblem(W=W, q=[-1, 0, 0, -1, 0, 0], mu=[0.5, 0.5])\n"
+        "told = False\n"
+        "def tell(*_):\n"
+        "    global told\n"
+        "    if not told:\n"
+        "        print('solving', flush=True)\n"
+        "    told = True\n"
+        "try:\n"
+        "    fclib.solve(problem, callback=tell, max_iterations=10**15)\n"
+        "except KeyboardInterrupt:\n"
+        "    print('interrupted', flush=True)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "solving\n"
+        process.send_signal(signal.SIGINT)
+        try:
+            output, errors = process.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise
+    assert output == "interrupted\n", errors
+    assert process.returncode == 0
+
+
+def test_python_goes_on_while_a_solver_runs() -> None:
+    moments: list[float] = []
+    done = threading.Event()
+
+    def tick() -> None:
+        while not done.wait(0.005):
+            moments.append(time.monotonic())
+
+    ticker = threading.Thread(target=tick)
+    ticker.start()
+    start = time.monotonic()
+    result = fclib.solve(endless(), max_iterations=10**15, time_limit=0.5)
+    end = time.monotonic()
+    done.set()
+    ticker.join()
+    assert result.status == "time_limit"
+    within = [moment for moment in moments if start + 0.05 < moment < end - 0.05]
+    assert len(within) >= 3
+
+
+def test_threads_solve_at_once_and_right() -> None:
+    cases = [planted_local(seed, nc=20) for seed in range(6)]
+    expected = [fclib.solve(case.problem, tol=1e-10).solution.r for case in cases]
+    found: list[Any] = [None] * len(cases)
+
+    def work(k: int) -> None:
+        found[k] = fclib.solve(cases[k].problem, tol=1e-10, callback=lambda *_: True).solution.r
+
+    threads = [threading.Thread(target=work, args=(k,)) for k in range(len(cases))]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for r, right in zip(found, expected, strict=True):
+        np.testing.assert_array_equal(r, right)

@@ -14,6 +14,7 @@
 
 #include <filesystem>
 
+#include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "fields.hpp"
@@ -92,7 +93,7 @@ std::string class_name(std::string_view kind) {
 template <class P>
 void bind_problem(nb::module_& m) {
   const std::string name = class_name(P::kind);
-  nb::class_<P> cls(m, name.c_str());
+  nb::class_<P> cls(m, name.c_str(), P::doc);
   def_construction(cls);
   def_fields(cls);
   cls.def_prop_ro("info", [](const P& p) { return p.info; }, "title, description, math_info");
@@ -269,8 +270,8 @@ void bind_files(nb::module_& m) {
       "file holds several.\n\nRaises FileError, or ProblemError, naming file and dataset.");
   m.def(
       "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
-      nb::sig(signature("read_solution", "", "Solution | None").c_str()), nb::call_guard<Unlocked>(),
-      "The stored solution of a file, or None. Raises FileError.");
+      nb::sig(signature("read_solution", "", "Solution | None").c_str()),
+      nb::call_guard<Unlocked>(), "The stored solution of a file, or None. Raises FileError.");
   m.def(
       "contents",
       [](const fs::path& path) {
@@ -278,32 +279,42 @@ void bind_files(nb::module_& m) {
         if (contents.solution) contents.kinds.emplace_back("solution");
         return contents.kinds;
       },
-      "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()),
-      nb::call_guard<Unlocked>(), "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
+      "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
+      "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
   m.def(
       "write_solution",
       [](const fs::path& path, const Solution& solution) {
-        write_solution(path.string(), solution);
+        const Problem problem = read_problem(path.string());
+        const Solution whole =
+            std::visit([&](const auto& p) { return complete(p, solution); }, problem);
+        write_solution(path.string(), whole);
       },
       "path"_a, "solution"_a,
       nb::sig(signature("write_solution", ", solution: Solution", "None").c_str()),
-      nb::call_guard<Unlocked>(), "Puts a solution into a file that has its problem, in place of the one it had, "
+      nb::call_guard<Unlocked>(),
+      "Puts a solution into a file that has its problem, in place of the one it had, "
       "atomically.\n\n"
       "Raises FileError, or ProblemError where the sizes disagree.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
         "write",
         [](const fs::path& path, const P& problem, const Solution* solution) {
-          write_file(path.string(), &problem, solution);
+          if (solution == nullptr) {
+            write_file(path.string(), &problem);
+          } else {
+            const Solution whole = complete(problem, *solution);
+            write_file(path.string(), &problem, &whole);
+          }
         },
         "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
-        nb::sig(signature("write",
-                          ", problem: " + class_name(P::kind) +
-                              ", solution: Solution | None = None",
-                          "None")
-                    .c_str()),
+        nb::sig(
+            signature("write",
+                      ", problem: " + class_name(P::kind) + ", solution: Solution | None = None",
+                      "None")
+                .c_str()),
         nb::call_guard<Unlocked>(),
-        "Writes an FCLIB file, or replaces the old one whole, atomically.\n\n"
+        "Writes an FCLIB file, or replaces the old one whole, atomically. What the solution lacks "
+        "of v and u is completed: readers of libfclib 3.1 need it.\n\n"
         "Raises FileError, or ProblemError where the data is not valid.");
   });
 }
@@ -312,7 +323,8 @@ void bind_files(nb::module_& m) {
 
 NB_MODULE(_core, m) {
   m.doc() = "The core of fclib, in C++.";
-  nb::set_leak_warnings(false);  // module-level references at exit are the interpreter's own business
+  nb::set_leak_warnings(
+      false);  // module-level references at exit are the interpreter's own business
   m.attr("version") = version;
   bind_errors(m);
 

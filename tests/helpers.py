@@ -20,9 +20,14 @@ STORAGES = ("csr", "csc", "coo", "dense")
 # ---- the judge: the equations, in NumPy
 
 
+def tangential_norm(x: Array) -> Array:
+    """||x_T|| of each row, without overflow where its square would."""
+    return np.asarray(np.hypot.reduce(np.abs(x[:, 1:]), axis=1))
+
+
 def project(x: Array, mu: Array) -> Array:
     """The projection of each row on { ||x_T|| <= mu x_N }: x itself, or its part along a ray."""
-    norm = np.linalg.norm(x[:, 1:], axis=1)
+    norm = tangential_norm(x)
     directions = x[:, 1:] / np.where(norm > 0, norm, 1)[:, None]
     rays = np.column_stack([np.ones_like(mu), mu[:, None] * directions])
     rays /= np.sqrt(1 + mu**2)[:, None]
@@ -33,7 +38,7 @@ def project(x: Array, mu: Array) -> Array:
 def modified(u: Array, mu: Array) -> Array:
     """u^ = u + [mu ||u_T||, 0, 0] of each row."""
     result = u.copy()
-    result[:, 0] += mu * np.linalg.norm(u[:, 1:], axis=1)
+    result[:, 0] += mu * tangential_norm(u)
     return result
 
 
@@ -44,7 +49,7 @@ def natural_map(r: Array, hat: Array, mu: Array) -> Array:
     P_K(y) = 0, and along the normal of the cone's boundary elsewhere.
     """
     y = r - hat
-    norm = np.linalg.norm(y[:, 1:], axis=1)
+    norm = tangential_norm(y)
     directions = y[:, 1:] / np.where(norm > 0, norm, 1)[:, None]
     gap = norm - mu * y[:, 0]
     normal = (gap / (1 + mu**2))[:, None] * np.column_stack([-mu, directions])
@@ -88,40 +93,48 @@ def columns(a: Any) -> Any:
     return result
 
 
+def sizes(a: Any, x: Array) -> Array:
+    """What the product a @ x adds up, however much of it cancels."""
+    return np.asarray(abs(a) @ abs(x))
+
+
 def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
     """Judge a solution by the equations of its formulation."""
     d, mu, r = problem.spacedim, problem.mu, solution.r
     dynamics = bilateral = kinematics = 0.0
     if isinstance(problem, fclib.LocalProblem):
         q = problem.q
-        terms = [columns(problem.W) @ r]
+        W = columns(problem.W)
+        u = W @ r + q
+        velocity_terms = [sizes(W, r), q]
         if problem.V is not None:
             V, R, lam, s = columns(problem.V), columns(problem.R), solution.l, problem.s
             assert lam is not None
             assert s is not None
-            terms.append(V @ lam)
-            bilateral = relative(V.T @ r + R @ lam + s, abs(V).T @ abs(r), R @ lam, s)
-        u = np.sum(terms, axis=0) + q
-        velocity_terms = [*terms, q]
-        diagonal = columns(problem.W).diagonal()
+            u = u + V @ lam
+            velocity_terms.append(sizes(V, lam))
+            bilateral = relative(V.T @ r + R @ lam + s, sizes(V.T, r), sizes(R, lam), s)
+        diagonal = W.diagonal()
     else:
         M, H, f, w = columns(problem.M), columns(problem.H), problem.f, problem.w
         solve = splu(M).solve if problem.n else np.copy
-        impulses = [H @ r, f]
+        impulse = H @ r + f
+        impulse_terms = [sizes(H, r), f]
         if problem.G is not None:
             assert solution.l is not None
-            impulses.append(columns(problem.G) @ solution.l)
+            impulse = impulse + columns(problem.G) @ solution.l
+            impulse_terms.append(sizes(columns(problem.G), solution.l))
         v = solution.v
         if v is None:
-            v = solve(np.sum(impulses, axis=0))
+            v = solve(impulse)
         else:
-            dynamics = relative(M @ v - np.sum(impulses, axis=0), M @ v, *impulses)
+            dynamics = relative(M @ v - impulse, sizes(M, v), *impulse_terms)
         if problem.G is not None:
             G, b = columns(problem.G), problem.b
             assert b is not None
-            bilateral = relative(G.T @ v + b, abs(G).T @ abs(v), b)
+            bilateral = relative(G.T @ v + b, sizes(G.T, v), b)
         u = H.T @ v + w
-        velocity_terms = [H.T @ v, w]
+        velocity_terms = [sizes(H.T, v), w]
         q = H.T @ solve(f) + w
         y = solve(H.toarray()) if problem.n and problem.m else np.zeros(H.shape)
         diagonal = np.sum(H.toarray() * y, axis=0)

@@ -1,5 +1,8 @@
 #include "convert/eliminate.hpp"
 
+#include <cmath>
+#include <limits>
+
 namespace fclib {
 
 Elimination::Elimination(const LocalProblem& problem)
@@ -9,7 +12,15 @@ Elimination::Elimination(const LocalProblem& problem)
   plain_.info = problem.info;
   const SparseColumns v = to_eigen(problem.V);
   const SparseColumns coupling = bilateral_.solve(SparseColumns(v.transpose()));
-  const SparseColumns w = to_eigen(problem.W) - SparseColumns(v * coupling);
+  // what the bilateral constraints hold entirely is zero, not the rounding of a difference
+  const SparseColumns full = to_eigen(problem.W);
+  const SparseColumns held = v * coupling;
+  SparseColumns w = full - held;
+  const SparseColumns size = SparseColumns(full.cwiseAbs()) + SparseColumns(held.cwiseAbs());
+  constexpr double rounding = 16 * std::numeric_limits<double>::epsilon();
+  w.prune([&](Eigen::Index row, Eigen::Index col, double value) {
+    return std::abs(value) > rounding * size.coeff(row, col);
+  });
   plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
   plain_.q = problem.q - v * bilateral_.solve(problem.s);
 }

@@ -34,7 +34,8 @@ Problem read_problem(const std::string& path, std::string_view kind = {});
 /// problem: merit() and solve() do.
 std::optional<Solution> read_solution(const std::string& path);
 
-/// Writes a new file, or replaces the old one whole.
+/// Writes a new file, or replaces the old one whole. A solution must be complete (v for a global
+/// problem, u): the readers of libfclib 3.1 end their host's process where it is not.
 void write_file(const std::string& path, ProblemPointer problem,
                 const Solution* solution = nullptr);
 

@@ -89,17 +89,15 @@ SparseColumns to_eigen(const Matrix& a);
 template <class X, class Y>
 void multiply_add(const Matrix& a, const X& x, Y& y) {
   using Real = typename Y::Scalar;
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    y[row] += Real(value) * Real(x[col]);
-  });
+  for_each_entry(a,
+                 [&](Index row, Index col, double value) { y[row] += Real(value) * Real(x[col]); });
 }
 /// y += A^T x, with x of length rows and y of length cols, in the precision of y.
 template <class X, class Y>
 void multiply_transposed_add(const Matrix& a, const X& x, Y& y) {
   using Real = typename Y::Scalar;
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    y[col] += Real(value) * Real(x[row]);
-  });
+  for_each_entry(a,
+                 [&](Index row, Index col, double value) { y[col] += Real(value) * Real(x[row]); });
 }
 
 }  // namespace fclib

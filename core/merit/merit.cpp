@@ -28,11 +28,13 @@ RealVector product_transposed(const Matrix& a, const RealVector& x) {
   return y;
 }
 
-/// || |A|^T |x| ||: the size of the products that A^T x adds up, whatever they cancel to.
-Real term_size_transposed(const Matrix& a, const RealVector& x) {
+/// || |A| |x| ||: the size of what the product adds up, however much of it cancels. A velocity that
+/// vanishes is a sum of terms that do not, and its rounding is relative to them.
+Real size_of_product(const Matrix& a, const RealVector& x, bool transposed = false) {
   Matrix sizes = a;
   for (double& value : sizes.x) value = std::abs(value);
-  return product_transposed(sizes, x.cwiseAbs()).norm();
+  return (transposed ? product_transposed(sizes, x.cwiseAbs()) : product(sizes, x.cwiseAbs()))
+      .norm();
 }
 
 double relative(Real residual, std::initializer_list<Real> terms) {
@@ -44,8 +46,8 @@ void raise(double& largest, Real value) { largest = std::max(largest, static_cas
 
 /// The parts that depend on one contact at a time. `scale` is tr(W_aa) / d of each contact.
 template <int D>
-void judge_contacts(const Vector& mu, const RealVector& q, const RealVector& u,
-                    const RealVector& r, const RealVector& scale, Merit& result) {
+void judge_contacts(const Vector& mu, const RealVector& q, const RealVector& u, const RealVector& r,
+                    const RealVector& scale, Merit& result) {
   Real squares = 0;
   Real scaled_squares = 0;
   Real scaled_q = 0;
@@ -103,21 +105,20 @@ Merit merit(const LocalProblem& problem, const Solution& solution) {
   const RealVector r = solution.r.cast<Real>();
 
   // u = W r + V lambda + q
-  const RealVector from_r = product(problem.W, r);
-  RealVector from_l = RealVector::Zero(q.size());
+  RealVector u = product(problem.W, r) + q;
+  Real largest = std::max(size_of_product(problem.W, r), q.norm());
   if (is_mixed(problem)) {
     const RealVector l = solution.l.cast<Real>();
     const RealVector s = problem.s.cast<Real>();
-    from_l = product(problem.V, l);
-    const RealVector rl = product(problem.R, l);
-    result.bilateral = relative((product_transposed(problem.V, r) + rl + s).norm(),
-                                {term_size_transposed(problem.V, r), rl.norm(), s.norm()});
+    u += product(problem.V, l);
+    largest = std::max(largest, size_of_product(problem.V, l));
+    result.bilateral =
+        relative((product_transposed(problem.V, r) + product(problem.R, l) + s).norm(),
+                 {size_of_product(problem.V, r, true), size_of_product(problem.R, l), s.norm()});
   }
-  const RealVector u = from_r + from_l + q;
   if (solution.u.size() > 0) {
     const RealVector given = solution.u.cast<Real>();
-    result.kinematics =
-        relative((given - u).norm(), {given.norm(), from_r.norm(), from_l.norm(), q.norm()});
+    result.kinematics = relative((given - u).norm(), {given.norm(), largest});
   }
 
   RealVector scale = RealVector::Zero(problem.mu.size());
@@ -137,35 +138,35 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
   const RealVector r = solution.r.cast<Real>();
 
   // M v = H r + G lambda + f
-  const RealVector hr = product(problem.H, r);
-  RealVector gl = RealVector::Zero(f.size());
-  if (is_mixed(problem)) gl = product(problem.G, solution.l.cast<Real>());
+  RealVector momentum = product(problem.H, r) + f;
+  Real largest = std::max(size_of_product(problem.H, r), f.norm());
+  if (is_mixed(problem)) {
+    const RealVector l = solution.l.cast<Real>();
+    momentum += product(problem.G, l);
+    largest = std::max(largest, size_of_product(problem.G, l));
+  }
   RealVector v = solution.v.cast<Real>();
   if (v.size() == 0) {
-    const RealVector momentum = hr + gl + f;
     v = mass.solve(momentum.cast<double>()).cast<Real>();
   } else {
-    const RealVector mv = product(problem.M, v);
-    result.dynamics =
-        relative((mv - hr - gl - f).norm(), {mv.norm(), hr.norm(), gl.norm(), f.norm()});
+    result.dynamics = relative((product(problem.M, v) - momentum).norm(),
+                               {size_of_product(problem.M, v), largest});
   }
   if (is_mixed(problem)) {
-    // G^T v vanishes where b does, so that its own norm would compare rounding with rounding
     const RealVector b = problem.b.cast<Real>();
     result.bilateral = relative((product_transposed(problem.G, v) + b).norm(),
-                                {term_size_transposed(problem.G, v), b.norm()});
+                                {size_of_product(problem.G, v, true), b.norm()});
   }
 
   // u = H^T v + w
-  const RealVector hv = product_transposed(problem.H, v);
-  const RealVector u = hv + w;
+  const RealVector u = product_transposed(problem.H, v) + w;
   if (solution.u.size() > 0) {
     const RealVector given = solution.u.cast<Real>();
-    result.kinematics = relative((given - u).norm(), {given.norm(), hv.norm(), w.norm()});
+    result.kinematics =
+        relative((given - u).norm(), {given.norm(), size_of_product(problem.H, v, true), w.norm()});
   }
 
-  const RealVector q =
-      product_transposed(problem.H, mass.solve(problem.f).cast<Real>()) + w;
+  const RealVector q = product_transposed(problem.H, mass.solve(problem.f).cast<Real>()) + w;
   RealVector scale = RealVector::Zero(problem.mu.size());
   const SparseColumns h = to_eigen(problem.H);
   const SparseColumns y = mass.is_cholesky() ? mass.half_solve(h) : mass.solve(h);

@@ -3,6 +3,10 @@
 // The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
 // error = ||F||_2 / ||q||_2, absolute where q is zero. u is recomputed: W r + V lambda + q, or
 // H^T v + w, never taken from the solution. All sums are made in extended precision.
+//
+// The residual of an equation is relative to its largest term, and the size of a term A x is
+// || |A| |x| ||: where the term itself vanishes (contacts at rest), its norm would compare rounding
+// with rounding.
 #pragma once
 
 #include <string_view>
@@ -45,9 +49,7 @@ struct Merit {
                          .doc = "||M v - H r - G lambda - f|| over its largest term"},
         Field<M, double>{.name = "bilateral",
                          .member = &M::bilateral,
-                         .doc =
-                             "||G^T v + b|| (or ||V^T r + R lambda + s||) over its largest term, "
-                             "the products of G^T v and V^T r taken without cancellation"},
+                         .doc = "||G^T v + b|| or ||V^T r + R lambda + s|| over its largest term"},
         Field<M, double>{.name = "kinematics",
                          .member = &M::kinematics,
                          .doc = "distance of the solution's u from the recomputed one, over the "

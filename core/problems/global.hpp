@@ -22,8 +22,10 @@ namespace fclib {
 
 struct GlobalProblem {
   static constexpr std::string_view kind = "global";  // the group /fclib_global
-  static constexpr std::string_view prefix = "G";     // of the formulation's name
-  static constexpr bool triplets_on_disk = true;      // the one storage that Siconos reads
+  static constexpr const char* doc =
+      "The global problem: M v = H r + f (+ G lambda), u = H^T v + w, Coulomb's law.";
+  static constexpr std::string_view prefix = "G";  // of the formulation's name
+  static constexpr bool triplets_on_disk = true;   // the one storage that Siconos reads
 
   Index spacedim = 3;
   Matrix M;

@@ -24,8 +24,10 @@ namespace fclib {
 
 struct LocalProblem {
   static constexpr std::string_view kind = "local";  // the group /fclib_local
-  static constexpr std::string_view prefix = "";     // of the formulation's name
-  static constexpr bool triplets_on_disk = false;    // W keeps its storage
+  static constexpr const char* doc =
+      "The local problem: u = W r + q (+ V lambda), Coulomb's law at each contact.";
+  static constexpr std::string_view prefix = "";   // of the formulation's name
+  static constexpr bool triplets_on_disk = false;  // W keeps its storage
 
   Index spacedim = 3;
   Matrix W;

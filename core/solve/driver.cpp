@@ -29,10 +29,15 @@ struct Request {
 };
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
+/// `q` is the one that the merit is relative to.
 template <class Judge>
-Result run(const LocalProblem& plain, const Request& request, const Solution& guess,
-           const Judge& judge) {
-  const Delassus reduced{BlockMatrix(plain.W, plain.spacedim), plain.q, plain.mu};
+Result run(const LocalProblem& plain, const Vector& q, const Request& request,
+           const Solution& guess, const Judge& judge) {
+  const double norm_q = q.norm();
+  const Delassus reduced{.W = BlockMatrix(plain.W, plain.spacedim),
+                         .q = plain.q,
+                         .mu = plain.mu,
+                         .scale = norm_q > 0 ? norm_q : 1.0};
   Result result;
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
@@ -52,8 +57,11 @@ Result run(const LocalProblem& plain, const Request& request, const Solution& gu
     }
     result.solution.r = r;
     result.error = judge(result.solution);
-    if (result.status != Status::converged || result.error <= request.settings.tolerance)
+    if (result.error <= request.settings.tolerance) {
+      result.status = Status::converged;
       return result;
+    }
+    if (result.status != Status::converged) return result;
     // the limits hold for all the attempts together
     settings.max_iterations = max_iterations - result.iterations;
     const std::chrono::duration<double> elapsed = Clock::now() - first_start;
@@ -89,12 +97,12 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 Result solve_local(const LocalProblem& problem, const Request& request, const Solution& guess) {
   if (is_mixed(problem)) {
     const Elimination elimination(problem);
-    return run(elimination.plain(), request, guess, [&](Solution& solution) {
+    return run(elimination.plain(), problem.q, request, guess, [&](Solution& solution) {
       solution = elimination.expand(solution);
       return merit(problem, solution).error;
     });
   }
-  return run(problem, request, guess, [&](Solution& solution) {
+  return run(problem, problem.q, request, guess, [&](Solution& solution) {
     solution.u = problem.q;
     multiply_add(problem.W, solution.r, solution.u);
     return merit(problem, solution).error;
@@ -141,9 +149,9 @@ Result solve(const GlobalProblem& problem, std::string_view solver, const Settin
       solution = condensation.expand(solution);
       return merit(problem, solution).error;
     };
-    if (!is_mixed(local)) return run(local, request, guess, judge);
+    if (!is_mixed(local)) return run(local, local.q, request, guess, judge);
     const Elimination elimination(local);
-    return run(elimination.plain(), request, guess, [&](Solution& solution) {
+    return run(elimination.plain(), local.q, request, guess, [&](Solution& solution) {
       solution = elimination.expand(solution);
       return judge(solution);
     });

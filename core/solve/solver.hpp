@@ -50,7 +50,7 @@ constexpr std::string_view name_of(Status status) {
 /// A point of the convergence history.
 struct Progress {
   std::int64_t iteration = 0;
-  double error = 0;  ///< the solver's own, relative to ||q||
+  double error = 0;  ///< the solver's own, relative to Delassus::scale
   double time = 0;   ///< wall clock since the solver started [s]
 };
 
@@ -69,6 +69,7 @@ struct Delassus {
   BlockMatrix W;
   Vector q;
   Vector mu;
+  double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
 
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }

@@ -141,15 +141,15 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
   if (options.shuffle == Shuffle::once) shuffle_order(order, random);
 
-  const double norm_q = problem.q.norm();
-  const double scale = norm_q > 0 ? 1.0 / norm_q : 1.0;
   const auto error_of = [&](const Vector& u) {
-    return scale * std::sqrt(natural_map_squared<D>(u, r, problem.mu));
+    return std::sqrt(natural_map_squared<D>(u, r, problem.mu)) / problem.scale;
   };
 
   Vector u(problem.q.size());
   problem.W.multiply_add(r, problem.q, u);
-  if (const auto stop = monitor.report(0, error_of(u))) return {*stop, 0};
+  double best_error = error_of(u);
+  Vector best = r;
+  if (const auto stop = monitor.report(0, best_error)) return {*stop, 0};
 
   Schedule schedule(options.error_interval, monitor.tolerance());
   for (std::int64_t sweep = 1;; ++sweep) {
@@ -164,8 +164,9 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
                                     static_cast<int>(options.local_iterations), next);
       }
       if (options.relaxation != 1.0) {
-        next = project_on_cone<D>(ContactVector<D>(options.relaxation * next + (1.0 - options.relaxation) * old),
-                                  problem.mu[a]);
+        next = project_on_cone<D>(
+            ContactVector<D>(options.relaxation * next + (1.0 - options.relaxation) * old),
+            problem.mu[a]);
       }
       const ContactVector<D> delta = next - old;
       if ((delta.array() == 0).all()) continue;
@@ -181,7 +182,14 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
         problem.W.multiply_add(r, problem.q, u);
         error = error_of(u);
       }
-      if (const auto stop = monitor.report(sweep, error)) return {*stop, sweep};
+      if (error <= best_error) {
+        best_error = error;
+        best = r;
+      }
+      if (const auto stop = monitor.report(sweep, error)) {
+        r = best;
+        return {*stop, sweep};
+      }
       schedule.evaluated(sweep, error);
     }
   }

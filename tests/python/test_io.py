@@ -144,7 +144,7 @@ def test_local_problems_come_back_as_they_were_stored(
 ) -> None:
     draw = data.draw
     solution = fclib.Solution(
-        u=draw_vector(draw, problem.m) if draw(st.booleans()) else None,
+        u=draw_vector(draw, problem.m),
         r=draw_vector(draw, problem.m),
         l=draw_vector(draw, problem.p) if problem.p else None,
     )
@@ -172,6 +172,23 @@ def test_global_problems_come_back_as_triplets_of_the_same_matrices(
     fclib.write_solution(path, solution)
     assert_same(problem, fclib.read(path))
     assert_same_vectors(solution, fclib.read_solution(path), ("v", "u", "r", "l"))
+
+
+@pytest.mark.parametrize("mixed", [0, 2])
+def test_velocities_that_a_solution_lacks_are_completed(scratch: Path, mixed: int) -> None:
+    path = scratch / "completed.hdf5"
+    for case in (planted_local(1, p=mixed), planted_global(1, p=mixed)):
+        reactions = fclib.Solution(r=case.solution.r, l=case.solution.l)
+        fclib.write(path, case.problem, reactions)
+        first = fclib.read_solution(path)
+        fclib.write_solution(path, reactions)
+        for stored_solution in (first, fclib.read_solution(path)):
+            assert stored_solution is not None
+            for name in ("v", "u", "r", "l"):
+                expected, found = (getattr(s, name) for s in (case.solution, stored_solution))
+                assert (expected is None) == (found is None), name
+                if expected is not None:
+                    np.testing.assert_allclose(found, expected, atol=1e-13, err_msg=name)
 
 
 @settings(max_examples=50)

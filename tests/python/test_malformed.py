@@ -443,7 +443,10 @@ def test_flipped_bytes_never_do_worse_than_an_error(corpus: Path, tmp_path: Path
     )
     assert run.returncode == 0, run.stderr[-2000:]
     assert int(run.stdout) > 100
-    assert run.stderr == ""
+    # after damaged metadata HDF5 1.10 may say, as the process ends, that it could not close its own
+    # objects: "HDF5: infinite loop closing library" and a line of their names
+    own = run.stderr.splitlines()
+    assert not own or (len(own) == 2 and own[0].startswith("HDF5: infinite loop closing"))
 
 
 # ---- solutions

@@ -136,7 +136,7 @@ class Report:
         """Report a file that could not be dealt with; the others go on."""
         self.failed = True
         if self.as_json:
-            typer.echo(json.dumps({"problem": str(path), "error": str(error)}))
+            typer.echo(json.dumps({"problem": str(path), "message": str(error)}))
         err.print(f"fclib: {error}", style="red", markup=False, highlight=False)
 
     def finish(self) -> NoReturn:

@@ -32,14 +32,22 @@ TEST(CoulombCone, projection_satisfies_the_decomposition_of_Moreau) {
 
 TEST(CoulombCone, natural_map_is_zero_for_each_status_and_not_otherwise) {
   const double mu = 0.5;
-  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
-  EXPECT_EQ(natural_map<3>({0.2, 1, -2}, none, mu).norm(), 0);              // open
-  EXPECT_EQ(natural_map<3>(none, {2, 0.3, -0.4}, mu).norm(), 0);            // stick
-  EXPECT_LT(natural_map<3>({0, 3, 4}, {2, -0.6, -0.8}, mu).norm(), 1e-15);  // slide
-  EXPECT_GT(natural_map<3>({0, 3, 4}, {2, 0.6, 0.8}, mu).norm(), 0.1);      // slides the wrong way
-  EXPECT_GT(natural_map<3>({-0.1, 0, 0}, none, mu).norm(), 0.05);           // penetrates
-  EXPECT_GT(natural_map<3>({0.1, 0, 0}, {2, 0, 0}, mu).norm(), 0.05);       // pulls away under load
-  EXPECT_GT(natural_map<3>(none, {1, 1, 0}, mu).norm(), 0.1);               // outside the cone
+  using Vec = Eigen::Vector3d;
+  const Vec none = Vec::Zero();
+  EXPECT_EQ(natural_map<3>(Vec{0.2, 1, -2}, none, mu).norm(), 0);                 // open
+  EXPECT_EQ(natural_map<3>(none, Vec{2, 0.3, -0.4}, mu).norm(), 0);               // stick
+  EXPECT_LT(natural_map<3>(Vec{0, 3, 4}, Vec{2, -0.6, -0.8}, mu).norm(), 1e-15);  // slide
+  EXPECT_GT(natural_map<3>(Vec{0, 3, 4}, Vec{2, 0.6, 0.8}, mu).norm(),
+            0.1);                                                     // slides the wrong way
+  EXPECT_GT(natural_map<3>(Vec{-0.1, 0, 0}, none, mu).norm(), 0.05);  // penetrates
+  EXPECT_GT(natural_map<3>(Vec{0.1, 0, 0}, Vec{2, 0, 0}, mu).norm(),
+            0.05);                                                // pulls away under load
+  EXPECT_GT(natural_map<3>(none, Vec{1, 1, 0}, mu).norm(), 0.1);  // outside the cone
+}
+
+TEST(CoulombCone, a_huge_reaction_does_not_swallow_a_wrong_velocity) {
+  using Vec = Eigen::Vector3d;
+  EXPECT_EQ(natural_map<3>(Vec{-1, 0, 0}, Vec{1e20, 0, 0}, 0.5).norm(), 1);
 }
 
 }  // namespace

@@ -10,7 +10,8 @@ namespace {
 template <int D>
 double error_of(const ContactMatrix<D>& a, const ContactVector<D>& b, const ContactVector<D>& r,
                 double mu) {
-  return natural_map<D>(a * r + b, r, mu).norm() / b.norm();
+  const ContactVector<D> u = a * r + b;
+  return natural_map<D>(u, r, mu).norm() / b.norm();
 }
 
 template <int D>

@@ -361,7 +361,7 @@ def test_the_commands_say_one_line_for_each_spoilt_file(corpus: Path, command: l
     for line, path in zip(lines, paths, strict=True):
         assert line.startswith(f"fclib: {path}: ")
     records = [json.loads(line) for line in run.stdout.splitlines()]
-    assert [record["problem"] for record in records if "error" in record][: len(paths)] == paths
+    assert [record["problem"] for record in records if "message" in record][: len(paths)] == paths
     assert "formulation" in records[-1]
     assert {path: Path(path).read_bytes() for path in paths} == before
 

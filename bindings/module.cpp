@@ -123,24 +123,28 @@ void bind_problem(nb::module_& m) {
 }
 
 void bind_conversions(nb::module_& m) {
-  nb::handle global = m.attr("GlobalProblem");
-  nb::cpp_function_def(
-      [](const GlobalProblem& p) {
-        validate(p);
-        return condense(p);
-      },
-      nb::scope(global), nb::name("condense"), nb::is_method(), nb::call_guard<Unlocked>(),
-      "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
-      "Raises UnsuitableError where M is singular or not positive definite.");
-  nb::handle local = m.attr("LocalProblem");
-  nb::cpp_function_def(
-      [](const LocalProblem& p) {
-        validate(p);
-        return is_mixed(p) ? Elimination(p).plain() : p;
-      },
-      nb::scope(local), nb::name("eliminate"), nb::is_method(), nb::call_guard<Unlocked>(),
-      "The problem without bilateral constraints: W - V R^-1 V^T, q - V R^-1 s.\n\n"
-      "Raises UnsuitableError where R is singular.");
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    const nb::handle cls = m.attr(class_name(P::kind).c_str());
+    const auto method = [&](const char* name, auto function, const char* doc) {
+      nb::cpp_function_def(
+          [function](const P& p) {
+            validate(p);
+            return function(p);
+          },
+          nb::scope(cls), nb::name(name), nb::is_method(), nb::call_guard<Unlocked>(), doc);
+    };
+    if constexpr (requires(const P& p) { condense(p); }) {
+      method(
+          "condense", [](const P& p) { return condense(p); },
+          "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
+          "Raises UnsuitableError where M is singular or not positive definite.");
+    } else {
+      method(
+          "eliminate", [](const P& p) { return eliminate(p); },
+          "The problem without bilateral constraints: W - V R^-1 V^T, q - V R^-1 s.\n\n"
+          "Raises UnsuitableError where R is singular.");
+    }
+  });
 }
 
 // ---- solving
@@ -197,6 +201,8 @@ void bind_solvers(nb::module_& m) {
       .def_prop_ro("title", [](const Solver& s) { return std::string(s.title); })
       .def_prop_ro("citation", [](const Solver& s) { return std::string(s.citation); })
       .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
+      .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
+              "the spacedims of rolling problems")
       .def_ro("options", &Solver::options)
       .def(
           "check_options",
@@ -302,6 +308,7 @@ void bind_files(nb::module_& m) {
           if (solution == nullptr) {
             write_file(path.string(), &problem);
           } else {
+            validate(problem);
             const Solution whole = complete(problem, *solution);
             write_file(path.string(), &problem, &whole);
           }

@@ -10,6 +10,7 @@
 #include "error.hpp"
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/
+#include "friction.hpp"
 #include "solution.hpp"
 
 namespace fclib {
@@ -60,11 +61,19 @@ bool is_mixed(const P& problem) {
   return problem.size(Dim::p) > 0;
 }
 
-/// "3DFC", "M3DFC", "G2DFC", ...: the name of the formulation in RT-0444.
+/// "3DFC", "M3DFC", "G2DFC", "GR3DFC", ...: the formulation, as in RT-0444; R is for rolling.
 template <class P>
 std::string formulation(const P& problem) {
-  return std::string(P::prefix) + (is_mixed(problem) ? "M" : "") +
-         std::to_string(problem.spacedim) + "DFC";
+  const Index space = P::rolling ? (problem.spacedim + 1) / 2 : problem.spacedim;
+  return std::string(P::prefix) + (is_mixed(problem) ? "M" : "") + std::to_string(space) + "DFC";
+}
+
+/// The coefficients of friction of all contacts.
+template <class P>
+Friction friction_of(const P& problem) {
+  Friction friction{problem.mu, {}};
+  if constexpr (P::rolling) friction.mu_r = problem.mu_r;
+  return friction;
 }
 
 namespace detail {
@@ -102,9 +111,11 @@ void validate_vector(const Vector& values, Index expected, const Field<Struct, V
 template <class P>
 void validate(const P& problem) {
   const std::string group = "/" + group_name<P>() + "/";
-  if (problem.spacedim != 2 && problem.spacedim != 3) {
+  const auto [planar, spatial] = P::dimensions;
+  if (problem.spacedim != planar && problem.spacedim != spatial) {
     throw Error(ErrorKind::problem,
-                "is " + std::to_string(problem.spacedim) + ", but must be 2 or 3",
+                "is " + std::to_string(problem.spacedim) + ", but must be " +
+                    std::to_string(planar) + " or " + std::to_string(spatial),
                 group + "spacedim");
   }
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {

@@ -5,7 +5,6 @@
 namespace fclib {
 
 Solution complete(const LocalProblem& problem, Solution solution) {
-  validate(problem);
   validate(solution, problem);
   if (solution.u.size() == 0) {
     solution.u = problem.q;
@@ -16,7 +15,6 @@ Solution complete(const LocalProblem& problem, Solution solution) {
 }
 
 Solution complete(const GlobalProblem& problem, Solution solution) {
-  validate(problem);
   validate(solution, problem);
   if (solution.v.size() == 0) {
     Vector momentum = problem.f;

@@ -1,4 +1,5 @@
-// Completing a solution: what follows from r (and lambda) by the equations of the problem.
+// Completing a solution: what follows from r (and lambda) by the equations of the problem, which
+// must be valid. Rolling problems have the same equations.
 #pragma once
 
 #include "problem.hpp"

@@ -53,4 +53,8 @@ Solution Condensation::expand(const Solution& local) const {
 
 LocalProblem condense(const GlobalProblem& problem) { return Condensation(problem).local(); }
 
+LocalRollingProblem condense(const GlobalRollingProblem& problem) {
+  return {Condensation(problem).local(), problem.mu_r};
+}
+
 }  // namespace fclib

@@ -26,5 +26,6 @@ class Condensation {
 
 /// The local form of a global problem (M3DFC from GM3DFC).
 LocalProblem condense(const GlobalProblem& problem);
+LocalRollingProblem condense(const GlobalRollingProblem& problem);
 
 }  // namespace fclib

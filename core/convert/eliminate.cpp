@@ -36,4 +36,12 @@ Solution Elimination::expand(const Solution& plain) const {
   return result;
 }
 
+LocalProblem eliminate(const LocalProblem& problem) {
+  return is_mixed(problem) ? Elimination(problem).plain() : problem;
+}
+
+LocalRollingProblem eliminate(const LocalRollingProblem& problem) {
+  return {eliminate(static_cast<const LocalProblem&>(problem)), problem.mu_r};
+}
+
 }  // namespace fclib

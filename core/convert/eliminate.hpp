@@ -24,4 +24,8 @@ class Elimination {
   LocalProblem plain_;
 };
 
+/// The local problem without bilateral constraints; itself where it has none.
+LocalProblem eliminate(const LocalProblem& problem);
+LocalRollingProblem eliminate(const LocalRollingProblem& problem);
+
 }  // namespace fclib

@@ -14,8 +14,10 @@ constexpr std::size_t dense_limit = 128;
 BlockMatrix::BlockMatrix(const Matrix& a, int d) : d_(d), nc_(a.rows / d) {
   if (d == 2) {
     fill<2>(a);
-  } else {
+  } else if (d == 3) {
     fill<3>(a);
+  } else {
+    fill<5>(a);
   }
 }
 
@@ -87,10 +89,13 @@ void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y) cons
   y = q;
   for (Index contact = 0; contact < nc_; ++contact) {
     const double* part = x.data() + std::ptrdiff_t{d_} * contact;
+    if (std::all_of(part, part + d_, [](double value) { return value == 0; })) continue;
     if (d_ == 2) {
-      if (part[0] != 0 || part[1] != 0) add_column<2>(contact, part, y.data());
+      add_column<2>(contact, part, y.data());
+    } else if (d_ == 3) {
+      add_column<3>(contact, part, y.data());
     } else {
-      if (part[0] != 0 || part[1] != 0 || part[2] != 0) add_column<3>(contact, part, y.data());
+      add_column<5>(contact, part, y.data());
     }
   }
 }

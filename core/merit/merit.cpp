@@ -5,6 +5,7 @@
 #include <initializer_list>
 
 #include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {
@@ -45,61 +46,58 @@ double relative(Real residual, std::initializer_list<Real> terms) {
 void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
 
 /// The parts that depend on one contact at a time. `scale` is tr(W_aa) / d of each contact.
-template <int D>
-void judge_contacts(const Vector& mu, const RealVector& q, const RealVector& u, const RealVector& r,
-                    const RealVector& scale, Merit& result) {
+template <class Cone>
+void judge_contacts(const Friction& friction, const RealVector& q, const RealVector& u,
+                    const RealVector& r, const RealVector& scale, Merit& result) {
+  constexpr int D = Cone::dim;
   Real squares = 0;
   Real scaled_squares = 0;
   Real scaled_q = 0;
-  for (Eigen::Index contact = 0; contact < mu.size(); ++contact) {
+  for (Eigen::Index contact = 0; contact < friction.mu.size(); ++contact) {
+    const Cone cone(friction, contact);
     const ContactVector<D, Real> ua = u.segment<D>(D * contact);
     const ContactVector<D, Real> ra = r.segment<D>(D * contact);
-    const Real friction = mu[contact];
-    const ContactVector<D, Real> modified = modified_velocity<D>(ua, friction);
-    squares += natural_map<D>(ua, ra, friction).squaredNorm();
+    const ContactVector<D, Real> modified = cone.modified(ua);
+    squares += natural_map(cone, ua, ra).squaredNorm();
     const Real rho = scale[contact] > 0 ? 1 / scale[contact] : Real(1);
-    scaled_squares += natural_map<D>(ua, ra, friction, rho).squaredNorm();
+    scaled_squares += natural_map(cone, ua, ra, rho).squaredNorm();
     scaled_q += rho * rho * q.segment<D>(D * contact).squaredNorm();
-    raise(result.cone, cone_violation<D>(ra, friction));
-    raise(result.dual_cone, dual_violation<D>(modified, friction));
+    raise(result.cone, cone_violation(cone, ra));
+    raise(result.dual_cone, dual_violation(cone, modified));
     raise(result.complementarity, std::abs(ra.dot(modified)));
-
-    // the status is read off the set that the natural map projects on
-    const ContactVector<D, Real> y = ra - rho * modified;
-    const Real norm = tangential_norm<D>(y);
-    if (norm <= friction * y[0] && y[0] > 0) {
-      ++result.stick;
-    } else if (friction * norm <= -y[0]) {
-      ++result.open;
-    } else {
-      ++result.slide;
+    switch (status_of(cone, ua, ra, rho)) {
+      case ContactStatus::open:
+        ++result.open;
+        break;
+      case ContactStatus::stick:
+        ++result.stick;
+        break;
+      case ContactStatus::slide:
+        ++result.slide;
+        break;
     }
   }
   result.natural = relative(std::sqrt(squares), {q.norm()});
   result.scaled_natural = relative(std::sqrt(scaled_squares), {std::sqrt(scaled_q)});
 }
 
-void judge_contacts(int spacedim, const Vector& mu, const RealVector& q, const RealVector& u,
-                    const RealVector& r, const RealVector& scale, Merit& result) {
+void judge_contacts(Index spacedim, const Friction& friction, const RealVector& q,
+                    const RealVector& u, const RealVector& r, const RealVector& scale,
+                    Merit& result) {
+  const bool rolling = friction.mu_r.size() > 0;
   if (spacedim == 2) {
-    judge_contacts<2>(mu, q, u, r, scale, result);
+    judge_contacts<Coulomb<2, Real>>(friction, q, u, r, scale, result);
+  } else if (spacedim == 5) {
+    judge_contacts<Rolling<5, Real>>(friction, q, u, r, scale, result);
+  } else if (rolling) {
+    judge_contacts<Rolling<3, Real>>(friction, q, u, r, scale, result);
   } else {
-    judge_contacts<3>(mu, q, u, r, scale, result);
+    judge_contacts<Coulomb<3, Real>>(friction, q, u, r, scale, result);
   }
   result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
 }
 
-/// std::max drops a NaN; a solution that holds one must never look good.
-template <class P>
-void require_valid(const P& problem, const Solution& solution) {
-  validate(problem);
-  validate(solution, problem);
-}
-
-}  // namespace
-
-Merit merit(const LocalProblem& problem, const Solution& solution) {
-  require_valid(problem, solution);
+Merit judge(const LocalProblem& problem, const Friction& friction, const Solution& solution) {
   Merit result;
   const RealVector q = problem.q.cast<Real>();
   const RealVector r = solution.r.cast<Real>();
@@ -125,12 +123,11 @@ Merit merit(const LocalProblem& problem, const Solution& solution) {
   for_each_entry(problem.W, [&](Index row, Index col, double value) {
     if (row == col) scale[row / problem.spacedim] += Real(value) / problem.spacedim;
   });
-  judge_contacts(problem.spacedim, problem.mu, q, u, r, scale, result);
+  judge_contacts(problem.spacedim, friction, q, u, r, scale, result);
   return result;
 }
 
-Merit merit(const GlobalProblem& problem, const Solution& solution) {
-  require_valid(problem, solution);
+Merit judge(const GlobalProblem& problem, const Friction& friction, const Solution& solution) {
   Merit result;
   const Factorization mass(to_eigen(problem.M), "M");
   const RealVector f = problem.f.cast<Real>();
@@ -175,8 +172,31 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
         mass.is_cholesky() ? y.col(col).squaredNorm() : h.col(col).dot(y.col(col));
     scale[col / problem.spacedim] += Real(diagonal) / problem.spacedim;
   }
-  judge_contacts(problem.spacedim, problem.mu, q, u, r, scale, result);
+  judge_contacts(problem.spacedim, friction, q, u, r, scale, result);
   return result;
+}
+
+/// std::max drops a NaN; a solution that holds one must never look good.
+template <class P>
+Merit judge_valid(const P& problem, const Solution& solution) {
+  validate(problem);
+  validate(solution, problem);
+  return judge(problem, friction_of(problem), solution);
+}
+
+}  // namespace
+
+Merit merit(const LocalProblem& problem, const Solution& solution) {
+  return judge_valid(problem, solution);
+}
+Merit merit(const LocalRollingProblem& problem, const Solution& solution) {
+  return judge_valid(problem, solution);
+}
+Merit merit(const GlobalProblem& problem, const Solution& solution) {
+  return judge_valid(problem, solution);
+}
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
+  return judge_valid(problem, solution);
 }
 
 }  // namespace fclib

@@ -86,6 +86,8 @@ struct Merit {
 /// Throws Error (problem) where problem or solution are not valid, (unsuitable) where M is
 /// singular.
 Merit merit(const LocalProblem& problem, const Solution& solution);
+Merit merit(const LocalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
 
 }  // namespace fclib

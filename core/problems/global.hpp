@@ -12,6 +12,7 @@
 // problems", INRIA RT-0444 (2014), sections 2.4 and 2.5.
 #pragma once
 
+#include <array>
 #include <tuple>
 
 #include "field.hpp"
@@ -27,6 +28,9 @@ struct GlobalProblem {
   static constexpr std::string_view prefix = "G";  // of the formulation's name
   static constexpr bool triplets_on_disk = true;   // the one storage that Siconos reads
 
+  static constexpr bool rolling = false;
+  static constexpr std::array<Index, 2> dimensions{2, 3};  // the spacedims there are
+
   Index spacedim = 3;
   Matrix M;
   Matrix H;
@@ -37,13 +41,14 @@ struct GlobalProblem {
   Vector b;
   ProblemInfo info;
 
+  /// `P` is this struct, or one that adds to it.
+  template <class P = GlobalProblem>
   static constexpr auto fields() {
-    using P = GlobalProblem;
     return std::tuple{
         Field<P, Index>{.name = "spacedim",
                         .member = &P::spacedim,
                         .unit = "1",
-                        .doc = "components of a contact: 2 (planar) or 3"},
+                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling"},
         Field<P, Matrix>{.name = "M",
                          .member = &P::M,
                          .rows = Dim::n,

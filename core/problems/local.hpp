@@ -14,6 +14,7 @@
 // problems", INRIA RT-0444 (2014), sections 2.2 and 2.3.
 #pragma once
 
+#include <array>
 #include <tuple>
 
 #include "field.hpp"
@@ -29,6 +30,9 @@ struct LocalProblem {
   static constexpr std::string_view prefix = "";   // of the formulation's name
   static constexpr bool triplets_on_disk = false;  // W keeps its storage
 
+  static constexpr bool rolling = false;
+  static constexpr std::array<Index, 2> dimensions{2, 3};  // the spacedims there are
+
   Index spacedim = 3;
   Matrix W;
   Matrix V;
@@ -38,13 +42,14 @@ struct LocalProblem {
   Vector s;
   ProblemInfo info;
 
+  /// `P` is this struct, or one that adds to it.
+  template <class P = LocalProblem>
   static constexpr auto fields() {
-    using P = LocalProblem;
     return std::tuple{
         Field<P, Index>{.name = "spacedim",
                         .member = &P::spacedim,
                         .unit = "1",
-                        .doc = "components of a contact: 2 (planar) or 3"},
+                        .doc = "components of a contact: 2 (planar) or 3; 3 or 5 with rolling"},
         Field<P, Matrix>{.name = "W",
                          .member = &P::W,
                          .rows = Dim::m,

@@ -1,8 +1,10 @@
 #include "solve/driver.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
 
+#include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 
@@ -31,12 +33,12 @@ struct Request {
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
 /// `q` is the one that the merit is relative to.
 template <class Judge>
-Result run(const LocalProblem& plain, const Vector& q, const Request& request,
-           const Solution& guess, const Judge& judge) {
+Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
+           const Request& request, const Solution& guess, const Judge& judge) {
   const double norm_q = q.norm();
   const Delassus reduced{.W = BlockMatrix(plain.W, plain.spacedim),
                          .q = plain.q,
-                         .mu = plain.mu,
+                         .friction = friction,
                          .scale = norm_q > 0 ? norm_q : 1.0};
   Result result;
   result.solver = request.solver.name;
@@ -77,42 +79,63 @@ Result run(const LocalProblem& plain, const Vector& q, const Request& request,
 template <class P>
 void require_solvable(const P& problem, const Solver& solver, const Solution& guess) {
   validate(problem);
-  if (guess.r.size() > 0) {
-    Solution reaction;
-    reaction.r = guess.r;
-    if (guess.r.size() != problem.size(Dim::m) || !guess.r.allFinite()) {
-      throw Error(ErrorKind::problem,
-                  "has " + std::to_string(guess.r.size()) + " entries, expected m = " +
-                      std::to_string(problem.size(Dim::m)) + " finite ones",
-                  "guess r");
-    }
+  if (guess.r.size() > 0 && (guess.r.size() != problem.size(Dim::m) || !guess.r.allFinite())) {
+    throw Error(ErrorKind::problem,
+                "has " + std::to_string(guess.r.size()) + " entries, expected m = " +
+                    std::to_string(problem.size(Dim::m)) + " finite ones",
+                "guess r");
   }
-  for (const int d : solver.dimensions) {
-    if (d == problem.spacedim) return;
+  const auto& taken = P::rolling ? solver.rolling_dimensions : solver.dimensions;
+  if (std::find(taken.begin(), taken.end(), problem.spacedim) == taken.end()) {
+    throw Error(ErrorKind::unsuitable, "solver " + std::string(solver.name) + " does not take " +
+                                           formulation(problem) + " problems");
   }
-  throw Error(ErrorKind::unsuitable, "solver " + std::string(solver.name) + " does not take " +
-                                         formulation(problem) + " problems");
 }
 
-Result solve_local(const LocalProblem& problem, const Request& request, const Solution& guess) {
+template <class P>
+Result solve_local(const P& problem, const Request& request, const Solution& guess) {
   if (is_mixed(problem)) {
     const Elimination elimination(problem);
-    return run(elimination.plain(), problem.q, request, guess, [&](Solution& solution) {
-      solution = elimination.expand(solution);
-      return merit(problem, solution).error;
-    });
+    return run(elimination.plain(), friction_of(problem), problem.q, request, guess,
+               [&](Solution& solution) {
+                 solution = elimination.expand(solution);
+                 return merit(problem, solution).error;
+               });
   }
-  return run(problem, problem.q, request, guess, [&](Solution& solution) {
-    solution.u = problem.q;
-    multiply_add(problem.W, solution.r, solution.u);
+  return run(problem, friction_of(problem), problem.q, request, guess, [&](Solution& solution) {
+    solution.u.resize(0);
+    solution = complete(problem, solution);
     return merit(problem, solution).error;
   });
 }
 
-template <class Body>
-Result timed(const Body& body) {
+template <class P>
+Result solve_global(const P& problem, const Request& request, const Solution& guess) {
+  const Condensation condensation(problem);
+  const LocalProblem& local = condensation.local();
+  const auto judge = [&](Solution& solution) {
+    solution = condensation.expand(solution);
+    return merit(problem, solution).error;
+  };
+  if (!is_mixed(local)) {
+    return run(local, friction_of(problem), local.q, request, guess, judge);
+  }
+  const Elimination elimination(local);
+  return run(elimination.plain(), friction_of(problem), local.q, request, guess,
+             [&](Solution& solution) {
+               solution = elimination.expand(solution);
+               return judge(solution);
+             });
+}
+
+/// What every solve does: finds the solver, checks, times.
+template <class P, class Form>
+Result solve_any(const P& problem, std::string_view solver, const Settings& settings,
+                 const OptionValues& options, const Solution& guess, const Form& form) {
   const double start = cpu_time();
-  Result result = body();
+  const Request request{find_solver(solver), settings, options};
+  require_solvable(problem, request.solver, guess);
+  Result result = form(problem, request, guess);
   result.setup_s = cpu_time() - start - result.cpu_s;
   return result;
 }
@@ -131,31 +154,22 @@ const Solver& find_solver(std::string_view name) {
 
 Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return timed([&] {
-    const Request request{find_solver(solver), settings, options};
-    require_solvable(problem, request.solver, guess);
-    return solve_local(problem, request, guess);
-  });
+  return solve_any(problem, solver, settings, options, guess, solve_local<LocalProblem>);
+}
+
+Result solve(const LocalRollingProblem& problem, std::string_view solver, const Settings& settings,
+             const OptionValues& options, const Solution& guess) {
+  return solve_any(problem, solver, settings, options, guess, solve_local<LocalRollingProblem>);
 }
 
 Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return timed([&] {
-    const Request request{find_solver(solver), settings, options};
-    require_solvable(problem, request.solver, guess);
-    const Condensation condensation(problem);
-    const LocalProblem& local = condensation.local();
-    const auto judge = [&](Solution& solution) {
-      solution = condensation.expand(solution);
-      return merit(problem, solution).error;
-    };
-    if (!is_mixed(local)) return run(local, local.q, request, guess, judge);
-    const Elimination elimination(local);
-    return run(elimination.plain(), local.q, request, guess, [&](Solution& solution) {
-      solution = elimination.expand(solution);
-      return judge(solution);
-    });
-  });
+  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalProblem>);
+}
+
+Result solve(const GlobalRollingProblem& problem, std::string_view solver, const Settings& settings,
+             const OptionValues& options, const Solution& guess) {
+  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalRollingProblem>);
 }
 
 }  // namespace fclib

@@ -28,7 +28,13 @@ struct Result {
 /// (unsuitable) where the problem cannot be brought to the form that the solver takes.
 Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
+Result solve(const LocalRollingProblem& problem, std::string_view solver,
+             const Settings& settings = {}, const OptionValues& options = {},
+             const Solution& guess = {});
 Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
+Result solve(const GlobalRollingProblem& problem, std::string_view solver,
+             const Settings& settings = {}, const OptionValues& options = {},
+             const Solution& guess = {});
 
 }  // namespace fclib

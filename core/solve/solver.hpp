@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "cones/cone.hpp"
 #include "linalg/block_matrix.hpp"
 #include "solve/options.hpp"
 
@@ -64,15 +65,16 @@ struct Settings {
                                                   ///< iterations; false stops the solver
 };
 
-/// The problem in the form that reduced solvers take: W (m x m) by blocks, q (m), mu (nc).
+/// The problem in the form that reduced solvers take: W (m x m) by blocks, q (m), friction (nc).
 struct Delassus {
   BlockMatrix W;
   Vector q;
-  Vector mu;
+  Friction friction;
   double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
 
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }
+  [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
 };
 
 /// Watches over a solver: it reports its iterates, and learns whether to stop.
@@ -133,7 +135,8 @@ struct Solver {
   std::string_view family;
   std::string_view title;
   std::string_view citation;
-  std::vector<int> dimensions;  ///< the spacedims it takes
+  std::vector<int> dimensions;          ///< the spacedims it takes
+  std::vector<int> rolling_dimensions;  ///< ... of rolling problems
   std::vector<OptionInfo> options;
   std::int64_t max_iterations = 0;  ///< where the caller sets none
   /// Throws Error (option) at the first option that is unknown or has a wrong value.

@@ -17,8 +17,11 @@
 #include <numeric>
 #include <random>
 
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/exact_contact.hpp"
 #include "kernels/natural_error.hpp"
-#include "kernels/one_contact.hpp"
+#include "kernels/projected_contact.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::nsgs {
@@ -46,8 +49,8 @@ struct Options {
         OptionField<O, LocalSolver>{
             .name = "local_solver",
             .member = &O::local_solver,
-            .doc = "one-contact solver: exact (enumeration of statuses) or projection (P_K with "
-                   "local iterations)",
+            .doc = "one-contact solver: exact (enumeration of statuses; rolling contacts have "
+                   "none) or projection (P_K with local iterations)",
             .choices = local_solvers},
         OptionField<O, double>{.name = "relaxation",
                                .member = &O::relaxation,
@@ -128,13 +131,34 @@ void shuffle_order(std::vector<Index>& order, std::mt19937_64& random) {
 /// The rounding of the updates of u is taken out by u = W r + q at least this often [sweeps].
 constexpr std::int64_t refresh_interval = 1000;
 
+/// The local problem of a contact, with an exact solver where the cone has one.
+template <class Cone>
+struct LocalProblemOf {
+  LocalProblemOf(const ContactMatrix<Cone::dim>& block, const Cone& cone)
+      : projected(block, cone) {}
+  bool solve_exact(const typename Cone::Vec&, typename Cone::Vec&) { return false; }
+
+  ProjectedContact<Cone> projected;
+};
+
 template <int D>
+struct LocalProblemOf<Coulomb<D>> {
+  LocalProblemOf(const ContactMatrix<D>& block, const Coulomb<D>& cone)
+      : exact(block, cone.mu()), projected(block, cone) {}
+  bool solve_exact(const ContactVector<D>& b, ContactVector<D>& r) { return exact.solve(b, r); }
+
+  ExactContact<D> exact;
+  ProjectedContact<Coulomb<D>> projected;
+};
+
+template <class Cone>
 Outcome iterate(const Delassus& problem, const Options& options, Monitor& monitor, Vector& r) {
+  constexpr int D = Cone::dim;
   const Index nc = problem.nc();
-  std::vector<OneContact<D>> contacts;
+  std::vector<LocalProblemOf<Cone>> contacts;
   contacts.reserve(static_cast<std::size_t>(nc));
   for (Index a = 0; a < nc; ++a) {
-    contacts.emplace_back(problem.W.template diagonal_block<D>(a), problem.mu[a]);
+    contacts.emplace_back(problem.W.template diagonal_block<D>(a), Cone(problem.friction, a));
   }
   std::vector<Index> order(static_cast<std::size_t>(nc));
   std::iota(order.begin(), order.end(), 0);
@@ -142,7 +166,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   if (options.shuffle == Shuffle::once) shuffle_order(order, random);
 
   const auto error_of = [&](const Vector& u) {
-    return std::sqrt(natural_map_squared<D>(u, r, problem.mu)) / problem.scale;
+    return std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
   };
 
   Vector u(problem.q.size());
@@ -155,18 +179,17 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   for (std::int64_t sweep = 1;; ++sweep) {
     if (options.shuffle == Shuffle::always) shuffle_order(order, random);
     for (const Index a : order) {
-      OneContact<D>& contact = contacts[static_cast<std::size_t>(a)];
+      LocalProblemOf<Cone>& contact = contacts[static_cast<std::size_t>(a)];
       const ContactVector<D> old = r.segment<D>(D * a);
-      const ContactVector<D> b = u.segment<D>(D * a) - contact.block() * old;
+      const ContactVector<D> b = u.segment<D>(D * a) - contact.projected.block() * old;
       ContactVector<D> next = old;
       if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
-        contact.solve_by_projection(b, options.local_accuracy,
-                                    static_cast<int>(options.local_iterations), next);
+        contact.projected.solve(b, options.local_accuracy,
+                                static_cast<int>(options.local_iterations), next);
       }
       if (options.relaxation != 1.0) {
-        next = project_on_cone<D>(
-            ContactVector<D>(options.relaxation * next + (1.0 - options.relaxation) * old),
-            problem.mu[a]);
+        next = contact.projected.cone().project(options.relaxation * next +
+                                                (1.0 - options.relaxation) * old);
       }
       const ContactVector<D> delta = next - old;
       if ((delta.array() == 0).all()) continue;
@@ -199,8 +222,12 @@ Outcome solve(const Delassus& problem, const OptionValues& values, const Setting
               Vector& r) {
   const auto options = parse_options<Options>(values);
   Monitor monitor(settings);
-  return problem.d() == 2 ? iterate<2>(problem, options, monitor, r)
-                          : iterate<3>(problem, options, monitor, r);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, monitor, r)
+                            : iterate<Rolling<5>>(problem, options, monitor, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, monitor, r)
+                          : iterate<Coulomb<3>>(problem, options, monitor, r);
 }
 
 }  // namespace
@@ -212,6 +239,7 @@ const Solver& solver() {
       .title = "Nonsmooth Gauss-Seidel",
       .citation = "Jean & Moreau 1992; Jourdan, Alart & Jean 1998; Acary, Bremond & Huber 2018",
       .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
       .check_options = [](const OptionValues& values) { parse_options<Options>(values); },

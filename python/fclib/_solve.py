@@ -10,7 +10,12 @@ import numpy as np
 
 from fclib import _core
 
-Problem: TypeAlias = _core.LocalProblem | _core.GlobalProblem
+Problem: TypeAlias = (
+    _core.LocalProblem
+    | _core.LocalRollingProblem
+    | _core.GlobalProblem
+    | _core.GlobalRollingProblem
+)
 
 
 def solve(

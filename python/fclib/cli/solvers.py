@@ -32,11 +32,14 @@ def command(as_json: Json = False) -> None:
                     "title": solver.title,
                     "citation": solver.citation,
                     "dimensions": solver.dimensions,
+                    "rolling_dimensions": solver.rolling_dimensions,
                     "options": options,
                 }
             )
             continue
         takes = ", ".join(f"{d}D" for d in solver.dimensions)
+        if solver.rolling_dimensions:
+            takes += ", rolling"
         out.print(f"[bold]{solver.name}[/]  {solver.title} ({solver.family}; {takes})")
         out.print(f"  {solver.citation}\n", highlight=False)
         out.print(make_table(options))

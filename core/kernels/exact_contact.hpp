@@ -1,27 +1,25 @@
-// The problem of one contact: given A = W_aa (D x D) and b = u - A r, find r and u = A r + b that
-// satisfy Coulomb's law.
+// The problem of one contact, solved exactly: given A = W_aa (D x D) and b = u - A r, find r so
+// that r and A r + b satisfy Coulomb's law.
 //
-// Two ways to solve it. Both are exact Gauss-Seidel steps once they have converged.
-//  - OneContact::solve_exact: by enumeration of the statuses. Open where b_N >= 0; stick where
-//    -A^-1 b is in the cone; else slip, u_T = -alpha r_T with alpha > 0, and with
-//        S = A_TT - A_TN A_NT / A_NN,   c = b_T - A_TN b_N / A_NN
-//        r_T(alpha) = -(S + alpha I)^-1 c,   r_N(alpha) = -(b_N + A_NT r_T) / A_NN
-//    a bracketed Newton method on h(alpha) = mu r_N / ||r_T|| - 1. The quartic of
-//    Bonnefon & Daviet, "Quartic formulation of Coulomb 3D frictional contact" (2011), has the same
-//    roots.
-//  - OneContact::solve_by_projection: r <- P_K(r - rho u^) with a step rho that adapts
-//    (Khobotov's rule), as in Acary, Bremond, Huber 2018, section 4.
+// By enumeration of the statuses. Open where b_N >= 0; stick where -A^-1 b is in the cone; else
+// slip, u_T = -alpha r_T with alpha > 0, and with
+//
+//   S = A_TT - A_TN A_NT / A_NN,   c = b_T - A_TN b_N / A_NN
+//   r_T(alpha) = -(S + alpha I)^-1 c,   r_N(alpha) = -(b_N + A_NT r_T) / A_NN
+//
+// a bracketed Newton method on h(alpha) = mu r_N / ||r_T|| - 1. The quartic of Bonnefon & Daviet,
+// "Quartic formulation of Coulomb 3D frictional contact" (2011), has the same roots.
 #pragma once
 
 #include <cmath>
 #include <limits>
 
-#include "cones/coulomb.hpp"
+#include "cones/cone.hpp"
 
 namespace fclib {
 
 template <int D>
-class OneContact {
+class ExactContact {
  public:
   using Vec = ContactVector<D>;
   using Mat = ContactMatrix<D>;
@@ -29,9 +27,7 @@ class OneContact {
   using TangentVec = Eigen::Matrix<double, T, 1>;
   using TangentMat = Eigen::Matrix<double, T, T>;
 
-  OneContact() = default;
-
-  OneContact(const Mat& a, double mu) : a_(a), mu_(mu) {
+  ExactContact(const Mat& a, double mu) : mu_(mu) {
     normal_ = a(0, 0);
     trace_ = a.trace();
     solvable_ = normal_ > tiny * trace_ && trace_ > 0;
@@ -44,15 +40,11 @@ class OneContact {
       sticks_ = std::abs(det) > tiny * (T == 1 ? trace_ : size * size) && size > tiny * trace_;
       if (sticks_) inverse_ = shifted_inverse(schur_, 0.0);
     }
-    const double largest = a.norm();
-    rho_ = largest > 0 ? 1.0 / largest : 1.0;
   }
-
-  [[nodiscard]] const Mat& block() const { return a_; }
 
   /// Replaces r by an exact solution. False, with r untouched, where there is none to be found: the
   /// block has no normal part, or coupling and mu leave the slip equation without a root.
-  bool solve_exact(const Vec& b, Vec& r) {
+  bool solve(const Vec& b, Vec& r) {
     if (b[0] >= 0) {
       r.setZero();
       return true;
@@ -76,35 +68,6 @@ class OneContact {
       }
     }
     return slip(c, free_normal, r);
-  }
-
-  /// Improves r by at most max_iterations projections, until a step changes r by less than
-  /// `accuracy` relative to r. Never fails.
-  void solve_by_projection(const Vec& b, double accuracy, int max_iterations, Vec& r) {
-    constexpr double contraction = 0.9;  // of a step that is accepted
-    constexpr double reduction = 2.0 / 3.0;
-    constexpr double growth = 1.5;
-    Vec hat = modified_velocity<D>(Vec(a_ * r + b), mu_);
-    for (int k = 0; k < max_iterations; ++k) {
-      Vec next = r;
-      Vec next_hat = hat;
-      double ratio = 0;
-      double change = 0;
-      for (int attempt = 0; attempt < 50; ++attempt) {
-        next = project_on_cone<D>(Vec(r - rho_ * hat), mu_);
-        change = (next - r).norm();
-        if (change <= accuracy * r.norm()) break;
-        next_hat = modified_velocity<D>(Vec(a_ * next + b), mu_);
-        ratio = rho_ * (next_hat - hat).norm() / change;
-        if (ratio <= contraction) break;
-        rho_ *= reduction;
-      }
-      const bool settled = change <= accuracy * r.norm();
-      r = next;
-      if (settled) return;
-      hat = next_hat;
-      if (ratio < 0.3) rho_ *= growth;
-    }
   }
 
  private:
@@ -176,7 +139,6 @@ class OneContact {
     }
   }
 
-  Mat a_ = Mat::Zero();
   double mu_ = 0;
   double normal_ = 0;  // A_NN
   double trace_ = 0;
@@ -187,7 +149,6 @@ class OneContact {
   TangentMat schur_ = TangentMat::Zero();       // S
   TangentMat inverse_ = TangentMat::Zero();     // S^-1
   double alpha_ = 0;                            // root of the last slip, a warm start
-  double rho_ = 1;                              // step of the last projection
 };
 
 }  // namespace fclib

@@ -1,0 +1,186 @@
+"""Rolling friction: files, merits and solutions, against equations written here in NumPy."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import fclib
+
+Array = npt.NDArray[np.float64]
+CASES = [(d, seed) for d in (3, 5) for seed in range(6)]
+
+
+def norms(x: Array) -> tuple[Array, Array]:
+    """||x_T|| and ||x_R|| of each row (N, T.., R..)."""
+    half = (x.shape[1] - 1) // 2
+    return np.linalg.norm(x[:, 1 : 1 + half], axis=1), np.linalg.norm(x[:, 1 + half :], axis=1)
+
+
+def natural_error(u: Array, r: Array, q: Array, mu: Array, mu_r: Array, d: int) -> float:
+    """||r - P_K(r - u^)|| / ||q||; the projection by bisection on its normal part."""
+    velocity, reaction = u.reshape(-1, d), r.reshape(-1, d)
+    slide, roll = norms(velocity)
+    y = reaction - velocity
+    y[:, 0] -= mu * slide + mu_r * roll
+    t, s = norms(y)
+    low, high = np.zeros(len(mu)), np.maximum(y[:, 0], 0) + mu * t + mu_r * s
+    for _ in range(200):
+        n = 0.5 * (low + high)
+        slope = n - y[:, 0] - mu * np.maximum(t - mu * n, 0) - mu_r * np.maximum(s - mu_r * n, 0)
+        low, high = np.where(slope < 0, n, low), np.where(slope < 0, high, n)
+    half = (d - 1) // 2
+    projection = y.copy()
+    projection[:, 0] = high
+    for part, size, limit in ((slice(1, 1 + half), t, mu), (slice(1 + half, d), s, mu_r)):
+        factor = np.minimum(1.0, limit * high / np.where(size > 0, size, 1.0))
+        projection[:, part] *= factor[:, None]
+    return float(np.linalg.norm(reaction - projection) / np.linalg.norm(q))
+
+
+def planted(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingProblem, Array]:
+    """A problem and its reactions: open, sticking, sliding, rolling, and both, in turn."""
+    rng = np.random.default_rng(seed)
+    half = (d - 1) // 2
+    mu, mu_r = rng.uniform(0.2, 0.8, nc), rng.uniform(0.02, 0.3, nc)
+    r, u = np.zeros((nc, d)), np.zeros((nc, d))
+    for k in range(nc):
+        status = k % 5
+        if status == 0:
+            u[k] = rng.normal(size=d)
+            u[k, 0] = abs(u[k, 0]) + 0.1
+            continue
+        r[k, 0] = rng.uniform(0.5, 2)
+        for part, limit, moves in (
+            (slice(1, 1 + half), mu[k], status in (2, 4)),
+            (slice(1 + half, d), mu_r[k], status in (3, 4)),
+        ):
+            direction = rng.normal(size=half)
+            direction /= np.linalg.norm(direction)
+            r[k, part] = limit * r[k, 0] * direction * (1.0 if moves else 0.5)
+            u[k, part] = -direction * rng.uniform(0.5, 2) if moves else 0.0
+    root = rng.normal(size=(nc * d, nc * d)) / np.sqrt(nc * d)
+    W = root @ root.T + 0.5 * np.eye(nc * d)
+    problem = fclib.LocalRollingProblem(
+        spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), mu=mu, mu_r=mu_r
+    )
+    return problem, r.ravel()
+
+
+def as_global(problem: fclib.LocalRollingProblem) -> fclib.GlobalRollingProblem:
+    """The same contacts on bodies: H = I, M = W^-1."""
+    W = np.asarray(problem.W)
+    mass = np.linalg.inv(W)
+    mass = 0.5 * (mass + mass.T)
+    return fclib.GlobalRollingProblem(
+        spacedim=problem.spacedim,
+        M=mass,
+        H=np.eye(problem.m),
+        f=mass @ problem.q,
+        w=np.zeros(problem.m),
+        mu=problem.mu,
+        mu_r=problem.mu_r,
+    )
+
+
+@pytest.mark.parametrize(("d", "seed"), CASES)
+def test_a_planted_solution_has_no_error_and_another_has_the_error_of_the_equations(
+    d: int, seed: int
+) -> None:
+    problem, r = planted(d, seed)
+    assert fclib.merit(problem, fclib.Solution(r=r)).error < 1e-13
+    assert fclib.merit(as_global(problem), fclib.Solution(r=r)).natural < 1e-12
+    wrong = r + 0.3 * np.random.default_rng(seed).normal(size=r.size)
+    u = np.asarray(problem.W) @ wrong + problem.q
+    expected = natural_error(u, wrong, problem.q, problem.mu, problem.mu_r, d)
+    assert expected > 1e-2
+    merit = fclib.merit(problem, fclib.Solution(r=wrong))
+    assert merit.natural == pytest.approx(expected, rel=1e-12)
+    assert fclib.merit(as_global(problem), fclib.Solution(r=wrong)).natural == pytest.approx(
+        expected, rel=1e-9
+    )
+
+
+@pytest.mark.parametrize(("d", "seed"), CASES)
+def test_statuses_are_told_apart(d: int, seed: int) -> None:
+    problem, r = planted(d, seed, nc=10)
+    merit = fclib.merit(problem, fclib.Solution(r=r))
+    assert (merit.open, merit.stick, merit.slide) == (2, 2, 6)
+
+
+@pytest.mark.parametrize(
+    "solver", [s.name for s in fclib.solvers() if s.rolling_dimensions], ids=str
+)
+@pytest.mark.parametrize(("d", "seed"), CASES)
+def test_every_solver_that_claims_rolling_solves_it(solver: str, d: int, seed: int) -> None:
+    problem, _ = planted(d, seed)
+    for form in (problem, as_global(problem)):
+        result = fclib.solve(form, solver, tol=1e-9)
+        assert result.converged
+        r = result.solution.r
+        u = np.asarray(problem.W) @ r + problem.q
+        assert natural_error(u, r, problem.q, problem.mu, problem.mu_r, d) <= 1.1e-9
+
+
+@pytest.mark.parametrize(("d", "seed"), CASES)
+def test_files_keep_every_number(d: int, seed: int, tmp_path: Path) -> None:
+    local, r = planted(d, seed)
+    path = tmp_path / "rolling.hdf5"
+    for problem in (local, as_global(local)):
+        fclib.write(path, problem, fclib.Solution(r=r))
+        back = fclib.read(path)
+        assert type(back) is type(problem)
+        assert isinstance(back, (fclib.LocalRollingProblem, fclib.GlobalRollingProblem))
+        np.testing.assert_array_equal(back.mu_r, problem.mu_r)
+        assert back.spacedim == d
+        solution = fclib.read_solution(path)
+        assert solution is not None
+        np.testing.assert_array_equal(solution.r, r)
+        assert fclib.merit(back, solution).error < 1e-12
+
+
+def test_condensing_a_rolling_problem_gives_one() -> None:
+    problem, _ = planted(5, 0)
+    local = as_global(problem).condense()
+    assert isinstance(local, fclib.LocalRollingProblem)
+    np.testing.assert_allclose(local.W.toarray(), np.asarray(problem.W), atol=1e-12)
+    np.testing.assert_array_equal(local.mu_r, problem.mu_r)
+    assert local.formulation == "R3DFC"
+
+
+def test_what_is_wrong_is_named() -> None:
+    good: dict[str, Any] = {
+        "W": np.eye(5),
+        "q": np.ones(5),
+        "mu": [0.5],
+        "mu_r": [0.1],
+        "spacedim": 5,
+    }
+    fclib.LocalRollingProblem(**good).validate()
+    cases: tuple[tuple[dict[str, Any], str], ...] = (
+        ({"mu_r": [-0.1]}, "mu_r"),
+        ({"mu_r": [0.1, 0.1]}, "mu_r"),
+        ({"spacedim": 2}, "spacedim"),
+        ({"spacedim": 4}, "spacedim"),
+        ({"q": np.ones(3)}, "q"),
+    )
+    for wrong, named in cases:
+        with pytest.raises(fclib.ProblemError, match=named):
+            fclib.LocalRollingProblem(**(good | wrong)).validate()
+
+
+def test_real_rolling_problems_read_and_solve(real_data: Path) -> None:
+    with (real_data / "INDEX.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["kind"].startswith("rolling")]
+    assert len(rows) == 5
+    for row in rows:
+        problem = fclib.read(real_data / row["kind"] / f"{row['name']}.hdf5")
+        assert problem.spacedim == int(row["spacedim"])
+        assert (problem.nc, problem.m) == (int(row["nc"]), int(row["m"]))
+        result = fclib.solve(problem, tol=1e-8)
+        assert result.converged, row["name"]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 import fclib
+from helpers import dense
 
 Array = npt.NDArray[np.float64]
 CASES = [(d, seed) for d in (3, 5) for seed in range(6)]
@@ -148,7 +149,7 @@ def test_condensing_a_rolling_problem_gives_one() -> None:
     problem, _ = planted(5, 0)
     local = as_global(problem).condense()
     assert isinstance(local, fclib.LocalRollingProblem)
-    np.testing.assert_allclose(local.W.toarray(), np.asarray(problem.W), atol=1e-12)
+    np.testing.assert_allclose(dense(local.W), np.asarray(problem.W), atol=1e-12)
     np.testing.assert_array_equal(local.mu_r, problem.mu_r)
     assert local.formulation == "R3DFC"
 

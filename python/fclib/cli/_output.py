@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,7 +12,15 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 from rich.text import Text
 
@@ -61,23 +69,29 @@ def parse_options(pairs: Sequence[str]) -> dict[str, str]:
 
 
 @contextmanager
-def progress_bar(what: str, total: int) -> Iterator[Progress]:
-    """A bar on the standard error while it is a terminal and there is more than one thing to do."""
+def progress_bar(total: int) -> Iterator[Callable[[str], None]]:
+    """A bar on the standard error, where that is a terminal.
+
+    Yields a function that says what comes next, and counts what came before as done.
+    """
     columns = (
+        SpinnerColumn(),
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
+        TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    hidden = not err.is_terminal or total < 2
-    with Progress(*columns, console=err, transient=True, disable=hidden) as progress:
-        progress.add_task(what, total=total)
-        yield progress
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as progress:
+        task = progress.add_task("", total=total)
+        done = -1
 
+        def show(what: str) -> None:
+            nonlocal done
+            done += 1
+            progress.update(task, description=what, completed=done)
 
-def advance(progress: Progress, what: str) -> None:
-    """One step further, with a word on what is being done."""
-    progress.update(progress.task_ids[0], description=what, advance=1)
+        yield show
 
 
 def format_value(value: object) -> str:
@@ -158,10 +172,10 @@ class Report:
         raise typer.Exit(int(self.failed))
 
 
-def each_file(files: Iterable[Path], what: str, report: Report) -> Iterator[Path]:
-    """Go through the files with progress; the caller's errors of one file do not stop the rest."""
+def each_file(files: Iterable[Path], what: str) -> Iterator[Path]:
+    """Go through the files with progress."""
     paths = list(files)
-    with progress_bar(what, len(paths)) as progress:
+    with progress_bar(len(paths)) as show:
         for path in paths:
+            show(f"{what} {path.name}")
             yield path
-            advance(progress, what)

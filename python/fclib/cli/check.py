@@ -25,7 +25,7 @@ PARTS = (
 def command(files: Files, tol: Tolerance = 1e-8, as_json: Json = False) -> None:
     """Judge the stored solutions from the data alone."""
     report = Report(as_json, hidden=("n", "formulation", "scaled_natural"))
-    for path in each_file(files, "checking", report):
+    for path in each_file(files, "checking"):
         try:
             problem = fclib.read(path)
             solution = fclib.read_solution(path)

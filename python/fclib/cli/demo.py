@@ -8,7 +8,16 @@ from typing import Annotated, Any
 import typer
 
 from fclib import bench, demo
-from fclib.cli._output import Json, Report, Tolerance, advance, err, make_table, out, progress_bar
+from fclib.cli._output import (
+    Json,
+    Report,
+    Tolerance,
+    each_file,
+    err,
+    make_table,
+    out,
+    progress_bar,
+)
 
 TABLE_ROWS = 24  # the CSV has them all
 
@@ -49,21 +58,20 @@ def command(
     say.print(f"Simulating {boxes} boxes that fall on the ground, {steps} steps ...")
     paths: list[Path] = []
     picture: Path | None = out_dir / "stack.png"
-    with progress_bar("simulating", steps) as progress:
+    with progress_bar(steps) as show:
+        show("simulating")
         try:
             for stored in demo.simulate(out_dir, boxes, steps, picture):
                 paths += [stored.global_path, stored.local_path]
-                advance(progress, "simulating")
+                show("simulating" if len(paths) < 2 * steps else "drawing")
         except NoRenderer as error:
             picture = None
             say.print(f"No picture: {error}")
 
     say.print(f"Solving {len(paths)} problems, each in {len(demo.CONFIGURATIONS)} ways ...")
     runs: list[bench.Run] = []
-    with progress_bar("solving", len(paths)) as progress:
-        for path in paths:
-            runs += demo.solve(path, tol)
-            advance(progress, "solving")
+    for path in each_file(paths, "solving"):
+        runs += demo.solve(path, tol)
     table = out_dir / "runs.csv"
     demo.write_csv(table, runs)
 

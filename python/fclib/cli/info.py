@@ -42,7 +42,7 @@ def describe(path: Path, kind: str | None) -> dict[str, Any]:
 def command(files: Files, as_json: Json = False) -> None:
     """Print formulation, sizes and friction of FCLIB files."""
     report = Report(as_json, hidden=("nnz_of", "description", "math_info", "spacedim", "m"))
-    for path in each_file(files, "reading", report):
+    for path in each_file(files, "reading"):
         try:
             kinds = [kind for kind in fclib.contents(path) if kind != "solution"]
             for kind in kinds or (None,):  # None: reading says what is wrong

@@ -41,7 +41,7 @@ def command(
     except fclib.OptionError as error:
         usage_error(error)
     report = Report(as_json)
-    for path in each_file(files, "solving", report):
+    for path in each_file(files, "solving"):
         try:
             run = bench.run(str(path), fclib.read(path), solver, tol, time_limit, options)
             if write and run.status == "converged":

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import typer
 
+import fclib
 from fclib.cli import check, demo, info, solve, solvers
-from fclib.cli._output import print_version
+from fclib.cli._output import fail, print_version
 
 app = typer.Typer(
     name="fclib",
@@ -25,5 +26,10 @@ app.callback(invoke_without_command=True)(print_version)
 
 
 def main() -> None:
-    """Entry point of the ``fclib`` script."""
-    app()
+    """Entry point of the ``fclib`` script. What no command deals with is one line all the same."""
+    try:
+        app()
+    except fclib.Error as error:
+        fail(str(error))
+    except OSError as error:
+        fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))

@@ -52,6 +52,12 @@ def print_version(
         raise typer.BadParameter("a command is missing, see fclib --help")
 
 
+def fail(message: str) -> NoReturn:
+    """End the process with one line on the standard error and exit status 1."""
+    err.print(f"fclib: {message}", style="red", markup=False, highlight=False)
+    raise SystemExit(1)
+
+
 def usage_error(error: Exception) -> NoReturn:
     """End the command with the message and exit status 2."""
     raise typer.BadParameter(str(error)) from None

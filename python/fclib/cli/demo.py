@@ -14,6 +14,7 @@ from fclib.cli._output import (
     Tolerance,
     each_file,
     err,
+    fail,
     make_table,
     out,
     progress_bar,
@@ -51,8 +52,7 @@ def command(
     try:
         from fclib.simulate import NoRenderer
     except ImportError as error:
-        err.print(f"fclib: {error}", style="red", markup=False, highlight=False)
-        raise typer.Exit(1) from None
+        fail(str(error))
 
     say = err if as_json else out
     say.print(f"Simulating {boxes} boxes that fall on the ground, {steps} steps ...")

@@ -1,0 +1,79 @@
+"""``fclib demo``: the main job, small, from the scene to the table."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import fclib
+
+pytest.importorskip("mujoco")
+
+STEPS = 22  # the first box lands in step 14
+
+
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fclib", "demo", "--out", folder, "--boxes", "2"]
+    return subprocess.run(
+        [*map(str, command), "--steps", str(STEPS), *arguments], capture_output=True, text=True
+    )
+
+
+def test_the_demo_stores_solves_and_judges_every_step(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "demo"
+    done = run(folder, "--json")
+    assert done.returncode == 0, done.stderr
+    records = [json.loads(line) for line in done.stdout.splitlines()]
+    paths = sorted(folder.glob("*.hdf5"))
+    assert len(paths) == 2 * STEPS
+    # each problem in two configurations, and the CSV says the same
+    assert len(records) == 4 * STEPS
+    with (folder / "runs.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [row["problem"] for row in rows] == [record["problem"] for record in records]
+    assert [float(row["error"]) for row in rows] == [record["error"] for record in records]
+    assert max(record["nc"] for record in records) == 8
+
+    # what is stored is what the records say
+    for path in paths:
+        problem, solution = fclib.read(path), fclib.read_solution(path)
+        assert solution is not None
+        own = [record for record in records if record["problem"] == path.stem]
+        assert fclib.merit(problem, solution).error == min(r["error"] for r in own) <= 1e-8
+        assert {record["nc"] for record in own} == {problem.nc}
+
+
+def test_the_two_forms_of_a_step_are_one_problem(tmp_path: Path) -> None:
+    assert run(tmp_path).returncode == 0
+    for step in (0, STEPS - 1):
+        whole = fclib.read(tmp_path / f"stack-{step:03d}-global.hdf5")
+        local = fclib.read(tmp_path / f"stack-{step:03d}-local.hdf5")
+        assert isinstance(whole, fclib.GlobalProblem)
+        assert isinstance(local, fclib.LocalProblem)
+        solution = fclib.read_solution(tmp_path / f"stack-{step:03d}-global.hdf5")
+        assert solution is not None
+        assert fclib.merit(local, fclib.Solution(r=solution.r)).error <= 1e-8
+        assert whole.n == 12
+        assert "seed" in whole.info.description
+
+
+def test_the_table_is_for_people(tmp_path: Path) -> None:
+    done = run(tmp_path)
+    for word in ("problem", "iterations", "cpu_s", "error", "converged", "runs.csv"):
+        assert word in done.stdout
+    assert "\x1b" not in done.stdout
+    assert "simulating" not in done.stderr  # no progress bar into a pipe
+
+
+def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    done = run(tmp_path / "file")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert str(tmp_path / "file") in done.stderr

@@ -103,6 +103,8 @@ def compare(path: Path, python: str, tol: float, limit: float) -> dict[str, Any]
     problem = fclib.read(path)
     if isinstance(problem, fclib.GlobalProblem):
         problem = problem.condense()
+    if not isinstance(problem, fclib.LocalProblem):
+        sys.exit(f"{path}: is a {problem.formulation} problem; fc3d of Siconos takes none")
     row: dict[str, Any] = {"problem": path.stem, "nc": problem.nc}
 
     ours = fclib.solve(problem, "nsgs", tol, time_limit=limit)

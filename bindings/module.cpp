@@ -14,6 +14,7 @@
 
 #include <filesystem>
 
+#include "conversions.hpp"
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
@@ -356,6 +357,7 @@ NB_MODULE(_core, m) {
         "Raises ProblemError where problem or solution are not valid.");
   });
   bind_files(m);
+  bind_siconos(m);
 }
 
 }  // namespace fclib::bindings

@@ -102,7 +102,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
     """Judge a solution by the equations of its formulation."""
     d, mu, r = problem.spacedim, problem.mu, solution.r
     dynamics = bilateral = kinematics = 0.0
-    if isinstance(problem, fclib.LocalProblem):
+    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         q = problem.q
         W = columns(problem.W)
         u = W @ r + q

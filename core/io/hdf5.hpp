@@ -2,12 +2,14 @@
 //
 //   /fclib_local/{spacedim, W/, V/, R/, vectors/{q,mu,s}, info/{title,description,math_info}}
 //   /fclib_global/{spacedim, M/, H/, G/, vectors/{f,w,mu,b}, info/}
+//   /fclib_local_rolling, /fclib_global_rolling: the same, and vectors/mu_r
 //   /solution/{v,u,r,l}
+//   /guesses/{number_of_guesses, 1/{v,u,r,l}, 2/, ...}
 //   matrix group: nzmax, m, n, nz, p, i, x; nz >= 0 triplet, -1 CSC, -2 CSR, -3 dense
 //
 // Every function throws Error (file) that names the file and the dataset. Writes are atomic: the
-// new file is made beside the old one and renamed over it. HDF5 is not thread-safe; a lock of the
-// library's own makes these functions so.
+// new file is made beside the old one and renamed over it; writers that add to one file take turns.
+// HDF5 is not thread-safe; a lock of the library's own makes these functions so.
 #pragma once
 
 #include <optional>
@@ -23,23 +25,85 @@ namespace fclib {
 struct Contents {
   std::vector<std::string> kinds;  ///< "local", "global", ...
   bool solution = false;
+  Index guesses = 0;  ///< how many
 };
+
+/// How a file is written.
+struct WriteOptions {
+  bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
+  bool append = false;   ///< keep what an existing file holds; write_file alone asks
+  bool replace = false;  ///< what is there already gives way; false: it is an error
+  int compression = 4;   ///< level of deflate, 0 (none) to 9
+};
+
+/// Whether the data of a problem is checked when it is read. `none` checks only that the arrays
+/// have the lengths that their matrix declares, and keeps room that nzmax leaves at their end.
+enum class Validation { full, none };
+
+/// The value of a text that a file does not have, where it is read without validation; writing it
+/// so leaves it out. No text of a file can hold a NUL.
+inline const std::string absent_text(1, '\0');
 
 Contents read_contents(const std::string& path);
 
 /// The problem in the file, validated. `kind` chooses where there are several.
-Problem read_problem(const std::string& path, std::string_view kind = {});
+Problem read_problem(const std::string& path, std::string_view kind = {},
+                     Validation validation = Validation::full);
+
+/// The problem that the solution and the guesses of the file belong to, its sizes alone: matrices
+/// have no entries, mu is zero. It is the global one where there are several, as in libfclib 3.1.
+Problem read_outline(const std::string& path);
+
+/// Makes mu as long as the matrices say that there are contacts, zero; mu gives all other vectors
+/// their size. Throws Error (problem) where the sizes do not divide.
+template <class P>
+void count_contacts(P& problem) {
+  const std::string group = "/" + group_name<P>() + "/";
+  if (problem.spacedim < 1) {
+    throw Error(ErrorKind::problem, "is " + std::to_string(problem.spacedim), group + "spacedim");
+  }
+  bool counted = false;
+  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
+    if constexpr (std::is_same_v<Member, Matrix>) {
+      if (counted || field.cols != Dim::m) return;
+      counted = true;
+      const Index m = (problem.*field.member).cols;
+      if (m < 0 || m % problem.spacedim != 0) {
+        throw Error(ErrorKind::problem,
+                    "has " + std::to_string(m) + " columns, which is no multiple of spacedim = " +
+                        std::to_string(problem.spacedim),
+                    group + std::string(field.name));
+      }
+      problem.mu = Vector::Zero(m / problem.spacedim);
+    }
+  });
+}
 
 /// The stored solution, or nothing where the file has none. Its sizes are not checked against a
 /// problem: merit() and solve() do.
 std::optional<Solution> read_solution(const std::string& path);
 
-/// Writes a new file, or replaces the old one whole. A solution must be complete (v for a global
-/// problem, u): the readers of libfclib 3.1 end their host's process where it is not.
-void write_file(const std::string& path, ProblemPointer problem,
-                const Solution* solution = nullptr);
+/// The stored guesses, as read_solution.
+std::vector<Solution> read_guesses(const std::string& path);
 
-/// Puts a solution into a file that has its problem, in place of the one it had.
-void write_solution(const std::string& path, const Solution& solution);
+/// Writes a new file, or replaces the old one whole; or adds to it (WriteOptions::append), where a
+/// problem that replaces one of its kind takes the solution and the guesses with it. A solution
+/// must be complete (v for a global problem, u): the readers of libfclib 3.1 end their host's
+/// process where it is not.
+void write_file(const std::string& path, ProblemPointer problem, const Solution* solution = nullptr,
+                const WriteOptions& options = {});
+
+/// Puts a solution into a file that has its problem, by default in place of the one it had.
+void write_solution(const std::string& path, const Solution& solution,
+                    const WriteOptions& options = {.replace = true});
+
+/// Puts guesses into a file that has their problem, by default in place of those it had.
+void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
+                   const WriteOptions& options = {.replace = true});
+
+/// Gives the info group of the problem that read_outline() finds, the local one first, an integer
+/// attribute.
+void write_int_attribute(const std::string& path, const std::string& name, Index value,
+                         const WriteOptions& options = {.replace = true});
 
 }  // namespace fclib

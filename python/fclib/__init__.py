@@ -26,9 +26,11 @@ from fclib._core import (
     find_solver,
     merit,
     read,
+    read_siconos,
     read_solution,
     solvers,
     write,
+    write_siconos,
     write_solution,
 )
 from fclib._core import version as __version__
@@ -56,10 +58,12 @@ __all__ = [
     "find_solver",
     "merit",
     "read",
+    "read_siconos",
     "read_solution",
     "solve",
     "solvers",
     "write",
+    "write_siconos",
     "write_solution",
 ]
 

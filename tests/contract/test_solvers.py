@@ -28,7 +28,7 @@ EXACT = 1e-12
 def in_units(mass: float, speed: float) -> Callable[[int], fclib.Problem]:
     def make(d: int) -> fclib.Problem:
         problem = planted_local(3, d=d).problem
-        assert isinstance(problem, fclib.LocalProblem)
+        assert isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
         return fclib.LocalProblem(
             spacedim=d, W=problem.W / mass, q=problem.q * speed, mu=problem.mu
         )
@@ -38,7 +38,7 @@ def in_units(mass: float, speed: float) -> Callable[[int], fclib.Problem]:
 
 def with_zero_block(d: int) -> fclib.Problem:
     problem = planted_local(4, d=d, nc=3).problem
-    assert isinstance(problem, fclib.LocalProblem)
+    assert isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
     W = np.zeros((4 * d, 4 * d))
     W[d:, d:] = dense(problem.W)
     return local_problem(W, [1.0, *[0.3] * (d - 1), *problem.q], [0.5, *problem.mu])
@@ -54,7 +54,7 @@ def redundant(d: int) -> fclib.Problem:
 def stretched(d: int) -> fclib.Problem:
     """Masses from 1e-6 to 1e6 in one problem."""
     problem = planted_local(5, d=d).problem
-    assert isinstance(problem, fclib.LocalProblem)
+    assert isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
     scale = np.repeat(10.0 ** np.linspace(-3, 3, problem.nc), d)
     return local_problem(scale[:, None] * dense(problem.W) * scale, problem.q * scale, problem.mu)
 
@@ -122,7 +122,11 @@ def assert_honest(problem: fclib.Problem, result: fclib.Result, tol: float) -> N
     assert result.error == error
     # the judge rounds as the numbers that it adds do
     impulses = float(np.linalg.norm(solution.r))
-    q = problem.q if isinstance(problem, fclib.LocalProblem) else problem.w
+    q = (
+        problem.q
+        if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
+        else problem.w
+    )
     rounding = min(1e-2, EXACT * max(1.0, impulses / (float(np.linalg.norm(q)) or 1.0)))
     assert error == pytest.approx(judge(problem, solution).error, rel=1e-9, abs=rounding)
     assert (result.status == "converged") == (error <= tol)
@@ -202,7 +206,7 @@ def test_starts_from_the_guess(solver: str) -> None:
 def test_leaves_its_problem_and_its_guess_alone(solver: str) -> None:
     for d in SOLVERS[solver].dimensions:
         problem = planted_local(1, d=d).problem
-        assert isinstance(problem, fclib.LocalProblem)
+        assert isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
         guess = fclib.Solution(r=np.ones(problem.m))
         before = dense(problem.W), problem.q.copy()
         fclib.solve(problem, solver, guess=guess)

@@ -77,7 +77,7 @@ def test_bilateral_constraints_hold(d: int, kind: str) -> None:
     solution = fclib.solve(problem, tol=1e-10).solution
     r, lam = solution.r, solution.l
     assert lam is not None
-    if isinstance(problem, fclib.LocalProblem):
+    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         assert problem.s is not None
         residual = dense(problem.V).T @ r + dense(problem.R) @ lam + problem.s
     else:

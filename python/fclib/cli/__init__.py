@@ -1,4 +1,4 @@
-"""The command line: ``fclib info | check | solve | solvers | demo``.
+"""The command line: ``fclib info | check | solve | convert | solvers | demo``.
 
 Each command is one module with one function; all of them keep the same rules. Results go to the
 standard output, as a table or with ``--json`` as one object a line; errors and progress go to the
@@ -10,7 +10,7 @@ from __future__ import annotations
 import typer
 
 import fclib
-from fclib.cli import check, demo, info, solve, solvers
+from fclib.cli import check, convert, demo, info, solve, solvers
 from fclib.cli._output import fail, print_version
 
 app = typer.Typer(
@@ -20,7 +20,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (info, check, solve, solvers, demo):
+for module in (info, check, solve, convert, solvers, demo):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.callback(invoke_without_command=True)(print_version)
 

@@ -1,0 +1,111 @@
+#include "io/replace_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+
+#include "error.hpp"
+
+namespace fclib {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& path, const std::string& message) {
+  throw Error(ErrorKind::file, message, {}, path);
+}
+/// With what the system says of it.
+[[noreturn]] void fail_in_system(const std::string& path, const char* message) {
+  fail(path, std::string(message) + ": " + std::strerror(errno));
+}
+
+/// A file descriptor that closes itself.
+class Descriptor {
+ public:
+  explicit Descriptor(int id) : id_(id) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (id_ >= 0) ::close(id_);
+  }
+  [[nodiscard]] int id() const { return id_; }
+
+ private:
+  int id_;
+};
+
+/// Where a path leads to, through links; the last one may point to a file that is not there yet.
+std::string resolve(const std::string& path) {
+  constexpr int most_hops = 40;
+  fs::path target(path);
+  std::error_code error;
+  for (int hops = 0; hops < most_hops && fs::is_symlink(target, error); ++hops) {
+    target = target.parent_path() / fs::read_symlink(target, error);
+  }
+  return target.string();
+}
+
+/// The permissions of the old file, or those a new one gets.
+mode_t mode_of(const std::string& path, const std::string& target) {
+  struct stat status{};
+  if (::stat(target.c_str(), &status) == 0) {
+    if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
+    if (::access(target.c_str(), W_OK) != 0) fail_in_system(path, "cannot be written");
+    return status.st_mode & 07777U;
+  }
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  return 0666U & ~mask;
+}
+
+}  // namespace
+
+std::string read_file(const std::string& path) {
+  // a pipe that nobody writes to must not hold the reader
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+  struct stat status{};
+  if (file.id() < 0 || ::fstat(file.id(), &status) != 0) fail_in_system(path, "cannot be read");
+  if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
+  std::string bytes(static_cast<std::size_t>(status.st_size), '\0');
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count = ::read(file.id(), bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail_in_system(path, "cannot be read");
+    if (count == 0) break;  // somebody made it shorter
+    done += static_cast<std::size_t>(count);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+void replace_file(const std::string& path, std::string_view bytes) {
+  const std::string target = resolve(path);
+  const mode_t mode = mode_of(path, target);
+  std::string temporary = target + ".XXXXXX";
+  const Descriptor file(::mkstemp(temporary.data()));
+  if (file.id() < 0) fail_in_system(path, "cannot be written");
+  try {
+    ::fchmod(file.id(), mode);
+    while (!bytes.empty()) {
+      const ssize_t count = ::write(file.id(), bytes.data(), bytes.size());
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) fail_in_system(path, "cannot be written");
+      bytes.remove_prefix(static_cast<std::size_t>(count));
+    }
+    if (::fsync(file.id()) != 0 || ::rename(temporary.c_str(), target.c_str()) != 0) {
+      fail_in_system(path, "cannot be written");
+    }
+  } catch (...) {
+    ::unlink(temporary.c_str());
+    throw;
+  }
+}
+
+}  // namespace fclib

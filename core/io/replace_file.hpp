@@ -1,0 +1,17 @@
+// Whole files at once: a writer never leaves half a file behind.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace fclib {
+
+/// All bytes of a regular file. Throws Error (file) that names it.
+std::string read_file(const std::string& path);
+
+/// Puts the bytes in the place of the file, all or none: they go into a file beside it, which is
+/// flushed and renamed over it. Links are followed, permissions kept. Throws Error (file) that
+/// names the file.
+void replace_file(const std::string& path, std::string_view bytes);
+
+}  // namespace fclib

@@ -7,10 +7,10 @@ BUILD := build
 
 # what the installed package is made of
 SOURCES := CMakeLists.txt pyproject.toml README.md \
-           $(shell find core bindings python include -type f \
-             \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.py' -o -name '*.xml' \
-                -o -name py.typed \) 2>/dev/null)
-CXX_SOURCES := $(shell find core bindings tests -name '*.[ch]pp')
+           $(shell find core bindings cmake python include -type f \
+             \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.map' -o -name '*.py' \
+                -o -name py.typed \))
+CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test lint format clean help
 
@@ -28,9 +28,9 @@ demo: setup
 	$(BIN)/fclib demo
 
 test: setup $(VENV)/.test-tools
-	cmake --build $(BUILD) --target fclib_tests
+	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
-	$(BIN)/python -m pytest
+	FCLIB_BUILD=$(BUILD) $(BIN)/python -m pytest
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
 	$(BIN)/ruff check python tests benchmarks

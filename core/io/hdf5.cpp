@@ -89,10 +89,10 @@ struct Group {
 // ---- reading ----------------------------------------------------------------------------------
 
 Handle open_group(const Group& parent, const std::string& name) {
-  const std::string path = parent.child(name);
-  if (!parent.has(name)) fail(path, "the group is missing");
   Handle group(H5Gopen2(parent.id, name.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!group.ok()) fail(path, "is not a group");
+  if (!group.ok()) {
+    fail(parent.child(name), parent.has(name) ? "is not a group" : "the group is missing");
+  }
   return group;
 }
 
@@ -101,6 +101,7 @@ struct Dataset {
   Handle id;
   std::string path;
   std::size_t size;
+  bool narrow;  ///< holds integers of 32 bits at most, with their sign
 };
 
 /// deflate cannot shrink data further than this
@@ -109,9 +110,10 @@ constexpr std::size_t small_dataset = std::size_t{1} << 20;
 
 Dataset open_numbers(const Group& group, const std::string& name, bool integers) {
   const std::string path = group.child(name);
-  if (!group.has(name)) fail(path, "the dataset is missing");
   Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
+  if (!dataset.ok()) {
+    fail(path, group.has(name) ? "is not a dataset that HDF5 can open" : "the dataset is missing");
+  }
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.id());
   if (integers && kind != H5T_INTEGER) fail(path, "does not hold integers");
@@ -126,12 +128,15 @@ Dataset open_numbers(const Group& group, const std::string& name, bool integers)
       bytes > best_compression * static_cast<double>(H5Dget_storage_size(dataset.id()))) {
     fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
   }
-  return {std::move(dataset), path, size};
+  const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
+                                                 (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
+  return {std::move(dataset), path, size, narrow};
 }
 
-template <class Number>
-std::vector<Number> read_as(const Dataset& dataset, hid_t memory) {
-  std::vector<Number> values(dataset.size);
+/// Values is a vector of numbers of the type `memory`.
+template <class Values>
+Values read_as(const Dataset& dataset, hid_t memory) {
+  Values values(static_cast<decltype(Values().size())>(dataset.size));
   if (dataset.size > 0 &&
       H5Dread(dataset.id.id(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0) {
     fail(dataset.path, "cannot be read (the file is damaged or cut short)");
@@ -140,17 +145,14 @@ std::vector<Number> read_as(const Dataset& dataset, hid_t memory) {
 }
 
 std::vector<double> read_doubles(const Group& group, const std::string& name) {
-  return read_as<double>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
+  return read_as<std::vector<double>>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
 }
 
 std::vector<Index> read_indices(const Group& group, const std::string& name) {
   const Dataset dataset = open_numbers(group, name, true);
-  const Handle type(H5Dget_type(dataset.id.id()), H5Tclose);
-  const bool fits = H5Tget_precision(type.id()) < 32 ||
-                    (H5Tget_precision(type.id()) == 32 && H5Tget_sign(type.id()) == H5T_SGN_2);
-  if (fits) return read_as<Index>(dataset, H5T_NATIVE_INT32);
+  if (dataset.narrow) return read_as<std::vector<Index>>(dataset, H5T_NATIVE_INT32);
   // HDF5 would clip what does not fit
-  const auto wide = read_as<std::int64_t>(dataset, H5T_NATIVE_INT64);
+  const auto wide = read_as<std::vector<std::int64_t>>(dataset, H5T_NATIVE_INT64);
   std::vector<Index> result(wide.size());
   for (std::size_t k = 0; k < wide.size(); ++k) {
     if (wide[k] < std::numeric_limits<Index>::min() ||
@@ -296,8 +298,7 @@ Matrix read_matrix(const Group& parent, const std::string& name, Validation vali
 }
 
 Vector read_vector(const Group& group, const std::string& name) {
-  const auto values = read_numbers<double>(group, name);
-  return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+  return read_as<Vector>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
 }
 
 ProblemInfo read_info(const Group& parent, Validation validation) {
@@ -311,12 +312,10 @@ ProblemInfo read_info(const Group& parent, Validation validation) {
   return info;
 }
 
-/// Opens the group of a formulation and calls visit(field, place) for each field that is there,
-/// with the group in which it lies.
+/// Calls visit(field, place) for each field that the group of a formulation has, with the group in
+/// which it lies.
 template <class P, class Visitor>
-void for_each_stored_field(const Group& root, const Visitor& visit) {
-  const Handle handle = open_group(root, group_name<P>());
-  const Group group{handle.id(), root.child(group_name<P>())};
+void for_each_stored_field(const Group& group, const Visitor& visit) {
   const Handle vectors_handle = open_group(group, "vectors");
   const Group vectors{vectors_handle.id(), group.child("vectors")};
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
@@ -329,8 +328,10 @@ void for_each_stored_field(const Group& root, const Visitor& visit) {
 
 template <class P>
 P read_fields(const Group& root, Validation validation) {
+  const Handle handle = open_group(root, group_name<P>());
+  const Group group{handle.id(), root.child(group_name<P>())};
   P problem;
-  for_each_stored_field<P>(root,
+  for_each_stored_field<P>(group,
                            [&]<class Member>(const Field<P, Member>& field, const Group& place) {
                              const std::string name(field.name);
                              if constexpr (std::is_same_v<Member, Matrix>) {
@@ -341,8 +342,7 @@ P read_fields(const Group& root, Validation validation) {
                                problem.*field.member = read_number<Member>(place, name);
                              }
                            });
-  const Handle handle = open_group(root, group_name<P>());
-  problem.info = read_info({handle.id(), root.child(group_name<P>())}, validation);
+  problem.info = read_info(group, validation);
   return problem;
 }
 
@@ -370,13 +370,15 @@ void require_lengths(const P& problem) {
 
 template <class P>
 P read_sizes(const Group& root) {
+  const Handle handle = open_group(root, group_name<P>());
+  const Group group{handle.id(), root.child(group_name<P>())};
   P problem;
   for_each_stored_field<P>(
-      root, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
+      group, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
         const std::string name(field.name);
         if constexpr (std::is_same_v<Member, Matrix>) {
-          const Handle handle = open_group(place, name);
-          problem.*field.member = read_matrix_outline({handle.id(), place.child(name)});
+          const Handle matrix = open_group(place, name);
+          problem.*field.member = read_matrix_outline({matrix.id(), place.child(name)});
         } else if constexpr (!std::is_same_v<Member, Vector>) {
           problem.*field.member = read_number<Member>(place, name);
         }
@@ -409,9 +411,12 @@ Handle open_file(const std::string& path) {
   if (!fs::exists(status)) fail("", "there is no such file");
   require_regular(status);
   if (access(path.c_str(), R_OK) != 0) fail("", "cannot be opened: " + system_message());
-  if (H5Fis_hdf5(path.c_str()) <= 0) fail("", "is not an HDF5 file");
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
-  if (!file.ok()) fail("", "cannot be opened by HDF5 (the file is damaged or cut short)");
+  if (!file.ok()) {
+    fail("", H5Fis_hdf5(path.c_str()) > 0
+                 ? "cannot be opened by HDF5 (the file is damaged or cut short)"
+                 : "is not an HDF5 file");
+  }
   return file;
 }
 
@@ -909,22 +914,35 @@ Contents read_contents(const std::string& path) {
   });
 }
 
+namespace {
+
+/// The kind of problem to read: the one asked for, or the only one there is.
+std::string kind_to_read(const Group& root, std::string_view asked) {
+  const std::string name(asked);
+  bool found = false;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    found = found || (asked == P::kind && root.has(group_name<P>()));
+  });
+  if (found) return name;
+  const std::vector<std::string> kinds = kinds_of(root);
+  std::string known;
+  for (const auto& other : kinds) known += (known.empty() ? "" : ", ") + other;
+  if (!asked.empty()) {
+    fail("/", "holds no " + name + " problem" + (known.empty() ? "" : "; it holds: " + known));
+  }
+  if (kinds.empty()) fail("/", "holds no problem in a known FCLIB layout");
+  if (kinds.size() > 1) fail("/", "holds several problems, name one of: " + known);
+  return kinds.front();
+}
+
+}  // namespace
+
 Problem read_problem(const std::string& path, std::string_view kind, Validation validation) {
   const Session session;
   return in_file(path, [&] {
     const Handle file = open_file(path);
     const Group root{file.id(), "/"};
-    const std::vector<std::string> kinds = kinds_of(root);
-    std::string known;
-    for (const auto& name : kinds) known += (known.empty() ? "" : ", ") + name;
-    if (kind.empty()) {
-      if (kinds.empty()) fail("/", "holds no problem in a known FCLIB layout");
-      if (kinds.size() > 1) fail("/", "holds several problems, name one of: " + known);
-    } else if (std::find(kinds.begin(), kinds.end(), kind) == kinds.end()) {
-      fail("/", "holds no " + std::string(kind) + " problem" +
-                    (known.empty() ? "" : "; it holds: " + known));
-    }
-    const std::string wanted = kind.empty() ? kinds.front() : std::string(kind);
+    const std::string wanted = kind_to_read(root, kind);
     Problem problem;
     for_each_formulation([&]<class P>(std::type_identity<P>) {
       if (wanted != P::kind) return;

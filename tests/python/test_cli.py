@@ -285,7 +285,7 @@ def test_version_and_help() -> None:
         result = run("--version", module=module)
         assert result.returncode == 0
         assert result.stdout == f"fclib {fclib.__version__}\n"
-    for command in ([], ["info"], ["solve"], ["check"], ["solvers"]):
+    for command in ([], ["info"], ["solve"], ["check"], ["convert"], ["solvers"], ["demo"]):
         for flag in ("--help", "-h"):
             result = run(*command, flag)
             assert result.returncode == 0

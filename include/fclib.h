@@ -1,0 +1,363 @@
+/* fclib.h: frictional contact problems in HDF5 files, their merits and their solvers, from C.
+ *
+ * A drop-in for libfclib 3.1: every struct, field, constant and function of that library is here
+ * with its layout and its meaning, and the shared library has its SONAME, libfclib.so.0. What is
+ * new since is marked so.
+ *
+ * Problems
+ *
+ *   local     u = W r + V l + q,           V^T r + R l + s = 0
+ *   global    M v = H r + G l + f,         u = H^T v + w,         G^T v + b = 0
+ *
+ *   n degrees of freedom, nc contacts, d = spacedim, m = d nc, p bilateral constraints; terms with
+ *   V, R, s or G, b, l are there where p > 0. For each contact, component 0 normal (N) and the
+ *   others tangential (T), with u^ = u + [mu ||u_T||, 0, 0],
+ *
+ *       K* contains u^,   u^ . r = 0,   r in K = { ||r_T|| <= mu r_N }.
+ *
+ *   d is 2 or 3. With rolling (d is 3 or 5: N, T, R), K also asks for ||r_R|| <= mu_r r_N, and
+ *   u^_N = u_N + mu ||u_T|| + mu_r ||u_R||.
+ *
+ * Errors
+ *
+ *   No function ends the process or throws. An int result is 1 on success and 0 on failure, a
+ *   pointer is NULL on failure, a merit is NaN; fclib_last_error() then has the reason, and the
+ *   handler of fclib_set_error_handler() has been called with it. A NULL argument is an error of
+ *   this kind, except for what is marked "or NULL".
+ *
+ * Ownership
+ *
+ *   What a read returns is the caller's. Its parts come from malloc: fclib_delete_local() and its
+ *   like free the members, and then free() the struct itself; fclib_delete_solutions() frees the
+ *   members and the array. What a write takes stays the caller's, and is not changed.
+ *
+ * Files
+ *
+ *   A write is atomic: a process that is killed leaves the old file or the new one. A file may hold
+ *   one problem of each kind, then one solution and any number of guesses; these belong to the
+ *   global problem where there are several. What is there already is replaced only if
+ *   fclib_set_write_mode() says so.
+ *
+ * Threads
+ *
+ *   All functions may be called from several threads at once. Access to files is serialised, since
+ *   HDF5 is not thread-safe; a host that calls HDF5 itself must not do so at the same time.
+ *
+ * The header-only mode that the sources of 3.1 had, FCLIB_HEADER_ONLY, is not offered: the library
+ * is C++ behind this header, and its packages never used that mode.
+ */
+#ifndef _fclib_h_
+#define _fclib_h_
+
+/* the macros of 3.1, which clients may set or test */
+#ifndef FCLIB_APICOMPILE
+#define FCLIB_APICOMPILE
+#endif
+#ifndef FCLIB_NOT_HEADER_ONLY
+#define FCLIB_NOT_HEADER_ONLY
+#endif
+#ifndef FCLIB_WITH_MERIT_FUNCTIONS
+#define FCLIB_WITH_MERIT_FUNCTIONS
+#endif
+#ifndef H5Gcreate_vers
+#define H5Gcreate_vers 2
+#endif
+#ifndef H5Gopen_vers
+#define H5Gopen_vers 2
+#endif
+
+/* this interface: that of 3.1 is 3.1 */
+#define FCLIB_VERSION_MAJOR 3
+#define FCLIB_VERSION_MINOR 2
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- data ------------------------------------------------------------------------------------ */
+
+/** A problem in words. Each text, and the struct itself, may be NULL. */
+struct FCLIB_APICOMPILE fclib_info {
+  char* title;
+  char* description; /**< where the problem comes from */
+  char* math_info;   /**< known properties: existence, uniqueness, ... */
+};
+
+/** What is known of a matrix and cannot be read off its entries. */
+struct FCLIB_APICOMPILE fclib_matrix_info {
+  char* comment; /**< or NULL */
+  double conditioning;
+  double determinant;
+  int rank;
+};
+
+/** A matrix (m x n), index base 0, entries in any order.
+ *
+ *  nz    storage             p                            i                x
+ *  >= 0  triplet             columns (nz)                 rows (nz)        (nz)
+ *  -1    compressed columns  first entry of each (n + 1)  rows (nzmax)     (nzmax)
+ *  -2    compressed rows     first entry of each (m + 1)  columns (nzmax)  (nzmax)
+ *  -3    dense (new)         NULL                         NULL             (m n), by columns
+ *
+ *  Up to -2 this is the cs struct of CSparse, to which it may be cast. Triplets are as CSparse has
+ *  them, and as all known files are; a comment in the header of 3.1 says the reverse. The entries
+ *  of triplets at one place add up. 3.1 does not read dense matrices.
+ */
+struct FCLIB_APICOMPILE fclib_matrix {
+  int nzmax; /**< room for entries; in what is read, the length of x */
+  int m;     /**< rows */
+  int n;     /**< columns */
+  int* p;
+  int* i;
+  double* x;
+  int nz;
+  struct fclib_matrix_info* info; /**< or NULL */
+};
+
+/** The global problem. M, H, f, w, mu are required; G and b come together or are NULL. */
+struct FCLIB_APICOMPILE fclib_global {
+  struct fclib_matrix* M; /**< mass matrix, symmetric positive definite (n x n) [kg] */
+  struct fclib_matrix* H; /**< reactions to generalised forces (n x m) [1] */
+  struct fclib_matrix* G; /**< bilateral multipliers to generalised forces (n x p) [1] */
+  double* mu;             /**< coefficient of friction of each contact (nc) [1] */
+  double* f;              /**< momentum without reactions (n) [N s] */
+  double* b;              /**< prescribed velocity of the bilateral constraints (p) [m/s] */
+  double* w;              /**< prescribed part of the contact velocity (m) [m/s] */
+  int spacedim;           /**< components of a contact: 2 or 3 */
+  struct fclib_info* info;
+};
+
+/** The local problem. W, q, mu are required; V, R and s come together or are NULL. */
+struct FCLIB_APICOMPILE fclib_local {
+  struct fclib_matrix* W; /**< Delassus matrix, positive semi-definite (m x m) [1/kg] */
+  struct fclib_matrix* V; /**< contact velocity under the bilateral multipliers (m x p) [1/kg] */
+  struct fclib_matrix* R; /**< Delassus matrix of the bilateral constraints (p x p) [1/kg] */
+  double* mu;             /**< coefficient of friction of each contact (nc) [1] */
+  double* q;              /**< contact velocity without reactions (m) [m/s] */
+  double* s;              /**< velocity of the bilateral constraints without reactions (p) [m/s] */
+  int spacedim;           /**< components of a contact: 2 or 3 */
+  struct fclib_info* info;
+};
+
+/** New. The global problem with rolling friction. */
+struct FCLIB_APICOMPILE fclib_global_rolling {
+  struct fclib_matrix* M;
+  struct fclib_matrix* H;
+  struct fclib_matrix* G;
+  double* mu;
+  double* mu_r; /**< coefficient of rolling friction of each contact (nc) [m] */
+  double* f;
+  double* b;
+  double* w;
+  int spacedim; /**< 3 (planar) or 5 */
+  struct fclib_info* info;
+};
+
+/** New. The local problem with rolling friction. */
+struct FCLIB_APICOMPILE fclib_local_rolling {
+  struct fclib_matrix* W;
+  struct fclib_matrix* V;
+  struct fclib_matrix* R;
+  double* mu;
+  double* mu_r; /**< coefficient of rolling friction of each contact (nc) [m] */
+  double* q;
+  double* s;
+  int spacedim; /**< 3 (planar) or 5 */
+  struct fclib_info* info;
+};
+
+/** A solution, or a guess. */
+struct FCLIB_APICOMPILE fclib_solution {
+  double* v; /**< generalised velocity (n), NULL for a local problem [m/s] */
+  double* u; /**< relative velocity at the contacts (m) [m/s] */
+  double* r; /**< reaction at the contacts (m), an impulse [N s] */
+  double* l; /**< multiplier of the bilateral constraints (p), NULL where p = 0 [N s] */
+};
+
+/* ---- files ----------------------------------------------------------------------------------- */
+
+/** Writes a problem into a new file, or adds it to an existing one, which must not hold one of its
+ *  kind unless fclib_set_write_mode() allows that. Values and indices are not checked: see
+ *  fclib_validate_global(). Matrices keep their storage; Siconos reads a global problem only where
+ *  it is in triplets. Returns 1, or 0. */
+int fclib_write_global(struct fclib_global* problem, const char* path);
+int fclib_write_local(struct fclib_local* problem, const char* path);
+int fclib_write_global_rolling(struct fclib_global_rolling* problem, const char* path); /* new */
+int fclib_write_local_rolling(struct fclib_local_rolling* problem, const char* path);   /* new */
+
+/** Adds the solution of the problem that is in the file. Its arrays must have the lengths of that
+ *  problem. Returns 1, or 0. */
+int fclib_write_solution(struct fclib_solution* solution, const char* path);
+
+/** Adds guesses for the problem that is in the file (number_of_guesses structs). Returns 1, or 0.
+ */
+int fclib_write_guesses(int number_of_guesses, struct fclib_solution* guesses, const char* path);
+
+/** Reads a problem. Every array has the length that the structs above state; values and indices are
+ *  not checked. Returns NULL on failure. */
+struct fclib_global* fclib_read_global(const char* path);
+struct fclib_local* fclib_read_local(const char* path);
+struct fclib_global_rolling* fclib_read_global_rolling(const char* path); /* new */
+struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new */
+
+/** Reads the solution. Its arrays have the lengths of the problem in the file. Returns NULL on
+ *  failure, and where there is none. Free it with fclib_delete_solutions(solution, 1). */
+struct fclib_solution* fclib_read_solution(const char* path);
+
+/** Reads the guesses, and stores how many there are. Returns their array, to be freed with
+ *  fclib_delete_solutions(guesses, number); NULL on failure, and where there are none. */
+struct fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses);
+
+/** Gives the info of the local problem in the file (of another one where there is no local one) an
+ *  integer attribute. Returns 1, or 0 where it is there already and is not to be replaced. */
+int fclib_create_int_attributes_in_info(const char* path, const char* attr_name, int attr_value);
+
+/** New. The kind of the problem that a solution of the file belongs to: "global", "local",
+ *  "global_rolling" or "local_rolling". Not to be freed. NULL where the file holds none. */
+const char* fclib_problem_kind(const char* path);
+
+/** New. What a write does where the file already holds such a thing. */
+enum fclib_write_mode {
+  FCLIB_WRITE_ADD,    /**< it fails; as 3.1 does, and the default */
+  FCLIB_WRITE_REPLACE /**< it puts the new in the place of the old; a problem takes the solution and
+                           the guesses with it */
+};
+
+/** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */
+int fclib_set_write_mode(enum fclib_write_mode mode);
+
+/** New. Sets the level of compression of all writes of the process, 0 (none) to 9; 4 at first. The
+ *  filters are those that every HDF5 has. Returns 1, or 0 for a level outside. */
+int fclib_set_compression(int level);
+
+/* ---- deleting -------------------------------------------------------------------------------- */
+
+/** Frees all members of a problem (or NULL), not the struct itself. */
+void fclib_delete_global(struct fclib_global* problem);
+void fclib_delete_local(struct fclib_local* problem);
+void fclib_delete_global_rolling(struct fclib_global_rolling* problem); /* new */
+void fclib_delete_local_rolling(struct fclib_local_rolling* problem);   /* new */
+
+/** Frees the members of solutions or guesses (count structs), and the array (or NULL) itself. */
+void fclib_delete_solutions(struct fclib_solution* data, int count);
+
+/* ---- errors ---------------------------------------------------------------------------------- */
+
+/** New. Why the last call of this thread failed, "" where it did not. The text is the library's,
+ *  and stays until the next call of this thread. */
+const char* fclib_last_error(void);
+
+/** New. A function that is told of every failure, in the thread in which it happens; it must return
+ *  and may call fclib. */
+typedef void (*fclib_error_handler)(const char* message, void* context);
+
+/** New. Installs a handler (or NULL) and the context it is called with, for the whole process. */
+void fclib_set_error_handler(fclib_error_handler handler, void* context);
+
+/* ---- validation ------------------------------------------------------------------------------ */
+
+/** New. Whether the data of a problem makes sense: sizes that agree, pointers in order, indices in
+ *  range, finite numbers, no negative friction. Returns 1, or 0 with the first thing that is wrong.
+ *  Merits and solves begin with this. */
+int fclib_validate_global(const struct fclib_global* problem);
+int fclib_validate_local(const struct fclib_local* problem);
+int fclib_validate_global_rolling(const struct fclib_global_rolling* problem);
+int fclib_validate_local_rolling(const struct fclib_local_rolling* problem);
+
+/** New. Whether the members that a solution has are finite, and whether it has those it needs: r,
+ *  and l where p > 0. Returns 1, or 0. */
+int fclib_validate_global_solution(const struct fclib_global* problem,
+                                   const struct fclib_solution* solution);
+int fclib_validate_local_solution(const struct fclib_local* problem,
+                                  const struct fclib_solution* solution);
+int fclib_validate_global_rolling_solution(const struct fclib_global_rolling* problem,
+                                           const struct fclib_solution* solution);
+int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* problem,
+                                          const struct fclib_solution* solution);
+
+/* ---- merits ---------------------------------------------------------------------------------- */
+
+/** How wrong a solution is. u is always recomputed: W r + V l + q, or H^T v + w.
+ *
+ *  MERIT_1   ||F|| / (1 + sqrt(||q||)) + ||V^T r + R l + s|| / (1 + ||s||) with the natural map
+ *            F = r - P_K(r - u^), in double precision: the number of 3.1, which has it for matrices
+ *            by columns and d = 3 alone, and here is the same thing for all. For a global problem
+ *            q = H^T M^-1 f + w, the second term is ||G^T v + b|| / (1 + ||b||), and a third one
+ *            ||M v - H r - G l - f|| / (1 + ||f||).
+ *  MERIT_2   the relative error that every tolerance of this library bounds (3.1 returns 0): the
+ *            largest of ||F|| / ||q||, of the residuals of the dynamics and of the bilateral
+ *            constraints, and of the distance of the solution's u from the recomputed one, each
+ *            relative to the largest term of its equation.
+ */
+enum FCLIB_APICOMPILE fclib_merit { MERIT_1, MERIT_2 };
+
+#ifdef FCLIB_WITH_MERIT_FUNCTIONS
+/** The merit of a solution. It needs r, and l where p > 0; v follows from them where it is NULL.
+ *  NaN where the problem or the solution is not valid. */
+double fclib_merit_global(struct fclib_global* problem, enum fclib_merit merit,
+                          struct fclib_solution* solution);
+double fclib_merit_local(struct fclib_local* problem, enum fclib_merit merit,
+                         struct fclib_solution* solution);
+double fclib_merit_global_rolling(struct fclib_global_rolling* problem, enum fclib_merit merit,
+                                  struct fclib_solution* solution); /* new */
+double fclib_merit_local_rolling(struct fclib_local_rolling* problem, enum fclib_merit merit,
+                                 struct fclib_solution* solution); /* new */
+#endif
+
+/* ---- solving --------------------------------------------------------------------------------- */
+
+/** New. What is asked of a solver; a struct of zeros asks for the defaults. */
+struct fclib_solve_options {
+  double tolerance;    /**< on MERIT_2; 0 for 1e-8 */
+  int max_iterations;  /**< 0 for the solver's own */
+  double time_limit;   /**< wall clock [s]; 0 for none */
+  const double* guess; /**< reactions to start from (m), or NULL */
+  const char* options; /**< options of the solver, "name=value name=value", or NULL */
+};
+
+/** New. How a solve ended. */
+enum fclib_status {
+  FCLIB_CONVERGED,       /**< MERIT_2 is at most the tolerance */
+  FCLIB_ITERATION_LIMIT, /**< stopped at max_iterations */
+  FCLIB_TIME_LIMIT,      /**< stopped at time_limit */
+  FCLIB_DIVERGED,        /**< an iterate was not finite */
+  FCLIB_INACCURATE,      /**< the solver was content, MERIT_2 is not */
+  FCLIB_INTERRUPTED
+};
+
+/** New. What a solve says of itself. */
+struct fclib_solve_result {
+  enum fclib_status status;
+  int iterations;
+  double error; /**< MERIT_2 of the solution */
+  double cpu_s; /**< CPU time of the solver alone [s] */
+};
+
+/** New. Solves a problem by the solver of this name (see fclib_solver_name()). The arrays of
+ *  `solution` are the caller's, of the lengths that struct states, and are filled; v, u and l may
+ *  be NULL. `options` and `result` may be NULL. Returns 1 where the solver ran, however it ended,
+ *  and 0 for invalid data, an unknown solver or option. */
+int fclib_solve_global(const struct fclib_global* problem, const char* solver,
+                       const struct fclib_solve_options* options, struct fclib_solution* solution,
+                       struct fclib_solve_result* result);
+int fclib_solve_local(const struct fclib_local* problem, const char* solver,
+                      const struct fclib_solve_options* options, struct fclib_solution* solution,
+                      struct fclib_solve_result* result);
+int fclib_solve_global_rolling(const struct fclib_global_rolling* problem, const char* solver,
+                               const struct fclib_solve_options* options,
+                               struct fclib_solution* solution, struct fclib_solve_result* result);
+int fclib_solve_local_rolling(const struct fclib_local_rolling* problem, const char* solver,
+                              const struct fclib_solve_options* options,
+                              struct fclib_solution* solution, struct fclib_solve_result* result);
+
+/** New. The name of solver number k = 0, 1, ..., NULL past the last. Not to be freed. */
+const char* fclib_solver_name(int k);
+
+/** New. "converged", "iteration_limit", ...: not to be freed. */
+const char* fclib_status_name(enum fclib_status status);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif /* _fclib_h_ */

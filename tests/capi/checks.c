@@ -1,0 +1,334 @@
+/* What the interface promises beyond the layout of files; ends with 0 where it holds.
+ *
+ *   checks FOLDER
+ */
+#include <fclib.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CHECK(condition)                                                               \
+  do {                                                                                 \
+    if (!(condition)) {                                                                \
+      fprintf(stderr, "line %d: %s (%s)\n", __LINE__, #condition, fclib_last_error()); \
+      exit(1);                                                                         \
+    }                                                                                  \
+  } while (0)
+#define SAYS(text) CHECK(strstr(fclib_last_error(), text))
+
+static char folder[512];
+
+static const char* path_of(const char* name) {
+  static _Thread_local char path[1024];
+  snprintf(path, sizeof path, "%s/%s", folder, name);
+  return path;
+}
+
+/* one contact of a ball on a plane, sliding */
+static int columns[] = {0, 1, 2, 3, 4, 5}, rows[] = {0, 1, 2, 3, 4};
+static double one[] = {1, 1, 1, 1, 1};
+static struct fclib_matrix identity = {3, 3, 3, columns, rows, one, -1, NULL};
+static double q[] = {-1, 2, 0}, mu[] = {0.5}, zero[5];
+static double u[] = {0, 1.5, 0}, r[] = {1, -0.5, 0}, v[] = {0, 1.5, 0};
+static struct fclib_local local(void) {
+  struct fclib_local a = {0};
+  a.W = &identity;
+  a.q = q;
+  a.mu = mu;
+  a.spacedim = 3;
+  return a;
+}
+static struct fclib_global global(void) {
+  struct fclib_global a = {0};
+  a.M = &identity;
+  a.H = &identity;
+  a.f = q;
+  a.w = zero;
+  a.mu = mu;
+  a.spacedim = 3;
+  return a;
+}
+
+static void errors(void) {
+  struct fclib_local a = local();
+  struct fclib_solution s = {NULL, u, r, NULL};
+  int count = 7;
+  CHECK(!fclib_read_local(path_of("missing")));
+  SAYS("there is no such file");
+  SAYS("missing");
+  CHECK(!fclib_read_local(folder));
+  SAYS("is a directory");
+  CHECK(!fclib_read_global(NULL));
+  SAYS("is NULL");
+  CHECK(!fclib_read_solution(path_of("missing")));
+  CHECK(!fclib_read_guesses(path_of("missing"), &count) && count == 0);
+  CHECK(!fclib_problem_kind(path_of("missing")));
+  CHECK(!fclib_write_local(&a, folder));
+  CHECK(!fclib_write_local(&a, path_of("no/such/folder")));
+  CHECK(!fclib_write_local(NULL, path_of("a")));
+  CHECK(!fclib_write_solution(&s, path_of("missing")));
+  CHECK(!fclib_create_int_attributes_in_info(path_of("missing"), "a", 1));
+
+  FILE* text = fopen(path_of("text"), "w");
+  fputs("not HDF5\n", text);
+  fclose(text);
+  CHECK(!fclib_read_local(path_of("text")));
+  SAYS("is not an HDF5 file");
+  CHECK(!fclib_write_local(&a, path_of("text")));
+
+  /* what a problem lacks, or says wrongly */
+  a.q = NULL;
+  CHECK(!fclib_write_local(&a, path_of("a")));
+  SAYS("/fclib_local/vectors/q");
+  a = local();
+  a.spacedim = 4;
+  CHECK(!fclib_write_local(&a, path_of("a")));
+  SAYS("spacedim");
+  a.spacedim = 2;
+  CHECK(!fclib_write_local(&a, path_of("a")));
+  SAYS("no multiple");
+  a = local();
+  a.V = &identity;
+  CHECK(!fclib_write_local(&a, path_of("a")));
+  struct fclib_matrix bad = identity;
+  bad.nz = -7;
+  a = local();
+  a.W = &bad;
+  CHECK(!fclib_write_local(&a, path_of("a")));
+  SAYS("is no storage");
+  CHECK(!fclib_read_local(path_of("a")));
+
+  /* a success clears the message */
+  a = local();
+  CHECK(fclib_write_local(&a, path_of("a")));
+  CHECK(!*fclib_last_error());
+  CHECK(!fclib_read_global(path_of("a")));
+  SAYS("holds no global problem; it holds: local");
+  CHECK(!fclib_read_solution(path_of("a")));
+  CHECK(!fclib_read_guesses(path_of("a"), &count));
+
+  /* nothing to delete */
+  fclib_delete_local(NULL);
+  fclib_delete_global(NULL);
+  fclib_delete_local_rolling(NULL);
+  fclib_delete_global_rolling(NULL);
+  fclib_delete_solutions(NULL, 3);
+  struct fclib_local empty = {0};
+  fclib_delete_local(&empty);
+}
+
+static int told;
+static void handler(const char* message, void* context) {
+  CHECK(strstr(message, "missing") && context == &told);
+  told++;
+}
+
+static void handlers(void) {
+  fclib_set_error_handler(handler, &told);
+  CHECK(!fclib_read_local(path_of("missing")) && told == 1);
+  fclib_set_error_handler(NULL, NULL);
+  CHECK(!fclib_read_local(path_of("missing")) && told == 1);
+}
+
+static void modes(void) {
+  struct fclib_local a = local();
+  struct fclib_global b = global();
+  struct fclib_solution s = {v, u, r, NULL}, *read, guesses[] = {s, s};
+  const char* path = path_of("modes");
+  int count;
+  CHECK(fclib_write_local(&a, path));
+  CHECK(!strcmp(fclib_problem_kind(path), "local"));
+  CHECK(!fclib_write_local(&a, path));
+  SAYS("is in the file already");
+  CHECK(fclib_write_global(&b, path));
+  CHECK(!strcmp(fclib_problem_kind(path), "global"));
+  CHECK(fclib_write_solution(&s, path));
+  CHECK(!fclib_write_solution(&s, path));
+  CHECK(fclib_write_guesses(2, guesses, path));
+  CHECK(!fclib_write_guesses(2, guesses, path));
+  CHECK(fclib_create_int_attributes_in_info(path, "number", 1));
+  CHECK(!fclib_create_int_attributes_in_info(path, "number", 2));
+  CHECK((read = fclib_read_guesses(path, &count)) && count == 2 && read[1].v[1] == 1.5);
+  fclib_delete_solutions(read, count);
+
+  CHECK(!fclib_set_write_mode((enum fclib_write_mode)9));
+  CHECK(fclib_set_write_mode(FCLIB_WRITE_REPLACE));
+  double other[] = {0, 0, 0};
+  s.u = other;
+  CHECK(fclib_write_solution(&s, path));
+  CHECK(fclib_write_guesses(1, guesses, path));
+  CHECK(fclib_create_int_attributes_in_info(path, "number", 2));
+  CHECK((read = fclib_read_solution(path)) && read->u[1] == 0);
+  fclib_delete_solutions(read, 1);
+  CHECK(fclib_write_global(&b, path));
+  CHECK(!fclib_read_solution(path)); /* it was that of another problem */
+  CHECK(fclib_set_write_mode(FCLIB_WRITE_ADD));
+
+  CHECK(!fclib_set_compression(10));
+  CHECK(!fclib_set_compression(-1));
+  CHECK(fclib_set_compression(0));
+  CHECK(fclib_write_local(&a, path_of("plain")));
+  CHECK(fclib_set_compression(4));
+}
+
+static void validation_and_merits(void) {
+  struct fclib_local a = local();
+  struct fclib_global b = global();
+  struct fclib_solution s = {NULL, u, r, NULL};
+  CHECK(fclib_validate_local(&a) && fclib_validate_global(&b));
+  CHECK(fclib_validate_local_solution(&a, &s));
+  CHECK(fclib_merit_local(&a, MERIT_1, &s) == 0 && fclib_merit_local(&a, MERIT_2, &s) == 0);
+  CHECK(fclib_merit_global(&b, MERIT_1, &s) == 0 && fclib_merit_global(&b, MERIT_2, &s) == 0);
+  s.v = v;
+  CHECK(fclib_merit_global(&b, MERIT_1, &s) == 0);
+  double wrong[] = {2, 0, 0};
+  s.r = wrong;
+  s.v = s.u = NULL;
+  CHECK(fclib_merit_local(&a, MERIT_1, &s) > 0.1 && fclib_merit_local(&a, MERIT_2, &s) > 0.1);
+  /* without a residual of the dynamics, the global merit is that of the condensed problem */
+  CHECK(fabs(fclib_merit_global(&b, MERIT_1, &s) - fclib_merit_local(&a, MERIT_1, &s)) < 1e-15);
+
+  /* the same matrix in every storage */
+  int row_pointers[] = {0, 1, 2, 3};
+  double dense[] = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  struct fclib_matrix others[] = {{3, 3, 3, row_pointers, rows, one, -2, NULL},
+                                  {3, 3, 3, rows, rows, one, 3, NULL},
+                                  {9, 3, 3, NULL, NULL, dense, -3, NULL}};
+  for (int k = 0; k < 3; k++) {
+    struct fclib_local other = local();
+    other.W = &others[k];
+    CHECK(fclib_merit_local(&other, MERIT_1, &s) == fclib_merit_local(&a, MERIT_1, &s));
+    char name[] = "storage0";
+    name[7] = (char)('0' + k);
+    CHECK(fclib_write_local(&other, path_of(name)));
+    struct fclib_local* back = fclib_read_local(path_of(name));
+    CHECK(back && back->W->nz == others[k].nz && !back->V && !back->info);
+    CHECK(fclib_merit_local(back, MERIT_2, &s) == fclib_merit_local(&a, MERIT_2, &s));
+    fclib_delete_local(back);
+    CHECK(!back->W && !back->q); /* a second time does no harm */
+    fclib_delete_local(back);
+    free(back);
+  }
+
+  /* a merit of what makes no sense is none; 3.1's writer takes it all the same */
+  int outside[] = {0, 1, 5};
+  struct fclib_matrix bad = identity;
+  bad.i = outside;
+  a.W = &bad;
+  CHECK(!fclib_validate_local(&a));
+  SAYS("/fclib_local/W/i[2]");
+  CHECK(isnan(fclib_merit_local(&a, MERIT_1, &s)) && isnan(fclib_merit_local(&a, MERIT_2, &s)));
+  CHECK(fclib_write_local(&a, path_of("outside")));
+  struct fclib_local* back = fclib_read_local(path_of("outside"));
+  CHECK(back && back->W->i[2] == 5);
+  fclib_delete_local(back);
+  free(back);
+  a = local();
+  wrong[1] = NAN;
+  CHECK(!fclib_validate_local_solution(&a, &s));
+  CHECK(isnan(fclib_merit_local(&a, MERIT_1, &s)));
+  s.r = NULL;
+  CHECK(!fclib_validate_local_solution(&a, &s) && isnan(fclib_merit_local(&a, MERIT_2, &s)));
+  CHECK(isnan(fclib_merit_local(&a, (enum fclib_merit)5, &s)));
+}
+
+static void rolling(void) {
+  struct fclib_matrix five = {5, 5, 5, columns, rows, one, -1, NULL};
+  double q5[] = {-1, 2, 0, 0.5, 0}, mu_r[] = {0.1};
+  struct fclib_local_rolling a = {0};
+  a.W = &five;
+  a.q = q5;
+  a.mu = mu;
+  a.mu_r = mu_r;
+  a.spacedim = 5;
+  CHECK(fclib_validate_local_rolling(&a));
+  CHECK(fclib_write_local_rolling(&a, path_of("rolling")));
+  CHECK(!strcmp(fclib_problem_kind(path_of("rolling")), "local_rolling"));
+  struct fclib_local_rolling* back = fclib_read_local_rolling(path_of("rolling"));
+  CHECK(back && back->mu_r[0] == 0.1 && back->spacedim == 5);
+
+  /* it stops falling; friction slows sliding by mu, rolling by mu_r */
+  double r5[] = {1, -0.5, 0, -0.1, 0}, u5[] = {0, 1.5, 0, 0.4, 0};
+  struct fclib_solution s = {NULL, u5, r5, NULL};
+  CHECK(fclib_validate_local_rolling_solution(back, &s));
+  CHECK(fclib_merit_local_rolling(back, MERIT_1, &s) < 1e-15);
+  CHECK(fclib_merit_local_rolling(back, MERIT_2, &s) < 1e-15);
+  CHECK(fclib_write_solution(&s, path_of("rolling")));
+  fclib_delete_local_rolling(back);
+  free(back);
+}
+
+static void solving(void) {
+  struct fclib_local a = local();
+  struct fclib_global b = global();
+  double v_[3], u_[3], r_[3];
+  struct fclib_solution s = {v_, u_, r_, NULL};
+  struct fclib_solve_result result;
+  CHECK(fclib_solver_name(0) && !fclib_solver_name(-1) && !fclib_solver_name(1000));
+  CHECK(fclib_solve_local(&a, "nsgs", NULL, &s, &result));
+  CHECK(result.status == FCLIB_CONVERGED && result.error <= 1e-8 && result.iterations > 0);
+  CHECK(!strcmp(fclib_status_name(result.status), "converged"));
+  CHECK(fabs(r_[1] + 0.5) < 1e-8 && fabs(u_[1] - 1.5) < 1e-8);
+  CHECK(fclib_solve_global(&b, "nsgs", NULL, &s, NULL));
+  CHECK(fabs(v_[1] - 1.5) < 1e-8);
+
+  struct fclib_solve_options options = {1e-12, 50, 5, r, NULL};
+  CHECK(fclib_solve_local(&a, "nsgs", &options, &s, &result) && result.error <= 1e-12);
+  CHECK(!fclib_solve_local(&a, "no such solver", NULL, &s, &result));
+  SAYS("nsgs");
+  options.options = "no_such_option=1";
+  CHECK(!fclib_solve_local(&a, "nsgs", &options, &s, &result));
+  SAYS("no_such_option");
+  options.options = "nonsense";
+  CHECK(!fclib_solve_local(&a, "nsgs", &options, &s, &result));
+  options.options = NULL;
+  options.tolerance = -1;
+  CHECK(!fclib_solve_local(&a, "nsgs", &options, &s, &result));
+  CHECK(!fclib_solve_local(&a, NULL, NULL, &s, &result));
+  CHECK(!fclib_solve_local(&a, "nsgs", NULL, NULL, &result));
+  s.r = NULL;
+  CHECK(!fclib_solve_local(&a, "nsgs", NULL, &s, &result));
+}
+
+/* each thread with its own file, and its own last error */
+static void* work(void* number) {
+  struct fclib_local a = local();
+  char name[32];
+  snprintf(name, sizeof name, "thread%d", *(int*)number);
+  for (int k = 0; k < 20; k++) {
+    remove(path_of(name));
+    CHECK(fclib_write_local(&a, path_of(name)));
+    CHECK(!fclib_write_local(&a, path_of(name)));
+    SAYS(name);
+    struct fclib_local* back = fclib_read_local(path_of(name));
+    CHECK(back && !*fclib_last_error() && back->q[1] == 2);
+    fclib_delete_local(back);
+    free(back);
+  }
+  return NULL;
+}
+
+static void threads(void) {
+  pthread_t all[4];
+  int numbers[4];
+  for (int k = 0; k < 4; k++) {
+    numbers[k] = k;
+    CHECK(!pthread_create(&all[k], NULL, work, &numbers[k]));
+  }
+  for (int k = 0; k < 4; k++) pthread_join(all[k], NULL);
+}
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  snprintf(folder, sizeof folder, "%s", argv[1]);
+  errors();
+  handlers();
+  modes();
+  validation_and_merits();
+  rolling();
+  solving();
+  threads();
+  return 0;
+}

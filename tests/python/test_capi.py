@@ -1,0 +1,508 @@
+"""The C library: a drop-in for libfclib 3.1 that never takes its host down."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fclib
+from capi_library import HEADERS, ROOT, compile_program, library_folder
+from helpers import Array, dense, modified, planted_global, planted_local, project
+
+PEER_HEADER = Path("/usr/include/fclib.h")
+BATCH = 25  # problems in one process
+
+
+@pytest.fixture(scope="session")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for what is compiled here."""
+    return tmp_path_factory.mktemp("programs")
+
+
+# ---- what the interface promises
+
+
+@pytest.fixture(scope="session")
+def checks(programs: Path) -> Path:
+    return compile_program(ROOT / "tests/capi/checks.c", programs / "checks")
+
+
+def test_what_the_header_promises(checks: Path, tmp_path: Path) -> None:
+    done = subprocess.run([checks, tmp_path], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == done.stderr == "", "the library prints nothing"
+
+
+def valgrind(*command: object) -> None:
+    tool = shutil.which("valgrind")
+    if tool is None:
+        pytest.skip("there is no valgrind")
+    options = ["--quiet", "--leak-check=full", "--error-exitcode=99"]
+    done = subprocess.run(
+        [tool, *options, *map(str, command)], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_library_is_clean_under_valgrind(checks: Path, tmp_path: Path) -> None:
+    valgrind(checks, tmp_path)
+
+
+def test_only_the_interface_is_exported() -> None:
+    tool = shutil.which("nm")
+    if tool is None:
+        pytest.skip("there is no nm")
+    library = library_folder() / "libfclib.so.0"
+    names = subprocess.run(
+        [tool, "--dynamic", "--defined-only", library], capture_output=True, text=True, check=True
+    )
+    exported = {line.split()[-1] for line in names.stdout.splitlines()}
+    assert {name for name in exported if not name.startswith("fclib_")} == set()
+    assert len(exported) > 40
+
+
+def test_the_header_compiles_as_cxx(programs: Path) -> None:
+    compiler = shutil.which("c++")
+    if compiler is None:
+        pytest.skip("there is no C++ compiler")
+    source = programs / "header.cpp"
+    source.write_text(
+        "#define FCLIB_WITH_MERIT_FUNCTIONS\n#define FCLIB_APICOMPILE\n"
+        "#include <fclib.h>\n#include <fclib.h>\n"
+        "int main() { return fclib_solver_name(0) ? 0 : 1; }\n"
+    )
+    program, folder = programs / "header", library_folder()
+    command = [compiler, "-std=c++98", "-pedantic", "-Werror", f"-I{HEADERS}", str(source)]
+    libraries = [f"-L{folder}", "-lfclib", f"-Wl,-rpath,{folder}"]
+    subprocess.run([*command, "-o", str(program), *libraries], check=True)
+    assert subprocess.run([program]).returncode == 0
+
+
+# ---- the examples
+
+
+@pytest.fixture(scope="session")
+def examples(programs: Path) -> dict[str, Path]:
+    sources = sorted((ROOT / "examples/c").glob("*.c"))
+    return {
+        source.stem: compile_program(source, programs / source.stem, "-std=c99", "-pedantic")
+        for source in sources
+    }
+
+
+def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
+    path = tmp_path / "ball.hdf5"
+    for _ in range(2):  # the file may be there already
+        done = subprocess.run([examples["write"], path], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+    problem, solution = fclib.read(path), fclib.read_solution(path)
+    assert problem.info.title == "a ball on a plane"
+    assert solution is not None
+    assert fclib.merit(problem, solution).error == 0
+
+    done = subprocess.run([examples["solve"], path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "converged" in done.stdout
+    assert "contact 0: r = 1 -0.5" in done.stdout
+    done = subprocess.run(
+        [examples["solve"], path, "no_such_solver"], capture_output=True, text=True
+    )
+    assert done.returncode == 1
+    assert "no_such_solver" in done.stderr
+
+
+def test_the_examples_are_clean_under_valgrind(examples: dict[str, Path], tmp_path: Path) -> None:
+    valgrind(examples["write"], tmp_path / "ball.hdf5")
+    valgrind(examples["solve"], tmp_path / "ball.hdf5")
+
+
+# ---- files go both ways
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library, and the program that exchanges problems through it."""
+
+    name: str
+    program: Path
+    environment: dict[str, str]
+
+    def __call__(self, verb: str, words: str) -> str:
+        done = subprocess.run(
+            [self.program, verb],
+            input=words,
+            capture_output=True,
+            text=True,
+            env=self.environment,
+            timeout=120,
+        )
+        assert done.returncode == 0, f"{self.name} {verb}: {done.stderr[-1000:]}"
+        return done.stdout
+
+
+EXCHANGE = ROOT / "tests/capi/exchange.c"
+
+
+@pytest.fixture(scope="session")
+def ours(programs: Path) -> Library:
+    """Our library, and a program compiled with our header."""
+    return Library("ours", compile_program(EXCHANGE, programs / "ours"), dict(os.environ))
+
+
+@pytest.fixture(scope="session")
+def peer_folder() -> Path:
+    """The folder of the peer's library."""
+    found = sorted(Path("/usr/lib").glob("*/libfclib.so.0"))
+    if not PEER_HEADER.is_file() or not found or "FCLIB_VERSION_MAJOR" in PEER_HEADER.read_text():
+        pytest.skip("libfclib 3.1 is not installed")
+    return found[0].parent
+
+
+@pytest.fixture(scope="session")
+def theirs(programs: Path, peer_folder: Path) -> Library:
+    """The peer, and a program compiled with its header."""
+    program = compile_program(
+        EXCHANGE, programs / "theirs", "-DONLY_3_1", "-I/usr/include", folder=peer_folder
+    )
+    return Library("theirs", program, dict(os.environ))
+
+
+@pytest.fixture(scope="session")
+def replaced(theirs: Library) -> Library:
+    """The program compiled with the peer's header, and our library in the place of theirs."""
+    environment = os.environ | {"LD_LIBRARY_PATH": str(library_folder())}
+    return Library("a client of theirs with our library", theirs.program, environment)
+
+
+@pytest.fixture(scope="session")
+def brought(programs: Path, peer_folder: Path) -> Library:
+    """A program compiled with our header, and the peer's library."""
+    program = compile_program(
+        EXCHANGE, programs / "brought", "-DONLY_3_1", f"-I{HEADERS}", folder=peer_folder
+    )
+    return Library("a client of ours with their library", program, dict(os.environ))
+
+
+def number(x: float) -> str:
+    """As %a prints it."""
+    if not np.isfinite(x):
+        return str(float(x))
+    text = float(x).hex()
+    mantissa, exponent = text.split("p")
+    if "." in mantissa:
+        mantissa = mantissa.rstrip("0").rstrip(".")
+    return f"{mantissa}p{exponent}"
+
+
+class Words:
+    """Random problems in words: of one kind, in any storage, with any numbers."""
+
+    def __init__(self, seed: int, kind: str) -> None:
+        self.rng = np.random.default_rng(seed)
+        self.kind = kind
+        self.words: list[str] = []
+
+    def add(self, *values: object) -> None:
+        self.words += [str(value) for value in values]
+
+    def vector(self, size: int, given: bool = True) -> None:
+        if size == 0 or not given:
+            return self.add("-")
+        values = self.rng.standard_normal(size) * 10.0 ** self.rng.integers(-300, 300, size)
+        values[self.rng.uniform(size=size) < 0.1] = self.rng.choice([0, -0.0, np.inf, -np.inf])
+        self.add(*map(number, values))
+
+    def text(self) -> None:
+        letters = [*"abc -_", "é", "\n", "%s"]
+        size = int(self.rng.integers(-1, 12))
+        chosen = "".join(letters[k] for k in self.rng.integers(0, len(letters), max(size, 0)))
+        self.add("-" if size < 0 else "=" + chosen.encode().hex())
+
+    def info(self) -> None:
+        if self.rng.uniform() < 0.3:
+            return self.add("-")
+        self.add("+")
+        start = len(self.words)
+        for _ in range(3):
+            self.text()
+        if set(self.words[start:]) == {"-"}:
+            self.words[start] = "="
+
+    def matrix(self, rows: int, cols: int) -> None:
+        """Indices and pointers are whatever: 3.1 writes and reads them."""
+        storage = int(self.rng.integers(0, 3))
+        entries = int(self.rng.integers(0, rows * cols + 3))
+        indices = self.rng.integers(-5, rows + cols + 5, entries)
+        if storage == 0:
+            self.add(entries, rows, cols, entries)
+            pointers = self.rng.integers(-5, rows + cols + 5, entries)
+        else:
+            self.add(entries, rows, cols, -storage)
+            outer = cols if storage == 1 else rows
+            pointers = np.sort(self.rng.integers(0, entries + 1, outer + 1))
+            if self.rng.uniform() < 0.3:
+                pointers = self.rng.integers(-(2**31), 2**31, outer + 1)
+        self.add(*pointers, *indices)
+        if entries:
+            self.vector(entries)
+        if self.rng.uniform() < 0.5:
+            return self.add("-")
+        self.add("+")
+        self.text()
+        self.add(*map(number, self.rng.standard_normal(2)), self.rng.integers(-3, 100))
+
+    def problem(self) -> tuple[str, str]:
+        """The words, and what there is beside the problem ("s" and "g", or neither)."""
+        rng = self.rng
+        rolling = self.kind.endswith("rolling")
+        d = int(rng.choice([3, 5] if rolling else [2, 3]))
+        nc, p = int(rng.integers(0, 5)), int(rng.choice([0, 1, 3]))
+        m, n = d * nc, int(rng.integers(1, 9))
+        local = self.kind.startswith("local")
+        self.add(self.kind, d)
+        if local:
+            self.matrix(m, m)
+            shapes = [(m, p), (p, p)]
+        else:
+            self.matrix(n, n)
+            self.matrix(n, m)
+            shapes = [(n, p)]
+        for shape in shapes:
+            if p:
+                self.matrix(*shape)
+            else:
+                self.add("-")
+        for size in [nc, *([nc] if rolling else []), *((m, p) if local else (n, p, m))]:
+            self.vector(size)
+        self.info()
+        # 3.1 takes no solution without contacts
+        what = "-" if m == 0 else str(rng.choice(["-", "s", "g", "sg"]))
+        sizes = (0 if local else n, m, m, p)
+        self.add("+" if "s" in what else "-")
+        guesses = int(rng.integers(1, 4)) if "g" in what else 0
+        for k in range(guesses + ("s" in what)):
+            if k == ("s" in what):
+                self.add(guesses)
+            for size in sizes:
+                self.vector(size)
+        if guesses == 0:
+            self.add(0)
+        return " ".join(self.words), what
+
+
+def both_ways(
+    writers: Iterable[Library], readers: Iterable[Library], kind: str, seed: int, folder: Path
+) -> None:
+    """What any of the writers writes is what any of the readers reads, word for word."""
+    problems = [Words(seed + k, kind).problem() for k in range(BATCH)]
+    readers = list(readers)
+    for writer in writers:
+        paths = [folder / str(k) for k in range(BATCH)]
+        for path in paths:
+            path.unlink(missing_ok=True)
+        lines = [f"{path} {words}" for path, (words, _) in zip(paths, problems, strict=True)]
+        writer("write", "\n".join(lines))
+        asked = "\n".join(
+            f"{kind} {what} {path}" for path, (_, what) in zip(paths, problems, strict=True)
+        )
+        for reader in readers:
+            seen = reader("show", asked).splitlines()
+            for line, got in zip(lines, seen, strict=True):
+                assert got == line, f"{writer.name} wrote, {reader.name} read"
+
+
+@pytest.mark.parametrize("kind", ["local", "global"])
+def test_files_go_both_ways(
+    kind: str,
+    ours: Library,
+    theirs: Library,
+    replaced: Library,
+    brought: Library,
+    tmp_path_factory: pytest.TempPathFactory,
+) -> None:
+    folder = tmp_path_factory.mktemp(kind)
+
+    @settings(max_examples=8)
+    @given(st.integers(0, 2**32))
+    def check(seed: int) -> None:
+        both_ways([ours, theirs], [ours, theirs], kind, seed, folder)
+
+    check()
+    both_ways([replaced], [theirs], kind, 1, folder)
+    both_ways([theirs], [replaced], kind, 2, folder)
+    both_ways([brought], [ours], kind, 3, folder)
+    both_ways([ours], [brought], kind, 4, folder)
+
+
+@pytest.mark.parametrize("kind", ["local", "global", "local_rolling", "global_rolling"])
+def test_files_come_back(
+    kind: str, ours: Library, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp(kind)
+
+    @settings(max_examples=4)
+    @given(st.integers(0, 2**32))
+    def check(seed: int) -> None:
+        both_ways([ours], [ours], kind, seed, folder)
+
+    check()
+
+
+# ---- MERIT_1
+
+
+def matrix_words(a: Any) -> Iterator[str]:
+    a = a.tocsc()
+    yield from map(str, [a.nnz, *a.shape, -1, *a.indptr, *a.indices])
+    yield from map(number, a.data)
+    yield "-"
+
+
+def vector_words(x: Array | None) -> Iterator[str]:
+    yield from ["-"] if x is None or x.size == 0 else map(number, x)
+
+
+def judged_words(problem: fclib.Problem, solution: fclib.Solution) -> str:
+    """A problem with matrices by columns, and a solution, for `exchange merit`."""
+    words = ["-", problem.kind, str(problem.spacedim)]
+    local = isinstance(problem, fclib.LocalProblem)
+    for name in ("W", "V", "R") if local else ("M", "H", "G"):
+        a = getattr(problem, name)
+        words += ["-"] if a is None else matrix_words(a)
+    for name in ("mu", "q", "s") if local else ("mu", "f", "b", "w"):
+        words += vector_words(getattr(problem, name))
+    words += ["-", "+"]
+    for name in ("v", "u", "r", "l"):
+        words += vector_words(None if local and name == "v" else getattr(solution, name))
+    return " ".join([*words, "0"])
+
+
+def perturbed(seed: int, solution: fclib.Solution, size: float) -> fclib.Solution:
+    rng = np.random.default_rng(seed)
+
+    def moved(x: Array | None) -> Array | None:
+        return None if x is None else x + size * rng.standard_normal(x.size)
+
+    r = moved(solution.r)
+    assert r is not None
+    return fclib.Solution(v=moved(solution.v), u=moved(solution.u), r=r, l=moved(solution.l))
+
+
+def merit_1(problem: Any, solution: fclib.Solution) -> float:
+    """The formula, in NumPy."""
+    r, mu, d = solution.r, problem.mu, problem.spacedim
+    lam = np.zeros(0) if solution.l is None else solution.l
+    norm = np.linalg.norm
+    others: Any = 0.0
+    if isinstance(problem, fclib.LocalProblem):
+        q: Any = problem.q
+        u: Any = problem.W @ r + problem.q
+        if problem.V is not None:
+            V, R, s = dense(problem.V), dense(problem.R), np.asarray(problem.s)
+            u = u + V @ lam
+            others += norm(V.T @ r + R @ lam + s) / (1 + norm(s))
+    else:
+        v, f = solution.v, problem.f
+        u = problem.H.T @ v + problem.w
+        q = problem.H.T @ np.linalg.solve(dense(problem.M), f) + problem.w
+        momentum = problem.H @ r + f
+        if problem.G is not None:
+            momentum = momentum + problem.G @ lam
+            others += norm(problem.G.T @ v + problem.b) / (1 + norm(problem.b))
+        others += norm(problem.M @ v - momentum) / (1 + norm(f))
+    reactions, velocities = r.reshape(-1, d), u.reshape(-1, d)
+    residual = reactions - project(reactions - modified(velocities, mu), mu)
+    return float(norm(residual) / (1 + np.sqrt(norm(q))) + others)
+
+
+def test_merit_1_is_that_of_libfclib(ours: Library, theirs: Library) -> None:
+    words = []
+    for seed in range(60):
+        case = planted_local(seed, nc=1 + seed % 7, p=seed % 4, storage="csc")
+        solution = perturbed(seed, case.solution, [0, 1e-6, 0.1, 10][seed % 4])
+        words.append(judged_words(case.problem, solution))
+    mine, his = (
+        np.array([float.fromhex(x) for x in program("merit", "\n".join(words)).split()])
+        for program in (ours, theirs)
+    )
+    assert mine.size == his.size == len(words)
+    np.testing.assert_allclose(mine, his, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("p", [0, 2])
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("kind", ["local", "global"])
+def test_merit_1_is_its_formula(ours: Library, kind: str, d: int, p: int) -> None:
+    make = planted_local if kind == "local" else planted_global
+    words, expected = [], []
+    for seed, size in enumerate([0, 1e-6, 0.1, 10]):
+        case = make(seed, d=d, p=p, storage="csc")
+        solution = perturbed(seed, case.solution, size)
+        words.append(judged_words(case.problem, solution))
+        expected.append(merit_1(case.problem, solution))
+    seen = [float.fromhex(x) for x in ours("merit", "\n".join(words)).split()]
+    np.testing.assert_allclose(seen, expected, rtol=1e-10, atol=1e-13)
+
+
+# ---- installed
+
+
+def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
+    cmake, folder = shutil.which("cmake"), library_folder()
+    cache = folder / "CMakeCache.txt"
+    if cmake is None or not cache.is_file() or "FCLIB_SHARED:BOOL=ON" not in cache.read_text():
+        pytest.skip("there is no build of the C library alone to install")
+    prefix = tmp_path / "prefix"
+
+    def run(*command: object) -> str:
+        environment = os.environ | {"PKG_CONFIG_PATH": ":".join(map(str, found))}
+        done = subprocess.run(
+            list(map(str, command)), capture_output=True, text=True, env=environment
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    found: list[Path] = []
+    run(cmake, "--install", folder, "--prefix", prefix)
+    assert (prefix / "include/fclib.h").read_bytes() == (HEADERS / "fclib.h").read_bytes()
+
+    # by CMake
+    client = tmp_path / "client"
+    client.mkdir()
+    (client / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(client C)\n"
+        "find_package(fclib 3.1 REQUIRED)\n"
+        f'add_executable(write "{ROOT}/examples/c/write.c")\n'
+        "target_link_libraries(write fclib::fclib m)\n"
+        f'add_executable(solve "{ROOT}/examples/c/solve.c")\n'
+        "target_link_libraries(solve FCLIB::fclib)\n"
+    )
+    build = client / "build"
+    run(cmake, "-S", client, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
+    run(cmake, "--build", build)
+    run(build / "write", tmp_path / "ball.hdf5")
+    assert "converged" in run(build / "solve", tmp_path / "ball.hdf5")
+
+    # by pkg-config
+    config, compiler = shutil.which("pkg-config"), shutil.which("cc")
+    if config is None or compiler is None or not sys.platform.startswith("linux"):
+        return
+    found += [path.parent for path in prefix.rglob("fclib.pc")]
+    flags = run(config, "--cflags", "--libs", "fclib").split()
+    library = next(prefix.rglob("libfclib.so.0")).parent
+    run(compiler, ROOT / "examples/c/write.c", "-o", tmp_path / "write", *flags, "-lm")
+    ran = subprocess.run(
+        [tmp_path / "write", tmp_path / "ball.hdf5"],
+        env=os.environ | {"LD_LIBRARY_PATH": str(library)},
+        capture_output=True,
+    )
+    assert ran.returncode == 0

@@ -30,7 +30,7 @@ demo: setup
 test: setup $(VENV)/.test-tools
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
-	FCLIB_BUILD=$(BUILD) $(BIN)/python -m pytest
+	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
 	$(BIN)/ruff check python tests benchmarks

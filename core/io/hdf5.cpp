@@ -17,6 +17,7 @@
 #include <limits>
 #include <mutex>
 
+#include "io/replace_file.hpp"
 #include "version.hpp"
 
 namespace fclib {
@@ -721,68 +722,13 @@ void make_room(const Group& root, const std::string& name, bool replace) {
   check(H5Ldelete(root.id, name.c_str(), H5P_DEFAULT), root.child(name));
 }
 
-/// Where a path leads to, through links; the last one may point to a file that is not there yet.
-std::string resolve(const std::string& path) {
-  fs::path target(path);
-  std::error_code error;
-  for (int hops = 0; hops < 40 && fs::is_symlink(target, error); ++hops) {
-    target = target.parent_path() / fs::read_symlink(target, error);
-  }
-  return target.string();
-}
-
-/// Writes all bytes, or says why not.
-void write_bytes(int file, std::string_view bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) fail("", "cannot be written: " + system_message());
-    done += static_cast<std::size_t>(count);
-  }
-  if (::fsync(file) != 0) fail("", "cannot be written: " + system_message());
-}
-
-/// Puts the bytes in the place of the file, all or none: they go into a file beside it, which is
-/// renamed over it.
-void replace_file(const std::string& path, std::string_view bytes) {
-  const std::string target = resolve(path);
-  std::error_code error;
-  const auto status = fs::status(target, error);
-  require_regular(status);
-  mode_t mode = 0;
-  if (fs::exists(status)) {
-    if (access(target.c_str(), W_OK) != 0) fail("", "cannot be written: " + system_message());
-    mode = static_cast<mode_t>(status.permissions());
-  } else {
-    mode = ::umask(0);
-    ::umask(mode);
-    mode = 0666U & ~mode;
-  }
-  std::string temporary = target + ".XXXXXX";
-  const int file = ::mkstemp(temporary.data());
-  if (file < 0) fail("", "cannot be written: " + system_message());
-  try {
-    ::fchmod(file, mode);
-    write_bytes(file, bytes);
-    if (::rename(temporary.c_str(), target.c_str()) != 0) {
-      fail("", "cannot be written: " + system_message());
-    }
-  } catch (...) {
-    ::close(file);
-    ::unlink(temporary.c_str());
-    throw;
-  }
-  ::close(file);
-}
-
 /// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
 /// since the file itself is replaced; it goes with the process that holds it. Where the file system
 /// has no such locks there is none.
 class Turn {
  public:
   explicit Turn(const std::string& path) {
-    const fs::path folder = fs::path(resolve(path)).parent_path();
+    const fs::path folder = fs::path(resolve_links(path)).parent_path();
     folder_ = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     while (folder_ >= 0 && ::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
     }

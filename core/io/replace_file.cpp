@@ -40,21 +40,11 @@ class Descriptor {
   int id_;
 };
 
-/// Where a path leads to, through links; the last one may point to a file that is not there yet.
-std::string resolve(const std::string& path) {
-  constexpr int most_hops = 40;
-  fs::path target(path);
-  std::error_code error;
-  for (int hops = 0; hops < most_hops && fs::is_symlink(target, error); ++hops) {
-    target = target.parent_path() / fs::read_symlink(target, error);
-  }
-  return target.string();
-}
-
 /// The permissions of the old file, or those a new one gets.
 mode_t mode_of(const std::string& path, const std::string& target) {
   struct stat status{};
   if (::stat(target.c_str(), &status) == 0) {
+    if (S_ISDIR(status.st_mode)) fail(path, "is a directory, expected a file");
     if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
     if (::access(target.c_str(), W_OK) != 0) fail_in_system(path, "cannot be written");
     return status.st_mode & 07777U;
@@ -65,6 +55,16 @@ mode_t mode_of(const std::string& path, const std::string& target) {
 }
 
 }  // namespace
+
+std::string resolve_links(const std::string& path) {
+  constexpr int most_hops = 40;
+  fs::path target(path);
+  std::error_code error;
+  for (int hops = 0; hops < most_hops && fs::is_symlink(target, error); ++hops) {
+    target = target.parent_path() / fs::read_symlink(target, error);
+  }
+  return target.string();
+}
 
 std::string read_file(const std::string& path) {
   // a pipe that nobody writes to must not hold the reader
@@ -86,7 +86,7 @@ std::string read_file(const std::string& path) {
 }
 
 void replace_file(const std::string& path, std::string_view bytes) {
-  const std::string target = resolve(path);
+  const std::string target = resolve_links(path);
   const mode_t mode = mode_of(path, target);
   std::string temporary = target + ".XXXXXX";
   const Descriptor file(::mkstemp(temporary.data()));

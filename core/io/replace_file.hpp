@@ -6,6 +6,9 @@
 
 namespace fclib {
 
+/// Where a path leads to, through links; the last one may point to a file that is not there yet.
+std::string resolve_links(const std::string& path);
+
 /// All bytes of a regular file. Throws Error (file) that names it.
 std::string read_file(const std::string& path);
 

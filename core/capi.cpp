@@ -547,6 +547,8 @@ fclib_status status_in_c(Status status) {
       return FCLIB_INACCURATE;
     case Status::interrupted:
       return FCLIB_INTERRUPTED;
+    case Status::stalled:
+      return FCLIB_STALLED;
   }
   return FCLIB_DIVERGED;
 }
@@ -744,7 +746,8 @@ const char* fclib_solver_name(int k) {
 
 const char* fclib_status_name(fclib_status status) {
   for (const Status candidate : {Status::converged, Status::iteration_limit, Status::time_limit,
-                                 Status::diverged, Status::inaccurate, Status::interrupted}) {
+                                 Status::diverged, Status::inaccurate, Status::interrupted,
+                                 Status::stalled}) {
     if (status_in_c(candidate) == status) return name_of(candidate).data();  // a literal
   }
   return "unknown";

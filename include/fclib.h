@@ -322,7 +322,8 @@ enum fclib_status {
   FCLIB_TIME_LIMIT,      /**< stopped at time_limit */
   FCLIB_DIVERGED,        /**< an iterate was not finite */
   FCLIB_INACCURATE,      /**< the solver was content, MERIT_2 is not */
-  FCLIB_INTERRUPTED
+  FCLIB_INTERRUPTED,
+  FCLIB_STALLED /**< the solver has nothing left to try; its best iterate is returned */
 };
 
 /** New. What a solve says of itself. */

@@ -13,12 +13,16 @@ template <int D, class Real = double>
 class Coulomb {
  public:
   static constexpr int dim = D;
+  static constexpr int groups = 1;          // of tangential components with a limit each
+  static constexpr int group_size = D - 1;  // components of a group
   using Vec = ContactVector<D, Real>;
 
   explicit Coulomb(Real mu) : mu_(mu) {}
   Coulomb(const Friction& friction, Eigen::Index contact) : mu_(friction.mu[contact]) {}
 
   [[nodiscard]] Real mu() const { return mu_; }
+  /// Of a group: ||r_group|| <= coefficient r_N.
+  [[nodiscard]] Real coefficient(int /*group*/) const { return mu_; }
 
   /// ||x_T||
   static Real tangential_norm(const Vec& x) {

@@ -22,11 +22,16 @@ class Rolling {
 
  public:
   static constexpr int dim = D;
+  static constexpr int groups = 2;      // sliding, rolling
+  static constexpr int group_size = T;  // components of a group
   using Vec = ContactVector<D, Real>;
 
   Rolling(Real mu, Real mu_r) : mu_(mu), mu_r_(mu_r) {}
   Rolling(const Friction& friction, Eigen::Index contact)
       : mu_(friction.mu[contact]), mu_r_(friction.mu_r[contact]) {}
+
+  /// Of a group: ||r_group|| <= coefficient r_N.
+  [[nodiscard]] Real coefficient(int group) const { return group == 0 ? mu_ : mu_r_; }
 
   [[nodiscard]] Vec modified(const Vec& u) const {
     Vec result = u;

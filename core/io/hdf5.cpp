@@ -109,6 +109,41 @@ struct Dataset {
 constexpr double best_compression = 1100.0;
 constexpr std::size_t small_dataset = std::size_t{1} << 20;
 
+hsize_t size_of_file_with(hid_t object) {
+  const Handle file(H5Iget_file_id(object), H5Fclose);
+  hsize_t size = 0;
+  H5Fget_filesize(file.id(), &size);
+  return size;
+}
+
+/// What a dataset takes in its file, in bytes. Throws where its data are in other files.
+double stored_bytes(hid_t dataset, const std::string& path) {
+  const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+  if (H5Pget_layout(properties.id()) == H5D_VIRTUAL ||
+      H5Pget_external_count(properties.id()) > 0) {
+    fail(path, "keeps its data in other places, which are not read");
+  }
+  return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
+}
+
+/// Throws where HDF5 would ask for much more memory than the file has data, for chunks that are too
+/// many or too large.
+void require_chunks(hid_t dataset, double entries, double entry_size, const std::string& path) {
+  const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+  if (H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
+  hsize_t extents[H5S_MAX_RANK] = {};
+  const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, extents);
+  double chunk = 1;
+  for (int k = 0; k < rank; ++k) chunk *= static_cast<double>(extents[k]);
+  constexpr double many = 1024;
+  constexpr double large = 1 << 26;
+  const auto file_size = static_cast<double>(size_of_file_with(dataset));
+  if (rank < 1 || chunk < 1 || entries / chunk > std::max(many, file_size) ||
+      chunk * entry_size > std::max(large, best_compression * file_size)) {
+    fail(path, "has chunks that the file does not hold");
+  }
+}
+
 Dataset open_numbers(const Group& group, const std::string& name, bool integers) {
   const std::string path = group.child(name);
   Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
@@ -124,10 +159,15 @@ Dataset open_numbers(const Group& group, const std::string& name, bool integers)
   if (points < 0) fail(path, "has no size");
   if (H5Sget_simple_extent_ndims(space.id()) > 1) fail(path, "has more than one dimension");
   const auto size = static_cast<std::size_t>(points);
-  const double bytes = static_cast<double>(size) * static_cast<double>(H5Tget_size(type.id()));
-  if (bytes > static_cast<double>(small_dataset) &&
-      bytes > best_compression * static_cast<double>(H5Dget_storage_size(dataset.id()))) {
+  const auto entry_size = static_cast<double>(H5Tget_size(type.id()));
+  const double bytes = static_cast<double>(size) * entry_size;
+  const double stored = stored_bytes(dataset.id(), path);
+  if (bytes > static_cast<double>(small_dataset) && bytes > best_compression * stored) {
     fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
+  }
+  require_chunks(dataset.id(), static_cast<double>(size), entry_size, path);
+  if (size > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
+    fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
   }
   const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
                                                  (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
@@ -193,6 +233,9 @@ std::string read_text(const Group& group, const std::string& name) {
   const Handle space(H5Dget_space(dataset.id()), H5Sclose);
   if (H5Tget_class(type.id()) != H5T_STRING) fail(path, "does not hold text");
   if (H5Sget_simple_extent_npoints(space.id()) != 1) fail(path, "does not hold one text");
+  const std::size_t length = H5Tget_size(type.id());
+  const double stored = stored_bytes(dataset.id(), path);
+  require_chunks(dataset.id(), 1, static_cast<double>(length), path);
   if (H5Tis_variable_str(type.id()) > 0) {
     char* value = nullptr;
     if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
@@ -202,8 +245,7 @@ std::string read_text(const Group& group, const std::string& name) {
     H5Dvlen_reclaim(type.id(), space.id(), H5P_DEFAULT, &value);
     return text;
   }
-  const std::size_t length = H5Tget_size(type.id());
-  if (length > small_dataset && length > H5Dget_storage_size(dataset.id())) {
+  if (length > small_dataset && static_cast<double>(length) > stored) {
     fail(path,
          "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
   }
@@ -347,6 +389,16 @@ P read_fields(const Group& root, Validation validation) {
   return problem;
 }
 
+/// Makes mu as long as the matrices say, where that is how long it is in the file.
+template <class P>
+void require_contacts(P& outline, std::size_t stored) {
+  if (static_cast<std::size_t>(contact_count(outline)) != stored) {
+    detail::require_size(static_cast<Index>(stored), contact_count(outline), Dim::nc,
+                         "/" + group_name<P>() + "/vectors/mu", "entries");
+  }
+  count_contacts(outline);
+}
+
 /// Throws where a vector has not the length that the matrices give it.
 template <class P>
 void require_lengths(const P& problem) {
@@ -359,7 +411,7 @@ void require_lengths(const P& problem) {
       outline.*field.member = problem.*field.member;
     }
   });
-  count_contacts(outline);
+  require_contacts(outline, static_cast<std::size_t>(problem.mu.size()));
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
     if constexpr (std::is_same_v<Member, Vector>) {
       detail::require_size(static_cast<Index>((problem.*field.member).size()),
@@ -374,17 +426,20 @@ P read_sizes(const Group& root) {
   const Handle handle = open_group(root, group_name<P>());
   const Group group{handle.id(), root.child(group_name<P>())};
   P problem;
+  std::size_t contacts = 0;
   for_each_stored_field<P>(
       group, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
         const std::string name(field.name);
-        if constexpr (std::is_same_v<Member, Matrix>) {
+        if constexpr (std::is_same_v<Member, Vector>) {
+          if (field.member == &P::mu) contacts = open_numbers(place, name, false).size;
+        } else if constexpr (std::is_same_v<Member, Matrix>) {
           const Handle matrix = open_group(place, name);
           problem.*field.member = read_matrix_outline({matrix.id(), place.child(name)});
-        } else if constexpr (!std::is_same_v<Member, Vector>) {
+        } else {
           problem.*field.member = read_number<Member>(place, name);
         }
       });
-  count_contacts(problem);
+  require_contacts(problem, contacts);
   return problem;
 }
 

@@ -54,19 +54,18 @@ Problem read_problem(const std::string& path, std::string_view kind = {},
 /// have no entries, mu is zero. It is the global one where there are several, as in libfclib 3.1.
 Problem read_outline(const std::string& path);
 
-/// Makes mu as long as the matrices say that there are contacts, zero; mu gives all other vectors
-/// their size. Throws Error (problem) where the sizes do not divide.
+/// How many contacts the matrices say that there are. Throws Error (problem) where the sizes do not
+/// divide.
 template <class P>
-void count_contacts(P& problem) {
+Index contact_count(const P& problem) {
   const std::string group = "/" + group_name<P>() + "/";
   if (problem.spacedim < 1) {
     throw Error(ErrorKind::problem, "is " + std::to_string(problem.spacedim), group + "spacedim");
   }
-  bool counted = false;
+  std::optional<Index> count;
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
     if constexpr (std::is_same_v<Member, Matrix>) {
-      if (counted || field.cols != Dim::m) return;
-      counted = true;
+      if (count || field.cols != Dim::m) return;
       const Index m = (problem.*field.member).cols;
       if (m < 0 || m % problem.spacedim != 0) {
         throw Error(ErrorKind::problem,
@@ -74,9 +73,16 @@ void count_contacts(P& problem) {
                         std::to_string(problem.spacedim),
                     group + std::string(field.name));
       }
-      problem.mu = Vector::Zero(m / problem.spacedim);
+      count = m / problem.spacedim;
     }
   });
+  return count.value_or(0);
+}
+
+/// Makes mu as long as there are contacts, zero; mu gives all other vectors their size.
+template <class P>
+void count_contacts(P& problem) {
+  problem.mu = Vector::Zero(contact_count(problem));
 }
 
 /// The stored solution, or nothing where the file has none. Its sizes are not checked against a

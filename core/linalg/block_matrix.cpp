@@ -1,6 +1,7 @@
 #include "linalg/block_matrix.hpp"
 
 #include <algorithm>
+#include <numeric>
 
 namespace fclib {
 
@@ -98,6 +99,51 @@ void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y) cons
       add_column<5>(contact, part, y.data());
     }
   }
+}
+
+std::vector<Index> BlockMatrix::components() const {
+  std::vector<Index> group(static_cast<std::size_t>(nc_), dense_ ? 0 : -1);
+  if (dense_) return group;
+  // the pattern may be unsymmetric: union-find over all blocks
+  std::vector<Index> parent(static_cast<std::size_t>(nc_));
+  std::iota(parent.begin(), parent.end(), 0);
+  const auto root = [&](Index node) {
+    while (parent[node] != node) node = parent[node] = parent[parent[node]];
+    return node;
+  };
+  for (Index col = 0; col < nc_; ++col) {
+    for (std::size_t k = column_[col]; k < column_[col + 1]; ++k) {
+      const Index a = root(row_[k]);
+      const Index b = root(col);
+      if (a != b) parent[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  Index count = 0;
+  for (Index contact = 0; contact < nc_; ++contact) {
+    const Index top = root(contact);
+    group[contact] = top == contact ? count++ : group[top];
+  }
+  return group;
+}
+
+BlockMatrix BlockMatrix::restricted(const std::vector<Index>& contacts) const {
+  BlockMatrix result;
+  result.d_ = d_;
+  result.nc_ = static_cast<Index>(contacts.size());
+  const auto block = static_cast<std::size_t>(d_) * static_cast<std::size_t>(d_);
+  std::vector<Index> where(static_cast<std::size_t>(nc_), -1);
+  for (std::size_t k = 0; k < contacts.size(); ++k) where[contacts[k]] = static_cast<Index>(k);
+  result.column_.assign(1, 0);
+  for (const Index contact : contacts) {
+    for (std::size_t k = column_[contact]; k < column_[contact + 1]; ++k) {
+      if (row_[k] == contact) result.diagonal_.push_back(result.row_.size());
+      result.row_.push_back(where[row_[k]]);
+      const double* values = values_.data() + block * k;
+      result.values_.insert(result.values_.end(), values, values + block);
+    }
+    result.column_.push_back(result.row_.size());
+  }
+  return result;
 }
 
 }  // namespace fclib

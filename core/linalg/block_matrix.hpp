@@ -21,6 +21,8 @@ class BlockMatrix {
   [[nodiscard]] int block_size() const { return d_; }
   [[nodiscard]] Index block_count() const { return nc_; }
   [[nodiscard]] bool dense() const { return dense_; }
+  /// Numbers stored.
+  [[nodiscard]] std::size_t entries() const { return values_.size(); }
 
   /// The diagonal block of a contact, D x D by columns. Zero where the matrix has none.
   template <int D>
@@ -41,6 +43,17 @@ class BlockMatrix {
   /// y = W x + q, all of length d nc.
   void multiply_add(const Vector& x, const Vector& q, Vector& y) const;
 
+  /// Calls visit(row, col, block) for each stored block, a D x D matrix.
+  template <int D, class Visitor>
+  void for_each_block(Visitor&& visit) const;
+
+  /// Groups of contacts with no block between them: the number of each contact's group. Groups are
+  /// numbered by their first contact.
+  [[nodiscard]] std::vector<Index> components() const;
+
+  /// The rows and columns of these contacts, which are a union of components.
+  [[nodiscard]] BlockMatrix restricted(const std::vector<Index>& contacts) const;
+
  private:
   template <int D>
   void fill(const Matrix& a);
@@ -53,6 +66,25 @@ class BlockMatrix {
   std::vector<std::size_t> diagonal_;  // position of each diagonal block (nc)
   std::vector<double> values_;
 };
+
+template <int D, class Visitor>
+void BlockMatrix::for_each_block(Visitor&& visit) const {
+  using Block = Eigen::Map<const Eigen::Matrix<double, D, D>, 0, Eigen::OuterStride<>>;
+  const Eigen::Index m = Eigen::Index{D} * nc_;
+  for (Index col = 0; col < nc_; ++col) {
+    if (dense_) {
+      const double* column = values_.data() + m * D * col;
+      for (Index row = 0; row < nc_; ++row) {
+        visit(row, col, Block(column + std::ptrdiff_t{D} * row, Eigen::OuterStride<>(m)));
+      }
+    } else {
+      for (std::size_t k = column_[col]; k < column_[col + 1]; ++k) {
+        visit(row_[k], col, Block(values_.data() + std::size_t{D * D} * k,
+                                  Eigen::OuterStride<>(D)));
+      }
+    }
+  }
+}
 
 template <int D>
 inline void BlockMatrix::add_column(Index contact, const double* delta,

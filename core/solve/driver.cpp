@@ -53,6 +53,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     result.cpu_s += cpu_time() - start;
     result.iterations += outcome.iterations;
     result.status = outcome.status;
+    result.stages = outcome.stages;
     if (!r.allFinite()) {
       result.status = Status::diverged;
       r.setZero();

@@ -17,6 +17,7 @@ struct Result {
   double error = 0;    ///< Merit::error of the solution, on the problem as it was given
   double cpu_s = 0;    ///< CPU time of the solver alone [s]
   double setup_s = 0;  ///< CPU time of conversions, validation and merit [s]
+  std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
   std::string solver;
 
   [[nodiscard]] bool converged() const { return status == Status::converged; }

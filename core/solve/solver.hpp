@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "cones/cone.hpp"
-#include "linalg/block_matrix.hpp"
+#include "kernels/delassus.hpp"
 #include "solve/options.hpp"
 
 namespace fclib {
@@ -27,6 +27,7 @@ enum class Status {
   time_limit,       ///< stopped at time_limit
   diverged,         ///< an iterate was not finite
   inaccurate,       ///< the solver was content, the merit of the original problem is not
+  stalled,          ///< the solver has nothing left to try; its best iterate is returned
   interrupted,      ///< the callback asked to stop
 };
 
@@ -42,6 +43,8 @@ constexpr std::string_view name_of(Status status) {
       return "diverged";
     case Status::inaccurate:
       return "inaccurate";
+    case Status::stalled:
+      return "stalled";
     case Status::interrupted:
       return "interrupted";
   }
@@ -63,18 +66,6 @@ struct Settings {
   std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
   std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or
                                                   ///< iterations; false stops the solver
-};
-
-/// The problem in the form that reduced solvers take: W (m x m) by blocks, q (m), friction (nc).
-struct Delassus {
-  BlockMatrix W;
-  Vector q;
-  Friction friction;
-  double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
-
-  [[nodiscard]] int d() const { return W.block_size(); }
-  [[nodiscard]] Index nc() const { return W.block_count(); }
-  [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
 };
 
 /// Watches over a solver: it reports its iterates, and learns whether to stop.
@@ -123,10 +114,21 @@ class Monitor {
   Clock::time_point last_poll_ = start_;
 };
 
+/// A part of a solve, by a method of its own.
+struct Stage {
+  std::string_view name;
+  std::int64_t calls = 0;  ///< how often it was entered: once for each island that needed it
+  std::int64_t solved = 0;  ///< ... and brought it to the tolerance
+  std::int64_t iterations = 0;
+  std::int64_t factorisations = 0;
+  double time = 0;  ///< wall clock [s]
+};
+
 /// What a solver returns beside r.
 struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
+  std::vector<Stage> stages = {};  ///< in the order of their first call; empty for plain solvers
 };
 
 /// The entry of a solver in the registry.

@@ -19,9 +19,8 @@
 
 #include "cones/coulomb.hpp"
 #include "cones/rolling.hpp"
-#include "kernels/exact_contact.hpp"
+#include "kernels/gauss_seidel.hpp"
 #include "kernels/natural_error.hpp"
-#include "kernels/projected_contact.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::nsgs {
@@ -131,36 +130,22 @@ void shuffle_order(std::vector<Index>& order, std::mt19937_64& random) {
 /// The rounding of the updates of u is taken out by u = W r + q at least this often [sweeps].
 constexpr std::int64_t refresh_interval = 1000;
 
-/// The local problem of a contact, with an exact solver where the cone has one.
-template <class Cone>
-struct LocalProblemOf {
-  LocalProblemOf(const ContactMatrix<Cone::dim>& block, const Cone& cone)
-      : projected(block, cone) {}
-  bool solve_exact(const typename Cone::Vec&, typename Cone::Vec&) { return false; }
-
-  ProjectedContact<Cone> projected;
-};
-
-template <int D>
-struct LocalProblemOf<Coulomb<D>> {
-  LocalProblemOf(const ContactMatrix<D>& block, const Coulomb<D>& cone)
-      : exact(block, cone.mu()), projected(block, cone) {}
-  bool solve_exact(const ContactVector<D>& b, ContactVector<D>& r) { return exact.solve(b, r); }
-
-  ExactContact<D> exact;
-  ProjectedContact<Coulomb<D>> projected;
-};
-
 template <class Cone>
 Outcome iterate(const Delassus& problem, const Options& options, Monitor& monitor, Vector& r) {
-  constexpr int D = Cone::dim;
-  const Index nc = problem.nc();
-  std::vector<LocalProblemOf<Cone>> contacts;
-  contacts.reserve(static_cast<std::size_t>(nc));
-  for (Index a = 0; a < nc; ++a) {
-    contacts.emplace_back(problem.W.template diagonal_block<D>(a), Cone(problem.friction, a));
-  }
-  std::vector<Index> order(static_cast<std::size_t>(nc));
+  using Vec = typename Cone::Vec;
+  GaussSeidel<Cone> contacts(problem);
+  const auto step = [&](ContactProblem<Cone>& contact, const Vec& b, Vec& next) {
+    const Vec old = next;
+    if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
+      contact.projected.solve(b, options.local_accuracy,
+                              static_cast<int>(options.local_iterations), next);
+    }
+    if (options.relaxation != 1.0) {
+      next = contact.projected.cone().project(options.relaxation * next +
+                                              (1.0 - options.relaxation) * old);
+    }
+  };
+  std::vector<Index> order(static_cast<std::size_t>(problem.nc()));
   std::iota(order.begin(), order.end(), 0);
   std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
   if (options.shuffle == Shuffle::once) shuffle_order(order, random);
@@ -178,24 +163,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   Schedule schedule(options.error_interval, monitor.tolerance());
   for (std::int64_t sweep = 1;; ++sweep) {
     if (options.shuffle == Shuffle::always) shuffle_order(order, random);
-    for (const Index a : order) {
-      LocalProblemOf<Cone>& contact = contacts[static_cast<std::size_t>(a)];
-      const ContactVector<D> old = r.segment<D>(D * a);
-      const ContactVector<D> b = u.segment<D>(D * a) - contact.projected.block() * old;
-      ContactVector<D> next = old;
-      if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
-        contact.projected.solve(b, options.local_accuracy,
-                                static_cast<int>(options.local_iterations), next);
-      }
-      if (options.relaxation != 1.0) {
-        next = contact.projected.cone().project(options.relaxation * next +
-                                                (1.0 - options.relaxation) * old);
-      }
-      const ContactVector<D> delta = next - old;
-      if ((delta.array() == 0).all()) continue;
-      r.segment<D>(D * a) = next;
-      problem.W.template add_column<D>(a, delta.data(), u.data());
-    }
+    for (const Index a : order) contacts.update(a, r, u, step);
 
     if (sweep % refresh_interval == 0) problem.W.multiply_add(r, problem.q, u);
     if (schedule.due(sweep) || sweep >= monitor.max_iterations() ||

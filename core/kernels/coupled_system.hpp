@@ -1,0 +1,66 @@
+// The one linear system that Newton and interior-point methods solve here,
+//
+//   (I + D W) x = h,   D block-diagonal, d x d, possibly singular or not symmetric.
+//
+// On the contacts it is factorised as it stands, each block row scaled. Where the problem is known
+// by its bodies, W = H^T M^-1 H, the same x comes from
+//
+//   (M + H D H^T) y = H h,   x = h - D H^T y
+//
+// whichever factorisation takes fewer operations. One step of iterative refinement with W follows.
+#pragma once
+
+#include <memory>
+
+#include "kernels/delassus.hpp"
+#include "linalg/multifrontal.hpp"
+
+namespace fclib {
+
+class CoupledSystem {
+ public:
+  /// Plans the factorisations; keeps a reference to the problem.
+  explicit CoupledSystem(const Delassus& problem);
+
+  /// The blocks of D, each d x d by columns, one after another (d d nc): to be filled before
+  /// factorise().
+  [[nodiscard]] std::vector<double>& blocks() { return D_; }
+
+  /// False where the blocks are not finite.
+  bool factorise();
+
+  /// x <- (I + D W)^-1 x.
+  void solve(Vector& x);
+
+  [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
+  /// Multiplications of one factorisation.
+  [[nodiscard]] double flops() const { return lu_.flops(); }
+  [[nodiscard]] bool on_bodies() const { return on_bodies_; }
+
+ private:
+  template <int D>
+  void fill_contacts();
+  void fill_bodies();
+  void apply_blocks(const Vector& x, Vector& y) const;
+  void solve_once(Vector& x);
+  void plan_contacts();
+  template <int D>
+  void plan_contacts_of();
+  bool plan_bodies();
+
+  const Delassus& problem_;
+  Multifrontal lu_;
+  std::vector<double> D_;
+  std::vector<double> values_;
+  Vector row_scale_;                      // of each contact
+  std::vector<std::int64_t> place_;       // of each block of W in the values, in W's order
+  std::vector<std::int64_t> diagonal_;    // of each diagonal block
+  bool on_bodies_ = false;
+  std::vector<double> fixed_;             // M in the pattern of the bodies
+  std::vector<std::int64_t> scatter_;     // of each contact's H D H^T
+  std::int64_t factorisations_ = 0;
+  Vector rhs_, residual_, product_, body_;
+  Vector zero_;
+};
+
+}  // namespace fclib

@@ -1,0 +1,348 @@
+// An interior-point method for Coulomb's law, with de Saxce's term inside the Newton system.
+//
+//   x = (mu r_N, r_T),  y = (u^_N / mu, u^_T),  both in the Lorentz cone,  x o y = tau e
+//   R = u + mu ||y_T|| e_N - u^ = 0,  u = W r + q
+//
+// Nesterov & Todd's scaling N (N^2 y = x, lambda = N y) turns Newton's step into one CoupledSystem:
+// with S = diag(1/mu, 1, 1), P = I + mu e_N (y_T / ||y_T||)^T, D0 = S N^2 S P, and delta > 0,
+//
+//   (I + D W) dr = (I + delta D0)^-1 (S N g - D0 R),   D = (I + delta D0)^-1 D0
+//
+// Mehrotra's predictor and corrector choose g. Without the term (`associated`) this is the convex
+// problem of an associated flow rule.
+//
+// Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact mechanics
+// using interior point algorithm" (2023), for the convex part; the shift in the Newton system is
+// ours.
+//
+// All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "cones/coulomb.hpp"
+#include "kernels/coupled_system.hpp"
+#include "kernels/natural_error.hpp"
+
+namespace fclib {
+
+struct InteriorPointRules {
+  bool associated = false;
+  double step_cap = 0.95;    ///< highest share of the step to the boundary
+  double delta = 1e-6;       ///< regularisation at first
+  bool delta_follows = true; ///< delta <= 1e4 tau
+  int max_iterations = 60;
+};
+
+template <int D>
+class InteriorPoint {
+ public:
+  using Cone = Coulomb<D>;
+  using Vec = ContactVector<D>;
+  using Mat = ContactMatrix<D>;
+  static constexpr int T = D - 1;
+
+  InteriorPoint(const Delassus& problem, CoupledSystem& system)
+      : problem_(problem), system_(system) {
+    const Index nc = problem.nc();
+    double mean = 0;
+    for (Index a = 0; a < nc; ++a) {
+      mean += problem.W.template diagonal_block<D>(a).trace() / D / static_cast<double>(nc);
+    }
+    omega_ = mean > 0 ? mean : 1.0;
+    size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
+    if (!(size_q_ > 0)) size_q_ = 1.0;
+  }
+
+  [[nodiscard]] double tau() const { return tau_; }
+  /// ||R||_inf / ||q||_inf and ||u|| / ||q|| of the last iterate.
+  [[nodiscard]] double residual() const { return residual_; }
+  [[nodiscard]] double speed() const { return u_.norm() / problem_.q.norm() * size_q_; }
+  [[nodiscard]] int iterations() const { return iterations_; }
+
+  /// Iterates; `report(error, r)` is told of each iterate, and ends it by returning true.
+  template <class Report>
+  void solve(const InteriorPointRules& rules, const Report& report) {
+    const Index nc = problem_.nc();
+    const double count = static_cast<double>(nc);
+    start();
+    double delta = rules.delta;
+    for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
+      evaluate(rules.associated);
+      physical_ = r_ * (size_q_ / omega_);
+      velocity_ = u_ * size_q_;
+      const double error =
+          std::sqrt(natural_map_squared<Cone>(velocity_, physical_, problem_.friction)) /
+          problem_.scale;
+      if (report(error, physical_)) return;
+      if (!(tau_ > 1e-15)) return;
+      if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
+      delta = std::clamp(delta, 1e-8, 1.0);
+
+      assemble(delta, rules.associated);
+      if (!system_.factorise()) return;
+      // predictor
+      for (Index a = 0; a < nc; ++a) {
+        g_.template segment<D>(D * a) = -lambda_.template segment<D>(D * a);
+      }
+      if (!direction(delta, rules.associated)) return;
+      const double affine_step = std::min(1.0, longest());
+      const double affine_gap =
+          (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
+      double sigma = std::clamp(std::pow(affine_gap / tau_, 3), 1e-6, 1.0);
+      if (residual_ > 1e4 * tau_) {
+        sigma = 1;
+      } else if (residual_ > 1e3 * tau_) {
+        sigma = std::max(sigma, 0.3);
+      }
+      affine_x_ = dx_;
+      affine_y_ = dy_;
+      const double cap = std::clamp(1 - tau_, std::min(0.9, rules.step_cap), rules.step_cap);
+      double step = 0;
+      for (int attempt = 0; attempt < 3; ++attempt) {
+        if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
+        correct(sigma, attempt == 0);
+        if (!direction(delta, rules.associated)) return;
+        step = std::min(1.0, cap * longest());
+        if (step >= 0.3) break;
+      }
+      x_ += step * dx_;
+      y_ += step * dy_;
+      r_ += step * dr_;
+      for (Index a = 0; a < nc; ++a) {  // x follows from r, to the last digit
+        const double mu = problem_.friction.mu[a];
+        x_.template segment<D>(D * a) = r_.template segment<D>(D * a);
+        if (mu > 0) x_[D * a] *= mu;
+      }
+      if (step < 0.1) {
+        delta *= 10;
+      } else if (step > 0.5) {
+        delta *= 0.1;
+      }
+      if (step < 1e-6) return;
+    }
+  }
+
+ private:
+  void start() {
+    const Index nc = problem_.nc();
+    const auto m = problem_.m();
+    x_ = Vector::Zero(m);
+    y_ = Vector::Zero(m);
+    r_ = Vector::Zero(m);
+    for (Index a = 0; a < nc; ++a) {
+      const double mu = problem_.friction.mu[a];
+      r_[D * a] = 1;
+      x_[D * a] = mu > 0 ? mu : 1.0;
+      y_[D * a] = mu > 0 ? 1.0 / mu : 1.0;
+    }
+    q_ = problem_.q / size_q_;
+    for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_}) v->setZero(m);
+    scaling_.resize(static_cast<std::size_t>(nc));
+  }
+
+  /// The Lorentz cone's determinant, without cancellation.
+  static double det(const Vec& x) {
+    const double t = x.template tail<T>().norm();
+    return (x[0] - t) * (x[0] + t);
+  }
+
+  void evaluate(bool associated) {
+    problem_.W.multiply_add(r_ / omega_, q_, u_);
+    tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
+    residual_ = 0;
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double mu = problem_.friction.mu[a];
+      const Vec y = y_.template segment<D>(D * a);
+      Vec residual = u_.template segment<D>(D * a);
+      if (mu > 0) {
+        residual -= y;
+        residual[0] += y[0] - mu * y[0];
+        if (!associated) residual[0] += mu * y.template tail<T>().norm();
+        residual_ = std::max(residual_, residual.template lpNorm<Eigen::Infinity>());
+      } else {
+        residual[0] -= y[0];
+        residual.template tail<T>().setZero();
+        residual_ = std::max(residual_, std::abs(residual[0]));
+      }
+      residual_vector_.template segment<D>(D * a) = residual;
+    }
+  }
+
+  /// S N g of a contact.
+  [[nodiscard]] Vec scaled_target(Index a) const {
+    const double mu = problem_.friction.mu[a];
+    Vec v = scaling_[static_cast<std::size_t>(a)].N * g_.template segment<D>(D * a);
+    if (mu > 0) v[0] /= mu;
+    return v;
+  }
+
+  void assemble(double delta, bool associated) {
+    std::vector<double>& blocks = system_.blocks();
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double mu = problem_.friction.mu[a];
+      Scaling& s = scaling_[static_cast<std::size_t>(a)];
+      const Vec x = x_.template segment<D>(D * a);
+      const Vec y = y_.template segment<D>(D * a);
+      Mat d0 = Mat::Zero();
+      s.P.setIdentity();
+      s.N.setZero();
+      if (mu > 0) {
+        const double det_x = std::max(det(x), std::numeric_limits<double>::min());
+        const double det_y = std::max(det(y), std::numeric_limits<double>::min());
+        Vec w = x / std::sqrt(det_x);
+        const Vec yb = y / std::sqrt(det_y);
+        const double gamma = std::sqrt(0.5 * (1 + w.dot(yb)));
+        w[0] += yb[0];
+        w.template tail<T>() -= yb.template tail<T>();
+        w /= 2 * gamma;
+        const double beta = std::sqrt(std::sqrt(det_x / det_y));
+        const auto w1 = w.template tail<T>();
+        s.N(0, 0) = w[0];
+        s.N.template block<1, T>(0, 1) = w1.transpose();
+        s.N.template block<T, 1>(1, 0) = w1;
+        s.N.template block<T, T>(1, 1).setIdentity();
+        s.N.template block<T, T>(1, 1) += w1 * w1.transpose() / (1 + w[0]);
+        s.N *= beta;
+        Mat n2 = 2 * w * w.transpose();
+        n2(0, 0) -= 1;
+        for (int k = 1; k < D; ++k) n2(k, k) += 1;
+        n2 *= beta * beta;
+        s.inverse = s.N;
+        s.inverse.template block<1, T>(0, 1) *= -1;
+        s.inverse.template block<T, 1>(1, 0) *= -1;
+        s.inverse /= beta * beta;
+        if (!associated) {
+          const double norm = y.template tail<T>().norm();
+          if (norm > 0) s.P.template block<1, T>(0, 1) = mu * y.template tail<T>().transpose() / norm;
+        }
+        n2.row(0) /= mu;
+        n2.col(0) /= mu;
+        d0 = n2 * s.P;
+        lambda_.template segment<D>(D * a) = s.N * y;
+      } else {
+        s.N(0, 0) = std::sqrt(x[0] / y[0]);
+        s.inverse.setZero();
+        s.inverse(0, 0) = 1 / s.N(0, 0);
+        d0(0, 0) = x[0] / y[0];
+        lambda_[D * a] = s.N(0, 0) * y[0];
+      }
+      s.D0 = d0;
+      const Mat regular = Mat::Identity() + delta * d0;
+      s.regular = regular.inverse();
+      Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = s.regular * d0 / omega_;
+    }
+  }
+
+  /// lambda \ g for the corrector: g <- -lambda + lambda \ (sigma tau e - second order).
+  void correct(double sigma, bool second_order) {
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double mu = problem_.friction.mu[a];
+      const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+      const Vec lambda = lambda_.template segment<D>(D * a);
+      if (!(mu > 0)) {
+        double target = sigma * tau_;
+        if (second_order) target -= affine_x_[D * a] * affine_y_[D * a];
+        g_[D * a] = -lambda[0] + target / lambda[0];
+        continue;
+      }
+      Vec target = Vec::Zero();
+      target[0] = sigma * tau_;
+      if (second_order) {
+        const Vec p = s.inverse * affine_x_.template segment<D>(D * a);
+        const Vec q = s.N * affine_y_.template segment<D>(D * a);
+        target[0] -= p.dot(q);
+        target.template tail<T>() -= p[0] * q.template tail<T>() + q[0] * p.template tail<T>();
+      }
+      const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
+      Vec solution;
+      solution[0] = (lambda[0] * target[0] -
+                     lambda.template tail<T>().dot(target.template tail<T>())) / determinant;
+      solution.template tail<T>() =
+          (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
+      g_.template segment<D>(D * a) = solution - lambda;
+    }
+  }
+
+  bool direction(double delta, bool /*associated*/) {
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+      dr_.template segment<D>(D * a) =
+          s.regular *
+          (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
+    }
+    system_.solve(dr_);
+    if (!dr_.allFinite()) return false;
+    problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_);  // W dr + R
+    rhs_ += delta * dr_;
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double mu = problem_.friction.mu[a];
+      const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+      Vec dx = dr_.template segment<D>(D * a);
+      Vec dy = s.P * rhs_.template segment<D>(D * a);
+      if (mu > 0) {
+        dx[0] *= mu;
+        dy[0] /= mu;
+      } else {
+        dx.template tail<T>().setZero();
+        dy.template tail<T>().setZero();
+      }
+      dx_.template segment<D>(D * a) = dx;
+      dy_.template segment<D>(D * a) = dy;
+    }
+    return true;
+  }
+
+  /// The step along d at which x leaves the Lorentz cone.
+  static double longest(const Vec& x, const Vec& d) {
+    // the least positive root of det(x + t d) = 0
+    const double a = det(d);
+    const double b = x[0] * d[0] - x.template tail<T>().dot(d.template tail<T>());
+    const double c = std::max(det(x), 0.0);
+    double root = std::numeric_limits<double>::infinity();
+    const double discriminant = b * b - a * c;
+    if (discriminant >= 0) {
+      const double s = std::sqrt(discriminant);
+      if (b < 0) {
+        root = c / (s - b);
+      } else if (a < 0) {
+        root = -(b + s) / a;
+      }
+    }
+    if (d[0] < 0) root = std::min(root, -x[0] / d[0]);
+    return root;
+  }
+
+  [[nodiscard]] double longest() const {
+    double step = std::numeric_limits<double>::infinity();
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      if (problem_.friction.mu[a] > 0) {
+        step = std::min({step, longest(x_.template segment<D>(D * a), dx_.template segment<D>(D * a)),
+                         longest(y_.template segment<D>(D * a), dy_.template segment<D>(D * a))});
+      } else {
+        if (dx_[D * a] < 0) step = std::min(step, -x_[D * a] / dx_[D * a]);
+        if (dy_[D * a] < 0) step = std::min(step, -y_[D * a] / dy_[D * a]);
+      }
+    }
+    return step;
+  }
+
+  struct Scaling {
+    Mat N, inverse, P, D0, regular;
+  };
+
+  const Delassus& problem_;
+  CoupledSystem& system_;
+  double omega_ = 1;
+  double size_q_ = 1;
+  double tau_ = 1;
+  double residual_ = 0;
+  int iterations_ = 0;
+  std::vector<Scaling> scaling_;
+  Vector q_, x_, y_, r_, u_, g_, lambda_, dx_, dy_, dr_, rhs_, residual_vector_;
+  Vector affine_x_, affine_y_, physical_, velocity_;
+};
+
+}  // namespace fclib

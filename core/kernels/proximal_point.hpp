@@ -1,0 +1,159 @@
+// The proximal point algorithm on Coulomb's law, its inner problem solved by a semismooth Newton
+// method: from r_k, find p with
+//
+//   p = disk_map(r_k - rho (W p + q)),   rho_a = kappa d / tr(W_aa)
+//
+// then r_{k+1} = p. Each Newton step is one CoupledSystem with D = rho disk_map'. A large kappa
+// makes a step nearly exact, and W, singular as it may be, is regularised by r - r_k all the same.
+//
+// The residual of the inner problem enters the error multiplied by W: it is solved until that is a
+// fraction of the error itself.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/coupled_system.hpp"
+#include "kernels/disk_map.hpp"
+#include "kernels/natural_error.hpp"
+
+namespace fclib {
+
+/// How kappa moves, and when to give up.
+struct ProximalRules {
+  double kappa = 100;      ///< at first
+  double kappa_max = 1e8;
+  double easy = 3;         ///< factor after at most 2 Newton steps; after at most 4, its share 2/3
+  double hard = 0.5;       ///< factor on failure
+  double patience = 1e3;   ///< the error may rise by this over the best before it is given up
+  std::int64_t max_factorisations = 8;
+};
+
+template <class Cone>
+class ProximalPoint {
+ public:
+  static constexpr int D = Cone::dim;
+  using Vec = typename Cone::Vec;
+  using Mat = ContactMatrix<D>;
+
+  ProximalPoint(const Delassus& problem, CoupledSystem& system)
+      : problem_(problem), system_(system), inverse_size_(problem.nc()) {
+    double mean = 0;
+    for (Index a = 0; a < problem.nc(); ++a) {
+      inverse_size_[a] = problem.W.template diagonal_block<D>(a).trace() / D;
+      mean += inverse_size_[a] / static_cast<double>(problem.nc());
+    }
+    for (auto& size : inverse_size_) size = 1.0 / (size > 0 ? size : mean > 0 ? mean : 1.0);
+  }
+
+  /// Improves r. `report(error)` is told of each accepted step, and ends it by returning true.
+  /// Returns the least error; r is the iterate that has it.
+  template <class Report>
+  double solve(const ProximalRules& rules, double tolerance, Vector& r, const Report& report) {
+    const auto stop_at = system_.factorisations() + rules.max_factorisations;
+    double kappa = rules.kappa;
+    int cautious = 0;  // steps since a failure
+    r_ = r;
+    problem_.velocity(r_, u_);
+    error_ = error_of(u_, r_);
+    double best = error_;
+    while (best > tolerance && system_.factorisations() < stop_at) {
+      const int steps = inner(kappa, stop_at);
+      if (steps == 0) {  // failed
+        kappa *= rules.hard;
+        cautious = 3;
+        if (kappa < 1e-6) break;
+        continue;
+      }
+      r_ = next_;
+      u_ = next_u_;
+      error_ = next_error_;
+      if (error_ < best) {
+        best = error_;
+        r = r_;
+      }
+      if (report(error_) || error_ > rules.patience * best) break;
+      double growth = steps <= 2 ? rules.easy : steps <= 4 ? rules.easy * 2 / 3 : 1.0;
+      if (steps >= 9) growth = 0.5;
+      if (cautious > 0) {
+        growth = std::min(growth, 1.5);
+        --cautious;
+      }
+      kappa = std::min(kappa * growth, rules.kappa_max);
+    }
+    return best;
+  }
+
+ private:
+  static constexpr int max_steps = 20;
+  static constexpr int max_halvings = 5;
+
+  double error_of(const Vector& u, const Vector& r) const {
+    return std::sqrt(natural_map_squared<Cone>(u, r, problem_.friction)) / problem_.scale;
+  }
+
+  /// F = p - disk_map(r_k - rho u(p)); `image` is the map.
+  double residual(double kappa, const Vector& p, const Vector& u, Vector& f, Vector& image) const {
+    image.resize(p.size());
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const Vec z = r_.template segment<D>(D * a) -
+                    kappa * inverse_size_[a] * u.template segment<D>(D * a);
+      image.template segment<D>(D * a) = disk_map(Cone(problem_.friction, a), z);
+    }
+    f = p - image;
+    return f.norm();
+  }
+
+  /// One proximal step; leaves it in next_, next_u_, next_error_. Newton steps taken, 0 on failure.
+  int inner(double kappa, std::int64_t stop_at) {
+    p_ = r_;
+    up_ = u_;
+    double norm = residual(kappa, p_, up_, f_, image_);
+    const double first = norm;
+    int rises = 0;
+    for (int step = 1; step <= max_steps && system_.factorisations() < stop_at; ++step) {
+      std::vector<double>& blocks = system_.blocks();
+      for (Index a = 0; a < problem_.nc(); ++a) {
+        const double rho = kappa * inverse_size_[a];
+        const Vec z = r_.template segment<D>(D * a) - rho * up_.template segment<D>(D * a);
+        Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
+            rho * disk_map_slope(Cone(problem_.friction, a), z);
+      }
+      if (!system_.factorise()) return 0;
+      step_ = -f_;
+      system_.solve(step_);
+      if (!step_.allFinite()) return 0;
+      double length = 1;
+      double trial_norm = 0;
+      for (int halving = 0;; ++halving) {
+        trial_ = p_ + length * step_;
+        problem_.velocity(trial_, trial_u_);
+        trial_norm = residual(kappa, trial_, trial_u_, f_, image_);
+        if (trial_norm < norm || halving == max_halvings) break;
+        length *= 0.5;
+      }
+      if (!(trial_norm < 10 * norm) || (trial_norm >= norm && ++rises == 2)) return 0;
+      p_ = trial_;
+      up_ = trial_u_;
+      norm = trial_norm;
+      if (norm > 1e-2 * first && first > 0) continue;
+      problem_.velocity(image_, next_u_);
+      next_error_ = error_of(next_u_, image_);
+      const double gap = (next_u_ - up_).norm() / problem_.scale;
+      if (gap <= 0.1 * next_error_ || gap <= 1e-15 || norm <= 1e-15 * p_.norm()) {
+        next_ = image_;
+        return step;
+      }
+    }
+    return 0;
+  }
+
+  const Delassus& problem_;
+  CoupledSystem& system_;
+  Vector inverse_size_;  // d / tr(W_aa)
+  double error_ = 0;
+  double next_error_ = 0;
+  Vector r_, u_, p_, up_, f_, image_, step_, trial_, trial_u_, next_, next_u_;
+};
+
+}  // namespace fclib

@@ -1,0 +1,444 @@
+// auto: the default. A chain of methods, each cheap to leave, from the fastest that may do to the
+// slowest that nearly always does:
+//
+//   0  r = 0, where nothing approaches
+//   1  Gauss-Seidel sweeps on the whole, then on each island (contacts linked through W) left over
+//   2  conjugate gradients on W r = -q, where all seems to stick and rest
+//   3  proximal Newton ("polish"), where the error is small already
+//   4  interior point with the shift in the Newton system, polished as it comes near
+//   5  interior point on the associated problem: packings without a Slater point, where u = 0
+//   6  proximal point with an accurate inner solution, the last resort
+//
+// Every stage starts from, and returns to, the best iterate so far; each island is held to its
+// share of the tolerance. What a stage may cost is counted in operations, not in time: the same
+// problem takes the same path on every machine.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <utility>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/gauss_seidel.hpp"
+#include "kernels/interior_point.hpp"
+#include "kernels/natural_error.hpp"
+#include "kernels/proximal_point.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::automatic {
+
+namespace {
+
+struct Options {
+  std::int64_t sweeps = 20;
+  std::int64_t island_sweeps = 100;
+  double polish_below = 1e-6;
+  std::int64_t last_resort = 4000;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, std::int64_t>{.name = "sweeps",
+                                     .member = &O::sweeps,
+                                     .unit = "sweeps",
+                                     .doc = "of Gauss-Seidel on the whole problem",
+                                     .lowest = 0},
+        OptionField<O, std::int64_t>{.name = "island_sweeps",
+                                     .member = &O::island_sweeps,
+                                     .unit = "sweeps",
+                                     .doc = "of Gauss-Seidel on each island that is left",
+                                     .lowest = 0},
+        OptionField<O, double>{.name = "polish_below",
+                               .member = &O::polish_below,
+                               .unit = "1",
+                               .doc = "error under which the proximal Newton method is tried",
+                               .lowest = 0},
+        OptionField<O, std::int64_t>{.name = "last_resort",
+                                     .member = &O::last_resort,
+                                     .unit = "factorisations",
+                                     .doc = "that the accurate proximal point method may take on "
+                                            "an island",
+                                     .lowest = 0},
+    };
+  }
+};
+
+/// Operations, about: of a sweep, and of a factorisation with its solve and the rest of an
+/// iteration.
+double sweep_cost(const Delassus& problem) {
+  return 60.0 * static_cast<double>(problem.nc()) + static_cast<double>(problem.W.entries());
+}
+double factorisation_cost(const Delassus& problem, const CoupledSystem& system) {
+  return 1500.0 * static_cast<double>(problem.nc()) + system.flops();
+}
+
+/// Follows the whole solve: iterations, stages, the error of the islands not being worked on.
+class Tracker {
+ public:
+  explicit Tracker(const Settings& settings) : monitor_(settings) {}
+
+  [[nodiscard]] double tolerance() const { return monitor_.tolerance(); }
+  [[nodiscard]] std::optional<Status> stopped() const { return stopped_; }
+  [[nodiscard]] std::int64_t iterations() const { return iterations_; }
+  [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
+
+  /// The squared error of all contacts but those worked on now.
+  void set_others(double squared) { others_ = squared; }
+
+  /// Counts iterations and tells of the error that is left. Whether to stop.
+  bool report(std::int64_t iterations, double error) {
+    iterations_ += iterations;
+    if (!stopped_) stopped_ = monitor_.report(iterations_, std::sqrt(others_ + error * error));
+    return stopped_.has_value();
+  }
+
+  template <class F>
+  void stage(std::string_view name, const F& run) {
+    auto at = std::find_if(stages_.begin(), stages_.end(),
+                           [&](const Stage& stage) { return stage.name == name; });
+    if (at == stages_.end()) at = stages_.insert(stages_.end(), Stage{.name = name});
+    const auto place = at - stages_.begin();  // stages may be entered one inside another
+    const auto start = std::chrono::steady_clock::now();
+    const auto before = iterations_;
+    const auto [factorisations, solved] = run();
+    Stage& stage = stages_[static_cast<std::size_t>(place)];
+    ++stage.calls;
+    stage.solved += solved;
+    stage.iterations += iterations_ - before;
+    stage.factorisations += factorisations;
+    stage.time += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+
+ private:
+  Monitor monitor_;
+  double others_ = 0;
+  std::int64_t iterations_ = 0;
+  std::optional<Status> stopped_;
+  std::vector<Stage> stages_;
+};
+
+template <class Cone>
+class Island {
+ public:
+  static constexpr int D = Cone::dim;
+
+  Island(const Delassus& problem, const Options& options, Tracker& tracker, double tolerance)
+      : problem_(problem),
+        options_(options),
+        tracker_(tracker),
+        tolerance_(tolerance),
+        gauss_seidel_(problem) {}
+
+  /// From r; the best iterate ends in r. Its error relative to the problem's scale.
+  double solve(Vector& r, std::int64_t sweeps, bool whole) {
+    r_ = r;
+    problem_.velocity(r_, u_);
+    best_ = r_;
+    error_ = error_of(u_, r_);
+    tracker_.report(0, error_);
+    if (!done()) stage("gauss-seidel", [&] { return sweep(sweeps, whole); });
+    if (!whole && !done()) continue_by_newton();
+    r = best_;
+    return error_;
+  }
+
+ private:
+  [[nodiscard]] bool done() const { return error_ <= tolerance_ || tracker_.stopped(); }
+
+  double error_of(const Vector& u, const Vector& r) const {
+    return std::sqrt(natural_map_squared<Cone>(u, r, problem_.friction)) / problem_.scale;
+  }
+
+  /// Keeps r where it is the best so far. Whether to stop.
+  bool take(std::int64_t iterations, double error, const Vector& r) {
+    if (error < error_) {
+      error_ = error;
+      best_ = r;
+    }
+    tracker_.report(iterations, error);
+    return done();
+  }
+
+  template <class F>
+  void stage(std::string_view name, const F& run) {
+    tracker_.stage(name, [&] {
+      const auto before = system_ ? system_->factorisations() : 0;
+      run();
+      return std::pair((system_ ? system_->factorisations() : 0) - before, error_ <= tolerance_);
+    });
+  }
+
+  CoupledSystem& system() {
+    if (!system_) system_.emplace(problem_);
+    return *system_;
+  }
+
+  void sweep(std::int64_t limit, bool whole) {
+    constexpr std::int64_t interval = 5;
+    double last = error_;
+    std::int64_t k = 0;
+    while (k < limit) {
+      const std::int64_t count = std::min(interval, limit - k);
+      for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
+      k += count;
+      double error = error_of(u_, r_);
+      if (error <= tolerance_) {
+        problem_.velocity(r_, u_);
+        error = error_of(u_, r_);
+      }
+      if (take(count, error, r_)) return;
+      // on an island, only while the sweeps to go cost less than a dozen factorisations
+      if (!whole && k >= 2 * interval && k >= limit / 4) {
+        const double rate = std::log(last / error) / static_cast<double>(count);
+        const double left = std::log(error / tolerance_) / rate;
+        if (!(rate > 0) || left * sweep_cost(problem_) >
+                               12 * factorisation_cost(problem_, system())) {
+          return;
+        }
+        if (k == limit && left < 20 * static_cast<double>(limit)) limit += interval;
+      }
+      last = error;
+    }
+  }
+
+  void continue_by_newton() {
+    if (mostly_closed()) stage("conjugate gradients", [&] { return conjugate_gradients(); });
+    if (!done() && error_ < options_.polish_below) {
+      stage("proximal newton", [&] { return polish(best_); });
+    }
+    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
+      if (!done()) stage("interior point", [&] { return interior_point({}); });
+      if (!done()) {
+        stage("associated interior point", [&] { return interior_point({.associated = true}); });
+      }
+      if (!done()) {
+        stage("interior point, careful", [&] {
+          return interior_point({.step_cap = 0.8, .delta = 1e-4, .delta_follows = false});
+        });
+      }
+    }
+    if (!done()) {
+      stage("proximal point", [&] {
+        const ProximalRules rules{.kappa = 10, .max_factorisations = options_.last_resort};
+        return proximal(rules, best_);
+      });
+    }
+  }
+
+  [[nodiscard]] bool mostly_closed() const {
+    if (problem_.nc() < 20) return false;
+    Index closed = 0;
+    for (Index a = 0; a < problem_.nc(); ++a) closed += best_[D * a] > 0;
+    return closed >= problem_.nc() - problem_.nc() / 10;
+  }
+
+  /// On W r = -q, preconditioned by tr(W_aa); given up where r leaves the cones for good.
+  void conjugate_gradients() {
+    constexpr std::int64_t limit = 200;
+    constexpr std::int64_t trial = 15;
+    Vector inverse(problem_.nc());
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double trace = problem_.W.template diagonal_block<D>(a).trace();
+      if (!(trace > 0)) return;
+      inverse[a] = D / trace;
+    }
+    const auto precondition = [&](const Vector& x, Vector& y) {
+      for (Index a = 0; a < problem_.nc(); ++a) {
+        y.template segment<D>(D * a) = inverse[a] * x.template segment<D>(D * a);
+      }
+    };
+    const Vector zero = Vector::Zero(problem_.m());
+    Vector r = zero;
+    Vector residual = -problem_.q;
+    Vector z(problem_.m());
+    Vector product(problem_.m());
+    precondition(residual, z);
+    Vector direction = z;
+    double rz = residual.dot(z);
+    for (std::int64_t k = 1; k <= limit; ++k) {
+      problem_.W.multiply_add(direction, zero, product);
+      const double curvature = direction.dot(product);
+      if (!(curvature > 0)) return;
+      const double length = rz / curvature;
+      r += length * direction;
+      residual -= length * product;
+      if (k % trial == 0 && (violation(r) > 1e-2 || tracker_.report(trial, error_))) return;
+      if (residual.norm() <= tolerance_ * problem_.scale) {
+        Vector inside = r;
+        project(inside);
+        Vector u(problem_.m());
+        problem_.velocity(inside, u);
+        if (take(0, error_of(u, inside), inside)) return;
+      }
+      precondition(residual, z);
+      const double next = residual.dot(z);
+      direction = z + (next / rz) * direction;
+      rz = next;
+    }
+  }
+
+  void project(Vector& r) const {
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      auto part = r.template segment<D>(D * a);
+      part = Cone(problem_.friction, a).project(part);
+    }
+  }
+  [[nodiscard]] double violation(const Vector& r) const {
+    Vector inside = r;
+    project(inside);
+    return (r - inside).norm() / r.norm();
+  }
+
+  void proximal(const ProximalRules& rules, Vector r) {
+    ProximalPoint<Cone> method(problem_, system());
+    const double error = method.solve(rules, tolerance_, r, [&](double at) {
+      return at > tolerance_ && tracker_.report(1, at);
+    });
+    take(0, error, r);
+  }
+
+  void polish(const Vector& r) {
+    proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 8}, r);
+  }
+
+  void interior_point(const InteriorPointRules& rules) {
+    InteriorPoint<D> method(problem_, system());
+    double next_polish = options_.polish_below;
+    method.solve(rules, [&](double error, const Vector& r) {
+      if (take(1, error, r)) return true;
+      if (rules.associated && method.tau() < 1e-6 && method.speed() > 1e-3) return true;
+      if (error < next_polish) {
+        polish(r);
+        next_polish = error / 30;
+      }
+      return done();
+    });
+  }
+
+  const Delassus& problem_;
+  const Options& options_;
+  Tracker& tracker_;
+  double tolerance_;
+  GaussSeidel<Cone> gauss_seidel_;
+  std::optional<CoupledSystem> system_;
+  Vector r_, u_, best_;
+  double error_ = 0;
+};
+
+/// The part of a problem that these contacts are.
+Delassus restricted(const Delassus& problem, const std::vector<Index>& contacts) {
+  const int d = problem.d();
+  Delassus part{.W = problem.W.restricted(contacts), .q = {}, .friction = {}, .scale = problem.scale};
+  const auto count = static_cast<Eigen::Index>(contacts.size());
+  part.q.resize(d * count);
+  part.friction.mu.resize(count);
+  if (problem.rolling()) part.friction.mu_r.resize(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    part.q.segment(d * k, d) = problem.q.segment(d * contacts[k], d);
+    part.friction.mu[k] = problem.friction.mu[contacts[k]];
+    if (problem.rolling()) part.friction.mu_r[k] = problem.friction.mu_r[contacts[k]];
+  }
+  return part;
+}
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  constexpr int D = Cone::dim;
+  const Index nc = problem.nc();
+  Tracker tracker(settings);
+  const auto outcome = [&] {
+    return Outcome{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
+                   std::move(tracker.stages())};
+  };
+  bool separating = true;
+  for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
+  if (separating) {
+    r.setZero();
+    tracker.report(0, 0.0);
+    return outcome();
+  }
+
+  const double tolerance = tracker.tolerance();
+  std::optional<Island<Cone>> whole;
+  whole.emplace(problem, options, tracker, tolerance);
+  whole->solve(r, nc <= 2 ? 5 : options.sweeps, true);
+  if (tracker.stopped()) return outcome();
+  const std::vector<Index> group = problem.W.components();
+  const Index count = 1 + *std::max_element(group.begin(), group.end());
+  if (count == 1) {
+    whole->solve(r, options.island_sweeps, false);
+    return outcome();
+  }
+  whole.reset();
+
+  std::vector<std::vector<Index>> islands(static_cast<std::size_t>(count));
+  for (Index a = 0; a < nc; ++a) islands[group[a]].push_back(a);
+  Vector u;
+  problem.velocity(r, u);
+  std::vector<double> squared(islands.size(), 0.0);
+  double sum = 0;
+  for (Index a = 0; a < nc; ++a) {
+    const Cone cone(problem.friction, a);
+    const double error = natural_map(cone, typename Cone::Vec(u.template segment<D>(D * a)),
+                                     typename Cone::Vec(r.template segment<D>(D * a)))
+                             .squaredNorm() /
+                         (problem.scale * problem.scale);
+    squared[group[a]] += error;
+    sum += error;
+  }
+  for (std::size_t k = 0; k < islands.size() && !tracker.stopped(); ++k) {
+    const std::vector<Index>& contacts = islands[k];
+    const double share =
+        tolerance * std::sqrt(static_cast<double>(contacts.size()) / static_cast<double>(nc));
+    if (squared[k] <= share * share) continue;
+    const Delassus part = restricted(problem, contacts);
+    const auto size = static_cast<Eigen::Index>(contacts.size());
+    Vector x(D * size);
+    for (Eigen::Index j = 0; j < size; ++j)
+      x.template segment<D>(D * j) = r.template segment<D>(D * contacts[j]);
+    sum = std::max(0.0, sum - squared[k]);
+    tracker.set_others(sum);
+    const double error =
+        Island<Cone>(part, options, tracker, share).solve(x, options.island_sweeps, false);
+    sum += error * error;
+    for (Eigen::Index j = 0; j < size; ++j)
+      r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);
+  }
+  tracker.set_others(0);
+  tracker.report(0, std::sqrt(sum));
+  return outcome();
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "auto",
+      .family = "chain",
+      .title = "The default: a chain from Gauss-Seidel to interior and proximal points",
+      .citation = "this project",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::automatic

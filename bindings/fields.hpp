@@ -1,4 +1,5 @@
-// Python classes from the fields() of a C++ struct: constructor, properties, repr and pickling.
+// Python classes from the fields() of a C++ struct: constructor, properties, copies
+// with changes and pickling.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -91,17 +92,63 @@ bool may_be_left_out(const Field<Struct, Member>& field) {
   return !array || field.presence != Presence::required;
 }
 
-/// Fills a struct from keyword arguments.
+/// What is known of the matrices of a problem, by their names.
 template <class Struct>
-void fill(Struct& self, const nb::dict& values) {
+nb::dict matrix_info_of(const Struct& self) {
+  nb::dict result;
+  for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+    if constexpr (std::is_same_v<Member, Matrix>) {
+      const auto& info = (self.*field.member).info;
+      if (info) result[std::string(field.name).c_str()] = nb::cast(*info);
+    }
+  });
+  return result;
+}
+
+template <class Struct>
+void set_matrix_info(Struct& self, nb::handle value) {
+  if (!nb::isinstance<nb::mapping>(value)) throw nb::type_error("matrix_info must be a mapping");
+  const nb::object builtin = nb::module_::import_("builtins").attr("dict");
+  const auto given = nb::borrow<nb::dict>(builtin(value));
+  std::size_t used = 0;
+  for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+    if constexpr (std::is_same_v<Member, Matrix>) {
+      Matrix& a = self.*field.member;
+      a.info.reset();
+      const std::string name(field.name);
+      if (a.empty() || !given.contains(name.c_str())) return;
+      ++used;
+      if (!nb::try_cast<MatrixInfo>(given[name.c_str()], a.info.emplace())) {
+        throw nb::type_error(("matrix_info['" + name + "'] must be of type MatrixInfo").c_str());
+      }
+    }
+  });
+  if (used == given.size()) return;
+  const nb::dict known = matrix_info_of(self);
+  for (const auto& [key, info] : given) {
+    if (known.contains(key)) continue;
+    throw Error(ErrorKind::problem, "the problem has no such matrix",
+                "matrix_info[" + nb::cast<std::string>(nb::repr(key)) + "]");
+  }
+}
+
+enum class Fill { all, changes };
+
+/// Fills a struct from keyword arguments: all that it needs, or what is to change.
+template <class Struct>
+void fill(Struct& self, const nb::dict& values, Fill what = Fill::all) {
   std::size_t used = 0;
   for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
     const std::string name(field.name);
     if (values.contains(name.c_str())) {
       ++used;
       const nb::object value = values[name.c_str()];
-      if (!(value.is_none() && may_be_left_out(field))) set(field, self, value);
-    } else if (!may_be_left_out(field)) {
+      if (value.is_none() && may_be_left_out(field)) {
+        self.*field.member = Struct{}.*field.member;
+      } else {
+        set(field, self, value);
+      }
+    } else if (what == Fill::all && !may_be_left_out(field)) {
       throw Error(ErrorKind::problem, "is missing", name);
     }
   });
@@ -111,6 +158,10 @@ void fill(Struct& self, const nb::dict& values) {
       if (!nb::try_cast<ProblemInfo>(values["info"], self.info)) {
         throw nb::type_error("info must be of type ProblemInfo");
       }
+    }
+    if (values.contains("matrix_info")) {
+      ++used;
+      set_matrix_info(self, values["matrix_info"]);
     }
   }
   if (used < values.size()) {
@@ -130,23 +181,32 @@ nb::dict to_dict(nb::handle self) {
   for_each_field<Struct>([&](const auto& field) {
     result[std::string(field.name).c_str()] = get(field, value, self);
   });
-  if constexpr (requires { value.info; }) result["info"] = nb::cast(value.info);
+  if constexpr (requires { value.info; }) {
+    result["info"] = nb::cast(value.info);
+    result["matrix_info"] = matrix_info_of(value);
+  }
   return result;
 }
 
 template <class Struct>
-std::string signature_of_init() {
-  std::string text = "def __init__(self, *";
+std::string signature_of(const std::string& method, const std::string& result, Fill what) {
+  std::string text = "def " + method + "(self, *";
   for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+    constexpr bool array = std::is_same_v<Member, Matrix> || std::is_same_v<Member, Vector>;
+    const bool optional = array && may_be_left_out(field);
     text += ", " + std::string(field.name) + ": " + type_name<Member>(true);
-    if constexpr (std::is_same_v<Member, Matrix> || std::is_same_v<Member, Vector>) {
-      if (may_be_left_out(field)) text += " | None = None";
-    } else {
+    if (optional) text += " | None";
+    if (!array || what == Fill::changes) {
       text += " = ...";
+    } else if (optional) {
+      text += " = None";
     }
   });
-  if constexpr (requires(Struct s) { s.info; }) text += ", info: ProblemInfo = ...";
-  return text + ") -> None";
+  if constexpr (requires(Struct s) { s.info; }) {
+    text += ", info: ProblemInfo = ...";
+    text += ", matrix_info: collections.abc.Mapping[str, MatrixInfo] = ...";
+  }
+  return text + ") -> " + result;
 }
 
 /// Read-only properties for all fields.
@@ -167,7 +227,7 @@ void def_fields(nb::class_<Struct>& cls) {
   });
 }
 
-/// A constructor by keywords, and pickling by the same ones.
+/// A constructor by keywords, copies with changes and pickling by the same ones.
 template <class Struct>
 void def_construction(nb::class_<Struct>& cls) {
   cls.def(
@@ -176,7 +236,18 @@ void def_construction(nb::class_<Struct>& cls) {
         new (self) Struct();
         fill(*self, nb::borrow<nb::dict>(values));
       },
-      nb::sig(signature_of_init<Struct>().c_str()));
+      nb::sig(signature_of<Struct>("__init__", "None", Fill::all).c_str()));
+  const auto name = nb::cast<std::string>(cls.attr("__name__"));
+  std::string doc = "A copy in which some members are others.";
+  if constexpr (requires(Struct s) { s.info; }) doc += " With a matrix goes what was known of it.";
+  cls.def(
+      "replace",
+      [](const Struct& self, const nb::kwargs& values) {
+        Struct copy = self;
+        fill(copy, nb::borrow<nb::dict>(values), Fill::changes);
+        return copy;
+      },
+      nb::sig(signature_of<Struct>("replace", name, Fill::changes).c_str()), doc.c_str());
   cls.def(
       "__getstate__", [](nb::handle self) { return to_dict<Struct>(self); },
       nb::sig("def __getstate__(self) -> dict[str, object]"));
@@ -187,6 +258,31 @@ void def_construction(nb::class_<Struct>& cls) {
         fill(self, values);
       },
       nb::sig("def __setstate__(self, values: dict[str, object], /) -> None"));
+}
+
+/// Structs of plain values: equal where their members are, and printed as they are made.
+template <class Struct>
+void def_value(nb::class_<Struct>& cls) {
+  cls.def(
+      "__eq__",
+      [](const Struct& self, nb::handle other) {
+        return nb::isinstance<Struct>(other) && self == nb::cast<const Struct&>(other);
+      },
+      nb::sig("def __eq__(self, other: object, /) -> bool"));
+  cls.def("__hash__", [](nb::handle self) {
+    const nb::object values = to_dict<Struct>(self).values();
+    return nb::hash(nb::steal(PySequence_Tuple(values.ptr())));
+  });
+  cls.def("__repr__", [](nb::handle self) {
+    std::string text = nb::cast<std::string>(self.type().attr("__name__")) + "(";
+    bool first = true;
+    for (const auto& [name, value] : to_dict<Struct>(self)) {
+      text += (first ? "" : ", ") + nb::cast<std::string>(name) + "=" +
+              nb::cast<std::string>(nb::repr(value));
+      first = false;
+    }
+    return text + ")";
+  });
 }
 
 }  // namespace fclib::bindings

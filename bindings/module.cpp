@@ -12,7 +12,9 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <initializer_list>
 
 #include "conversions.hpp"
 #include "convert/complete.hpp"
@@ -98,6 +100,14 @@ void bind_problem(nb::module_& m) {
   def_construction(cls);
   def_fields(cls);
   cls.def_prop_ro("info", [](const P& p) { return p.info; }, "title, description, math_info");
+  cls.def_prop_ro(
+      "matrix_info",
+      [](const P& p) {
+        return nb::module_::import_("types").attr("MappingProxyType")(matrix_info_of(p));
+      },
+      nb::sig("def matrix_info(self, /) -> collections.abc.Mapping[str, MatrixInfo]"),
+      "What is known of a matrix and cannot be read off its entries, by its name: "
+      "matrix_info[\"W\"].rank. Matrices of which nothing is known are left out.");
   const auto def_size = [&](const char* dim_name, Dim dim, const char* doc) {
     cls.def_prop_ro(dim_name, [dim](const P& p) { return p.size(dim); }, doc);
   };
@@ -261,6 +271,38 @@ std::string problem_union() {
   return names;
 }
 
+const std::string guesses_type = "guesses: collections.abc.Sequence[Solution]";
+const std::string compression_type =
+    "compression: int = " + std::to_string(WriteOptions{}.compression);
+
+/// The options of a mode's name.
+WriteOptions options_of(const std::string& mode, std::initializer_list<std::string_view> modes,
+                        int compression) {
+  std::string known;
+  for (const auto name : modes) known += (known.empty() ? "" : ", ") + std::string(name);
+  if (std::find(modes.begin(), modes.end(), mode) == modes.end()) {
+    throw Error(ErrorKind::option, "there is no mode '" + mode + "'; there are: " + known, "mode");
+  }
+  return {.append = mode != "overwrite", .replace = mode == "replace", .compression = compression};
+}
+
+/// The problem that the solution and the guesses of a file belong to.
+Problem read_owner(const std::string& path) {
+  const Problem outline = read_outline(path);
+  return read_problem(path, std::visit([]<class P>(const P&) { return P::kind; }, outline));
+}
+
+/// Guesses with all that readers of libfclib 3.1 need.
+template <class P>
+std::vector<Solution> complete(const P& problem, const std::vector<Solution>& guesses) {
+  std::vector<Solution> result;
+  for (const auto& guess : guesses) {
+    validate(guess, problem, guess_path(result.size() + 1));
+    result.push_back(fclib::complete(problem, guess));
+  }
+  return result;
+}
+
 void bind_files(nb::module_& m) {
   m.def(
       "read",
@@ -278,52 +320,104 @@ void bind_files(nb::module_& m) {
   m.def(
       "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
       nb::sig(signature("read_solution", "", "Solution | None").c_str()),
-      nb::call_guard<Unlocked>(), "The stored solution of a file, or None. Raises FileError.");
+      nb::call_guard<Unlocked>(),
+      "The stored solution of a file, or None. It is that of the global problem where the file "
+      "holds several. Raises FileError.");
+  m.def(
+      "read_guesses", [](const fs::path& path) { return read_guesses(path.string()); }, "path"_a,
+      nb::sig(signature("read_guesses", "", "list[Solution]").c_str()), nb::call_guard<Unlocked>(),
+      "The stored guesses of a file, of the problem that a solution would belong to. Raises "
+      "FileError.");
   m.def(
       "contents",
       [](const fs::path& path) {
         Contents contents = read_contents(path.string());
         if (contents.solution) contents.kinds.emplace_back("solution");
+        if (contents.guesses > 0) contents.kinds.emplace_back("guesses");
         return contents.kinds;
       },
       "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
-      "What a file holds: the kinds of its problems, and \"solution\". Raises FileError.");
+      "What a file holds: the kinds of its problems, \"solution\" and \"guesses\". Raises "
+      "FileError.");
   m.def(
       "write_solution",
-      [](const fs::path& path, const Solution& solution) {
-        const Problem problem = read_problem(path.string());
+      [](const fs::path& path, const Solution& solution, int compression) {
+        const Problem problem = read_owner(path.string());
         const Solution whole =
-            std::visit([&](const auto& p) { return complete(p, solution); }, problem);
-        write_solution(path.string(), whole);
+            std::visit([&](const auto& p) { return fclib::complete(p, solution); }, problem);
+        write_solution(path.string(), whole, {.replace = true, .compression = compression});
       },
-      "path"_a, "solution"_a,
-      nb::sig(signature("write_solution", ", solution: Solution", "None").c_str()),
+      "path"_a, "solution"_a, nb::kw_only(), "compression"_a = WriteOptions{}.compression,
+      nb::sig(signature("write_solution", ", solution: Solution, *, " + compression_type, "None")
+                  .c_str()),
       nb::call_guard<Unlocked>(),
-      "Puts a solution into a file that has its problem, in place of the one it had, "
-      "atomically.\n\n"
-      "Raises FileError, or ProblemError where the sizes disagree.");
+      "Puts a solution into a file that has its problem, in place of the one it had, atomically. "
+      "It is that of the global problem where the file holds several.\n\n"
+      "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
+      "outside 0..9.");
+  m.def(
+      "write_guesses",
+      [](const fs::path& path, const std::vector<Solution>& guesses, const std::string& mode,
+         int compression) {
+        WriteOptions options = options_of(mode, {"replace", "add"}, compression);
+        options.append = mode == "add";
+        const Problem problem = read_owner(path.string());
+        const std::vector<Solution> whole =
+            std::visit([&](const auto& p) { return complete(p, guesses); }, problem);
+        write_guesses(path.string(), whole, options);
+      },
+      "path"_a, "guesses"_a, nb::kw_only(), "mode"_a = "replace",
+      "compression"_a = WriteOptions{}.compression,
+      nb::sig(signature("write_guesses",
+                        ", " + guesses_type +
+                            ", *, mode: typing.Literal['replace', 'add'] = "
+                            "'replace', " +
+                            compression_type,
+                        "None")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "Puts guesses into a file that has their problem, atomically: in place of those it had "
+      "(\"replace\"), or after them (\"add\").\n\n"
+      "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
+      "or a compression outside 0..9.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
         "write",
-        [](const fs::path& path, const P& problem, const Solution* solution) {
-          if (solution == nullptr) {
-            write_file(path.string(), &problem);
-          } else {
-            validate(problem);
-            const Solution whole = complete(problem, *solution);
-            write_file(path.string(), &problem, &whole);
+        [](const fs::path& path, const P& problem, const Solution* solution,
+           const std::vector<Solution>& guesses, const std::string& mode, int compression) {
+          const WriteOptions options =
+              options_of(mode, {"overwrite", "add", "replace"}, compression);
+          if (solution == nullptr && guesses.empty()) {
+            write_file(path.string(), &problem, nullptr, {}, options);
+            return;
           }
+          validate(problem);
+          const bool solved = solution != nullptr;
+          const Solution whole = solved ? fclib::complete(problem, *solution) : Solution{};
+          write_file(path.string(), &problem, solved ? &whole : nullptr, complete(problem, guesses),
+                     options);
         },
         "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
-        nb::sig(
-            signature("write",
-                      ", problem: " + class_name(P::kind) + ", solution: Solution | None = None",
-                      "None")
-                .c_str()),
+        "guesses"_a = std::vector<Solution>{}, nb::kw_only(), "mode"_a = "overwrite",
+        "compression"_a = WriteOptions{}.compression,
+        nb::sig(signature("write",
+                          ", problem: " + class_name(P::kind) +
+                              ", solution: Solution | None = None, " + guesses_type +
+                              " = (), *, mode: typing.Literal['overwrite', 'add', 'replace'] = "
+                              "'overwrite', " +
+                              compression_type,
+                          "None")
+                    .c_str()),
         nb::call_guard<Unlocked>(),
-        "Writes an FCLIB file, or replaces the old one whole, atomically. What the solution lacks "
-        "of v and u is completed: readers of libfclib 3.1 need it.\n\n"
-        "Raises FileError, or ProblemError where the data is not valid.");
+        "Writes an FCLIB file, atomically. What the solution and the guesses lack of v and u is "
+        "completed: readers of libfclib 3.1 need it.\n\n"
+        "A file that is there is replaced whole (\"overwrite\"); or it keeps what it holds, and "
+        "must not have such a problem (\"add\"), or gives up the problem of this kind, with its "
+        "solution and its guesses (\"replace\"). In a file of several problems solution and "
+        "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
+        "9.\n\n"
+        "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
+        "mode or a compression outside 0..9.");
   });
 }
 
@@ -339,6 +433,12 @@ NB_MODULE(_core, m) {
   nb::class_<ProblemInfo> info(m, "ProblemInfo", "What a file says about its problem in words.");
   def_construction(info);
   def_fields(info);
+  def_value(info);
+  nb::class_<MatrixInfo> matrix_info(
+      m, "MatrixInfo", "What is known of a matrix and cannot be read off its entries.");
+  def_construction(matrix_info);
+  def_fields(matrix_info);
+  def_value(matrix_info);
   nb::class_<Solution> solution(m, "Solution", "A solution, or a guess, of any formulation.");
   def_construction(solution);
   def_fields(solution);

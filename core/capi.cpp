@@ -91,7 +91,7 @@ std::atomic<int> compression{WriteOptions{}.compression};
 
 /// 3.1 checks no value and converts no matrix.
 WriteOptions write_options() {
-  return {.validate = false, .append = true, .replace = replace, .compression = compression};
+  return {.validate = false, .replace = replace, .compression = compression};
 }
 
 // ---- the members of the structs ---------------------------------------------------------------
@@ -462,7 +462,9 @@ template <class C>
 int write_problem(const C* c, const char* path) {
   return guarded(0, [&] {
     const auto problem = problem_as_given(given(c, "problem"));
-    write_file(&given(path, "path"), &problem, nullptr, write_options());
+    WriteOptions options = write_options();
+    options.append = true;
+    write_file(&given(path, "path"), &problem, nullptr, {}, options);
     return 1;
   });
 }

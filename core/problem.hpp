@@ -55,6 +55,9 @@ std::string field_path(const Field<Struct, Vector>& field) {
   return "vectors/" + std::string(field.name);
 }
 
+/// The HDF5 group of a guess, the first of which is number 1.
+inline std::string guess_path(std::size_t number) { return "/guesses/" + std::to_string(number); }
+
 /// Whether the problem has bilateral constraints.
 template <class P>
 bool is_mixed(const P& problem) {
@@ -134,14 +137,14 @@ void validate(const P& problem) {
 }
 
 /// Throws Error (problem) where the members of a solution do not fit the problem. Members that may
-/// be absent (v and u, which follow from r) are accepted empty.
+/// be absent (v and u, which follow from r) are accepted empty. `where` is its group in a file.
 template <class P>
-void validate(const Solution& solution, const P& problem) {
+void validate(const Solution& solution, const P& problem, const std::string& where = "/solution") {
   for_each_field<Solution>([&](const Field<Solution, Vector>& field) {
     const Vector& values = solution.*field.member;
     if (field.presence == Presence::optional && values.size() == 0) return;
     detail::validate_vector(values, problem.size(field.rows), field,
-                            "/solution/" + std::string(field.name));
+                            where + "/" + std::string(field.name));
   });
 }
 

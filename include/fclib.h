@@ -219,8 +219,8 @@ const char* fclib_problem_kind(const char* path);
 /** New. What a write does where the file already holds such a thing. */
 enum fclib_write_mode {
   FCLIB_WRITE_ADD,    /**< it fails; as 3.1 does, and the default */
-  FCLIB_WRITE_REPLACE /**< it puts the new in the place of the old; a problem takes the solution and
-                           the guesses with it */
+  FCLIB_WRITE_REPLACE /**< it puts the new in the place of the old; a problem takes its solution and
+                           its guesses with it */
 };
 
 /** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */

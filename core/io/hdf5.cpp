@@ -277,7 +277,10 @@ std::string read_text_if_there(const Group& group, const std::string& name, Vali
 }
 
 std::optional<MatrixInfo> read_matrix_info(const Group& group, Validation validation) {
-  if (!group.has("comment") && !group.has("conditioning") && !group.has("rank")) return {};
+  if (!group.has("comment") && !group.has("conditioning") && !group.has("determinant") &&
+      !group.has("rank")) {
+    return {};
+  }
   MatrixInfo info;
   info.comment = read_text_if_there(group, "comment", validation);
   if (group.has("conditioning")) info.conditioning = read_number<double>(group, "conditioning");
@@ -1032,31 +1035,73 @@ void change_file(const std::string& path, Start start, const WriteOptions& optio
 
 }  // namespace
 
+namespace {
+
+/// Guesses number `first` and the following ones of a file.
+void write_guesses_from(const Target& guesses, std::size_t first,
+                        const std::vector<Solution>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    write_solution_group(guesses, std::to_string(first + k), values[k]);
+  }
+  write_number(guesses, "number_of_guesses", static_cast<Index>(first - 1 + values.size()));
+}
+
+/// Throws where a problem that was added is the one that a solution or a guess now belongs to,
+/// though it was written for another; or where it is not, though they are its own.
+void require_owner(const Group& root, const std::string& kind, bool owned_before, bool brings) {
+  const bool others = root.has("solution") || root.has("guesses");
+  const bool owner = owner_of(kinds_of(root)) == kind;
+  if (!owned_before && owner && others) {
+    fail("/",
+         "the solution and the guesses in the file would become those of the " + kind + " problem");
+  }
+  if (brings && !owner) {
+    fail("/", "a solution or a guess in the file belongs to its " + owner_of(kinds_of(root)) +
+                  " problem, not to the " + kind + " one");
+  }
+}
+
+}  // namespace
+
 void write_file(const std::string& path, ProblemPointer problem, const Solution* solution,
-                const WriteOptions& options) {
+                const std::vector<Solution>& guesses, const WriteOptions& options) {
   if (options.validate) {
     in_file(path, [&] {
       std::visit(
           [&](const auto* p) {
             validate(*p);
             if (solution != nullptr) validate(*solution, *p);
+            for (std::size_t k = 0; k < guesses.size(); ++k) {
+              validate(guesses[k], *p, guess_path(k + 1));
+            }
           },
           problem);
     });
   }
   const Start start = options.append ? Start::existing_or_empty : Start::empty;
   change_file(path, start, options, [&](const Target& root) {
-    const std::string group =
-        std::visit([]<class P>(const P*) { return group_name<P>(); }, problem);
+    const std::string kind =
+        std::visit([]<class P>(const P*) { return std::string(P::kind); }, problem);
+    const std::string group = "fclib_" + kind;
+    const std::vector<std::string> before = kinds_of(root);
+    const bool owned = before.empty() || owner_of(before) == kind;
     if (root.has(group)) {
       make_room(root, group, options.replace);
-      make_room(root, "solution", options.replace);
-      make_room(root, "guesses", options.replace);
+      // those of another problem stay
+      if (owned) make_room(root, "solution", options.replace);
+      if (owned) make_room(root, "guesses", options.replace);
     }
     std::visit([&](const auto* p) { write_fields(root, *p, !options.validate); }, problem);
+    if (options.validate) {
+      require_owner(root, kind, owned, solution != nullptr || !guesses.empty());
+    }
     if (solution != nullptr) {
       make_room(root, "solution", options.replace);
       write_solution_group(root, "solution", *solution);
+    }
+    if (!guesses.empty()) {
+      make_room(root, "guesses", options.replace);
+      write_guesses_from(NewGroup(root, "guesses").target(), 1, guesses);
     }
   });
 }
@@ -1077,16 +1122,21 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
   change_file(path, Start::existing, options, [&](const Target& root) {
     if (options.validate) {
       const Problem outline = outline_of(root);
-      for (const auto& guess : guesses) {
-        std::visit([&](const auto& p) { validate(guess, p); }, outline);
+      for (std::size_t k = 0; k < guesses.size(); ++k) {
+        std::visit([&](const auto& p) { validate(guesses[k], p, guess_path(k + 1)); }, outline);
       }
     }
-    make_room(root, "guesses", options.replace);
-    const NewGroup group(root, "guesses");
-    write_number(group.target(), "number_of_guesses", static_cast<Index>(guesses.size()));
-    for (std::size_t k = 0; k < guesses.size(); ++k) {
-      write_solution_group(group.target(), std::to_string(k + 1), guesses[k]);
+    const Index there = options.append ? contents_of(root).guesses : 0;
+    if (there > 0) {
+      const Handle group = open_group(root, "guesses");
+      const Target target{{group.id(), root.child("guesses")}, root.compression, root.scratch};
+      make_room(target, "number_of_guesses", true);
+      write_guesses_from(target, static_cast<std::size_t>(there) + 1, guesses);
+      return;
     }
+    // an empty group is no reason to refuse
+    make_room(root, "guesses", options.replace || options.append);
+    write_guesses_from(NewGroup(root, "guesses").target(), 1, guesses);
   });
 }
 

@@ -31,7 +31,7 @@ struct Contents {
 /// How a file is written.
 struct WriteOptions {
   bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
-  bool append = false;   ///< keep what an existing file holds; write_file alone asks
+  bool append = false;   ///< keep what the file holds: the other problems, the other guesses
   bool replace = false;  ///< what is there already gives way; false: it is an error
   int compression = 4;   ///< level of deflate, 0 (none) to 9
 };
@@ -93,17 +93,19 @@ std::optional<Solution> read_solution(const std::string& path);
 std::vector<Solution> read_guesses(const std::string& path);
 
 /// Writes a new file, or replaces the old one whole; or adds to it (WriteOptions::append), where a
-/// problem that replaces one of its kind takes the solution and the guesses with it. A solution
-/// must be complete (v for a global problem, u): the readers of libfclib 3.1 end their host's
-/// process where it is not.
+/// problem that replaces one of its kind takes its solution and its guesses with it. With
+/// validation, no solution and no guess comes to belong to another problem. They must be complete
+/// (v for a global problem, u): the readers of libfclib 3.1 end their host's process where they are
+/// not.
 void write_file(const std::string& path, ProblemPointer problem, const Solution* solution = nullptr,
-                const WriteOptions& options = {});
+                const std::vector<Solution>& guesses = {}, const WriteOptions& options = {});
 
 /// Puts a solution into a file that has its problem, by default in place of the one it had.
 void write_solution(const std::string& path, const Solution& solution,
                     const WriteOptions& options = {.replace = true});
 
-/// Puts guesses into a file that has their problem, by default in place of those it had.
+/// Puts guesses into a file that has their problem, by default in place of those it had; or after
+/// those (WriteOptions::append).
 void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
                    const WriteOptions& options = {.replace = true});
 

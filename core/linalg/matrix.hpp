@@ -6,7 +6,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
+
+#include "field.hpp"
 
 namespace fclib {
 
@@ -28,6 +31,20 @@ struct MatrixInfo {
   double conditioning = 0;  ///< 0 where it is not known
   double determinant = 0;
   Index rank = 0;
+
+  static constexpr auto fields() {
+    using S = MatrixInfo;
+    return std::tuple{
+        Field<S, std::string>{.name = "comment", .member = &S::comment, .doc = "anything"},
+        Field<S, double>{.name = "conditioning",
+                         .member = &S::conditioning,
+                         .doc = "condition number, 0 where it is not known"},
+        Field<S, double>{.name = "determinant",
+                         .member = &S::determinant,
+                         .doc = "determinant, 0 where it is not known"},
+        Field<S, Index>{.name = "rank", .member = &S::rank, .doc = "rank, 0 where it is not known"},
+    };
+  }
 
   bool operator==(const MatrixInfo&) const = default;
 };

@@ -5,6 +5,7 @@ import sys
 import types
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -102,6 +103,37 @@ def test_sizes_of_problems() -> None:
     assert (whole.n, whole.m, whole.nc, whole.p) == (5, 3, 1, 1)
     assert (whole.kind, whole.formulation) == ("global", "GM3DFC")
     assert "GM3DFC" in repr(whole)
+
+
+def test_values_are_equal_where_their_members_are() -> None:
+    rank: Any = np.int32(3)  # NumPy's scalars are taken too
+    info = fclib.MatrixInfo(comment="a", conditioning=np.inf, rank=rank)
+    same = fclib.MatrixInfo(comment="a", conditioning=np.inf, rank=3)
+    assert info == same
+    assert hash(info) == hash(same)
+    assert info != same.replace(rank=2)
+    assert info != "a"
+    assert repr(info) == "MatrixInfo(comment='a', conditioning=inf, determinant=0.0, rank=3)"
+    words = fclib.ProblemInfo(title="a")
+    assert words == fclib.ProblemInfo(title="a")
+    assert words != words.replace(title="b")
+    assert "title='a'" in repr(words)
+
+
+def test_a_copy_has_what_is_given_to_it_and_the_rest() -> None:
+    problem = fclib.LocalProblem(
+        W=np.eye(3), V=np.ones((3, 1)), R=np.eye(1), s=[1.0], q=np.zeros(3), mu=[0.5]
+    )
+    other = problem.replace(mu=[0.25], info=fclib.ProblemInfo(title="another"))
+    assert (other.mu[0], other.info.title) == (0.25, "another")
+    assert (problem.mu[0], problem.info.title) == (0.5, "")
+    np.testing.assert_array_equal(dense(other.W), np.eye(3))
+    plain = problem.replace(V=None, R=None, s=None)
+    assert (problem.p, plain.p) == (1, 0)
+    with pytest.raises(TypeError, match="unexpected argument 'mass'"):
+        problem.replace(mass=1)  # type: ignore[call-arg]
+    with pytest.raises(fclib.ProblemError, match="W"):
+        problem.replace(W=None)
 
 
 def test_condensation_and_elimination_are_what_they_say() -> None:

@@ -83,16 +83,44 @@ def test_info_as_a_table_names_every_file_on_one_line(files: list[Path]) -> None
         assert sum(path.name in line.split() and formulation in line.split() for line in lines) == 1
 
 
-def test_info_shows_each_problem_of_a_file(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
-    path, other = tmp_path / "both.hdf5", tmp_path / "other.hdf5"
-    fclib.write(path, planted_local(1).problem)
-    fclib.write(other, planted_global(1).problem)
-    with h5py.File(path, "a") as file, h5py.File(other) as source:
-        source.copy("fclib_global", file)
-    result = run("info", "--json", path)
+@pytest.fixture
+def both(tmp_path: Path) -> Path:
+    """A file of two problems, with a solution and two guesses of the global one."""
+    path = tmp_path / "both.hdf5"
+    local, whole = planted_local(1), planted_global(1)
+    fclib.write(path, local.problem)
+    fclib.write(path, whole.problem, whole.solution, [whole.solution] * 2, mode="add")
+    return path
+
+
+def test_info_shows_each_problem_of_a_file(both: Path) -> None:
+    result = run("info", "--json", both)
     assert result.returncode == 0
-    assert {record["formulation"] for record in records(result)} == {"3DFC", "G3DFC"}
+    whole, local = records(result)
+    assert (whole["formulation"], whole["solution"], whole["guesses"]) == ("G3DFC", True, 2)
+    assert (local["formulation"], local["solution"], local["guesses"]) == ("3DFC", False, 0)
+
+
+def test_info_shows_what_is_known_of_a_matrix(tmp_path: Path) -> None:
+    path, problem = tmp_path / "known.hdf5", planted_local(1).problem
+    fclib.write(path, problem)
+    assert "matrix_info" not in run("info", path).stdout
+    known = fclib.MatrixInfo(comment="of [full] rank", conditioning=np.inf, rank=18)
+    fclib.write(path, problem.replace(matrix_info={"W": known}))
+    (record,) = records(run("info", "--json", path))
+    assert record["matrix_info"] == {
+        "W": {"comment": "of [full] rank", "conditioning": None, "determinant": 0, "rank": 18}
+    }
+    assert "W: comment of [full] rank, conditioning inf, rank 18" in run("info", path).stdout
+
+
+def test_solve_and_check_take_the_problem_that_a_solution_belongs_to(both: Path) -> None:
+    (record,) = records(run("check", "--json", both))
+    assert (record["formulation"], record["status"]) == ("G3DFC", "ok")
+    (record,) = records(run("solve", "--json", "--write", both))
+    assert (record["formulation"], record["status"]) == ("G3DFC", "converged")
+    assert run("check", both).returncode == 0
+    assert fclib.contents(both) == ["global", "local", "solution", "guesses"]
 
 
 def test_info_of_a_problem_without_contacts_is_json(tmp_path: Path) -> None:

@@ -310,6 +310,72 @@ def test_forms_keep_the_solution(tmp_path: Path, form: str) -> None:
     assert fclib.merit(problem, solution).error < 1e-12
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_forms_keep_the_guesses(tmp_path: Path, form: str) -> None:
+    case = planted_global(3, p=2)
+    guess = case.solution.replace(r=2 * case.solution.r)
+    source, target = tmp_path / "in.hdf5", tmp_path / "out.hdf5"
+    fclib.write(source, case.problem, guesses=[case.solution, guess])
+    record = converted(source, target, *(["--form", form] if form else []))
+    assert (record["solution"], record["guesses"]) == (None, "kept")
+    problem, guesses = fclib.read(target), fclib.read_guesses(target)
+    assert len(guesses) == 2
+    assert fclib.merit(problem, guesses[0]).error < 1e-12
+    np.testing.assert_array_equal(guesses[1].r, guess.r)
+    assert guesses[1].u is not None
+
+
+def test_what_is_known_of_a_matrix_is_kept_where_it_stays(tmp_path: Path) -> None:
+    known = {"M": fclib.MatrixInfo(comment="mass", rank=37), "G": fclib.MatrixInfo(rank=2)}
+    source = tmp_path / "in.hdf5"
+    fclib.write(source, planted_global(3, p=2).problem.replace(matrix_info=known))
+    for arguments, result in (
+        ([], "kept"),
+        (["--storage", "triplet"], "kept"),
+        (["--form", "local"], "dropped"),
+        (["--form", "plain"], "dropped"),
+    ):
+        target = tmp_path / "out.hdf5"
+        assert converted("--force", *arguments, source, target)["matrix_info"] == result
+        assert fclib.read(target).matrix_info == (known if result == "kept" else {})
+    local = {"W": fclib.MatrixInfo(conditioning=10)}
+    fclib.write(source, planted_local(3).problem.replace(matrix_info=local))
+    for arguments in (["--storage", "dense"], ["--form", "plain"]):
+        assert converted("--force", *arguments, source, target)["matrix_info"] == "kept"
+        assert fclib.read(target).matrix_info == local
+    assert converted(source, tmp_path / "out.dat")["matrix_info"] == "dropped"
+
+
+def test_only_the_problem_that_they_belong_to_takes_them_along(tmp_path: Path) -> None:
+    source, target = tmp_path / "in.hdf5", tmp_path / "out.hdf5"
+    local, whole = planted_local(1), planted_global(1)
+    fclib.write(source, local.problem)
+    fclib.write(source, whole.problem, whole.solution, [whole.solution], mode="add")
+    record = converted("--kind", "local", source, target)
+    assert (record["solution"], record["guesses"]) == (None, None)
+    assert fclib.contents(target) == ["local"]
+    record = converted("--force", "--kind", "global", source, target)
+    assert (record["solution"], record["guesses"]) == ("kept", "kept")
+    assert fclib.contents(target) == ["global", "solution", "guesses"]
+
+
+def test_the_loss_of_all_that_a_text_cannot_hold_is_said(tmp_path: Path) -> None:
+    case = planted_local(1)
+    source, target = tmp_path / "in.hdf5", tmp_path / "out.dat"
+    known = {"W": fclib.MatrixInfo(rank=18)}
+    fclib.write(source, case.problem.replace(matrix_info=known), case.solution, [case.solution])
+    result = run(source, target)
+    assert result.returncode == 0
+    note = (
+        f"fclib: {source}: the solution, the guesses and what is known of the matrices are left "
+        "out, Siconos' text has no place for them"
+    )
+    assert result.stderr.splitlines() == [note]
+    fclib.write(source, case.problem, guesses=[case.solution])
+    note = f"fclib: {source}: the guesses are left out, Siconos' text has no place for them"
+    assert run("--force", source, target).stderr.splitlines() == [note]
+
+
 def test_the_loss_of_a_solution_is_said(tmp_path: Path) -> None:
     case = planted_local(1)
     source = tmp_path / "in.hdf5"

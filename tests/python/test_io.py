@@ -5,9 +5,9 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import h5py
 import numpy as np
@@ -17,7 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fclib
-from helpers import STORAGES, Array, dense, planted_global, planted_local, stored
+from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, stored
 
 Draw: TypeAlias = Callable[[st.SearchStrategy[Any]], Any]
 Layout: TypeAlias = dict[str, tuple[str, tuple[int, ...]]]
@@ -50,6 +50,20 @@ def infos(draw: st.DrawFn) -> fclib.ProblemInfo:
 
 
 @st.composite
+def matrix_infos(draw: st.DrawFn, names: Sequence[str]) -> dict[str, fclib.MatrixInfo]:
+    known = draw(st.lists(st.sampled_from(names), unique=True)) if names else []
+    return {
+        name: fclib.MatrixInfo(
+            comment=draw(TEXT),
+            conditioning=draw(st.floats(allow_nan=False)),
+            determinant=draw(FINITE),
+            rank=draw(st.integers(0, 2**31 - 1)),
+        )
+        for name in known
+    }
+
+
+@st.composite
 def local_problems(draw: st.DrawFn) -> fclib.LocalProblem:
     d, nc, p = draw(st.sampled_from([2, 3])), draw(st.integers(0, 4)), draw(st.integers(0, 3))
     m = d * nc
@@ -64,6 +78,8 @@ def local_problems(draw: st.DrawFn) -> fclib.LocalProblem:
         q=draw_vector(draw, m),
         mu=draw_vector(draw, nc, NONNEGATIVE),
         info=draw(infos()),
+        # without contacts there is no W
+        matrix_info=draw(matrix_infos(["W"] * (m > 0) + ["V", "R"] * (p > 0))),
         **(mixed if p else {}),
     )
 
@@ -81,6 +97,7 @@ def global_problems(draw: st.DrawFn) -> fclib.GlobalProblem:
         w=draw_vector(draw, d * nc),
         mu=draw_vector(draw, nc, NONNEGATIVE),
         info=draw(infos()),
+        matrix_info=draw(matrix_infos(["M", "H", *(["G"] if p else [])])),
         **(mixed if p else {}),
     )
 
@@ -115,8 +132,8 @@ def assert_same(a: fclib.Problem, b: fclib.Problem) -> None:
     assert type(a) is type(b)
     assert a.spacedim == b.spacedim
     assert a.formulation == b.formulation
-    for name in ("title", "description", "math_info"):
-        assert getattr(a.info, name) == getattr(b.info, name)
+    assert a.info == b.info
+    assert a.matrix_info == b.matrix_info
     if isinstance(a, fclib.LocalProblem):
         assert_same_vectors(a, b, LOCAL_VECTORS)
         for name in LOCAL_MATRICES:
@@ -195,6 +212,7 @@ def test_velocities_that_a_solution_lacks_are_completed(scratch: Path, mixed: in
 @given(problem=st.one_of(local_problems(), global_problems()))
 def test_problems_and_solutions_can_be_pickled(problem: fclib.Problem) -> None:
     copy = pickle.loads(pickle.dumps(problem))
+    assert (copy.info, copy.matrix_info) == (problem.info, problem.matrix_info)
     if isinstance(problem, fclib.LocalProblem):
         assert_same(problem, copy)
     else:
@@ -399,17 +417,209 @@ def test_what_else_a_file_holds_does_not_disturb(tmp_path: Path) -> None:
     with h5py.File(path, "a") as file:
         file["guesses/number_of_guesses"] = np.array([0], "<i4")
         file["fclib_local/info/more"] = 3.0
+    assert_same(planted_local(1).problem, fclib.read(path))
+    assert fclib.contents(path) == ["local"]
+    assert fclib.read_guesses(path) == []
+    fclib.write_guesses(path, [planted_local(1).solution], mode="add")
+    assert len(fclib.read_guesses(path)) == 1
+
+
+def test_what_is_known_of_a_matrix_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "known.hdf5"
+    planted = planted_local(1, p=2)
+    fclib.write(path, planted.problem)
+    with h5py.File(path, "a") as file:
         file["fclib_local/W/comment"] = np.array(b"of full rank", dtype="S13")
         file["fclib_local/W/conditioning"] = np.array([12.5])
         file["fclib_local/W/determinant"] = np.array([2.0])
         file["fclib_local/W/rank"] = np.array([18], "<i4")
-    assert_same(planted_local(1).problem, fclib.read(path))
-    # what is known of a matrix survives, though Python does not show it
-    fclib.write(path, fclib.read(path))
+        file["fclib_local/V/determinant"] = np.array([3.0])
+    known = {
+        "W": fclib.MatrixInfo(comment="of full rank", conditioning=12.5, determinant=2.0, rank=18),
+        "V": fclib.MatrixInfo(determinant=3.0),
+    }
+    problem = fclib.read(path)
+    assert problem.matrix_info == known
+    assert_same(planted.problem.replace(matrix_info=known), problem)
+    fclib.write(path, problem)
     with h5py.File(path) as file:
         assert file["fclib_local/W/comment"][()] == b"of full rank"
         assert file["fclib_local/W/rank"][0] == 18
         assert file["fclib_local/W/conditioning"][0] == 12.5
+        assert file["fclib_local/W/determinant"][0] == 2
+        # a reader of libfclib 3.1 wants all or nothing
+        assert {"comment", "conditioning", "determinant", "rank"} <= set(file["fclib_local/V"])
+        assert "rank" not in file["fclib_local/R"]
+
+
+def test_what_is_known_of_a_matrix_goes_with_it() -> None:
+    known = {name: fclib.MatrixInfo(comment=name) for name in "MHG"}
+    problem = planted_global(1, p=2).problem.replace(matrix_info=known)
+    assert problem.matrix_info == known
+    assert problem.with_storage("dense").matrix_info == known
+    assert isinstance(problem, fclib.GlobalProblem)
+    assert problem.condense().matrix_info == {}
+    assert set(problem.replace(M=2 * problem.M).matrix_info) == {"H", "G"}
+    assert problem.replace(mu=2 * problem.mu).matrix_info == known
+    assert problem.replace(matrix_info={}).matrix_info == {}
+    with pytest.raises(TypeError):
+        problem.matrix_info["M"] = fclib.MatrixInfo()  # type: ignore[index]
+    with pytest.raises(fclib.ProblemError, match=r"matrix_info\['W'\]: .* no such matrix"):
+        problem.replace(matrix_info={"W": fclib.MatrixInfo()})
+    plain = planted_global(1).problem
+    with pytest.raises(fclib.ProblemError, match=r"matrix_info\['G'\]"):
+        plain.replace(matrix_info={"G": fclib.MatrixInfo()})
+
+
+# ---- guesses, and several things in one file
+
+
+def assert_same_guesses(path: Path, expected: Sequence[fclib.Solution]) -> None:
+    found = fclib.read_guesses(path)
+    assert len(found) == len(expected)
+    for guess, other in zip(found, expected, strict=True):
+        assert_same_vectors(guess, other, ("v", "u", "r", "l"))
+
+
+def guesses_of(planted: Planted, count: int) -> list[fclib.Solution]:
+    """Guesses, whole ones."""
+    s = planted.solution
+    return [s.replace(r=k * s.r, u=np.full(s.r.size, k)) for k in range(count)]
+
+
+@pytest.mark.parametrize("p", [0, 2])
+def test_guesses_come_back(tmp_path: Path, p: int) -> None:
+    for k, planted in enumerate([planted_local(1, p=p), planted_global(1, p=p)]):
+        path, guesses = tmp_path / f"{k}.hdf5", guesses_of(planted, 11)
+        fclib.write(path, planted.problem, guesses=guesses[:9])
+        assert fclib.contents(path) == [planted.problem.kind, "guesses"]
+        assert_same_guesses(path, guesses[:9])
+        fclib.write_guesses(path, guesses[9:], mode="add")
+        assert_same_guesses(path, guesses)
+        fclib.write_solution(path, planted.solution)
+        assert_same_guesses(path, guesses)
+        assert_same(planted.problem, fclib.read(path))
+        fclib.write_guesses(path, guesses[2:4])
+        assert_same_guesses(path, guesses[2:4])
+        fclib.write_guesses(path, [])
+        assert fclib.read_guesses(path) == []
+        assert fclib.contents(path) == [planted.problem.kind, "solution"]
+
+
+def test_velocities_that_a_guess_lacks_are_completed(tmp_path: Path) -> None:
+    path = tmp_path / "completed.hdf5"
+    for planted in (planted_local(1, p=2), planted_global(1, p=2)):
+        u = planted.solution.u
+        assert u is not None
+        guess = planted.solution.replace(u=None, v=None)
+        fclib.write(path, planted.problem, None, [guess])
+        fclib.write_guesses(path, [guess], mode="add")
+        for found in fclib.read_guesses(path):
+            assert found.u is not None
+            np.testing.assert_allclose(found.u, u, atol=1e-13)
+
+
+def test_a_guess_that_does_not_fit_is_named(written: Path) -> None:
+    path = written / "p.hdf5"
+    before = path.read_bytes()
+    planted = planted_local(1)
+    wrong = [planted.solution, fclib.Solution(r=np.zeros(5))]
+    actions: list[Callable[[], None]] = [
+        lambda: fclib.write(path, planted.problem, guesses=wrong),
+        lambda: fclib.write_guesses(path, wrong),
+        lambda: fclib.write_guesses(path, wrong, mode="add"),
+    ]
+    for action in actions:
+        with pytest.raises(fclib.ProblemError, match="/guesses/2/r: has 5 entries, expected m"):
+            action()
+    assert path.read_bytes() == before
+    with pytest.raises(fclib.FileError, match="no problem"):
+        fclib.write_guesses(empty_file(written), [])
+
+
+def empty_file(folder: Path) -> Path:
+    with h5py.File(folder / "empty.hdf5", "w"):
+        pass
+    return folder / "empty.hdf5"
+
+
+def test_a_problem_is_added_to_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "both.hdf5"
+    local, whole = planted_local(1), planted_global(2)
+    fclib.write(path, local.problem, mode="add")
+    fclib.write(path, whole.problem, whole.solution, guesses_of(whole, 2), mode="add")
+    assert fclib.contents(path) == ["global", "local", "solution", "guesses"]
+    assert_same(local.problem, fclib.read(path, "local"))
+    assert_same(whole.problem, fclib.read(path, "global"))
+    # they are those of the global problem
+    fclib.write_solution(path, whole.solution.replace(u=None, v=None))
+    fclib.write_guesses(path, guesses_of(whole, 1), mode="add")
+    assert len(fclib.read_guesses(path)) == 3
+    before = path.read_bytes()
+    with pytest.raises(fclib.FileError, match="belongs to its global problem, not to the local"):
+        fclib.write(path, local.problem, local.solution, mode="replace")
+    with pytest.raises(fclib.FileError, match="/fclib_local: is in the file already"):
+        fclib.write(path, local.problem, mode="add")
+    assert path.read_bytes() == before
+
+    # another local problem leaves what is the global one's, another global one does not
+    fclib.write(path, planted_local(3).problem, mode="replace")
+    assert_same(planted_local(3).problem, fclib.read(path, "local"))
+    assert fclib.contents(path) == ["global", "local", "solution", "guesses"]
+    fclib.write(path, planted_global(3).problem, mode="replace")
+    assert fclib.contents(path) == ["global", "local"]
+    fclib.write(path, whole.problem)
+    assert fclib.contents(path) == ["global"]
+
+
+def test_a_solution_never_comes_to_belong_to_another_problem(tmp_path: Path) -> None:
+    path = tmp_path / "local.hdf5"
+    local, whole = planted_local(1), planted_global(1)
+    for stored_with in ({"solution": local.solution}, {"guesses": [local.solution]}):
+        fclib.write(path, local.problem, **stored_with)
+        before = path.read_bytes()
+        for mode in MODES:
+            with pytest.raises(fclib.FileError, match="would become those of the global problem"):
+                fclib.write(path, whole.problem, mode=mode)
+        assert path.read_bytes() == before
+
+
+MODES: list[Literal["add", "replace"]] = ["add", "replace"]
+
+
+def test_modes_and_levels_that_are_none(written: Path) -> None:
+    path, planted = written / "p.hdf5", planted_local(1)
+    before = path.read_bytes()
+    with pytest.raises(fclib.OptionError, match="no mode 'append'; there are: overwrite, add, rep"):
+        fclib.write(path, planted.problem, mode="append")  # type: ignore[call-overload]
+    with pytest.raises(fclib.OptionError, match="no mode 'overwrite'; there are: replace, add"):
+        fclib.write_guesses(path, [], mode="overwrite")  # type: ignore[arg-type]
+    for level in (-1, 10):
+        said = f"level: is {level}, but must be 0 to 9"
+        with pytest.raises(fclib.OptionError, match=said):
+            fclib.write(path, planted.problem, compression=level)
+        with pytest.raises(fclib.OptionError, match=said):
+            fclib.write_solution(path, planted.solution, compression=level)
+        with pytest.raises(fclib.OptionError, match=said):
+            fclib.write_guesses(path, [], compression=level)
+    assert path.read_bytes() == before
+
+
+def test_the_level_of_compression_is_that_asked_for(tmp_path: Path) -> None:
+    planted = planted_local(1, nc=60)
+    r = np.arange(planted.problem.m, dtype=float)
+    sizes = {}
+    for level in (0, 1, 9):
+        path = tmp_path / f"{level}.hdf5"
+        fclib.write(path, planted.problem, compression=level)
+        fclib.write_solution(path, fclib.Solution(r=r), compression=level)
+        fclib.write_guesses(path, [fclib.Solution(r=r)], compression=level)
+        with h5py.File(path) as file:
+            for name in ("fclib_local/W/x", "solution/r", "guesses/1/r"):
+                assert file[name].compression_opts == (level or None), name
+        assert_same(planted.problem, fclib.read(path))
+        sizes[level] = path.stat().st_size
+    assert sizes[9] <= sizes[1] < sizes[0]
 
 
 def test_kind_chooses_where_a_file_holds_both(tmp_path: Path) -> None:
@@ -477,6 +687,9 @@ def test_a_place_that_cannot_be_written_is_a_file_error(written: Path, kind: str
     for action in (
         lambda: fclib.write(path, planted_local(1).problem),
         lambda: fclib.write_solution(path, planted_local(1).solution),
+        lambda: fclib.write_guesses(path, [planted_local(1).solution]),
+        lambda: fclib.write(path, planted_local(1).problem, mode="add"),
+        lambda: fclib.read_guesses(path),
         lambda: fclib.read(path),
         lambda: fclib.contents(path),
         lambda: fclib.read_solution(path),
@@ -575,7 +788,9 @@ def fifo(tmp_path: Path) -> Iterator[Path]:
     [
         "write(sys.argv[1], fclib.LocalProblem(W=np.eye(3), q=np.zeros(3), mu=[1.0]))",
         "write_solution(sys.argv[1], fclib.Solution(r=np.zeros(3)))",
+        "write_guesses(sys.argv[1], [fclib.Solution(r=np.zeros(3))])",
         "read(sys.argv[1])",
+        "read_guesses(sys.argv[1])",
         "contents(sys.argv[1])",
     ],
 )

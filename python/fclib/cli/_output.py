@@ -31,7 +31,12 @@ if not out.is_terminal:
     out = Console(width=240)  # nothing is folded on its way into a file or a pipe
 err = Console(stderr=True, soft_wrap=True)
 
-WRAPPED = ("problem", "title", "meaning")  # columns that may be folded to fit the terminal
+WRAPPED = (
+    "problem",
+    "title",
+    "meaning",
+    "matrix_info",
+)  # columns that may be folded to fit the terminal
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
@@ -106,9 +111,17 @@ def format_value(value: object) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if isinstance(value, dict):
+        parts = (f"{key}: {format_known(known)}" for key, known in value.items())
+        return "; ".join(parts) or "-"
     if isinstance(value, float):
         return f"{value:.1e}" if value and not 1e-2 <= abs(value) < 1e4 else f"{value:.4g}"
     return str(value)
+
+
+def format_known(values: dict[str, object]) -> str:
+    """What is known of one thing in a cell: what is not there is left out."""
+    return ", ".join(f"{key} {format_value(value)}" for key, value in values.items() if value)
 
 
 def make_table(records: Sequence[dict[str, Any]], title: str | None = None) -> Table:
@@ -131,6 +144,13 @@ def make_table(records: Sequence[dict[str, Any]], title: str | None = None) -> T
     return table
 
 
+def finite(value: Any) -> Any:
+    """The value with None for each number that is not finite, which is no JSON."""
+    if isinstance(value, dict):
+        return {key: finite(inner) for key, inner in value.items()}
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 @dataclass
 class Report:
     """Gathers the records of a command, prints them, and knows the exit status."""
@@ -145,12 +165,7 @@ class Report:
         self.failed = self.failed or not good
         self.records.append(record)
         if self.as_json:
-            # a number that is not finite is no JSON
-            safe = {
-                key: None if isinstance(value, float) and not math.isfinite(value) else value
-                for key, value in record.items()
-            }
-            typer.echo(json.dumps(safe))
+            typer.echo(json.dumps(finite(record)))
 
     def error(self, path: Path, error: Exception) -> None:
         """Report a file that could not be dealt with; the others go on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import fclib
+from fclib.cli._files import read_owner
 from fclib.cli._output import Files, Json, Report, Tolerance, each_file
 
 PARTS = (
@@ -23,11 +24,11 @@ PARTS = (
 
 
 def command(files: Files, tol: Tolerance = 1e-8, as_json: Json = False) -> None:
-    """Judge the stored solutions from the data alone."""
+    """Judge the stored solutions from the data alone, of several in a file the global one's."""
     report = Report(as_json, hidden=("n", "formulation", "scaled_natural"))
     for path in each_file(files, "checking"):
         try:
-            problem = fclib.read(path)
+            problem = read_owner(path)
             solution = fclib.read_solution(path)
             if solution is None:
                 raise fclib.FileError(f"{path}: /solution: there is no solution to check")

@@ -12,6 +12,7 @@ import numpy as np
 import typer
 
 import fclib
+from fclib.cli._files import contents_of
 from fclib.cli._output import Json, Report, each_file, err, usage_error
 
 
@@ -64,20 +65,36 @@ def format_of(path: Path) -> Format:
     return EXTENSIONS.get(path.suffix.lower(), Format.siconos)
 
 
-def read(path: Path, kind: str | None) -> tuple[fclib.Problem, fclib.Solution | None]:
-    """The problem of a file in any format, and the solution that is stored with it.
+@dataclass(frozen=True)
+class Stored:
+    """A problem, and what is stored with it."""
+
+    problem: fclib.Problem
+    solution: fclib.Solution | None = None
+    guesses: tuple[fclib.Solution, ...] = ()
+
+    @property
+    def extras(self) -> dict[str, tuple[bool, str]]:
+        """Whether there is what a format may have no place for, and how it is called."""
+        return {
+            "solution": (self.solution is not None, "the solution"),
+            "guesses": (bool(self.guesses), "the guesses"),
+            "matrix_info": (bool(self.problem.matrix_info), "what is known of the matrices"),
+        }
+
+
+def read(path: Path, kind: str | None) -> Stored:
+    """The problem of a file in any format, and what is stored with it.
 
     Raises:
         fclib.Error: the file cannot be read, or the problem is not valid.
     """
     if format_of(path) is Format.siconos:
-        return fclib.read_siconos(path, kind), None
+        return Stored(fclib.read_siconos(path, kind))
     problem = fclib.read(path, kind)
-    solution = fclib.read_solution(path)
-    kinds = [name for name in fclib.contents(path) if name.startswith(("local", "global"))]
-    # beside other problems, a solution is that of the global one
-    owned = len(kinds) < 2 or is_global(problem)
-    return problem, solution if owned else None
+    if problem.kind != contents_of(path).owner:
+        return Stored(problem)
+    return Stored(problem, fclib.read_solution(path), tuple(fclib.read_guesses(path)))
 
 
 def is_global(problem: fclib.Problem) -> bool:
@@ -85,15 +102,13 @@ def is_global(problem: fclib.Problem) -> bool:
     return isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
 
 
-def in_form(
-    problem: fclib.Problem, solution: fclib.Solution | None, form: Form | None
-) -> tuple[fclib.Problem, fclib.Solution | None]:
-    """The problem in another form, with what its solution still means there.
+def in_form(stored: Stored, form: Form | None) -> Stored:
+    """The problem in another form, with what its solution and its guesses still mean there.
 
     Raises:
         fclib.UnsuitableError: M or R is singular.
     """
-    before = problem
+    problem = stored.problem
     if form is not None and isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
         problem = problem.condense()
     if (
@@ -102,10 +117,17 @@ def in_form(
         and isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem))
     ):
         problem = problem.eliminate()
-    if solution is not None and problem is not before:
+    if problem is stored.problem:
+        return stored
+
+    def taken(solution: fclib.Solution) -> fclib.Solution:
         # r, and lambda where it is left, are the same; what follows from them is computed again
-        solution = fclib.Solution(r=solution.r, l=solution.l if problem.p else None)
-    return problem, solution
+        return fclib.Solution(r=solution.r, l=solution.l if problem.p else None)
+
+    solution = stored.solution
+    return Stored(
+        problem, solution and taken(solution), tuple(taken(guess) for guess in stored.guesses)
+    )
 
 
 def stored_as(problem: fclib.Problem, output: Format) -> str:
@@ -132,8 +154,9 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
     """
     if target.exists() and not request.force:
         raise fclib.FileError(f"{target}: is there already; --force replaces it")
-    given, solution = read(source, request.kind)
-    problem, solution = in_form(given, solution, request.form)
+    given = read(source, request.kind)
+    result = in_form(given, request.form)
+    problem = result.problem
     if request.storage is not None:
         problem = problem.with_storage(request.storage.value)
         stored = stored_as(problem, output).replace("blocks", Storage.csr.value)
@@ -143,22 +166,37 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
                 f"{source}: the matrices of a {problem.kind} problem are {stored} in {file}, "
                 f"not {request.storage.value}"
             )
-    kept = None if solution is None else output is Format.hdf5
     if output is Format.hdf5:
-        fclib.write(target, problem, solution)
+        fclib.write(target, problem, result.solution, result.guesses)
+        kept = {name for name, (there, _) in result.extras.items() if there}
     else:
         fclib.write_siconos(target, problem)
+        kept = set()
+        lost = [what for there, what in result.extras.values() if there]
+        if lost:
+            say_lost(source, lost)
     return {
         "problem": str(source),
-        "formulation": given.formulation,
-        "n": given.n,
-        "nc": given.nc,
+        "formulation": given.problem.formulation,
+        "n": given.problem.n,
+        "nc": given.problem.nc,
         "output": str(target),
         "format": output.value,
         "becomes": problem.formulation,
         "storage": stored_as(problem, output),
-        "solution": None if kept is None else "kept" if kept else "dropped",
+        **{
+            name: ("kept" if name in kept else "dropped") if there else None
+            for name, (there, _) in given.extras.items()
+        },
     }
+
+
+def say_lost(source: Path, lost: Sequence[str]) -> None:
+    """Tell of what a text of Siconos cannot hold."""
+    what = " and ".join(filter(None, [", ".join(lost[:-1]), lost[-1]]))
+    verb, rest = ("is", "it") if lost == ["the solution"] else ("are", "them")
+    note = f"fclib: {source}: {what} {verb} left out, Siconos' text has no place for {rest}"
+    err.print(note, markup=False, highlight=False)
 
 
 def targets_of(
@@ -228,15 +266,16 @@ def command(
 ) -> None:
     """Convert between FCLIB files and Siconos' texts (.dat), formulations and storages.
 
-    What an input is in, its content says. Siconos' texts have no place for bilateral constraints,
-    solutions and titles.
+    What an input is in, its content says. Solutions, guesses and what is known of the matrices go
+    with the problem as far as they hold for what it becomes. Siconos' texts have no place for
+    them, nor for bilateral constraints and titles.
     """
     try:
         sources, targets, chosen = targets_of(files, out_dir, output)
     except ValueError as error:
         usage_error(error)
     request = Request(form, storage, kind, force)
-    report = Report(as_json, hidden=("n", "format"))
+    report = Report(as_json, hidden=("n", "format", "matrix_info"))
     target_of = dict(zip(sources, targets, strict=True))
     for source in each_file(sources, "converting"):
         target = target_of[source]
@@ -253,9 +292,4 @@ def command(
             report.error(source, fclib.Error(f"{source}: there is not enough memory"))
         else:
             report.add(record)
-            if record["solution"] == "dropped":
-                note = (
-                    f"fclib: {source}: the solution is left out, Siconos' text has no place for it"
-                )
-                err.print(note, markup=False, highlight=False)
     report.finish()

@@ -6,18 +6,21 @@ from pathlib import Path
 from typing import Any
 
 import fclib
+from fclib.cli._files import Contents, contents_of
 from fclib.cli._output import Files, Json, Report, each_file
 
 MATRICES = ("M", "H", "G", "W", "V", "R")
+MATRIX_INFO = ("comment", "conditioning", "determinant", "rank")
 
 
-def describe(path: Path, kind: str | None) -> dict[str, Any]:
+def describe(path: Path, kind: str | None, contents: Contents) -> dict[str, Any]:
     """The record of one problem of a file.
 
     Raises:
         fclib.Error: the file cannot be read, or the problem is not valid.
     """
     problem = fclib.read(path, kind)
+    own = kind == contents.owner
     stored = {name: getattr(problem, name, None) for name in MATRICES}
     nnz = {name: int(getattr(a, "nnz", a.size)) for name, a in stored.items() if a is not None}
     return {
@@ -32,7 +35,12 @@ def describe(path: Path, kind: str | None) -> dict[str, Any]:
         "nnz_of": nnz,
         "mu_min": float(problem.mu.min()) if problem.nc else None,
         "mu_max": float(problem.mu.max()) if problem.nc else None,
-        "solution": "solution" in fclib.contents(path),
+        "solution": own and contents.solution,
+        "guesses": len(fclib.read_guesses(path)) if own and contents.guesses else 0,
+        "matrix_info": {
+            name: {key: getattr(info, key) for key in MATRIX_INFO}
+            for name, info in problem.matrix_info.items()
+        },
         "title": problem.info.title,
         "description": problem.info.description,
         "math_info": problem.info.math_info,
@@ -40,13 +48,15 @@ def describe(path: Path, kind: str | None) -> dict[str, Any]:
 
 
 def command(files: Files, as_json: Json = False) -> None:
-    """Print formulation, sizes and friction of FCLIB files."""
+    """Print formulation, sizes and friction of FCLIB files, and what else they hold."""
     report = Report(as_json, hidden=("nnz_of", "description", "math_info", "spacedim", "m"))
     for path in each_file(files, "reading"):
         try:
-            kinds = [kind for kind in fclib.contents(path) if kind != "solution"]
-            for kind in kinds or (None,):  # None: reading says what is wrong
-                report.add(describe(path, kind))
+            contents = contents_of(path)
+            for kind in contents.kinds or (None,):  # None: reading says what is wrong
+                report.add(describe(path, kind, contents))
         except fclib.Error as error:
             report.error(path, error)
+    if not any(record["matrix_info"] for record in report.records):
+        report.hidden += ("matrix_info",)
     report.finish()

@@ -8,6 +8,7 @@ import typer
 
 import fclib
 from fclib import bench
+from fclib.cli._files import read_owner
 from fclib.cli._output import (
     Files,
     Json,
@@ -34,7 +35,7 @@ def command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Solve problems, and judge the solutions."""
+    """Solve problems, and judge the solutions; of several in a file the global one."""
     options = parse_options(option or [])
     try:
         fclib.find_solver(solver).check_options(options)
@@ -43,7 +44,7 @@ def command(
     report = Report(as_json)
     for path in each_file(files, "solving"):
         try:
-            run = bench.run(str(path), fclib.read(path), solver, tol, time_limit, options)
+            run = bench.run(str(path), read_owner(path), solver, tol, time_limit, options)
             if write and run.status == "converged":
                 fclib.write_solution(path, run.result.solution)
         except fclib.Error as error:

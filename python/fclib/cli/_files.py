@@ -1,0 +1,39 @@
+"""What the commands share about files that hold several things."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import fclib
+
+
+@dataclass(frozen=True)
+class Contents:
+    """The problems of a file, by their kinds, and which of them its solution and guesses are of."""
+
+    kinds: tuple[str, ...]
+    owner: str | None
+    solution: bool
+    guesses: bool
+
+
+def contents_of(path: Path) -> Contents:
+    """What a file holds.
+
+    Raises:
+        fclib.FileError: the file cannot be read.
+    """
+    names = fclib.contents(path)
+    kinds = tuple(name for name in names if name not in ("solution", "guesses"))
+    owner = "global" if "global" in kinds else kinds[0] if kinds else None
+    return Contents(kinds, owner, "solution" in names, "guesses" in names)
+
+
+def read_owner(path: Path) -> fclib.Problem:
+    """The problem that a solution in the file belongs to: the global one where there are several.
+
+    Raises:
+        fclib.Error: the file cannot be read, or the problem is not valid.
+    """
+    return fclib.read(path, contents_of(path).owner)

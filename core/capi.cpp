@@ -249,21 +249,21 @@ auto problem_as_given(const C& c) {
   const std::string group = "/" + group_name<P>() + "/";
   P problem;
   // the matrices say how long the vectors are
-  bool mixed = false;
-  bool incomplete = false;
+  std::string there;
+  std::string missing;
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
     if constexpr (std::is_same_v<Type, Index>) {
       problem.*field.member = c.*member;
     } else if constexpr (std::is_same_v<Type, Matrix>) {
       const std::string where = group + field_path(field);
       if (field.presence == Presence::mixed) {
-        (c.*member != nullptr ? mixed : incomplete) = true;
+        (c.*member != nullptr ? there : missing) = where;
         if (c.*member == nullptr) return;
       }
       problem.*field.member = matrix(given(c.*member, where.c_str()), where);
     }
   });
-  if (mixed && incomplete) fail(group, "has one of its bilateral matrices, but not the other");
+  if (!there.empty() && !missing.empty()) fail(missing, "is NULL, but " + there + " is not");
   const auto [planar, spatial] = P::dimensions;
   if (c.spacedim != planar && c.spacedim != spatial) {
     fail(group + "spacedim", "is " + std::to_string(c.spacedim) + ", but must be " +
@@ -427,7 +427,8 @@ C* to_c(P& problem) {
     if constexpr (std::is_same_v<Type, Index>) {
       (*c).*member = value;
     } else if constexpr (std::is_same_v<Type, Matrix>) {
-      if (!absent || !value.empty()) (*c).*member = to_c(value);
+      // what a file does not have has not even the pointers of an empty matrix
+      if (field.presence == Presence::required || !value.empty()) (*c).*member = to_c(value);
     } else {
       if (!absent) (*c).*member = moved(value);
     }
@@ -747,9 +748,9 @@ const char* fclib_solver_name(int k) {
 }
 
 const char* fclib_status_name(fclib_status status) {
-  for (const Status candidate : {Status::converged, Status::iteration_limit, Status::time_limit,
-                                 Status::diverged, Status::inaccurate, Status::interrupted,
-                                 Status::stalled}) {
+  for (const Status candidate :
+       {Status::converged, Status::iteration_limit, Status::time_limit, Status::diverged,
+        Status::inaccurate, Status::interrupted, Status::stalled}) {
     if (status_in_c(candidate) == status) return name_of(candidate).data();  // a literal
   }
   return "unknown";

@@ -4,6 +4,7 @@ Each case takes a good mixed local file, or a global one, and spoils one thing.
 """
 
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 import fclib
+from capi_library import CAPI, compile_program
 from helpers import planted_global, planted_local
 
 ROOT = "fclib_local"
@@ -366,6 +368,98 @@ def test_the_commands_say_one_line_for_each_spoilt_file(corpus: Path, command: l
     assert {path: Path(path).read_bytes() for path in paths} == before
 
 
+# ---- the same through the C library
+
+
+@pytest.fixture(scope="module")
+def refuse(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The program that says how the C library refuses files."""
+    folder = tmp_path_factory.mktemp("programs")
+    return compile_program(CAPI / "refuse.c", folder / "refuse")
+
+
+@pytest.fixture
+def copied(corpus: Path, tmp_path: Path) -> Path:
+    """The corpus again, for those who write into it."""
+    return Path(shutil.copytree(corpus, tmp_path / "malformed"))
+
+
+def refusals(program: Path, files: dict[Path, str], *tool: str) -> list[tuple[str, str]]:
+    """For each file, in which of the kinds it is read, the step that refuses it and the message."""
+    asked = "".join(f"{kind} {path}\n" for path, kind in files.items())
+    run = subprocess.run([*tool, program], input=asked, capture_output=True, text=True, timeout=300)
+    assert (run.returncode, run.stderr) == (0, ""), "it ended, or printed"
+    found = [line.partition("\t") for line in run.stdout.splitlines()]
+    assert len(found) == len(files)
+    return [(step, message) for step, _, message in found]
+
+
+def kinds_of_cases(folder: Path) -> dict[Path, str]:
+    return {path_of(folder, case): "local" if case in LOCAL else "global" for case in CASES}
+
+
+# where reading without validation meets another contradiction first
+NAMED_IN_C = {
+    "no R": f"{ROOT}/vectors/s",
+    "vectors/mu short": f"{ROOT}/vectors/mu",
+    "vectors/mu long": f"{ROOT}/vectors/mu",
+    "more columns than contacts": f"{ROOT}/vectors/mu",
+    "another spacedim": f"{ROOT}/vectors/mu",
+    "spacedim 1": f"{ROOT}/vectors/mu",
+    "spacedim 4": f"{ROOT}/W: has 18 columns, which is no multiple of spacedim",
+    "spacedim 5": f"{ROOT}/W: has 18 columns, which is no multiple of spacedim",
+    f"spacedim {2**31 - 1}": f"{ROOT}/W: has 18 columns, which is no multiple of spacedim",
+}
+# what is beyond the sizes of a matrix is room to it
+ACCEPTED_IN_C = {"W/p long"}
+
+
+def test_the_c_library_refuses_the_same_files(refuse: Path, copied: Path) -> None:
+    files = kinds_of_cases(copied)
+    for case, path, (step, message) in zip(CASES, files, refusals(refuse, files), strict=True):
+        if case in ACCEPTED_IN_C:
+            assert step == "accepted", f"{case}: {message}"
+            continue
+        assert step in ("read", "validate"), f"{case}: {step}"
+        assert message.startswith(f"{path}: " if step == "read" else "/fclib_"), case
+        named = NAMED_IN_C.get(case, CASES[case][1])
+        assert named.removeprefix(": ") in message.removeprefix(str(path)), f"{case}: {message}"
+        assert len(message) < len(str(path)) + 200
+    good = {copied / "good.hdf5": "local"}
+    assert refusals(refuse, good) == [("accepted", "")]
+
+
+def test_the_c_library_is_clean_on_the_same_files(refuse: Path, copied: Path) -> None:
+    tool = shutil.which("valgrind")
+    if tool is None:
+        pytest.skip("there is no valgrind")
+    options = ["--quiet", "--leak-check=full", "--error-exitcode=99"]
+    refusals(refuse, kinds_of_cases(copied), tool, *options)
+
+
+def test_the_c_library_refuses_what_is_no_whole_file(
+    refuse: Path, corpus: Path, tmp_path: Path
+) -> None:
+    contents = bad_bytes(corpus)
+    files = {tmp_path / f"{case.replace(' ', '-')}.hdf5": "local" for case in BAD_BYTES}
+    for path, case in zip(files, BAD_BYTES, strict=True):
+        path.write_bytes(contents[case])
+    for path, (step, message) in zip(files, refusals(refuse, files), strict=True):
+        assert step == "read"
+        assert message.startswith(f"{path}: ")
+    for path, case in zip(files, BAD_BYTES, strict=True):
+        assert path.read_bytes() == contents[case], "what cannot be read was written"
+
+
+def test_the_c_library_names_what_is_wrong_with_a_solution(
+    refuse: Path, corpus: Path, tmp_path: Path
+) -> None:
+    files = {spoilt_solution(corpus, tmp_path, case): "local" for case in SOLUTIONS}
+    for case, path, (step, message) in zip(SOLUTIONS, files, refusals(refuse, files), strict=True):
+        assert step in ("read-solution", "validate-solution"), case
+        assert SOLUTIONS[case][1] in message.removeprefix(f"{path}: "), f"{case}: {message}"
+
+
 # ---- files that are not what they seem from their first byte on
 
 
@@ -405,8 +499,10 @@ def test_what_is_no_whole_file_is_refused(corpus: Path, tmp_path: Path, case: st
     for action in (
         lambda: fclib.read(path),
         lambda: fclib.read_solution(path),
+        lambda: fclib.read_guesses(path),
         lambda: fclib.contents(path),
         lambda: fclib.write_solution(path, fclib.Solution(r=np.zeros(18))),
+        lambda: fclib.write_guesses(path, [fclib.Solution(r=np.zeros(18))]),
     ):
         with pytest.raises(fclib.FileError) as caught:
             action()
@@ -472,12 +568,16 @@ SOLUTIONS: dict[str, tuple[Spoil, str]] = {
 }
 
 
+def spoilt_solution(corpus: Path, folder: Path, case: str) -> Path:
+    path = path_of(folder, case)
+    path.write_bytes((corpus / "good.hdf5").read_bytes())
+    with h5py.File(path, "a") as file:
+        SOLUTIONS[case][0](file)
+    return path
+
+
 def test_check_names_what_is_wrong_with_a_solution(corpus: Path, tmp_path: Path) -> None:
-    paths = {case: path_of(tmp_path, case) for case in SOLUTIONS}
-    for case, path in paths.items():
-        path.write_bytes((corpus / "good.hdf5").read_bytes())
-        with h5py.File(path, "a") as file:
-            SOLUTIONS[case][0](file)
+    paths = {case: spoilt_solution(corpus, tmp_path, case) for case in SOLUTIONS}
     run = subprocess.run(
         [sys.executable, "-m", "fclib", "check", *map(str, paths.values())],
         capture_output=True,

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <concepts>
+#include <limits>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -120,6 +121,9 @@ void validate(const P& problem) {
                 "is " + std::to_string(problem.spacedim) + ", but must be " +
                     std::to_string(planar) + " or " + std::to_string(spatial),
                 group + "spacedim");
+  }
+  if (problem.mu.size() > std::numeric_limits<Index>::max() / problem.spacedim) {
+    throw Error(ErrorKind::problem, "has more contacts than can be numbered", group + "vectors/mu");
   }
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
     const std::string where = group + field_path(field);

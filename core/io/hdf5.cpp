@@ -119,15 +119,14 @@ hsize_t size_of_file_with(hid_t object) {
 /// What a dataset takes in its file, in bytes. Throws where its data are in other files.
 double stored_bytes(hid_t dataset, const std::string& path) {
   const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
-  if (H5Pget_layout(properties.id()) == H5D_VIRTUAL ||
-      H5Pget_external_count(properties.id()) > 0) {
+  if (H5Pget_layout(properties.id()) == H5D_VIRTUAL || H5Pget_external_count(properties.id()) > 0) {
     fail(path, "keeps its data in other places, which are not read");
   }
   return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
 }
 
 /// Throws where HDF5 would ask for much more memory than the file has data, for chunks that are too
-/// many or too large.
+/// many or too large; and where it would unpack data by filters that trust what they read.
 void require_chunks(hid_t dataset, double entries, double entry_size, const std::string& path) {
   const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
   if (H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
@@ -141,6 +140,14 @@ void require_chunks(hid_t dataset, double entries, double entry_size, const std:
   if (rank < 1 || chunk < 1 || entries / chunk > std::max(many, file_size) ||
       chunk * entry_size > std::max(large, best_compression * file_size)) {
     fail(path, "has chunks that the file does not hold");
+  }
+  for (int k = 0; k < H5Pget_nfilters(properties.id()); ++k) {
+    std::size_t values = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(properties.id(), static_cast<unsigned>(k), nullptr,
+                                               &values, nullptr, 0, nullptr, nullptr);
+    if (filter == H5Z_FILTER_NBIT || filter == H5Z_FILTER_SCALEOFFSET) {
+      fail(path, "is packed by a filter that is not read (n-bit or scale-offset)");
+    }
   }
 }
 
@@ -745,6 +752,7 @@ void write_fields(const Target& root, const P& problem, bool as_given) {
     if (field.presence == Presence::mixed && !is_mixed(problem)) return;
     if constexpr (std::is_same_v<Member, Matrix>) {
       const Matrix& a = problem.*field.member;
+      if (as_given && a.empty() && a.p.empty()) return;  // read from a file without it
       const bool convert = P::triplets_on_disk && !as_given;
       write_matrix(group, name, convert ? converted(a, Storage::triplet) : a);
     } else if constexpr (std::is_same_v<Member, Vector>) {

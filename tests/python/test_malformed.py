@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -80,6 +81,25 @@ def declare_sparsely(file: h5py.File) -> None:
     """One chunk of many is there."""
     declare(f"{ROOT}/vectors/q", "<f8")(file)
     file[f"{ROOT}/vectors/q"][:10] = 1.0
+
+
+def store(name: str, **layout: Any) -> Spoil:
+    """The same numbers, or a size that nobody stored, in another layout."""
+
+    def spoil(file: h5py.File) -> None:
+        values = file[name][()]
+        del file[name]
+        file.create_dataset(name, **({"data": values} | layout))
+
+    return spoil
+
+
+def store_elsewhere(file: h5py.File) -> None:
+    """A dataset whose numbers are those of other datasets."""
+    layout = h5py.VirtualLayout(shape=(18,), dtype="<f8")
+    layout[:] = h5py.VirtualSource(".", f"/{ROOT}/vectors/s", shape=(18,))
+    del file[f"{ROOT}/vectors/q"]
+    file.create_virtual_dataset(f"{ROOT}/vectors/q", layout)
 
 
 def declare_text(name: str) -> Spoil:
@@ -244,6 +264,32 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
             ("W/nz", "<i4"),
         )
     },
+    "many more chunks than there are": (
+        store(f"{ROOT}/vectors/q", data=None, shape=(10**5,), dtype="<f8", chunks=(1,)),
+        f"{ROOT}/vectors/q: has chunks",
+    ),
+    "a chunk beyond the file": (
+        store(
+            f"{ROOT}/vectors/q",
+            data=None,
+            shape=(18,),
+            dtype="<f8",
+            chunks=(2**28,),
+            maxshape=(None,),
+        ),
+        f"{ROOT}/vectors/q: has chunks",
+    ),
+    "numbers by their offsets": (
+        store(f"{ROOT}/W/p", chunks=True, scaleoffset=0),
+        f"{ROOT}/W/p: is packed",
+    ),
+    "numbers in another file": (
+        store(
+            f"{ROOT}/vectors/q", data=None, shape=(18,), dtype="<f8", external=[("data", 0, 144)]
+        ),
+        f"{ROOT}/vectors/q: keeps",
+    ),
+    "numbers in another dataset": (store_elsewhere, f"{ROOT}/vectors/q: keeps"),
     "a huge q with a little in it": (declare_sparsely, f"{ROOT}/vectors/q: declares"),
     "a size beyond all memory": (
         declare(f"{ROOT}/W/x", "<f8", 2**60),
@@ -458,6 +504,31 @@ def test_the_c_library_names_what_is_wrong_with_a_solution(
     for case, path, (step, message) in zip(SOLUTIONS, files, refusals(refuse, files), strict=True):
         assert step in ("read-solution", "validate-solution"), case
         assert SOLUTIONS[case][1] in message.removeprefix(f"{path}: "), f"{case}: {message}"
+
+
+def test_the_sizes_of_a_problem_alone_ask_for_no_memory(corpus: Path, tmp_path: Path) -> None:
+    path = tmp_path / "huge.hdf5"
+    path.write_bytes((corpus / "good.hdf5").read_bytes())
+    with h5py.File(path, "a") as file:
+        file[f"{ROOT}/W/n"][0] = 2**31 - 1
+        file[f"{ROOT}/spacedim"][0] = 1
+    with pytest.raises(fclib.ProblemError, match=r"vectors/mu: has 6 entries, expected"):
+        fclib.write_solution(path, fclib.Solution(r=np.zeros(18)))
+
+
+def test_a_dataset_beyond_the_end_of_the_file(corpus: Path, tmp_path: Path) -> None:
+    """Its size and the room for it agree, but no file is so long."""
+    path, size = tmp_path / "long.hdf5", 1000003
+    with h5py.File(corpus / "good.hdf5") as good, h5py.File(path, "w", libver="earliest") as file:
+        good.copy(ROOT, file)
+        del file[f"{ROOT}/vectors/q"]
+        file[f"{ROOT}/vectors/q"] = np.zeros(size)
+    data = path.read_bytes()
+    for true, false in ((size, 2**40), (8 * size, 2**43)):
+        data = data.replace(true.to_bytes(8, "little"), false.to_bytes(8, "little"))
+    path.write_bytes(data)
+    with pytest.raises(fclib.FileError, match=rf"/{ROOT}/vectors/q: declares {2**40} entries"):
+        fclib.read(path)
 
 
 # ---- files that are not what they seem from their first byte on

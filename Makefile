@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 BUILD := build
+SECONDS := 60
 
 # what the installed package is made of
 SOURCES := CMakeLists.txt pyproject.toml README.md \
@@ -12,12 +13,13 @@ SOURCES := CMakeLists.txt pyproject.toml README.md \
                 -o -name py.typed \))
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
-.PHONY: setup demo test lint format clean help
+.PHONY: setup demo test fuzz lint format clean help
 
 help:
 	@echo "make setup   install what is missing, build, install fclib into $(VENV)"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests"
+	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make lint    check style and types (ruff, mypy, clang-format)"
 	@echo "make format  put the sources into the style that lint checks"
 	@echo "make clean   remove what was built (not $(VENV))"
@@ -31,6 +33,9 @@ test: setup $(VENV)/.test-tools
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
 	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest
+
+fuzz:
+	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
 	$(BIN)/ruff check python tests benchmarks

@@ -172,6 +172,16 @@ TEST_F(Writing, WithoutValidationTheDataGoesInAsItIs) {
   EXPECT_EQ(std::get<GlobalProblem>(read_problem(path())).M.storage, Storage::triplet);
 }
 
+TEST_F(Writing, WithoutValidationAMatrixThatIsNotThereStaysSo) {
+  LocalProblem problem = local_problem(1);
+  problem.R = diagonal(2, 1);
+  problem.s = Vector::Zero(2);
+  write_file(path(), &problem, nullptr, {}, {.validate = false});
+  const auto read = std::get<LocalProblem>(read_problem(path(), {}, Validation::none));
+  EXPECT_TRUE(read.V.empty());
+  EXPECT_EQ(read.R, problem.R);
+}
+
 TEST_F(Writing, SolutionsTakeTheirPlace) {
   write(local_problem(1), {});
   write_solution(path(), local_solution(1));

@@ -752,7 +752,8 @@ void write_fields(const Target& root, const P& problem, bool as_given) {
     if (field.presence == Presence::mixed && !is_mixed(problem)) return;
     if constexpr (std::is_same_v<Member, Matrix>) {
       const Matrix& a = problem.*field.member;
-      if (as_given && a.empty() && a.p.empty()) return;  // read from a file without it
+      // read from a file without it
+      if (field.presence != Presence::required && as_given && a.empty() && a.p.empty()) return;
       const bool convert = P::triplets_on_disk && !as_given;
       write_matrix(group, name, convert ? converted(a, Storage::triplet) : a);
     } else if constexpr (std::is_same_v<Member, Vector>) {

@@ -38,15 +38,15 @@ fuzz:
 	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
-	$(BIN)/ruff check python tests benchmarks
-	$(BIN)/ruff format --check python tests benchmarks
+	$(BIN)/ruff check python tests benchmarks examples
+	$(BIN)/ruff format --check python tests benchmarks examples
 	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
 	$(BIN)/mypy --package fclib
-	$(BIN)/mypy tests benchmarks
+	$(BIN)/mypy tests benchmarks examples/python
 
 format: $(VENV)/.lint-tools
-	$(BIN)/ruff check --fix python tests benchmarks
-	$(BIN)/ruff format python tests benchmarks
+	$(BIN)/ruff check --fix python tests benchmarks examples
+	$(BIN)/ruff format python tests benchmarks examples
 	$(BIN)/clang-format -i $(CXX_SOURCES)
 
 clean:

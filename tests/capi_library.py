@@ -35,12 +35,42 @@ def library_folder() -> Path:
     return folder
 
 
-def compiler() -> str:
-    """The C compiler."""
-    found = shutil.which("cc") or shutil.which("gcc")
+def compiler(language: str) -> str:
+    """The compiler of C or of C++."""
+    names = {"C": ("cc", "gcc"), "C++": ("c++", "g++")}[language]
+    found = next(filter(None, map(shutil.which, names)), None)
     if found is None:
-        pytest.skip("there is no C compiler")
+        pytest.skip(f"there is no {language} compiler")
     return found
+
+
+def compile_fortran(source: Path, program: Path) -> Path:
+    """Link a Fortran program to our library, its module compiled beside it."""
+    compiler = shutil.which("gfortran")
+    if compiler is None:
+        pytest.skip("there is no Fortran compiler")
+    folder = library_folder()
+    module = folder / "generated" / "fclib.f90"
+    if not module.is_file():
+        pytest.skip("the build has no Fortran module")
+    warnings = ["-std=f2018", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-compare-reals"]
+    subprocess.run(
+        [
+            *(
+                compiler,
+                *warnings,
+                "-g",
+                "-fcheck=all",
+                "-J",
+                str(program.parent),
+                str(module),
+                str(source),
+            ),
+            *("-o", str(program), f"-L{folder}", "-lfclib", f"-Wl,-rpath,{folder}"),
+        ],
+        check=True,
+    )
+    return program
 
 
 def compile_program(source: Path, program: Path, *flags: str, folder: Path | None = None) -> Path:
@@ -49,6 +79,7 @@ def compile_program(source: Path, program: Path, *flags: str, folder: Path | Non
         folder = library_folder()
         flags = (f"-I{HEADERS}", f"-Wl,-rpath,{folder}", *flags)
     libraries = [f"-L{folder}", "-lfclib", "-lm", "-lpthread"]
-    command = [compiler(), "-std=gnu11", "-g", *WARNINGS, str(source), "-o", str(program)]
+    language, standard = ("C++", "-std=c++17") if source.suffix == ".cpp" else ("C", "-std=gnu11")
+    command = [compiler(language), standard, "-g", *WARNINGS, str(source), "-o", str(program)]
     subprocess.run([*command, *flags, *libraries], check=True)
     return program

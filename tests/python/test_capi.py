@@ -1,6 +1,7 @@
 """The C library: a drop-in for libfclib 3.1 that never takes its host down."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,7 +16,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fclib
-from capi_library import HEADERS, ROOT, compile_program, library_folder
+from capi_library import (
+    CAPI,
+    HEADERS,
+    ROOT,
+    compile_fortran,
+    compile_program,
+    library_folder,
+)
 from helpers import Array, dense, modified, planted_global, planted_local, project
 
 PEER_HEADER = Path("/usr/include/fclib.h")
@@ -123,6 +131,125 @@ def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
 def test_the_examples_are_clean_under_valgrind(examples: dict[str, Path], tmp_path: Path) -> None:
     valgrind(examples["write"], tmp_path / "ball.hdf5")
     valgrind(examples["solve"], tmp_path / "ball.hdf5")
+
+
+@pytest.fixture(scope="session")
+def cpp_example(programs: Path) -> Path:
+    return compile_program(ROOT / "examples/cpp/ball.cpp", programs / "ball-cpp")
+
+
+@pytest.fixture(scope="session")
+def fortran_example(programs: Path) -> Path:
+    return compile_fortran(ROOT / "examples/fortran/ball.f90", programs / "ball-fortran")
+
+
+def check_ball(program: Path, folder: Path) -> None:
+    """A program that writes a ball on a plane into a file, and solves it."""
+    path = folder / "ball.hdf5"
+    for _ in range(2):  # the file may be there already
+        done = subprocess.run([program, path], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "a ball on a plane" in done.stdout
+        assert "converged" in done.stdout
+    problem, solution = fclib.read(path), fclib.read_solution(path)
+    assert problem.info.title == "a ball on a plane"
+    assert solution is not None
+    assert fclib.merit(problem, solution).error < 1e-10
+    done = subprocess.run([program, folder / "no" / "folder"], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "no/folder: cannot be written" in done.stderr
+    done = subprocess.run([program], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "usage" in done.stderr
+    valgrind(program, path)
+
+
+def test_the_example_in_cpp_runs(cpp_example: Path, tmp_path: Path) -> None:
+    check_ball(cpp_example, tmp_path)
+
+
+def test_the_example_in_fortran_runs(fortran_example: Path, tmp_path: Path) -> None:
+    check_ball(fortran_example, tmp_path)
+    known = fclib.read(tmp_path / "ball.hdf5").matrix_info
+    assert known == {
+        "W": fclib.MatrixInfo(comment="1 / mass", conditioning=1, determinant=1, rank=3)
+    }
+
+
+def test_the_example_in_python_runs(tmp_path: Path) -> None:
+    path = tmp_path / "balls.hdf5"
+    command = [sys.executable, str(ROOT / "examples/python/ball.py")]
+    done = subprocess.run([*command, str(path)], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "converged" in done.stdout
+    problem, solution = fclib.read(path), fclib.read_solution(path)
+    assert problem.formulation == "GM3DFC"
+    assert solution is not None
+    merit = fclib.merit(problem, solution)
+    assert merit.error <= 1e-10
+    assert (merit.stick, merit.slide) == (1, 2)
+    assert subprocess.run(command, capture_output=True).returncode == 1
+
+
+# ---- the Fortran module
+
+
+def test_what_the_fortran_module_promises(programs: Path, tmp_path: Path) -> None:
+    program = compile_fortran(CAPI / "fortran.f90", programs / "fortran")
+    done = subprocess.run([program, tmp_path], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    (tmp_path / "valgrind").mkdir()
+    valgrind(program, tmp_path / "valgrind")
+
+
+def without_comments(header: str) -> str:
+    return re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
+
+
+IN_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)"}
+
+
+def in_fortran(declaration: str) -> str:
+    """A member or an argument of C as a type of Fortran."""
+    if "*" in declaration:
+        return "type(c_ptr)"
+    if declaration.startswith("enum"):
+        return "integer(c_int)"
+    return IN_FORTRAN[declaration.split()[0]]
+
+
+def test_the_fortran_module_is_the_header() -> None:
+    source = library_folder() / "generated" / "fclib.f90"
+    if not source.is_file():
+        pytest.skip("the build has no Fortran module")
+    module, header = source.read_text(), without_comments((HEADERS / "fclib.h").read_text())
+
+    structs = re.findall(r"struct (?:FCLIB_APICOMPILE )?(\w+) \{(.*?)\};", header, re.DOTALL)
+    assert len(structs) == 10
+    for name, body in structs:
+        members = [
+            (in_fortran(member), member.split()[-1].strip("*"))
+            for member in filter(None, map(str.strip, body.split(";")))
+        ]
+        found = re.search(rf"type, bind\(c\), public :: {name}\n(.*?)end type", module, re.DOTALL)
+        assert found, name
+        assert re.findall(r"(\S+) :: (\w+)", found[1]) == members, name
+
+    for name, body in re.findall(r"enum (?:FCLIB_APICOMPILE )?(\w+) \{(.*?)\};", header, re.DOTALL):
+        values = [value.strip() for value in body.split(",")]
+        lines = "".join(f"    enumerator :: {value}\n" for value in values)
+        assert f"enum, bind(c)\n{lines}  end enum" in module, name
+        for value in values:
+            assert re.search(rf"public :: .*\b{value}\b", module), value
+
+    functions = re.findall(r"^[\w *]+?\b(fclib_\w+)\(([^()]*)\);", header, re.MULTILINE)
+    assert len(functions) > 40
+    for name, arguments in functions:
+        count = 0 if arguments.strip() == "void" else arguments.count(",") + 1
+        found = re.search(rf"(?:function|subroutine) {name}\(([^)]*)\) bind\(c\)", module)
+        assert found, name
+        assert len(list(filter(None, found[1].split(",")))) == count, name
+        assert re.search(rf"^(  public ::|      ).*\b{name}\b", module, re.MULTILINE), name
 
 
 # ---- files go both ways
@@ -458,9 +585,8 @@ def test_merit_1_is_its_formula(ours: Library, kind: str, d: int, p: int) -> Non
 
 def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
     cmake, folder = shutil.which("cmake"), library_folder()
-    cache = folder / "CMakeCache.txt"
-    if cmake is None or not cache.is_file() or "FCLIB_SHARED:BOOL=ON" not in cache.read_text():
-        pytest.skip("there is no build of the C library alone to install")
+    if cmake is None or not (folder / "CMakeCache.txt").is_file():
+        pytest.skip("there is no cmake, or no build of its making to install")
     prefix = tmp_path / "prefix"
 
     def run(*command: object) -> str:
@@ -472,7 +598,8 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
         return done.stdout
 
     found: list[Path] = []
-    run(cmake, "--install", folder, "--prefix", prefix)
+    run(cmake, "--build", folder, "--target", "fclib_package")
+    run(cmake, "--install", folder, "--prefix", prefix, "--component", "c")
     assert (prefix / "include/fclib.h").read_bytes() == (HEADERS / "fclib.h").read_bytes()
 
     # by CMake
@@ -492,6 +619,21 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
     run(build / "write", tmp_path / "ball.hdf5")
     assert "converged" in run(build / "solve", tmp_path / "ball.hdf5")
 
+    # by CMake from Fortran, where the module was compiled; its source is there in any case
+    assert (prefix / "include/fclib.f90").is_file()
+    fortran = any(prefix.rglob("fclib.mod"))
+    if fortran:
+        (client / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.16)\nproject(client Fortran)\n"
+            "find_package(fclib REQUIRED COMPONENTS fortran)\n"
+            f'add_executable(ball "{ROOT}/examples/fortran/ball.f90")\n'
+            "target_link_libraries(ball fclib::fortran)\n"
+        )
+        build = client / "fortran"
+        run(cmake, "-S", client, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
+        run(cmake, "--build", build)
+        assert "converged" in run(build / "ball", tmp_path / "fortran.hdf5")
+
     # by pkg-config
     config, compiler = shutil.which("pkg-config"), shutil.which("cc")
     if config is None or compiler is None or not sys.platform.startswith("linux"):
@@ -500,9 +642,17 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
     flags = run(config, "--cflags", "--libs", "fclib").split()
     library = next(prefix.rglob("libfclib.so.0")).parent
     run(compiler, ROOT / "examples/c/write.c", "-o", tmp_path / "write", *flags, "-lm")
-    ran = subprocess.run(
-        [tmp_path / "write", tmp_path / "ball.hdf5"],
-        env=os.environ | {"LD_LIBRARY_PATH": str(library)},
-        capture_output=True,
-    )
-    assert ran.returncode == 0
+    programs = [tmp_path / "write"]
+    gfortran = shutil.which("gfortran")
+    if fortran and gfortran is not None:
+        programs.append(tmp_path / "ball")
+        source = ROOT / "examples/fortran/ball.f90"
+        flags = run(config, "--cflags", "--libs", "fclib-fortran").split()
+        run(gfortran, source, "-o", programs[-1], *flags)
+    for program in programs:
+        ran = subprocess.run(
+            [program, tmp_path / "ball.hdf5"],
+            env=os.environ | {"LD_LIBRARY_PATH": str(library)},
+            capture_output=True,
+        )
+        assert ran.returncode == 0

@@ -1,0 +1,277 @@
+! What the Fortran module promises; ends with 0 where it holds: fortran FOLDER.
+module hearing
+  use, intrinsic :: iso_c_binding
+  use fclib, only: fclib_text
+  implicit none
+  integer :: told = 0
+
+contains
+
+  subroutine hear(message, context) bind(c)
+    type(c_ptr), value :: message, context
+    if (.not. c_associated(context) .and. fclib_text(message) /= "") told = told + 1
+  end subroutine
+
+end module
+
+program checks
+  use, intrinsic :: iso_c_binding
+  use, intrinsic :: iso_fortran_env, only: error_unit
+  use fclib
+  use hearing
+  implicit none
+
+  integer, parameter :: dp = c_double
+  character(500) :: folder
+
+  call get_command_argument(1, folder)
+  call matrices
+  call words
+  call sliding_ball
+  call all_kinds
+  call failures
+  call check(fclib_solver(1) /= "", "there is a solver")
+  call check(fclib_solver(1000) == "" .and. fclib_solver(0) == "", "and not any number of them")
+  call check(fclib_status_text(FCLIB_INACCURATE) == "inaccurate", "statuses have names")
+
+contains
+
+  subroutine check(condition, what)
+    logical, intent(in) :: condition
+    character(*), intent(in) :: what
+    if (condition) return
+    write (error_unit, "(5a)") "not so: ", what, " (", fclib_error(), ")"
+    stop 1
+  end subroutine
+
+  function path_of(name) result(path)
+    character(*), intent(in) :: name
+    character(:), allocatable :: path
+    path = trim(folder) // "/" // name
+  end function
+
+  ! ---- arrays and texts into the structs and out of them
+
+  subroutine matrices
+    type(fclib_local) :: problem
+    type(fclib_matrix) :: a
+    real(dp) :: dense(2, 3), conditioning
+    integer, allocatable :: i(:), j(:)
+    real(dp), allocatable :: x(:)
+    real(dp), pointer :: view(:)
+    integer(c_int), pointer :: indices(:)
+    integer :: rank
+    dense = reshape([1, 2, 0, 4, 5, 0] * 1._dp, [2, 3])
+
+    call fclib_set_dense(problem%W, dense)
+    call check(all(fclib_get_dense(problem%W) == dense), "dense")
+    a = fclib_get_matrix(problem%W)
+    call check(a%m == 2 .and. a%n == 3 .and. a%nz == FCLIB_DENSE, "sizes")
+
+    call fclib_set_columns(problem%W, 2, 3, [1, 3, 4, 5], [1, 2, 2, 1], [1, 2, 4, 5] * 1._dp)
+    call check(all(fclib_get_dense(problem%W) == dense), "columns")
+    a = fclib_get_matrix(problem%W)
+    indices => fclib_indices(a%p, 4)
+    call check(all(indices == [0, 2, 3, 4]), "pointers begin with 0 in the struct")
+
+    call fclib_set_rows(problem%W, 2, 3, [1, 3, 5], [1, 3, 1, 2], [1, 5, 2, 4] * 1._dp)
+    call check(all(fclib_get_dense(problem%W) == dense), "rows")
+    call fclib_get_triplets(problem%W, i, j, x)
+    call check(all(i == [1, 1, 2, 2]) .and. all(j == [1, 3, 1, 2]), "the places of entries")
+
+    call fclib_set_triplets(problem%W, 2, 3, [1, 2, 2, 1, 1], [1, 1, 2, 3, 3], &
+                            [1, 2, 4, 3, 2] * 1._dp)
+    call check(all(fclib_get_dense(problem%W) == dense), "triplets add up")
+    call fclib_get_triplets(problem%W, i, j, x)
+    call check(size(x) == 5 .and. i(2) == 2 .and. j(2) == 1, "triplets stay triplets")
+    a = fclib_get_matrix(problem%W)
+    view => fclib_vector(a%x, a%nz)
+    view(1) = 7
+    dense(1, 1) = 7
+    call check(all(fclib_get_dense(problem%W) == dense), "a view is no copy")
+
+    call fclib_set_dense(problem%V, reshape([real(dp) ::], [0, 4]))
+    call check(size(fclib_get_dense(problem%V), 2) == 4, "no rows")
+    call check(size(fclib_get_dense(problem%R)) == 0, "no matrix")
+
+    call check(.not. fclib_get_matrix_info(problem%W), "nothing is known")
+    call fclib_set_matrix_info(problem%W, conditioning=2._dp)
+    call fclib_set_matrix_info(problem%W, comment="a comment", conditioning=3._dp, rank=2)
+    block
+      character(:), allocatable :: comment
+      call check(fclib_get_matrix_info(problem%W, comment, conditioning, rank=rank), "known")
+      call check(comment == "a comment" .and. conditioning == 3 .and. rank == 2, "what is known")
+    end block
+
+    call fclib_set(problem%mu, [0.5_dp])
+    call fclib_set(problem%mu, [0.25_dp, 0.75_dp])
+    view => fclib_vector(problem%mu, 2)
+    call check(all(view == [0.25_dp, 0.75_dp]), "vectors")
+    call check(size(fclib_vector(problem%q, 5)) == 0, "no vector")
+    call fclib_delete(problem)
+    call check(.not. c_associated(problem%W) .and. .not. c_associated(problem%mu), "deleted")
+    call fclib_delete(problem)
+  end subroutine
+
+  subroutine words
+    type(fclib_local) :: problem
+    character(:), allocatable :: title, description, math_info
+    call fclib_get_info(problem%info, title, description)
+    call check(title == "" .and. description == "", "no words")
+    call fclib_set_info(problem%info, title="a title", math_info="")
+    call fclib_set_info(problem%info, title="another title  ", math_info="")
+    call fclib_get_info(problem%info, title, description, math_info)
+    call check(title == "another title" .and. description == "" .and. math_info == "", "words")
+    call check(fclib_text(c_null_ptr) == "", "no text")
+    call fclib_delete(problem)
+  end subroutine
+
+  ! ---- problems
+
+  subroutine one_contact(contacts, size_of_contact)
+    type(c_ptr), intent(inout) :: contacts
+    integer, intent(in) :: size_of_contact
+    integer :: k
+    call fclib_set_triplets(contacts, size_of_contact, size_of_contact, &
+                            [(k, k=1, size_of_contact)], [(k, k=1, size_of_contact)], &
+                            [(1._dp, k=1, size_of_contact)])
+  end subroutine
+
+  subroutine sliding_ball
+    type(fclib_local) :: problem, again
+    type(fclib_solution) :: solution, other
+    type(fclib_solution), allocatable :: guesses(:)
+    type(fclib_solve_result) :: result
+    real(dp), pointer :: r(:), u(:)
+    integer :: n, m, p, nc
+    character(:), allocatable :: path
+    path = path_of("local.hdf5")
+    call one_contact(problem%W, 3)
+    call fclib_set(problem%q, [-1._dp, 2._dp, 0._dp])
+    call fclib_set(problem%mu, [0.5_dp])
+    call fclib_get_sizes(problem, n, m, p, nc)
+    call check(all([n, m, p, nc] == [0, 3, 0, 1]), "the sizes of a problem")
+    call check(fclib_validate(problem), "the problem is valid")
+
+    call fclib_allocate(solution, problem)
+    call check(fclib_validate(problem, solution), "zero is a solution of the right size")
+    call check(fclib_merit(problem, MERIT_2, solution) > 0.1, "and a wrong one")
+    call check(fclib_solve(problem, "nsgs", solution, result, tolerance=1e-12_dp, &
+                           max_iterations=100, time_limit=10._dp, options="relaxation=1"), "solve")
+    call check(result%status == FCLIB_CONVERGED, "it converged")
+    r => fclib_vector(solution%r, m)
+    u => fclib_vector(solution%u, m)
+    call check(all(abs(r - [1._dp, -0.5_dp, 0._dp]) < 1e-11), "the reaction")
+    call check(all(abs(u - [0._dp, 1.5_dp, 0._dp]) < 1e-11), "the velocity")
+    call check(fclib_merit(problem, MERIT_1, solution) < 1e-11, "the merit of libfclib")
+    call fclib_allocate(other, problem)
+    call check(fclib_solve(problem, "nsgs", other, guess=solution), "with a guess, and no more")
+
+    call check(fclib_write(problem, path), "write")
+    call check(.not. fclib_write(problem, path), "it is there already")
+    call check(index(fclib_error(), "already") > 0, "and that is said")
+    call check(fclib_write(solution, path), "write a solution")
+    call check(fclib_write([solution, other], path), "write guesses")
+    call check(fclib_kind(path) == "local", "the kind")
+    call check(fclib_create_int_attributes_in_info(path // c_null_char, "n" // c_null_char, 1) == 1, &
+               "an attribute")
+    call fclib_delete(other)
+    call check(fclib_read(path, again), "read")
+    call check(fclib_read(path, other), "read the solution")
+    call check(fclib_merit(again, MERIT_2, other) < 1e-11, "its merit")
+    call check(fclib_read(path // "   ", guesses), "blanks at the end of a path are none of it")
+    call check(size(guesses) == 2, "the guesses")
+    call check(fclib_merit(again, MERIT_2, guesses(1)) < 1e-11, "the merit of the first")
+    call fclib_delete(guesses)
+    call fclib_delete(other)
+    call fclib_delete(again)
+    call fclib_delete(solution)
+    call fclib_delete(problem)
+  end subroutine
+
+  subroutine all_kinds
+    type(fclib_global) :: global
+    type(fclib_global_rolling) :: global_rolling
+    type(fclib_local_rolling) :: local_rolling
+    type(fclib_solution) :: solution
+    integer :: k, n, m, p, nc
+
+    call one_contact(global%M, 3)
+    call one_contact(global%H, 3)
+    call fclib_set_dense(global%G, reshape([0._dp, 1._dp, 0._dp], [3, 1]))
+    call fclib_set(global%f, [-1._dp, 2._dp, 0._dp])
+    call fclib_set(global%w, [(0._dp, k=1, 3)])
+    call fclib_set(global%b, [0._dp])
+    call fclib_set(global%mu, [0.5_dp])
+    call fclib_get_sizes(global, n, m, p, nc)
+    call check(all([n, m, p, nc] == [3, 3, 1, 1]), "the sizes of a global problem")
+    call fclib_allocate(solution, global)
+    call check(fclib_solve(global, "nsgs", solution), "solve a global problem")
+    call check(fclib_merit(global, MERIT_2, solution) < 1e-8, "its merit")
+    call check(fclib_write(global, path_of("global.hdf5")), "write a global problem")
+    call check(fclib_write(solution, path_of("global.hdf5")), "and its solution")
+    call fclib_delete(global)
+    call fclib_delete(solution)
+    call check(fclib_read(path_of("global.hdf5"), global), "read a global problem")
+    call check(fclib_read(path_of("global.hdf5"), solution), "and its solution")
+    call check(fclib_validate(global, solution), "both are valid")
+    call fclib_delete(solution)
+    call fclib_delete(global)
+
+    call one_contact(local_rolling%W, 5)
+    call fclib_set(local_rolling%q, [-1._dp, 2._dp, 0._dp, 1._dp, 0._dp])
+    call fclib_set(local_rolling%mu, [0.5_dp])
+    call fclib_set(local_rolling%mu_r, [0.1_dp])
+    call fclib_allocate(solution, local_rolling)
+    call check(fclib_solve(local_rolling, "nsgs", solution), "solve a rolling problem")
+    call check(fclib_merit(local_rolling, MERIT_2, solution) < 1e-8, "its merit")
+    call check(fclib_write(local_rolling, path_of("rolling.hdf5")), "write a rolling problem")
+    call fclib_delete(local_rolling)
+    call check(fclib_read(path_of("rolling.hdf5"), local_rolling), "read a rolling problem")
+    call check(fclib_validate(local_rolling, solution), "it is valid")
+    call fclib_delete(solution)
+    call fclib_delete(local_rolling)
+
+    call one_contact(global_rolling%M, 5)
+    call one_contact(global_rolling%H, 5)
+    call fclib_set(global_rolling%f, [-1._dp, 2._dp, 0._dp, 1._dp, 0._dp])
+    call fclib_set(global_rolling%w, [(0._dp, k=1, 5)])
+    call fclib_set(global_rolling%mu, [0.5_dp])
+    call fclib_set(global_rolling%mu_r, [0.1_dp])
+    call check(fclib_write(global_rolling, path_of("both.hdf5")), "write a global rolling problem")
+    call fclib_delete(global_rolling)
+    call check(fclib_read(path_of("both.hdf5"), global_rolling), "read it")
+    call check(fclib_kind(path_of("both.hdf5")) == "global_rolling", "its kind")
+    call fclib_get_sizes(global_rolling, n, m, p, nc)
+    call check(all([n, m, p, nc] == [5, 5, 0, 1]), "its sizes")
+    call fclib_delete(global_rolling)
+  end subroutine
+
+  ! ---- what goes wrong
+
+  subroutine failures
+    type(fclib_local) :: problem
+    type(fclib_solution) :: solution
+    type(fclib_solution), allocatable :: guesses(:)
+    character(:), allocatable :: missing
+    real(dp) :: error
+    missing = path_of("missing.hdf5")
+    call fclib_set_error_handler(c_funloc(hear), c_null_ptr)
+    call check(.not. fclib_read(missing, problem), "no problem")
+    call check(fclib_error() == missing // ": there is no such file", "the message")
+    call check(.not. fclib_read(missing, solution), "no solution")
+    call check(.not. fclib_read(missing, guesses), "no guesses")
+    call check(.not. allocated(guesses), "none at all")
+    call check(fclib_kind(missing) == "", "no kind")
+    call check(.not. fclib_write(solution, missing), "nothing to write to")
+    call check(.not. fclib_validate(problem), "an empty problem")
+    call check(fclib_error() == "/fclib_local/W: is NULL", "what is wrong with it")
+    error = fclib_merit(problem, MERIT_2, solution)
+    call check(error /= error, "its merit")
+    call check(.not. fclib_solve(problem, "nsgs", solution), "it is not solved")
+    call check(fclib_set_compression(10) == 0 .and. fclib_set_compression(4) == 1, "levels")
+    call check(told == 9, "the handler hears of each")
+    call fclib_set_error_handler(c_null_funptr, c_null_ptr)
+  end subroutine
+
+end program

@@ -364,17 +364,11 @@ T* allocate(std::size_t count) {
   return memory;
 }
 
-/// Leaves the values empty: the room of one array then serves for the next.
-template <class Values>
-auto* moved(Values& values) {
-  using Number = std::remove_cvref_t<decltype(values[0])>;
+double* copy_vector(const Vector& values) {
   const auto size = static_cast<std::size_t>(values.size());
-  // not calloc: the numbers come at once
-  auto* result = static_cast<Number*>(std::malloc(std::max<std::size_t>(size, 1) * sizeof(Number)));
-  if (result == nullptr) throw std::bad_alloc();
-  if (size > 0) std::memcpy(result, values.data(), size * sizeof(Number));
-  Values().swap(values);
-  return result;
+  MallocArray<double> result(size);
+  if (size > 0) std::memcpy(result.data(), values.data(), size * sizeof(double));
+  return result.release();
 }
 
 char* copy_text(const std::string& value) {
@@ -384,7 +378,7 @@ char* copy_text(const std::string& value) {
   return result;
 }
 
-fclib_matrix* to_c(Matrix& a) {
+fclib_matrix* to_c(RawMatrix& a) {
   Owned<fclib_matrix> c(allocate<fclib_matrix>(1));
   c->nzmax = static_cast<int>(a.x.size());
   c->m = a.rows;
@@ -404,10 +398,10 @@ fclib_matrix* to_c(Matrix& a) {
       break;
   }
   if (a.storage != Storage::dense) {
-    c->p = moved(a.p);
-    c->i = moved(a.i);
+    c->p = a.p.release();
+    c->i = a.i.release();
   }
-  c->x = moved(a.x);
+  c->x = a.x.release();
   if (a.info) {
     c->info = allocate<fclib_matrix_info>(1);
     c->info->comment = copy_text(a.info->comment);
@@ -418,21 +412,23 @@ fclib_matrix* to_c(Matrix& a) {
   return c.release();
 }
 
-template <class C, class P>
-C* to_c(P& problem) {
+/// The arrays of the problem become those of the C struct.
+template <class C>
+C* to_c(RawProblem& problem) {
   Owned<C> c(allocate<C>(1));
-  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
-    Type& value = problem.*field.member;
-    const bool absent = field.presence == Presence::mixed && !is_mixed(problem);
-    if constexpr (std::is_same_v<Type, Index>) {
-      (*c).*member = value;
-    } else if constexpr (std::is_same_v<Type, Matrix>) {
-      // what a file does not have has not even the pointers of an empty matrix
-      if (field.presence == Presence::required || !value.empty()) (*c).*member = to_c(value);
-    } else {
-      if (!absent) (*c).*member = moved(value);
-    }
-  });
+  for (auto& [name, value] : problem.members) {
+    for_each_member<C>([&]<class Field, class Pointer>(const Field& field, Pointer member) {
+      if (field.name != name) return;
+      using CType = std::remove_reference_t<decltype((*c).*member)>;
+      if constexpr (std::is_same_v<CType, int>) {
+        (*c).*member = std::get<Index>(value);
+      } else if constexpr (std::is_same_v<CType, fclib_matrix*>) {
+        (*c).*member = to_c(std::get<RawMatrix>(value));
+      } else {
+        (*c).*member = std::get<MallocArray<double>>(value).release();
+      }
+    });
+  }
   Owned<fclib_info> info(allocate<fclib_info>(1));
   bool informed = false;
   for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
@@ -444,16 +440,17 @@ C* to_c(P& problem) {
 }
 
 /// Fills the members of a solution from a file, whose sizes are those of its problem.
-void to_c(Solution& solution, const Problem& outline, const std::string& where, fclib_solution& c) {
+void to_c(const Solution& solution, const Problem& outline, const std::string& where,
+          fclib_solution& c) {
   for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::* member) {
     const Index size = std::visit([&](const auto& p) { return p.size(field.rows); }, outline);
-    Vector& values = solution.*field.member;
+    const Vector& values = solution.*field.member;
     if (values.size() != size) {
       fail(where + "/" + std::string(field.name),
            "has " + std::to_string(values.size()) + " entries, expected " + std::to_string(size));
     }
     const bool absent = field.presence != Presence::required && size == 0;
-    if (!absent) c.*member = moved(values);
+    if (!absent) c.*member = copy_vector(values);
   });
 }
 
@@ -474,8 +471,8 @@ template <class C>
 C* read_c(const char* path) {
   return guarded<C*>(nullptr, [&] {
     using P = typename Twin<C>::Core;
-    Problem problem = read_problem(&given(path, "path"), P::kind, Validation::none);
-    return to_c<C>(std::get<P>(problem));
+    RawProblem problem = read_raw_problem(&given(path, "path"), P::kind);
+    return to_c<C>(problem);
   });
 }
 

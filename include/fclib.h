@@ -33,9 +33,10 @@
  *
  * Files
  *
- *   A write is atomic: a process that is killed leaves the old file or the new one. A file may hold
- *   one problem of each kind, then one solution and any number of guesses; these belong to the
- *   global problem where there are several. What is there already is replaced only if
+ *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
+ *   system has no files without a name, it leaves NAME.XXXXXX too.) A file may hold one problem of
+ *   each kind, then one solution and any number of guesses; these belong to the global problem
+ *   where there are several. What is there already is replaced only if
  *   fclib_set_write_mode() says so.
  *
  * Threads
@@ -226,7 +227,7 @@ enum fclib_write_mode {
 /** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */
 int fclib_set_write_mode(enum fclib_write_mode mode);
 
-/** New. Sets the level of compression of all writes of the process, 0 (none) to 9; 4 at first. The
+/** New. Sets the level of compression of all writes of the process, 0 (none) to 9; 6 at first. The
  *  filters are those that every HDF5 has. Returns 1, or 0 for a level outside. */
 int fclib_set_compression(int level);
 

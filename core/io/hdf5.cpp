@@ -116,20 +116,28 @@ hsize_t size_of_file_with(hid_t object) {
   return size;
 }
 
-/// What a dataset takes in its file, in bytes. Throws where its data are in other files.
-double stored_bytes(hid_t dataset, const std::string& path) {
-  const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+/// What a dataset takes in its file, in bytes.
+double stored_bytes(hid_t dataset) {
+  return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
+}
+
+/// The properties of a dataset, none where its data are in one piece in its file: to find that out
+/// is cheap, to ask for properties is not. Throws where the data are in other files.
+Handle properties_of(hid_t dataset, const std::string& path) {
+  if (H5Dget_offset(dataset) != HADDR_UNDEF) return {-1, H5Pclose};
+  Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+  if (!properties.ok()) fail(path, "has no properties that HDF5 can read");
   if (H5Pget_layout(properties.id()) == H5D_VIRTUAL || H5Pget_external_count(properties.id()) > 0) {
     fail(path, "keeps its data in other places, which are not read");
   }
-  return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
+  return properties;
 }
 
 /// Throws where HDF5 would ask for much more memory than the file has data, for chunks that are too
 /// many or too large; and where it would unpack data by filters that trust what they read.
-void require_chunks(hid_t dataset, double entries, double entry_size, const std::string& path) {
-  const Handle properties(H5Dget_create_plist(dataset), H5Pclose);
-  if (H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
+void require_chunks(const Handle& properties, hid_t dataset, double entries, double entry_size,
+                    const std::string& path) {
+  if (!properties.ok() || H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
   hsize_t extents[H5S_MAX_RANK] = {};
   const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, extents);
   double chunk = 1;
@@ -168,11 +176,12 @@ Dataset open_numbers(const Group& group, const std::string& name, bool integers)
   const auto size = static_cast<std::size_t>(points);
   const auto entry_size = static_cast<double>(H5Tget_size(type.id()));
   const double bytes = static_cast<double>(size) * entry_size;
-  const double stored = stored_bytes(dataset.id(), path);
-  if (bytes > static_cast<double>(small_dataset) && bytes > best_compression * stored) {
+  const Handle properties = properties_of(dataset.id(), path);
+  if (bytes > static_cast<double>(small_dataset) &&
+      bytes > best_compression * stored_bytes(dataset.id())) {
     fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
   }
-  require_chunks(dataset.id(), static_cast<double>(size), entry_size, path);
+  require_chunks(properties, dataset.id(), static_cast<double>(size), entry_size, path);
   if (size > static_cast<std::size_t>(std::numeric_limits<Index>::max())) {
     fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
   }
@@ -192,16 +201,18 @@ Values read_as(const Dataset& dataset, hid_t memory) {
   return values;
 }
 
-std::vector<double> read_doubles(const Group& group, const std::string& name) {
-  return read_as<std::vector<double>>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
+template <class Doubles>
+Doubles read_doubles(const Group& group, const std::string& name) {
+  return read_as<Doubles>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
 }
 
-std::vector<Index> read_indices(const Group& group, const std::string& name) {
+template <class Indices>
+Indices read_indices(const Group& group, const std::string& name) {
   const Dataset dataset = open_numbers(group, name, true);
-  if (dataset.narrow) return read_as<std::vector<Index>>(dataset, H5T_NATIVE_INT32);
+  if (dataset.narrow) return read_as<Indices>(dataset, H5T_NATIVE_INT32);
   // HDF5 would clip what does not fit
   const auto wide = read_as<std::vector<std::int64_t>>(dataset, H5T_NATIVE_INT64);
-  std::vector<Index> result(wide.size());
+  Indices result(wide.size());
   for (std::size_t k = 0; k < wide.size(); ++k) {
     if (wide[k] < std::numeric_limits<Index>::min() ||
         wide[k] > std::numeric_limits<Index>::max()) {
@@ -214,17 +225,14 @@ std::vector<Index> read_indices(const Group& group, const std::string& name) {
 }
 
 template <class Number>
-std::vector<Number> read_numbers(const Group& group, const std::string& name) {
-  if constexpr (std::is_integral_v<Number>) {
-    return read_indices(group, name);
-  } else {
-    return read_doubles(group, name);
-  }
-}
-
-template <class Number>
 Number read_number(const Group& group, const std::string& name) {
-  const auto values = read_numbers<Number>(group, name);
+  const auto values = [&] {
+    if constexpr (std::is_integral_v<Number>) {
+      return read_indices<std::vector<Number>>(group, name);
+    } else {
+      return read_doubles<std::vector<Number>>(group, name);
+    }
+  }();
   if (values.size() != 1) {
     fail(group.child(name), "has " + std::to_string(values.size()) + " entries, expected one");
   }
@@ -241,8 +249,8 @@ std::string read_text(const Group& group, const std::string& name) {
   if (H5Tget_class(type.id()) != H5T_STRING) fail(path, "does not hold text");
   if (H5Sget_simple_extent_npoints(space.id()) != 1) fail(path, "does not hold one text");
   const std::size_t length = H5Tget_size(type.id());
-  const double stored = stored_bytes(dataset.id(), path);
-  require_chunks(dataset.id(), 1, static_cast<double>(length), path);
+  const Handle properties = properties_of(dataset.id(), path);
+  require_chunks(properties, dataset.id(), 1, static_cast<double>(length), path);
   if (H5Tis_variable_str(type.id()) > 0) {
     char* value = nullptr;
     if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
@@ -252,7 +260,7 @@ std::string read_text(const Group& group, const std::string& name) {
     H5Dvlen_reclaim(type.id(), space.id(), H5P_DEFAULT, &value);
     return text;
   }
-  if (length > small_dataset && static_cast<double>(length) > stored) {
+  if (length > small_dataset && static_cast<double>(length) > stored_bytes(dataset.id())) {
     fail(path,
          "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
   }
@@ -264,46 +272,45 @@ std::string read_text(const Group& group, const std::string& name) {
   return text;
 }
 
-template <class Number>
-void shorten(std::vector<Number>& values, std::size_t length, const std::string& where) {
+template <class Values>
+void shorten(Values& values, std::size_t length, const std::string& where) {
   if (values.size() < length) {
     fail(where,
          "has " + std::to_string(values.size()) + " entries, expected " + std::to_string(length));
   }
-  values.resize(length);
+  if constexpr (requires { values.shorten(length); }) {
+    values.shorten(length);
+  } else {
+    values.resize(length);
+  }
 }
 
 constexpr Index nz_csc = -1;
 constexpr Index nz_csr = -2;
 constexpr Index nz_dense = -3;
 
-/// An absent text is empty, or absent_text where the difference is asked for.
-std::string read_text_if_there(const Group& group, const std::string& name, Validation validation) {
-  if (group.has(name)) return read_text(group, name);
-  return validation == Validation::full ? std::string() : absent_text;
+std::string read_text_if_there(const Group& group, const std::string& name,
+                               const std::string& otherwise) {
+  return group.has(name) ? read_text(group, name) : otherwise;
 }
 
-std::optional<MatrixInfo> read_matrix_info(const Group& group, Validation validation) {
+std::optional<MatrixInfo> read_matrix_info(const Group& group, const std::string& otherwise) {
   if (!group.has("comment") && !group.has("conditioning") && !group.has("determinant") &&
       !group.has("rank")) {
     return {};
   }
   MatrixInfo info;
-  info.comment = read_text_if_there(group, "comment", validation);
+  info.comment = read_text_if_there(group, "comment", otherwise);
   if (group.has("conditioning")) info.conditioning = read_number<double>(group, "conditioning");
   if (group.has("determinant")) info.determinant = read_number<double>(group, "determinant");
   if (group.has("rank")) info.rank = read_number<Index>(group, "rank");
   return info;
 }
 
-/// How many pointers a compressed matrix has.
-std::size_t pointer_count(const Matrix& a) {
-  return static_cast<std::size_t>(a.storage == Storage::csc ? a.cols : a.rows) + 1;
-}
-
-/// The sizes of a matrix.
-Matrix read_matrix_outline(const Group& group) {
-  Matrix a;
+/// The sizes of a matrix; A is Matrix or RawMatrix.
+template <class A>
+A read_matrix_outline(const Group& group) {
+  A a;
   a.rows = read_number<Index>(group, "m");
   a.cols = read_number<Index>(group, "n");
   if (a.rows < 0) fail(group.child("m"), "is negative");
@@ -311,56 +318,58 @@ Matrix read_matrix_outline(const Group& group) {
   return a;
 }
 
-Matrix read_matrix(const Group& parent, const std::string& name, Validation validation) {
+template <class A>
+A read_matrix(const Group& parent, const std::string& name) {
+  constexpr bool raw = std::is_same_v<A, RawMatrix>;
   const Handle handle = open_group(parent, name);
   const Group group{handle.id(), parent.child(name)};
-  Matrix a = read_matrix_outline(group);
+  A a = read_matrix_outline<A>(group);
+  const auto rows = static_cast<std::size_t>(a.rows);
+  const auto cols = static_cast<std::size_t>(a.cols);
   const Index nz = read_number<Index>(group, "nz");
-  a.x = read_numbers<double>(group, "x");
+  const auto read_entries = [&] { a.x = read_doubles<decltype(a.x)>(group, "x"); };
   if (nz == nz_dense) {
     a.storage = Storage::dense;
-    const auto entries = static_cast<std::size_t>(a.rows) * static_cast<std::size_t>(a.cols);
-    if (validation == Validation::none) shorten(a.x, entries, group.child("x"));
-  } else {
-    a.p = read_numbers<Index>(group, "p");
-    a.i = read_numbers<Index>(group, "i");
+    read_entries();
+    if constexpr (raw) shorten(a.x, rows * cols, group.child("x"));
+  } else if (nz >= nz_csr) {
+    a.p = read_indices<decltype(a.p)>(group, "p");
+    a.i = read_indices<decltype(a.i)>(group, "i");
+    read_entries();
     auto entries = static_cast<std::size_t>(std::max(nz, 0));
     if (nz >= 0) {
       a.storage = Storage::triplet;
       shorten(a.p, entries, group.child("p"));
-    } else if (nz == nz_csc || nz == nz_csr) {
+    } else {
       a.storage = nz == nz_csc ? Storage::csc : Storage::csr;
-      if (validation == Validation::none) {
-        shorten(a.p, pointer_count(a), group.child("p"));
-        entries = std::max<std::size_t>(a.i.size(), a.x.size());
+      if constexpr (raw) {
+        shorten(a.p, (nz == nz_csc ? cols : rows) + 1, group.child("p"));
+        entries = std::max(a.i.size(), a.x.size());
       } else {
         if (a.p.empty() || a.p.back() < 0) fail(group.child("p"), "has no valid last pointer");
         entries = static_cast<std::size_t>(a.p.back());
       }
-    } else {
-      fail(group.child("nz"), std::to_string(nz) +
-                                  " is no storage: expected the number of triplets, "
-                                  "-1 (CSC), -2 (CSR) or -3 (dense)");
     }
     // nzmax may leave room at the end
     shorten(a.i, entries, group.child("i"));
     shorten(a.x, entries, group.child("x"));
+  } else {
+    fail(group.child("nz"), std::to_string(nz) +
+                                " is no storage: expected the number of triplets, "
+                                "-1 (CSC), -2 (CSR) or -3 (dense)");
   }
-  a.info = read_matrix_info(group, validation);
+  a.info = read_matrix_info(group, raw ? absent_text : std::string());
   return a;
 }
 
-Vector read_vector(const Group& group, const std::string& name) {
-  return read_as<Vector>(open_numbers(group, name, false), H5T_NATIVE_DOUBLE);
-}
-
-ProblemInfo read_info(const Group& parent, Validation validation) {
+/// `otherwise` is the value of a text that is not there.
+ProblemInfo read_info(const Group& parent, const std::string& otherwise) {
   ProblemInfo info;
   std::optional<Handle> handle;
   if (parent.has("info")) handle.emplace(open_group(parent, "info"));
   for_each_field<ProblemInfo>([&](const auto& field) {
     const Group group{handle ? handle->id() : -1, parent.child("info")};
-    info.*field.member = read_text_if_there(group, std::string(field.name), validation);
+    info.*field.member = read_text_if_there(group, std::string(field.name), otherwise);
   });
   return info;
 }
@@ -380,7 +389,7 @@ void for_each_stored_field(const Group& group, const Visitor& visit) {
 }
 
 template <class P>
-P read_fields(const Group& root, Validation validation) {
+P read_fields(const Group& root) {
   const Handle handle = open_group(root, group_name<P>());
   const Group group{handle.id(), root.child(group_name<P>())};
   P problem;
@@ -388,14 +397,14 @@ P read_fields(const Group& root, Validation validation) {
                            [&]<class Member>(const Field<P, Member>& field, const Group& place) {
                              const std::string name(field.name);
                              if constexpr (std::is_same_v<Member, Matrix>) {
-                               problem.*field.member = read_matrix(place, name, validation);
+                               problem.*field.member = read_matrix<Matrix>(place, name);
                              } else if constexpr (std::is_same_v<Member, Vector>) {
-                               problem.*field.member = read_vector(place, name);
+                               problem.*field.member = read_doubles<Vector>(place, name);
                              } else {
                                problem.*field.member = read_number<Member>(place, name);
                              }
                            });
-  problem.info = read_info(group, validation);
+  problem.info = read_info(group, "");
   return problem;
 }
 
@@ -409,26 +418,45 @@ void require_contacts(P& outline, std::size_t stored) {
   count_contacts(outline);
 }
 
-/// Throws where a vector has not the length that the matrices give it.
 template <class P>
-void require_lengths(const P& problem) {
+RawProblem read_raw_fields(const Group& root) {
+  const Handle handle = open_group(root, group_name<P>());
+  const Group group{handle.id(), root.child(group_name<P>())};
+  RawProblem raw;
   P outline;
-  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
-    if constexpr (std::is_same_v<Member, Matrix>) {
-      (outline.*field.member).rows = (problem.*field.member).rows;
-      (outline.*field.member).cols = (problem.*field.member).cols;
-    } else if constexpr (!std::is_same_v<Member, Vector>) {
-      outline.*field.member = problem.*field.member;
-    }
-  });
-  require_contacts(outline, static_cast<std::size_t>(problem.mu.size()));
+  std::size_t contacts = 0;
+  for_each_stored_field<P>(group,
+                           [&]<class Member>(const Field<P, Member>& field, const Group& place) {
+                             const std::string name(field.name);
+                             if constexpr (std::is_same_v<Member, Matrix>) {
+                               RawMatrix a = read_matrix<RawMatrix>(place, name);
+                               (outline.*field.member).rows = a.rows;
+                               (outline.*field.member).cols = a.cols;
+                               raw.members.push_back({field.name, std::move(a)});
+                             } else if constexpr (std::is_same_v<Member, Vector>) {
+                               auto values = read_doubles<MallocArray<double>>(place, name);
+                               if (field.member == &P::mu) contacts = values.size();
+                               raw.members.push_back({field.name, std::move(values)});
+                             } else {
+                               outline.*field.member = read_number<Member>(place, name);
+                               raw.members.push_back({field.name, outline.*field.member});
+                             }
+                           });
+  raw.info = read_info(group, absent_text);
+
+  // vectors have the lengths that the matrices give them
+  require_contacts(outline, contacts);
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
     if constexpr (std::is_same_v<Member, Vector>) {
-      detail::require_size(static_cast<Index>((problem.*field.member).size()),
-                           outline.size(field.rows), field.rows,
+      std::size_t size = 0;
+      for (const auto& [name, value] : raw.members) {
+        if (name == field.name) size = std::get<MallocArray<double>>(value).size();
+      }
+      detail::require_size(static_cast<Index>(size), outline.size(field.rows), field.rows,
                            "/" + group_name<P>() + "/" + field_path(field), "entries");
     }
   });
+  return raw;
 }
 
 template <class P>
@@ -444,7 +472,7 @@ P read_sizes(const Group& root) {
           if (field.member == &P::mu) contacts = open_numbers(place, name, false).size;
         } else if constexpr (std::is_same_v<Member, Matrix>) {
           const Handle matrix = open_group(place, name);
-          problem.*field.member = read_matrix_outline({matrix.id(), place.child(name)});
+          problem.*field.member = read_matrix_outline<Matrix>({matrix.id(), place.child(name)});
         } else {
           problem.*field.member = read_number<Member>(place, name);
         }
@@ -460,7 +488,7 @@ Solution read_solution_group(const Group& parent, const std::string& name) {
   for_each_field<Solution>([&](const auto& field) {
     const std::string member(field.name);
     if (field.presence == Presence::required || group.has(member)) {
-      solution.*field.member = read_vector(group, member);
+      solution.*field.member = read_doubles<Vector>(group, member);
     }
   });
   return solution;
@@ -539,15 +567,18 @@ auto in_file(const std::string& path, const Body& body) {
 
 /// Smaller datasets are not worth a chunk and a filter.
 constexpr std::size_t chunked_from = 64;
-constexpr std::size_t chunk_entries = std::size_t{1} << 16;
+/// What a reader's cache of one dataset holds, by HDF5's default.
+constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 /// What the index of a dataset in chunks takes, in bytes.
-constexpr std::size_t index_bytes = 250;
+constexpr std::size_t index_bytes = 190;
+/// What filters are tried on.
+constexpr std::size_t sample_entries = std::size_t{1} << 16;
 /// Datasets up to this many bytes lie in their own header.
 constexpr std::size_t compact_bytes = 4096;
 /// Groups of up to this many members keep them in their own header: all of ours do.
 constexpr unsigned compact_links = 32;
 /// Chunks under a node of the index of a dataset, halved; few datasets have more than one.
-constexpr unsigned index_rank = 2;
+constexpr unsigned index_rank = 1;
 
 void check(herr_t status, const std::string& where) {
   if (status < 0) fail(where, "cannot be written by HDF5");
@@ -598,7 +629,7 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
   H5Pset_dset_no_attrs_hint(layout.id(), true);
 #endif
   if (filter != Filter::none) {
-    const hsize_t chunk = std::min(array.size, chunk_entries);
+    const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
     H5Pset_chunk(layout.id(), 1, &chunk);
     if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
     H5Pset_deflate(layout.id(), static_cast<unsigned>(compression));
@@ -615,12 +646,12 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
   return dataset;
 }
 
-/// The filter that makes an array smallest, found by trying them on its first chunk. Shuffling
+/// The filter that makes an array smallest, found by trying them on its beginning. Shuffling
 /// gathers the bytes that numbers of one size share, but hides numbers that come again.
 Filter best_filter(const Target& group, const Array& array) {
   if (array.size < chunked_from || group.compression == 0) return Filter::none;
   Array sample = array;
-  sample.size = std::min(array.size, chunk_entries);
+  sample.size = std::min(array.size, sample_entries);
   Filter best = Filter::none;
   std::size_t least = sample.bytes();
   for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
@@ -884,7 +915,7 @@ class MemoryFile {
     const Handle properties(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
     keep_small(properties.id());
     check(H5Pset_istore_k(properties.id(), index_rank), "");
-    check(H5Pset_sym_k(properties.id(), 1, 2), "");
+    check(H5Pset_sym_k(properties.id(), 1, 1), "");
     check(H5Pset_local_heap_size_hint(properties.id(), 64), "");
     Handle file(H5Fcreate(name, H5F_ACC_TRUNC, properties.id(), access), H5Fclose);
     if (!file.ok()) fail("", "cannot be created by HDF5");
@@ -950,7 +981,7 @@ std::string kind_to_read(const Group& root, std::string_view asked) {
 
 }  // namespace
 
-Problem read_problem(const std::string& path, std::string_view kind, Validation validation) {
+Problem read_problem(const std::string& path, std::string_view kind) {
   const Session session;
   return in_file(path, [&] {
     const Handle file = open_file(path);
@@ -959,13 +990,23 @@ Problem read_problem(const std::string& path, std::string_view kind, Validation 
     Problem problem;
     for_each_formulation([&]<class P>(std::type_identity<P>) {
       if (wanted != P::kind) return;
-      P read = read_fields<P>(root, validation);
-      if (validation == Validation::full) {
-        validate(read);
-      } else {
-        require_lengths(read);
-      }
+      P read = read_fields<P>(root);
+      validate(read);
       problem = std::move(read);
+    });
+    return problem;
+  });
+}
+
+RawProblem read_raw_problem(const std::string& path, std::string_view kind) {
+  const Session session;
+  return in_file(path, [&] {
+    const Handle file = open_file(path);
+    const Group root{file.id(), "/"};
+    const std::string wanted = kind_to_read(root, kind);
+    RawProblem problem;
+    for_each_formulation([&]<class P>(std::type_identity<P>) {
+      if (wanted == P::kind) problem = read_raw_fields<P>(root);
     });
     return problem;
   });

@@ -12,9 +12,14 @@
 // HDF5 is not thread-safe; a lock of the library's own makes these functions so.
 #pragma once
 
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <new>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "problem.hpp"
@@ -33,22 +38,70 @@ struct WriteOptions {
   bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
   bool append = false;   ///< keep what the file holds: the other problems, the other guesses
   bool replace = false;  ///< what is there already gives way; false: it is an error
-  int compression = 4;   ///< level of deflate, 0 (none) to 9
+  int compression = 6;   ///< level of deflate, 0 (none) to 9
 };
 
-/// Whether the data of a problem is checked when it is read. `none` checks only that the arrays
-/// have the lengths that their matrix declares, and keeps room that nzmax leaves at their end.
-enum class Validation { full, none };
-
-/// The value of a text that a file does not have, where it is read without validation; writing it
-/// so leaves it out. No text of a file can hold a NUL.
+/// The value of a text that a file does not have, where it is read raw; writing it without
+/// validation leaves it out. No text of a file can hold a NUL.
 inline const std::string absent_text(1, '\0');
+
+/// Numbers in memory from malloc, which C code takes over as it is.
+template <class Number>
+class MallocArray {
+ public:
+  MallocArray() = default;
+  /// Not set to zero. There is memory even for no number.
+  explicit MallocArray(std::size_t size)
+      : data_(static_cast<Number*>(std::malloc(std::max<std::size_t>(size, 1) * sizeof(Number)))),
+        size_(size) {
+    if (data_ == nullptr) throw std::bad_alloc();
+  }
+  [[nodiscard]] Number* data() { return data_.get(); }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  Number& operator[](std::size_t k) { return data_.get()[k]; }
+  /// Forgets what is beyond `size`, which is no more than there is.
+  void shorten(std::size_t size) { size_ = size; }
+  /// The memory is the caller's, to be freed.
+  Number* release() { return data_.release(); }
+
+ private:
+  struct Free {
+    void operator()(Number* data) const { std::free(data); }
+  };
+  std::unique_ptr<Number[], Free> data_;
+  std::size_t size_ = 0;
+};
+
+/// A matrix as a file has it: as Matrix, but i and x may go on after the last entry, since nzmax
+/// leaves room there.
+struct RawMatrix {
+  Storage storage = Storage::csr;
+  Index rows = 0;
+  Index cols = 0;
+  MallocArray<Index> p;
+  MallocArray<Index> i;
+  MallocArray<double> x;
+  std::optional<MatrixInfo> info;
+};
+
+/// A problem as a file has it: its arrays have the lengths that the matrices declare, nothing else
+/// is checked.
+struct RawProblem {
+  struct Member {
+    std::string_view name;  ///< of the field
+    std::variant<Index, RawMatrix, MallocArray<double>> value;
+  };
+  std::vector<Member> members;  ///< those that the file has
+  ProblemInfo info;             ///< of texts that may be absent_text
+};
 
 Contents read_contents(const std::string& path);
 
 /// The problem in the file, validated. `kind` chooses where there are several.
-Problem read_problem(const std::string& path, std::string_view kind = {},
-                     Validation validation = Validation::full);
+Problem read_problem(const std::string& path, std::string_view kind = {});
+
+/// The problem of this kind, without validation, and without a copy of its arrays.
+RawProblem read_raw_problem(const std::string& path, std::string_view kind);
 
 /// The problem that the solution and the guesses of the file belong to, its sizes alone: matrices
 /// have no entries, mu is zero. It is the global one where there are several, as in libfclib 3.1.

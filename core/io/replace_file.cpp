@@ -4,10 +4,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <utility>
 
 #include "error.hpp"
 
@@ -29,8 +31,10 @@ namespace fs = std::filesystem;
 class Descriptor {
  public:
   explicit Descriptor(int id) : id_(id) {}
+  Descriptor(Descriptor&& other) noexcept : id_(std::exchange(other.id_, -1)) {}
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
+  Descriptor& operator=(Descriptor&&) = delete;
   ~Descriptor() {
     if (id_ >= 0) ::close(id_);
   }
@@ -53,6 +57,62 @@ mode_t mode_of(const std::string& path, const std::string& target) {
   ::umask(mask);
   return 0666U & ~mask;
 }
+
+/// A new file beside the target, to be renamed over it.
+class Temporary {
+ public:
+  Temporary(const std::string& path, const std::string& target)
+      : path_(path), target_(target), name_(target + ".XXXXXX"), file_(open()) {
+    if (file_.id() < 0) fail_in_system(path_, "cannot be written");
+  }
+  ~Temporary() {
+    if (named_) ::unlink(name_.c_str());
+  }
+  Temporary(const Temporary&) = delete;
+  Temporary& operator=(const Temporary&) = delete;
+
+  [[nodiscard]] int id() const { return file_.id(); }
+
+  void take_the_place() {
+    if (!named_) give_name();
+    if (::rename(name_.c_str(), target_.c_str()) != 0) fail_in_system(path_, "cannot be written");
+    named_ = false;
+  }
+
+ private:
+  /// Without a name, if that can be: such a file goes with its process.
+  Descriptor open() {
+#ifdef O_TMPFILE
+    const fs::path folder = fs::path(target_).parent_path();
+    const int id = ::open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC,
+                          S_IRUSR | S_IWUSR);
+    if (id >= 0 && ::access(link_to(id).c_str(), F_OK) == 0) return Descriptor(id);
+    if (id >= 0) ::close(id);
+#endif
+    Descriptor file(::mkstemp(name_.data()));
+    named_ = file.id() >= 0;
+    return file;
+  }
+
+  /// A name that no file has, since a link replaces none.
+  void give_name() {
+    static std::atomic<unsigned> count{0};
+    do {
+      name_ = target_ + "." + std::to_string(::getpid()) + "-" + std::to_string(++count);
+      named_ = ::linkat(AT_FDCWD, link_to(id()).c_str(), AT_FDCWD, name_.c_str(),
+                        AT_SYMLINK_FOLLOW) == 0;
+    } while (!named_ && errno == EEXIST);
+    if (!named_) fail_in_system(path_, "cannot be written");
+  }
+
+  static std::string link_to(int id) { return "/proc/self/fd/" + std::to_string(id); }
+
+  const std::string& path_;
+  const std::string& target_;
+  std::string name_;
+  bool named_ = false;
+  Descriptor file_;
+};
 
 }  // namespace
 
@@ -88,24 +148,16 @@ std::string read_file(const std::string& path) {
 void replace_file(const std::string& path, std::string_view bytes) {
   const std::string target = resolve_links(path);
   const mode_t mode = mode_of(path, target);
-  std::string temporary = target + ".XXXXXX";
-  const Descriptor file(::mkstemp(temporary.data()));
-  if (file.id() < 0) fail_in_system(path, "cannot be written");
-  try {
-    ::fchmod(file.id(), mode);
-    while (!bytes.empty()) {
-      const ssize_t count = ::write(file.id(), bytes.data(), bytes.size());
-      if (count < 0 && errno == EINTR) continue;
-      if (count <= 0) fail_in_system(path, "cannot be written");
-      bytes.remove_prefix(static_cast<std::size_t>(count));
-    }
-    if (::fsync(file.id()) != 0 || ::rename(temporary.c_str(), target.c_str()) != 0) {
-      fail_in_system(path, "cannot be written");
-    }
-  } catch (...) {
-    ::unlink(temporary.c_str());
-    throw;
+  Temporary file(path, target);
+  ::fchmod(file.id(), mode);
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(file.id(), bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail_in_system(path, "cannot be written");
+    bytes.remove_prefix(static_cast<std::size_t>(count));
   }
+  if (::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");
+  file.take_the_place();
 }
 
 }  // namespace fclib

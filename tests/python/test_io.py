@@ -235,6 +235,20 @@ def test_large_datasets_come_back_through_chunks_and_compression(tmp_path: Path)
     assert_same(planted.problem, fclib.read(path))
 
 
+def test_datasets_of_many_chunks_come_back(tmp_path: Path) -> None:
+    m = 900
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=(m, m))
+    problem = fclib.LocalProblem(W=sp.csr_array(x), q=rng.normal(size=m), mu=[0.5] * (m // 3))
+    path = tmp_path / "large.hdf5"
+    fclib.write(path, problem)
+    with h5py.File(path) as file:
+        dataset = file["fclib_local/W/x"]
+        assert dataset.chunks[0] * 6 < dataset.size
+        np.testing.assert_array_equal(dataset[()], x.ravel())
+    assert_same(problem, fclib.read(path))
+
+
 # ---- the layout, seen by another reader
 
 

@@ -1,0 +1,145 @@
+"""Files of ours beside those of libfclib 3.1: how large, and how long a read takes, in one run.
+
+    .venv/bin/python benchmarks/files_against_libfclib.py FILE... [--limit 1.5] [--csv OUT]
+
+Each problem (with its solution and guesses) is written by both libraries, and each library reads
+both files: the same numbers, bit by bit, or the run fails. 3.1 never compresses. Times are CPU
+times of a read through the C interface with the file in the system's cache, the least of many that
+the libraries take by turns in one process. Needs a C compiler, our C library (--ours, by default
+build/libfclib.so.0) and that of 3.1 (--theirs, by default the system's, Debian's libfclib0).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import ctypes
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PROGRAM = Path(__file__).with_suffix(".c")
+UNKNOWN_TO_3_1 = 3  # exit status: a kind of problem that 3.1 has no layout for
+COLUMNS = (
+    "bytes_3_1",
+    "bytes_ours",
+    "size_ratio",
+    "read_3_1_ms",
+    "ours_own",
+    "ours_of_3_1",
+    "ours_same",
+)
+
+
+def system_library() -> Path | None:
+    """The libfclib.so.0 of the system, if it is not ours."""
+    compiler = shutil.which("cc")
+    if compiler is None:
+        return None
+    found = subprocess.run(
+        [compiler, "-print-file-name=libfclib.so.0"], capture_output=True, text=True
+    )
+    path = Path(found.stdout.strip())
+    if not path.is_absolute():
+        return None
+    # 3.1 has no such function
+    return None if hasattr(ctypes.CDLL(str(path)), "fclib_last_error") else path
+
+
+def figures(
+    program: Path, libraries: list[Path], path: Path, folder: Path, limit: float
+) -> dict[str, float] | str:
+    """What is measured of a file, or why it is not."""
+    theirs, ours = folder / "theirs.hdf5", folder / "ours.hdf5"
+    copied = subprocess.run(
+        [program, "copy", *libraries, path, theirs, ours], capture_output=True, text=True
+    )
+    if copied.returncode == UNKNOWN_TO_3_1:
+        return "3.1 does not know this kind of problem"
+    if copied.returncode:
+        return "cannot be copied: " + copied.stderr.strip()
+    timed = subprocess.run(
+        [program, "time", *libraries, theirs, ours, str(limit)], capture_output=True, text=True
+    )
+    if timed.returncode:
+        sys.exit(f"{path}: {timed.stderr.strip()}")
+    own, ours_own, ours_of_theirs, theirs_of_ours = map(float, timed.stdout.split())
+    sizes = theirs.stat().st_size, ours.stat().st_size
+    return {
+        "bytes_3_1": sizes[0],
+        "bytes_ours": sizes[1],
+        "size_ratio": sizes[1] / sizes[0],
+        "read_3_1_ms": 1e3 * own,
+        "ours_own": ours_own / own,
+        "ours_of_3_1": ours_of_theirs / own,
+        "ours_same": ours_own / theirs_of_ours,
+    }
+
+
+def line(name: str, row: dict[str, float]) -> str:
+    return (
+        f"{name[:44]:44} {row['bytes_3_1']:9.0f} {row['bytes_ours']:9.0f} "
+        f"{row['size_ratio']:6.1%} {row['read_3_1_ms']:8.3f} {row['ours_of_3_1']:8.2f} "
+        f"{row['ours_same']:8.2f} {row['ours_own']:8.2f}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("files", nargs="+", type=Path)
+    parser.add_argument("--ours", type=Path, default=ROOT / "build" / "libfclib.so.0")
+    parser.add_argument("--theirs", type=Path, default=None)
+    parser.add_argument("--limit", type=float, default=1.5, help="CPU time on a file [s]")
+    parser.add_argument("--csv", type=Path)
+    options = parser.parse_args()
+
+    theirs = options.theirs or system_library()
+    if theirs is None:
+        print("skipped: libfclib 3.1 or a C compiler is not installed")
+        return
+    if not options.ours.is_file():
+        sys.exit(f"{options.ours} is missing: cmake --build build --target fclib")
+
+    rows: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        program = folder / "program"
+        subprocess.run(
+            ["cc", "-O1", f"-I{ROOT / 'include'}", "-o", program, PROGRAM, "-ldl"], check=True
+        )
+        print(
+            f"{'':44} {'bytes':>9} {'bytes':>9} {'':>6} {'ms':>8}  CPU time of a read, ours : 3.1\n"
+            f"{'':44} {'3.1':>9} {'ours':>9} {'ratio':>6} {'3.1':>8} "
+            f"{'its file':>8} {'our file':>8} {'each own':>8}"
+        )
+        for path in options.files:
+            found = figures(program, [theirs, options.ours], path, folder, options.limit)
+            if isinstance(found, str):
+                print(f"{path.name[:44]:44} {found}")
+                continue
+            rows[path.name] = found
+            print(line(path.name, found), flush=True)
+    if not rows:
+        return
+
+    def of(name: str) -> list[float]:
+        return [row[name] for row in rows.values()]
+
+    medians = {name: statistics.median(of(name)) for name in COLUMNS}
+    print(line("median", medians))
+    total = sum(of("bytes_ours")), sum(of("bytes_3_1"))
+    print(f"total of {len(rows)} files: {total[0]:.0f} of {total[1]:.0f} bytes, ", end="")
+    print(f"{total[0] / total[1]:.1%}")
+    if options.csv:
+        with options.csv.open("w", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(["file", *COLUMNS])
+            writer.writerows([name, *row.values()] for name, row in rows.items())
+
+
+if __name__ == "__main__":
+    main()

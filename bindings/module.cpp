@@ -165,7 +165,8 @@ std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
   if (callback.is_none()) return {};
   return [&callback](const Progress& progress) {
     const nb::gil_scoped_acquire gil;
-    const nb::object answer = callback(progress.iteration, progress.error, progress.time);
+    const nb::object answer =
+        callback(progress.iteration, progress.error, progress.time, std::string(progress.stage));
     return answer.is_none() || nb::cast<bool>(answer);
   };
 }
@@ -234,17 +235,29 @@ void bind_solvers(nb::module_& m) {
       nb::rv_policy::reference,
       "The solver of this name. Raises OptionError, with the known names, where there is none.");
 
+  nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
+      .def_prop_ro("name", [](const Stage& s) { return std::string(s.name); })
+      .def_ro("calls", &Stage::calls, "how often it was entered: once for each island in need")
+      .def_ro("solved", &Stage::solved, "of these, how many it brought to the tolerance")
+      .def_ro("iterations", &Stage::iterations)
+      .def_ro("factorisations", &Stage::factorisations)
+      .def_ro("time", &Stage::time, "[s] wall clock")
+      .def("__repr__", [](const Stage& s) {
+        return "<Stage " + std::string(s.name) + ": solved " + std::to_string(s.solved) + " of " +
+               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
+      });
   nb::class_<Result>(m, "Result", "What fclib.solve returns.")
       .def_ro("solution", &Result::solution)
       .def_prop_ro(
           "status", [](const Result& r) { return std::string(name_of(r.status)); },
-          "converged, iteration_limit, time_limit, diverged, inaccurate or interrupted")
+          "converged, iteration_limit, time_limit, diverged, inaccurate, stalled or interrupted")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
       .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
+      .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
       .def("__repr__", [](const Result& r) {
         char text[160];
         std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",

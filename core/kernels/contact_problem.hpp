@@ -12,7 +12,8 @@ template <class Cone>
 struct ContactProblem {
   using Vec = typename Cone::Vec;
 
-  ContactProblem(const ContactMatrix<Cone::dim>& block, const Cone& cone) : projected(block, cone) {}
+  ContactProblem(const ContactMatrix<Cone::dim>& block, const Cone& cone)
+      : projected(block, cone) {}
 
   bool solve_exact(const Vec&, Vec&) { return false; }
 

@@ -150,8 +150,7 @@ void CoupledSystem::fill_contacts() {
   const double* blocks = D_.data();
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Eigen::Map<const Block> block(blocks + std::ptrdiff_t{D * D} * a);
-    const double size =
-        block.norm() * problem_.W.template diagonal_block<D>(a).norm();
+    const double size = block.norm() * problem_.W.template diagonal_block<D>(a).norm();
     row_scale_[a] = 1.0 / std::max(1.0, size);
   }
   const std::int64_t* place = place_.data();

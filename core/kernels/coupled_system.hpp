@@ -52,12 +52,12 @@ class CoupledSystem {
   Multifrontal lu_;
   std::vector<double> D_;
   std::vector<double> values_;
-  Vector row_scale_;                      // of each contact
-  std::vector<std::int64_t> place_;       // of each block of W in the values, in W's order
-  std::vector<std::int64_t> diagonal_;    // of each diagonal block
+  Vector row_scale_;                    // of each contact
+  std::vector<std::int64_t> place_;     // of each block of W in the values, in W's order
+  std::vector<std::int64_t> diagonal_;  // of each diagonal block
   bool on_bodies_ = false;
-  std::vector<double> fixed_;             // M in the pattern of the bodies
-  std::vector<std::int64_t> scatter_;     // of each contact's H D H^T
+  std::vector<double> fixed_;          // M in the pattern of the bodies
+  std::vector<std::int64_t> scatter_;  // of each contact's H D H^T
   std::int64_t factorisations_ = 0;
   Vector rhs_, residual_, product_, body_;
   Vector zero_;

@@ -11,9 +11,9 @@
 // Mehrotra's predictor and corrector choose g. Without the term (`associated`) this is the convex
 // problem of an associated flow rule.
 //
-// Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact mechanics
-// using interior point algorithm" (2023), for the convex part; the shift in the Newton system is
-// ours.
+// Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
+// mechanics using interior point algorithm" (2023), for the convex part; the shift in the Newton
+// system is ours.
 //
 // All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
 #pragma once
@@ -30,10 +30,11 @@ namespace fclib {
 
 struct InteriorPointRules {
   bool associated = false;
-  double step_cap = 0.95;    ///< highest share of the step to the boundary
-  double delta = 1e-6;       ///< regularisation at first
-  bool delta_follows = true; ///< delta <= 1e4 tau
+  double step_cap = 0.95;     ///< highest share of the step to the boundary
+  double delta = 1e-6;        ///< regularisation at first
+  bool delta_follows = true;  ///< delta <= 1e4 tau
   int max_iterations = 60;
+  int patience = 15;  ///< iterations in which the error must halve
 };
 
 template <int D>
@@ -69,6 +70,8 @@ class InteriorPoint {
     const double count = static_cast<double>(nc);
     start();
     double delta = rules.delta;
+    double least = std::numeric_limits<double>::infinity();
+    int least_at = 0;
     for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
       evaluate(rules.associated);
       physical_ = r_ * (size_q_ / omega_);
@@ -77,6 +80,11 @@ class InteriorPoint {
           std::sqrt(natural_map_squared<Cone>(velocity_, physical_, problem_.friction)) /
           problem_.scale;
       if (report(error, physical_)) return;
+      if (error < 0.5 * least) {
+        least = error;
+        least_at = iterations_;
+      }
+      if (iterations_ - least_at > rules.patience) return;
       if (!(tau_ > 1e-15)) return;
       if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
       delta = std::clamp(delta, 1e-8, 1.0);
@@ -87,10 +95,9 @@ class InteriorPoint {
       for (Index a = 0; a < nc; ++a) {
         g_.template segment<D>(D * a) = -lambda_.template segment<D>(D * a);
       }
-      if (!direction(delta, rules.associated)) return;
+      if (!direction(delta)) return;
       const double affine_step = std::min(1.0, longest());
-      const double affine_gap =
-          (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
+      const double affine_gap = (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
       double sigma = std::clamp(std::pow(affine_gap / tau_, 3), 1e-6, 1.0);
       if (residual_ > 1e4 * tau_) {
         sigma = 1;
@@ -104,7 +111,8 @@ class InteriorPoint {
       for (int attempt = 0; attempt < 3; ++attempt) {
         if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
         correct(sigma, attempt == 0);
-        if (!direction(delta, rules.associated)) return;
+        if (attempt == 0 && !rules.associated) correct_shift(affine_step);
+        if (!direction(delta)) return;
         step = std::min(1.0, cap * longest());
         if (step >= 0.3) break;
       }
@@ -139,7 +147,8 @@ class InteriorPoint {
       y_[D * a] = mu > 0 ? 1.0 / mu : 1.0;
     }
     q_ = problem_.q / size_q_;
-    for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_}) v->setZero(m);
+    for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_})
+      v->setZero(m);
     scaling_.resize(static_cast<std::size_t>(nc));
   }
 
@@ -216,7 +225,8 @@ class InteriorPoint {
         s.inverse /= beta * beta;
         if (!associated) {
           const double norm = y.template tail<T>().norm();
-          if (norm > 0) s.P.template block<1, T>(0, 1) = mu * y.template tail<T>().transpose() / norm;
+          if (norm > 0)
+            s.P.template block<1, T>(0, 1) = mu * y.template tail<T>().transpose() / norm;
         }
         n2.row(0) /= mu;
         n2.col(0) /= mu;
@@ -258,20 +268,33 @@ class InteriorPoint {
       }
       const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
       Vec solution;
-      solution[0] = (lambda[0] * target[0] -
-                     lambda.template tail<T>().dot(target.template tail<T>())) / determinant;
+      solution[0] =
+          (lambda[0] * target[0] - lambda.template tail<T>().dot(target.template tail<T>())) /
+          determinant;
       solution.template tail<T>() =
           (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
       g_.template segment<D>(D * a) = solution - lambda;
     }
   }
 
-  bool direction(double delta, bool /*associated*/) {
+  /// The shift mu ||y_T|| is convex: what the linearisation misses over the predictor's step is
+  /// added to R.
+  void correct_shift(double step) {
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const auto y = y_.template segment<T>(D * a + 1);
+      const double norm = y.norm();
+      if (!(norm > 0)) continue;
+      const ContactVector<T> dy = step * affine_y_.template segment<T>(D * a + 1);
+      residual_vector_[D * a] +=
+          problem_.friction.mu[a] * ((y + dy).norm() - norm - y.dot(dy) / norm);
+    }
+  }
+
+  bool direction(double delta) {
     for (Index a = 0; a < problem_.nc(); ++a) {
       const Scaling& s = scaling_[static_cast<std::size_t>(a)];
       dr_.template segment<D>(D * a) =
-          s.regular *
-          (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
+          s.regular * (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
     }
     system_.solve(dr_);
     if (!dr_.allFinite()) return false;
@@ -319,8 +342,9 @@ class InteriorPoint {
     double step = std::numeric_limits<double>::infinity();
     for (Index a = 0; a < problem_.nc(); ++a) {
       if (problem_.friction.mu[a] > 0) {
-        step = std::min({step, longest(x_.template segment<D>(D * a), dx_.template segment<D>(D * a)),
-                         longest(y_.template segment<D>(D * a), dy_.template segment<D>(D * a))});
+        step =
+            std::min({step, longest(x_.template segment<D>(D * a), dx_.template segment<D>(D * a)),
+                      longest(y_.template segment<D>(D * a), dy_.template segment<D>(D * a))});
       } else {
         if (dx_[D * a] < 0) step = std::min(step, -x_[D * a] / dx_[D * a]);
         if (dy_[D * a] < 0) step = std::min(step, -y_[D * a] / dy_[D * a]);

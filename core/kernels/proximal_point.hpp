@@ -21,11 +21,11 @@ namespace fclib {
 
 /// How kappa moves, and when to give up.
 struct ProximalRules {
-  double kappa = 100;      ///< at first
+  double kappa = 100;  ///< at first
   double kappa_max = 1e8;
-  double easy = 3;         ///< factor after at most 2 Newton steps; after at most 4, its share 2/3
-  double hard = 0.5;       ///< factor on failure
-  double patience = 1e3;   ///< the error may rise by this over the best before it is given up
+  double easy = 3;        ///< factor after at most 2 Newton steps; after at most 4, its share 2/3
+  double hard = 0.5;      ///< factor on failure
+  double patience = 1e3;  ///< the error may rise by this over the best before it is given up
   std::int64_t max_factorisations = 8;
 };
 
@@ -96,8 +96,8 @@ class ProximalPoint {
   double residual(double kappa, const Vector& p, const Vector& u, Vector& f, Vector& image) const {
     image.resize(p.size());
     for (Index a = 0; a < problem_.nc(); ++a) {
-      const Vec z = r_.template segment<D>(D * a) -
-                    kappa * inverse_size_[a] * u.template segment<D>(D * a);
+      const Vec z =
+          r_.template segment<D>(D * a) - kappa * inverse_size_[a] * u.template segment<D>(D * a);
       image.template segment<D>(D * a) = disk_map(Cone(problem_.friction, a), z);
     }
     f = p - image;

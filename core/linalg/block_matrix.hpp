@@ -79,8 +79,8 @@ void BlockMatrix::for_each_block(Visitor&& visit) const {
       }
     } else {
       for (std::size_t k = column_[col]; k < column_[col + 1]; ++k) {
-        visit(row_[k], col, Block(values_.data() + std::size_t{D * D} * k,
-                                  Eigen::OuterStride<>(D)));
+        visit(row_[k], col,
+              Block(values_.data() + std::size_t{D * D} * k, Eigen::OuterStride<>(D)));
       }
     }
   }

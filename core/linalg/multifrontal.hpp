@@ -62,10 +62,10 @@ class Multifrontal {
     std::vector<Index> children;
     std::vector<Index> to_parent;  // scalar offset in the parent's front of each update block
     // the factors
-    Dense diagonal;                 // L11 \ U11
-    Dense lower, upper;             // L21, U12
+    Dense diagonal;                // L11 \ U11
+    Dense lower, upper;            // L21, U12
     std::vector<Index> exchanged;  // rows, as in LAPACK
-    Dense update;                   // until the parent has taken it
+    Dense update;                  // until the parent has taken it
   };
 
   static bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny);

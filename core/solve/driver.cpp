@@ -34,12 +34,14 @@ struct Request {
 /// `q` is the one that the merit is relative to.
 template <class Judge>
 Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
-           const Request& request, const Solution& guess, const Judge& judge) {
+           const Request& request, const Solution& guess, const Judge& judge,
+           const Primal* primal = nullptr) {
   const double norm_q = q.norm();
   const Delassus reduced{.W = BlockMatrix(plain.W, plain.spacedim),
                          .q = plain.q,
                          .friction = friction,
-                         .scale = norm_q > 0 ? norm_q : 1.0};
+                         .scale = norm_q > 0 ? norm_q : 1.0,
+                         .primal = primal};
   Result result;
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
@@ -119,7 +121,8 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     return merit(problem, solution).error;
   };
   if (!is_mixed(local)) {
-    return run(local, friction_of(problem), local.q, request, guess, judge);
+    const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
+    return run(local, friction_of(problem), local.q, request, guess, judge, &primal);
   }
   const Elimination elimination(local);
   return run(elimination.plain(), friction_of(problem), local.q, request, guess,

@@ -14,9 +14,9 @@ struct Result {
   Solution solution;
   Status status = Status::diverged;
   std::int64_t iterations = 0;
-  double error = 0;    ///< Merit::error of the solution, on the problem as it was given
-  double cpu_s = 0;    ///< CPU time of the solver alone [s]
-  double setup_s = 0;  ///< CPU time of conversions, validation and merit [s]
+  double error = 0;           ///< Merit::error of the solution, on the problem as it was given
+  double cpu_s = 0;           ///< CPU time of the solver alone [s]
+  double setup_s = 0;         ///< CPU time of conversions, validation and merit [s]
   std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
   std::string solver;
 

@@ -54,8 +54,9 @@ constexpr std::string_view name_of(Status status) {
 /// A point of the convergence history.
 struct Progress {
   std::int64_t iteration = 0;
-  double error = 0;  ///< the solver's own, relative to Delassus::scale
-  double time = 0;   ///< wall clock since the solver started [s]
+  double error = 0;        ///< the solver's own, relative to Delassus::scale
+  double time = 0;         ///< wall clock since the solver started [s]
+  std::string_view stage;  ///< of a solver that chains others; empty for a plain one
 };
 
 /// What a caller asks of any solver.
@@ -76,10 +77,13 @@ class Monitor {
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
   [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
 
+  /// Names the stage of the reports to come.
+  void enter(std::string_view stage) { stage_ = stage; }
+
   /// The reason to stop at this iterate, if there is one.
   std::optional<Status> report(std::int64_t iteration, double error) {
     if (!(error < std::numeric_limits<double>::infinity())) return Status::diverged;
-    if (settings_.callback && !settings_.callback({iteration, error, elapsed()})) {
+    if (settings_.callback && !settings_.callback({iteration, error, elapsed(), stage_})) {
       return Status::interrupted;
     }
     if (error <= settings_.tolerance) return Status::converged;
@@ -110,6 +114,7 @@ class Monitor {
   }
 
   const Settings& settings_;
+  std::string_view stage_;
   Clock::time_point start_ = Clock::now();
   Clock::time_point last_poll_ = start_;
 };
@@ -117,7 +122,7 @@ class Monitor {
 /// A part of a solve, by a method of its own.
 struct Stage {
   std::string_view name;
-  std::int64_t calls = 0;  ///< how often it was entered: once for each island that needed it
+  std::int64_t calls = 0;   ///< how often it was entered: once for each island that needed it
   std::int64_t solved = 0;  ///< ... and brought it to the tolerance
   std::int64_t iterations = 0;
   std::int64_t factorisations = 0;

@@ -89,16 +89,23 @@ class Tracker {
 
   /// Counts iterations and tells of the error that is left. Whether to stop.
   bool report(std::int64_t iterations, double error) {
+    const bool first = iterations_ == 0 && !reported_;
     iterations_ += iterations;
-    if (!stopped_) stopped_ = monitor_.report(iterations_, std::sqrt(others_ + error * error));
+    reported_ = true;
+    if (!stopped_ && (iterations > 0 || first)) {
+      stopped_ = monitor_.report(iterations_, std::sqrt(others_ + error * error));
+    }
     return stopped_.has_value();
   }
+  /// Iterations that may still be made.
+  [[nodiscard]] std::int64_t left() const { return monitor_.max_iterations() - iterations_; }
 
   template <class F>
   void stage(std::string_view name, const F& run) {
     auto at = std::find_if(stages_.begin(), stages_.end(),
                            [&](const Stage& stage) { return stage.name == name; });
     if (at == stages_.end()) at = stages_.insert(stages_.end(), Stage{.name = name});
+    monitor_.enter(name);
     const auto place = at - stages_.begin();  // stages may be entered one inside another
     const auto start = std::chrono::steady_clock::now();
     const auto before = iterations_;
@@ -115,6 +122,7 @@ class Tracker {
   Monitor monitor_;
   double others_ = 0;
   std::int64_t iterations_ = 0;
+  bool reported_ = false;
   std::optional<Status> stopped_;
   std::vector<Stage> stages_;
 };
@@ -138,6 +146,7 @@ class Island {
     best_ = r_;
     error_ = error_of(u_, r_);
     tracker_.report(0, error_);
+    if (!whole && problem_.nc() >= 20) stage("conjugate gradients", [&] { conjugate_gradients(); });
     if (!done()) stage("gauss-seidel", [&] { return sweep(sweeps, whole); });
     if (!whole && !done()) continue_by_newton();
     r = best_;
@@ -180,7 +189,7 @@ class Island {
     double last = error_;
     std::int64_t k = 0;
     while (k < limit) {
-      const std::int64_t count = std::min(interval, limit - k);
+      const std::int64_t count = std::min({interval, limit - k, tracker_.left()});
       for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
       k += count;
       double error = error_of(u_, r_);
@@ -193,8 +202,8 @@ class Island {
       if (!whole && k >= 2 * interval && k >= limit / 4) {
         const double rate = std::log(last / error) / static_cast<double>(count);
         const double left = std::log(error / tolerance_) / rate;
-        if (!(rate > 0) || left * sweep_cost(problem_) >
-                               12 * factorisation_cost(problem_, system())) {
+        if (!(rate > 0) ||
+            left * sweep_cost(problem_) > 12 * factorisation_cost(problem_, system())) {
           return;
         }
         if (k == limit && left < 20 * static_cast<double>(limit)) limit += interval;
@@ -204,39 +213,28 @@ class Island {
   }
 
   void continue_by_newton() {
-    if (mostly_closed()) stage("conjugate gradients", [&] { return conjugate_gradients(); });
     if (!done() && error_ < options_.polish_below) {
       stage("proximal newton", [&] { return polish(best_); });
     }
+    start_ = best_;
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      if (!done()) stage("interior point", [&] { return interior_point({}); });
-      if (!done()) {
-        stage("associated interior point", [&] { return interior_point({.associated = true}); });
-      }
-      if (!done()) {
-        stage("interior point, careful", [&] {
-          return interior_point({.step_cap = 0.8, .delta = 1e-4, .delta_follows = false});
-        });
-      }
+      if (!done()) stage("interior point", [&] { interior_point({}); });
+      if (!done()) stage("associated", [&] { associated(); });
     }
-    if (!done()) {
-      stage("proximal point", [&] {
-        const ProximalRules rules{.kappa = 10, .max_factorisations = options_.last_resort};
-        return proximal(rules, best_);
-      });
+    // from the associated solution, then from the best iterate, which is another
+    std::int64_t left = options_.last_resort;
+    for (std::int64_t limit = 400; !done() && left > 0; limit *= 2) {
+      limit = std::min(limit, left);
+      stage("proximal point",
+            [&] { proximal({.kappa = 10, .max_factorisations = limit}, start_); });
+      left -= limit;
+      start_ = best_;
     }
-  }
-
-  [[nodiscard]] bool mostly_closed() const {
-    if (problem_.nc() < 20) return false;
-    Index closed = 0;
-    for (Index a = 0; a < problem_.nc(); ++a) closed += best_[D * a] > 0;
-    return closed >= problem_.nc() - problem_.nc() / 10;
   }
 
   /// On W r = -q, preconditioned by tr(W_aa); given up where r leaves the cones for good.
   void conjugate_gradients() {
-    constexpr std::int64_t limit = 200;
+    constexpr std::int64_t limit = 400;
     constexpr std::int64_t trial = 15;
     Vector inverse(problem_.nc());
     for (Index a = 0; a < problem_.nc(); ++a) {
@@ -257,6 +255,7 @@ class Island {
     precondition(residual, z);
     Vector direction = z;
     double rz = residual.dot(z);
+    double last = residual.norm();
     for (std::int64_t k = 1; k <= limit; ++k) {
       problem_.W.multiply_add(direction, zero, product);
       const double curvature = direction.dot(product);
@@ -264,13 +263,22 @@ class Island {
       const double length = rz / curvature;
       r += length * direction;
       residual -= length * product;
-      if (k % trial == 0 && (violation(r) > 1e-2 || tracker_.report(trial, error_))) return;
-      if (residual.norm() <= tolerance_ * problem_.scale) {
+      const double size = residual.norm();
+      if (k == 5 && violation(r) > 1e-2) return;
+      if (k % trial == 0) {
+        // at this rate, is it done within the limit?
+        const double rate = std::log(last / size) / trial;
+        const double left = std::log(size / (tolerance_ * problem_.scale)) / rate;
+        if (violation(r) > 1e-2 || !(rate > 0) || left > limit) return;
+        if (tracker_.report(trial, error_)) return;
+        last = size;
+      }
+      if (size <= tolerance_ * problem_.scale) {
         Vector inside = r;
         project(inside);
         Vector u(problem_.m());
         problem_.velocity(inside, u);
-        if (take(0, error_of(u, inside), inside)) return;
+        if (take(k % trial, error_of(u, inside), inside)) return;
       }
       precondition(residual, z);
       const double next = residual.dot(z);
@@ -293,14 +301,13 @@ class Island {
 
   void proximal(const ProximalRules& rules, Vector r) {
     ProximalPoint<Cone> method(problem_, system());
-    const double error = method.solve(rules, tolerance_, r, [&](double at) {
-      return at > tolerance_ && tracker_.report(1, at);
-    });
+    const double error =
+        method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at); });
     take(0, error, r);
   }
 
   void polish(const Vector& r) {
-    proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 8}, r);
+    proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 12}, r);
   }
 
   void interior_point(const InteriorPointRules& rules) {
@@ -308,7 +315,28 @@ class Island {
     double next_polish = options_.polish_below;
     method.solve(rules, [&](double error, const Vector& r) {
       if (take(1, error, r)) return true;
-      if (rules.associated && method.tau() < 1e-6 && method.speed() > 1e-3) return true;
+      if (error < next_polish) {
+        polish(r);
+        next_polish = error / 30;
+      }
+      return done();
+    });
+  }
+
+  /// Where the associated problem's velocity tends to zero, its reactions solve this one. Else what
+  /// it had on the way is where the proximal point starts.
+  void associated() {
+    InteriorPoint<D> method(problem_, system());
+    double next_polish = options_.polish_below;
+    bool near = false;
+    method.solve({.associated = true}, [&](double error, const Vector& r) {
+      if (take(1, error, r)) return true;
+      if (!near && method.tau() < 1e-4) {
+        near = true;
+        start_ = r;
+      }
+      if (method.tau() < 1e-4 && method.speed() > 0.05) return true;
+      if (method.tau() < 1e-6 && method.speed() > 1e-3) return true;
       if (error < next_polish) {
         polish(r);
         next_polish = error / 30;
@@ -324,13 +352,15 @@ class Island {
   GaussSeidel<Cone> gauss_seidel_;
   std::optional<CoupledSystem> system_;
   Vector r_, u_, best_;
+  Vector start_;  // of the last resort
   double error_ = 0;
 };
 
 /// The part of a problem that these contacts are.
 Delassus restricted(const Delassus& problem, const std::vector<Index>& contacts) {
   const int d = problem.d();
-  Delassus part{.W = problem.W.restricted(contacts), .q = {}, .friction = {}, .scale = problem.scale};
+  Delassus part{
+      .W = problem.W.restricted(contacts), .q = {}, .friction = {}, .scale = problem.scale};
   const auto count = static_cast<Eigen::Index>(contacts.size());
   part.q.resize(d * count);
   part.friction.mu.resize(count);
@@ -407,8 +437,6 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     for (Eigen::Index j = 0; j < size; ++j)
       r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);
   }
-  tracker.set_others(0);
-  tracker.report(0, std::sqrt(sum));
   return outcome();
 }
 

@@ -137,8 +137,8 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   const auto step = [&](ContactProblem<Cone>& contact, const Vec& b, Vec& next) {
     const Vec old = next;
     if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
-      contact.projected.solve(b, options.local_accuracy,
-                              static_cast<int>(options.local_iterations), next);
+      contact.projected.solve(b, options.local_accuracy, static_cast<int>(options.local_iterations),
+                              next);
     }
     if (options.relaxation != 1.0) {
       next = contact.projected.cone().project(options.relaxation * next +

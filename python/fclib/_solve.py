@@ -20,13 +20,13 @@ Problem: TypeAlias = (
 
 def solve(
     problem: Problem,
-    solver: str = "nsgs",
+    solver: str = "auto",
     tol: float = 1e-8,
     *,
     max_iterations: int | None = None,
     time_limit: float | None = None,
     guess: _core.Solution | None = None,
-    callback: Callable[[int, float, float], bool | None] | None = None,
+    callback: Callable[[int, float, float, str], bool | None] | None = None,
     **options: bool | int | float | str,
 ) -> _core.Result:
     """Solve a frictional contact problem of any formulation.
@@ -38,8 +38,9 @@ def solve(
         max_iterations: limit of the solver's iterations, its own default where None.
         time_limit: [s] limit of wall-clock time.
         guess: a starting point; of it ``r`` is used.
-        callback: called as ``callback(iteration, error, seconds)`` where the solver evaluates its
-            error; returning False stops it.
+        callback: called as ``callback(iteration, error, seconds, stage)`` where the solver evaluates
+            its error; returning False stops it. ``stage`` is empty but for solvers that chain
+            others, as ``auto`` does.
         **options: the solver's own options, see ``fclib solvers``.
 
     Returns:

@@ -16,8 +16,8 @@ from fclib import bench
 
 # solvers with their options
 CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
+    ("auto", {}),
     ("nsgs", {}),
-    ("nsgs", {"local_solver": "projection"}),
 )
 
 

@@ -243,7 +243,7 @@ def test_the_limit_holds_for_all_runs_of_the_solver_together() -> None:
 
 
 def test_the_time_limit_is_kept_and_said() -> None:
-    result = fclib.solve(endless(), max_iterations=10**15, time_limit=0.2)
+    result = fclib.solve(endless(), "nsgs", max_iterations=10**15, time_limit=0.2)
     assert result.status == "time_limit"
     assert not result.converged
     assert result.error > 0.1
@@ -261,10 +261,11 @@ def test_a_problem_without_a_solution_is_not_solved(limit: int) -> None:
 
 
 def test_the_callback_follows_the_iterations() -> None:
-    history: list[tuple[int, float, float]] = []
+    history: list[tuple[int, float, float, str]] = []
     result = fclib.solve(hard(), callback=lambda *progress: history.append(progress))
     assert result.converged
-    iterations, errors, times = zip(*history, strict=True)
+    iterations, errors, times, stages = zip(*history, strict=True)
+    assert stages[-1] == result.stages[-1].name
     assert iterations[0] == 0
     assert iterations[-1] == result.iterations
     assert list(iterations) == sorted(set(iterations))
@@ -376,7 +377,7 @@ def test_singular_bilateral_constraints_are_unsuitable() -> None:
 )
 def test_a_wrong_option_is_named(arguments: dict[str, Any], named: str) -> None:
     with pytest.raises(fclib.OptionError, match=named) as caught:
-        fclib.solve(hard(), **arguments)
+        fclib.solve(hard(), **({"solver": "nsgs"} | arguments))
     assert "\n" not in str(caught.value)
     assert isinstance(caught.value, ValueError)
 
@@ -385,7 +386,7 @@ def test_an_unknown_name_comes_with_the_known_ones() -> None:
     with pytest.raises(fclib.OptionError, match="nsgs"):
         fclib.solve(hard(), "nsgz")
     with pytest.raises(fclib.OptionError, match="relaxation"):
-        fclib.solve(hard(), relax=1.0)
+        fclib.solve(hard(), "nsgs", relax=1.0)
 
 
 @pytest.mark.parametrize(
@@ -405,12 +406,13 @@ def test_an_unknown_name_comes_with_the_known_ones() -> None:
 def test_every_configuration_solves(options: dict[str, Any]) -> None:
     for make, d, p in itertools.product([planted_local, planted_global], [2, 3], [0, 2]):
         case = make(5, d=d, nc=8, p=p)
-        assert_solved(case.problem, fclib.solve(case.problem, **options))
+        assert_solved(case.problem, fclib.solve(case.problem, "nsgs", **options))
 
 
 def test_the_seed_chooses_the_order() -> None:
     def iterate(seed: int) -> Any:
-        return fclib.solve(hard(), tol=0, max_iterations=3, shuffle="always", seed=seed).solution.r
+        options = {"shuffle": "always", "seed": seed}
+        return fclib.solve(hard(), "nsgs", tol=0, max_iterations=3, **options).solution.r
 
     np.testing.assert_array_equal(iterate(1), iterate(1))
     assert np.abs(iterate(1) - iterate(2)).max() > 1e-6
@@ -431,7 +433,7 @@ def test_ctrl_c_stops_a_long_solve() -> None:
         "        print('solving', flush=True)\n"
         "    told = True\n"
         "try:\n"
-        "    fclib.solve(problem, callback=tell, max_iterations=10**15)\n"
+        "    fclib.solve(problem, 'nsgs', callback=tell, max_iterations=10**15)\n"
         "except KeyboardInterrupt:\n"
         "    print('interrupted', flush=True)\n"
     )
@@ -461,7 +463,7 @@ def test_python_goes_on_while_a_solver_runs() -> None:
     ticker = threading.Thread(target=tick)
     ticker.start()
     start = time.monotonic()
-    result = fclib.solve(endless(), max_iterations=10**15, time_limit=0.5)
+    result = fclib.solve(endless(), "nsgs", max_iterations=10**15, time_limit=0.5)
     end = time.monotonic()
     done.set()
     ticker.join()

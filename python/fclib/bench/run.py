@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -47,10 +47,11 @@ COLUMNS = (
 def run(
     name: str,
     problem: fclib.Problem,
-    solver: str = "nsgs",
+    solver: str = "auto",
     tol: float = 1e-8,
     time_limit: float | None = None,
     options: Mapping[str, Any] = MappingProxyType({}),
+    callback: Callable[[int, float, float, str], bool | None] | None = None,
 ) -> Run:
     """Solve a problem and judge the solution.
 
@@ -61,11 +62,12 @@ def run(
         tol: bound on the merit.
         time_limit: [s] wall clock.
         options: the solver's own.
+        callback: as ``fclib.solve`` has it.
 
     Raises:
         fclib.Error: as ``fclib.solve`` does.
     """
-    result = fclib.solve(problem, solver, tol, time_limit=time_limit, **options)
+    result = fclib.solve(problem, solver, tol, time_limit=time_limit, callback=callback, **options)
     error = fclib.merit(problem, result.solution).error
     status = result.status
     if status == "converged" and not error <= tol:

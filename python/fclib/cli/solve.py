@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,14 +15,41 @@ from fclib.cli._output import (
     Report,
     Tolerance,
     each_file,
+    err,
+    make_table,
     parse_options,
     usage_error,
 )
 
 
+STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
+
+
+class Trace:
+    """Prints the iterations of a solve on the standard error, thinned to what a person reads."""
+
+    def __init__(self, name: str) -> None:
+        self.next = 0.0
+        self.stage = ""
+        err.print(f"{name}\n{'iteration':>10}  {'error':>9}  {'time [s]':>9}  stage", markup=False)
+
+    def __call__(self, iteration: int, error: float, seconds: float, stage: str) -> None:
+        """A line where the stage changes, or the iterations have grown by a tenth."""
+        if stage == self.stage and iteration < self.next:
+            return
+        self.stage, self.next = stage, max(iteration + 1, 1.1 * iteration)
+        line = f"{iteration:10}  {error:9.1e}  {seconds:9.2e}  {stage}"
+        err.print(line, markup=False, highlight=False)
+
+    def finish(self, stages: list[dict[str, Any]]) -> None:
+        """The stages: how often each was entered, and how often it solved."""
+        if stages:
+            err.print(make_table(stages))
+
+
 def command(
     files: Files,
-    solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "nsgs",
+    solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "auto",
     tol: Tolerance = 1e-8,
     time_limit: Annotated[
         float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.0)
@@ -33,6 +60,9 @@ def command(
     option: Annotated[
         list[str] | None, typer.Option(help="An option of the solver, name=value.")
     ] = None,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Show the iterations and the stages.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Solve problems, and judge the solutions; of several in a file the global one."""
@@ -41,15 +71,19 @@ def command(
         fclib.find_solver(solver).check_options(options)
     except fclib.OptionError as error:
         usage_error(error)
-    report = Report(as_json)
+    report = Report(as_json, hidden=("stages",))
     for path in each_file(files, "solving"):
         try:
-            run = bench.run(str(path), read_owner(path), solver, tol, time_limit, options)
+            trace = Trace(path.name) if verbose else None
+            run = bench.run(str(path), read_owner(path), solver, tol, time_limit, options, trace)
+            stages = [{key: getattr(stage, key) for key in STAGE} for stage in run.result.stages]
+            if trace is not None:
+                trace.finish(stages)
             if write and run.status == "converged":
                 fclib.write_solution(path, run.result.solution)
         except fclib.Error as error:
             named = str(error).startswith(str(path))
             report.error(path, error if named else fclib.Error(f"{path}: {error}"))
         else:
-            report.add(run.record, run.status == "converged")
+            report.add(run.record | {"stages": stages}, run.status == "converged")
     report.finish()

@@ -33,7 +33,7 @@ def simulate(
     scene: Scene,
     steps: int,
     *,
-    solver: str = "nsgs",
+    solver: str = "auto",
     tol: float = 1e-8,
     warm_start: bool = True,
     stabilization: float = 0.2,

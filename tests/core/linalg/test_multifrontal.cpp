@@ -1,0 +1,133 @@
+#include "linalg/multifrontal.hpp"
+
+#include <gtest/gtest.h>
+
+#include "random_data.hpp"
+
+namespace fclib {
+namespace {
+
+/// The block pattern of a symmetric graph where each pair is linked with this probability.
+BlockPattern random_pattern(testing::RandomData& random, Index nodes, int d, double share) {
+  std::vector<std::vector<Index>> columns(static_cast<std::size_t>(nodes));
+  for (Index col = 0; col < nodes; ++col) {
+    columns[col].push_back(col);
+    for (Index row = 0; row < col; ++row) {
+      if (random.uniform(0, 1) > share) continue;
+      columns[col].push_back(row);
+      columns[row].push_back(col);
+    }
+  }
+  BlockPattern pattern;
+  pattern.d = d;
+  pattern.first.push_back(0);
+  for (auto& rows : columns) {
+    std::sort(rows.begin(), rows.end());
+    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  return pattern;
+}
+
+Eigen::MatrixXd dense(const BlockPattern& pattern, const std::vector<double>& values) {
+  const int d = pattern.d;
+  const Index n = d * pattern.nodes();
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(n, n);
+  for (Index col = 0; col < pattern.nodes(); ++col) {
+    for (auto k = pattern.first[col]; k < pattern.first[col + 1]; ++k) {
+      result.block(d * pattern.row[static_cast<std::size_t>(k)], d * col, d, d) =
+          Eigen::Map<const Eigen::MatrixXd>(values.data() + d * d * k, d, d);
+    }
+  }
+  return result;
+}
+
+std::vector<double> random_values(testing::RandomData& random, const BlockPattern& pattern,
+                                  double diagonal) {
+  std::vector<double> values(pattern.values());
+  for (double& value : values) value = random.uniform(-1, 1);
+  for (Index col = 0; col < pattern.nodes(); ++col) {
+    for (auto k = pattern.first[col]; k < pattern.first[col + 1]; ++k) {
+      if (pattern.row[static_cast<std::size_t>(k)] != col) continue;
+      for (int c = 0; c < pattern.d; ++c) {
+        values[static_cast<std::size_t>(pattern.d * pattern.d * k + (pattern.d + 1) * c)] +=
+            diagonal;
+      }
+    }
+  }
+  return values;
+}
+
+TEST(Multifrontal, SolvesUnsymmetricSystemsOfAnySize) {
+  testing::RandomData random(1);
+  for (const int d : {1, 2, 3, 5}) {
+    for (const Index nodes : {0, 1, 2, 7, 40, 150}) {
+      for (const double share : {0.0, 0.02, 0.2, 1.0}) {
+        const BlockPattern pattern = random_pattern(random, nodes, d, share);
+        const auto values = random_values(random, pattern, 0.5 * d * nodes * share + 3);
+        Multifrontal lu(pattern);
+        ASSERT_EQ(lu.size(), d * nodes);
+        ASSERT_TRUE(lu.factorise(values));
+        const Vector x = random.vector(d * nodes);
+        Vector b = dense(pattern, values) * x;
+        lu.solve(b);
+        EXPECT_LE((b - x).norm(), 1e-11 * (1 + x.norm())) << d << " " << nodes << " " << share;
+      }
+    }
+  }
+}
+
+TEST(Multifrontal, FactorisesAgainOnItsPattern) {
+  testing::RandomData random(2);
+  const BlockPattern pattern = random_pattern(random, 120, 3, 0.03);
+  Multifrontal lu(pattern);
+  for (int k = 0; k < 3; ++k) {
+    const auto values = random_values(random, pattern, 20);
+    ASSERT_TRUE(lu.factorise(values));
+    const Vector x = random.vector(360);
+    Vector b = dense(pattern, values) * x;
+    lu.solve(b);
+    EXPECT_LE((b - x).norm(), 1e-11 * x.norm());
+  }
+}
+
+TEST(Multifrontal, ExchangesRowsInsideAFront) {
+  BlockPattern pattern;  // one 3 x 3 block without a diagonal
+  pattern.d = 3;
+  pattern.first = {0, 1};
+  pattern.row = {0};
+  Multifrontal lu(pattern);
+  ASSERT_TRUE(lu.factorise({0, 0, 2, 4, 0, 0, 0, 8, 0}));
+  Vector b(3);
+  b << 4, 8, 2;
+  lu.solve(b);
+  EXPECT_EQ(b, Vector(Vector::Ones(3)));
+}
+
+TEST(Multifrontal, RefusesWhatIsNotFinite) {
+  testing::RandomData random(3);
+  const BlockPattern pattern = random_pattern(random, 50, 3, 0.1);
+  auto values = random_values(random, pattern, 5);
+  values[17] = std::numeric_limits<double>::quiet_NaN();
+  Multifrontal lu(pattern);
+  EXPECT_FALSE(lu.factorise(values));
+  values[17] = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(lu.factorise(values));
+}
+
+TEST(Multifrontal, FillsLittleOnAChain) {
+  BlockPattern pattern;
+  pattern.d = 3;
+  pattern.first.push_back(0);
+  constexpr Index nodes = 2000;
+  for (Index k = 0; k < nodes; ++k) {
+    for (const Index row : {k - 1, k, k + 1}) {
+      if (row >= 0 && row < nodes) pattern.row.push_back(row);
+    }
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  EXPECT_LE(Multifrontal(pattern).memory(), 30.0 * nodes * 9);
+}
+
+}  // namespace
+}  // namespace fclib

@@ -95,7 +95,8 @@ bool CoupledSystem::plan_bodies() {
   for (Index a = 0; a < problem_.nc(); ++a) {
     auto& rows = touched[a];
     for (int c = 0; c < d; ++c) {
-      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at) rows.push_back(at.row());
+      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at)
+        rows.push_back(static_cast<Index>(at.row()));
     }
     std::sort(rows.begin(), rows.end());
     rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
@@ -176,7 +177,8 @@ void CoupledSystem::fill_bodies() {
   for (Index a = 0; a < problem_.nc(); ++a) {
     rows.clear();
     for (int c = 0; c < d; ++c) {
-      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at) rows.push_back(at.row());
+      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at)
+        rows.push_back(static_cast<Index>(at.row()));
     }
     std::sort(rows.begin(), rows.end());
     rows.erase(std::unique(rows.begin(), rows.end()), rows.end());

@@ -289,9 +289,9 @@ bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exc
 
 bool Multifrontal::factorise(const std::vector<double>& values) {
   const std::size_t block_size = static_cast<std::size_t>(d_) * static_cast<std::size_t>(d_);
-  double largest = 0;
-  for (const double value : values) largest = std::max(largest, std::abs(value));
-  if (!(largest < std::numeric_limits<double>::infinity())) return false;
+  const Eigen::Map<const Vector> all(values.data(), static_cast<Eigen::Index>(values.size()));
+  if (!all.allFinite()) return false;
+  const double largest = values.empty() ? 0 : all.lpNorm<Eigen::Infinity>();
   const double tiny = 1e-18 * largest;
   for (Front& front : fronts_) {
     auto a = work_.topLeftCorner(front.size, front.size);

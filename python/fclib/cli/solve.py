@@ -21,7 +21,6 @@ from fclib.cli._output import (
     usage_error,
 )
 
-
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
 
 

@@ -26,7 +26,7 @@ STEP = 5e-3  # [s]
 def contact_rows(
     normals: np.ndarray, points: np.ndarray, centres: np.ndarray, bodies: np.ndarray, sign: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Entries of H^T (rows, columns, values) for one side of the contacts; bodies < 0 is the ground."""
+    """Entries of H^T (rows, columns, values) for one side of the contacts; the ground is < 0."""
     nc = len(normals)
     helper = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
     t1 = np.cross(normals, helper)
@@ -53,7 +53,7 @@ def problem_of(
     mu: float,
     title: str,
 ) -> fclib.GlobalProblem:
-    """From bodies (mass, principal inertias (n, 3)) and contacts (body a, body b, normal, point)."""
+    """From masses, principal inertias (n, 3) and contacts (body a, body b, normal, point)."""
     first, second, normals, points = contacts
     count = len(masses)
     parts = [
@@ -125,7 +125,7 @@ def wall(contacts: int, push: float = 0.0, mu: float = 0.6, seed: int = 0) -> fc
 def packing(
     contacts: int, push: float = 0.0, mu: float = 0.5, seed: int = 0
 ) -> fclib.GlobalProblem:
-    """Spheres of about 1 cm on a shaken lattice, in a box without a lid; about 3.3 contacts each."""
+    """Spheres of about 1 cm on a shaken lattice, in a box without a lid."""
     rng = np.random.default_rng(seed)
     side = max(1, round((contacts / 3.3) ** (1 / 3)))
     grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)

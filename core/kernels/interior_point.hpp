@@ -33,6 +33,7 @@ struct InteriorPointRules {
   double step_cap = 0.95;     ///< highest share of the step to the boundary
   double delta = 1e-6;        ///< regularisation at first
   bool delta_follows = true;  ///< delta <= 1e4 tau
+  double balance = 1e4;       ///< tau is held where ||R|| exceeds it this many times
   int max_iterations = 60;
   int patience = 15;  ///< iterations in which the error must halve
 };
@@ -99,9 +100,9 @@ class InteriorPoint {
       const double affine_step = std::min(1.0, longest());
       const double affine_gap = (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
       double sigma = std::clamp(std::pow(affine_gap / tau_, 3), 1e-6, 1.0);
-      if (residual_ > 1e4 * tau_) {
+      if (residual_ > rules.balance * tau_) {
         sigma = 1;
-      } else if (residual_ > 1e3 * tau_) {
+      } else if (residual_ > 0.1 * rules.balance * tau_) {
         sigma = std::max(sigma, 0.3);
       }
       affine_x_ = dx_;

@@ -220,6 +220,11 @@ class Island {
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       if (!done()) stage("interior point", [&] { interior_point({}); });
       if (!done()) stage("associated", [&] { associated(); });
+      // R and tau go down together, slowly: passes where the path of the first one folds
+      if (!done()) {
+        stage("interior point, patient",
+              [&] { interior_point({.balance = 10, .max_iterations = 300, .patience = 60}); });
+      }
     }
     // from the associated solution, then from the best iterate, which is another
     std::int64_t left = options_.last_resort;

@@ -38,9 +38,9 @@ def solve(
         max_iterations: limit of the solver's iterations, its own default where None.
         time_limit: [s] limit of wall-clock time.
         guess: a starting point; of it ``r`` is used.
-        callback: called as ``callback(iteration, error, seconds, stage)`` where the solver evaluates
-            its error; returning False stops it. ``stage`` is empty but for solvers that chain
-            others, as ``auto`` does.
+        callback: called as ``callback(iteration, error, seconds, stage)`` where the solver
+            evaluates its error; returning False stops it. ``stage`` is empty but for solvers that
+            chain others, as ``auto`` does.
         **options: the solver's own options, see ``fclib solvers``.
 
     Returns:

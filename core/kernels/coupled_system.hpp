@@ -31,6 +31,8 @@ class CoupledSystem {
 
   /// x <- (I + D W)^-1 x.
   void solve(Vector& x);
+  /// The same without refinement, for iterations that mend it themselves.
+  void solve_plain(Vector& x) { solve_once(x); }
 
   [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
   /// Multiplications of one factorisation.

@@ -1,0 +1,198 @@
+// ACLM: a fixed point on de Saxce's shift.
+//
+//   s <- mu ||u_T||,   u = W r + q
+//   r <- argmin 1/2 r.W r + (q + s e_N).r  over K     (a convex second-order cone problem)
+//
+// Cadoux, "Analyse convexe et optimisation pour la dynamique non-reguliere" (2009); Acary, Cadoux,
+// Lemarechal, Malick, "A formulation of the linear discrete Coulomb friction problem via convex
+// optimization" (2011); section 5.3 of Acary, Bremond, Huber, "On solving contact problems with
+// Coulomb friction: formulations and numerical comparisons" (2018): ACLMFP.
+//
+// Differs from the papers in:
+// - the inner problem is solved to a share of the current error of Coulomb's law, from the last
+//   solution where the inner solver can start from one (the interior point cannot); what the
+//   interior point returns is finished by a few projected gradients;
+// - rolling friction adds its term to the shift.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "error.hpp"
+#include "kernels/convex_program.hpp"
+#include "kernels/interior_point.hpp"
+#include "solve/best_iterate.hpp"
+
+namespace fclib::aclm {
+
+namespace {
+
+enum class Inner { gauss_seidel, projected_gradient, interior_point, admm };
+constexpr std::array<std::string_view, 4> inners{"gauss_seidel", "projected_gradient",
+                                                 "interior_point", "admm"};
+
+struct Options {
+  Inner inner = Inner::projected_gradient;
+  double inner_accuracy = 0.1;
+  std::int64_t inner_iterations = 1000;
+  std::int64_t local_iterations = 10;
+  double relaxation = 1;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Inner>{.name = "inner",
+                              .member = &O::inner,
+                              .doc = "solver of the convex problem; interior_point does not take "
+                                     "rolling friction",
+                              .choices = inners},
+        OptionField<O, double>{.name = "inner_accuracy",
+                               .member = &O::inner_accuracy,
+                               .unit = "1",
+                               .doc = "of the convex problem, as a share of the current error",
+                               .lowest = 1e-6,
+                               .highest = 1},
+        OptionField<O, std::int64_t>{.name = "inner_iterations",
+                                     .member = &O::inner_iterations,
+                                     .unit = "iterations",
+                                     .doc = "of the inner solver before the shift is updated",
+                                     .lowest = 1,
+                                     .highest = 1e9},
+        OptionField<O, std::int64_t>{.name = "local_iterations",
+                                     .member = &O::local_iterations,
+                                     .unit = "1",
+                                     .doc = "of Gauss-Seidel on a contact",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, double>{.name = "relaxation",
+                               .member = &O::relaxation,
+                               .unit = "1",
+                               .doc = "share of the new shift in the next",
+                               .lowest = 0.01,
+                               .highest = 1},
+    };
+  }
+};
+
+/// The convex problem by an interior point, on a copy of the problem whose q has the shift.
+template <int D>
+class ShiftedInteriorPoint {
+ public:
+  explicit ShiftedInteriorPoint(const Delassus& problem)
+      : problem_(problem), shifted_(problem), system_(shifted_) {}
+
+  /// `follow(r, u)` ends it by returning true.
+  template <class Follow>
+  void solve(const Vector& shift, int limit, Vector& r, Vector& u, const Follow& follow) {
+    for (Index a = 0; a < problem_.nc(); ++a) shifted_.q[D * a] = problem_.q[D * a] + shift[a];
+    InteriorPoint<D> method(shifted_, system_);
+    method.solve({.associated = true, .max_iterations = limit, .patience = limit},
+                 [&](double, const Vector& reaction) {
+                   r = reaction;
+                   problem_.velocity(r, u);
+                   return follow(r, u);
+                 });
+  }
+
+ private:
+  const Delassus& problem_;
+  Delassus shifted_;
+  CoupledSystem system_;
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  constexpr int D = Cone::dim;
+  constexpr bool rolling = Cone::groups > 1;
+  constexpr int longest = 60;              // iterations of an interior point
+  constexpr std::int64_t finishing = 100;  // projected gradients after it
+  if (rolling && options.inner == Inner::interior_point) {
+    throw Error(ErrorKind::unsuitable, "inner = interior_point does not take rolling friction",
+                "solver aclm");
+  }
+  const Cones<Cone> cones(problem.friction);
+  ConvexProgram<Cones<Cone>> program(problem);
+  std::optional<ShiftedInteriorPoint<D>> interior_point;
+  BestIterate<Cone> best(problem, settings, r);
+  Vector u(problem.m());
+  Vector shift(problem.nc());
+  problem.velocity(r, u);
+  best.report(0, r, u);
+  const auto due = [&](std::int64_t count) { return best.due(count); };
+  const auto follow = [&](std::int64_t count, const Vector& reaction, const Vector& velocity) {
+    return best.report(count, reaction, velocity);
+  };
+  shift_of<Cone>(u, problem.friction, program.shift());
+  while (!best.stopped()) {
+    const double accuracy = options.inner_accuracy * best.last_error();
+    const std::int64_t before = best.iterations();
+    switch (options.inner) {
+      case Inner::gauss_seidel:
+        program.gauss_seidel(cones, static_cast<int>(options.local_iterations), accuracy,
+                             options.inner_iterations, r, u, due, follow);
+        break;
+      case Inner::projected_gradient:
+        program.projected_gradient(cones, accuracy, options.inner_iterations, r, u, due, follow);
+        break;
+      case Inner::admm:
+        program.admm(cones, {}, accuracy, options.inner_iterations, r, u, due, follow);
+        break;
+      case Inner::interior_point:
+        if constexpr (!rolling) {
+          if (!interior_point) interior_point.emplace(problem);
+          std::int64_t count = 0;  // its first iterate is its own starting point
+          interior_point->solve(program.shift(), longest, r, u,
+                                [&](const Vector& reaction, const Vector& velocity) {
+                                  if (count++ == 0) return false;
+                                  return best.report(1, reaction, velocity) ||
+                                         program.residual(cones, reaction, velocity) <= accuracy;
+                                });
+          if (!best.stopped()) {  // its iterates keep a distance from the boundary of the cones
+            program.projected_gradient(cones, accuracy, finishing, r, u, due, follow);
+          }
+        }
+        break;
+    }
+    if (best.iterations() == before) break;  // nothing could be done
+    problem.velocity(r, u);
+    shift_of<Cone>(u, problem.friction, shift);
+    program.shift() += options.relaxation * (shift - program.shift());
+  }
+  return best.outcome(r);
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "aclm",
+      .family = "optimisation",
+      .title = "Fixed point on the shift of de Saxce",
+      .citation =
+          "Cadoux 2009; Acary, Cadoux, Lemarechal & Malick 2011; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::aclm

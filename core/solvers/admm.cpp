@@ -1,0 +1,168 @@
+// ADMM on the cone relaxation, with de Saxce's shift updated in the loop.
+//
+//   x <- (W + rho weight)^-1 (rho weight (z - w) - q - s)
+//   z <- P_K(alpha x + (1 - alpha) z + w),   w <- w + alpha x + (1 - alpha) z_old - z
+//   s <- mu ||u_T||,   u = -rho weight w
+//
+// Boyd, Parikh, Chu, Peleato, Eckstein, "Distributed optimization and statistical learning via the
+// alternating direction method of multipliers" (2011); Tasora, Mangoni, Benatti, Garziera, "Solving
+// variational inequalities and cone complementarity problems in nonsmooth dynamics using the
+// alternating direction method of multipliers" (2021); Goldstein, O'Donoghue, Setzer, Baraniuk
+// (2014) for acceleration; Xu, Figueiredo, Goldstein (2017) for the spectral penalty.
+//
+// Differs from the papers in:
+// - the shift makes the problem Coulomb's law instead of its convex relaxation, and takes away the
+//   proof of convergence;
+// - the penalty is relative to tr(W_aa) / d of each contact, so that masses may differ;
+// - the penalty changes only by factors above 3, because each change is a factorisation, and the
+//   changes become rarer and rarer;
+// - where the problem is known by its bodies, (M + H H^T / rho) is factorised instead of
+//   (W + rho I) if that takes fewer operations;
+// - the best iterate by the natural map of Coulomb's law is returned.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/alternating_directions.hpp"
+#include "solve/best_iterate.hpp"
+
+namespace fclib::admm {
+
+namespace {
+
+constexpr std::array<std::string_view, 3> penalties{"constant", "balance", "spectral"};
+
+enum class Acceleration { none, restart };
+constexpr std::array<std::string_view, 2> accelerations{"none", "restart"};
+
+struct Options {
+  double rho = 1;
+  PenaltyRule penalty = PenaltyRule::spectral;
+  std::int64_t penalty_interval = 10;
+  double relaxation = 1.6;
+  Acceleration acceleration = Acceleration::none;
+  double restart = 0.999;
+  bool weights = true;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, double>{.name = "rho",
+                               .member = &O::rho,
+                               .unit = "1",
+                               .doc = "penalty at first, relative to tr(W_aa) / d",
+                               .lowest = 1e-6,
+                               .highest = 1e6},
+        OptionField<O, PenaltyRule>{.name = "penalty",
+                                    .member = &O::penalty,
+                                    .doc = "how rho changes: not at all, by balancing the relative "
+                                           "residuals, or by spectral estimates of curvature",
+                                    .choices = penalties},
+        OptionField<O, std::int64_t>{.name = "penalty_interval",
+                                     .member = &O::penalty_interval,
+                                     .unit = "iterations",
+                                     .doc = "between changes of rho; doubles with each change",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, double>{.name = "relaxation",
+                               .member = &O::relaxation,
+                               .unit = "1",
+                               .doc = "alpha: above 1 is over-relaxation",
+                               .lowest = 0.1,
+                               .highest = 1.95},
+        OptionField<O, Acceleration>{.name = "acceleration",
+                                     .member = &O::acceleration,
+                                     .doc = "Nesterov's momentum, started afresh where the "
+                                            "residual does not fall (restart), or none",
+                                     .choices = accelerations},
+        OptionField<O, double>{.name = "restart",
+                               .member = &O::restart,
+                               .unit = "1",
+                               .doc = "share of its last value that the combined residual must "
+                                      "fall below for the momentum to be kept",
+                               .lowest = 0.1,
+                               .highest = 1},
+        OptionField<O, bool>{.name = "weights",
+                             .member = &O::weights,
+                             .doc = "a penalty for each contact by its own block of W, else the "
+                                    "same for all"},
+    };
+  }
+};
+
+/// The error costs a product with W: iterations to the next one.
+std::int64_t next_check(std::int64_t k) { return k + std::clamp<std::int64_t>(k / 4, 1, 10); }
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  const Cones<Cone> cones(problem.friction);
+  BestIterate<Cone> best(problem, settings, r);
+  Vector u(problem.m());
+  Vector shift(problem.nc());
+  problem.velocity(r, u);
+  shift_of<Cone>(u, problem.friction, shift);
+  if (best.report(0, r, u)) return best.outcome(r);
+
+  AlternatingDirections<Cone> step(problem,
+                                   {.rho = options.rho,
+                                    .relaxation = options.relaxation,
+                                    .penalty = options.penalty,
+                                    .accelerate = options.acceleration == Acceleration::restart,
+                                    .eta = options.restart,
+                                    .interval = options.penalty_interval},
+                                   options.weights);
+  if (!step.start(r, u, shift)) return best.outcome(r);
+  std::int64_t check = 1;
+  std::int64_t told = 0;
+  for (std::int64_t k = 1;; ++k) {
+    step.x_update(shift);
+    step.z_update(cones);
+    step.w_update();
+    step.velocity(u);
+    shift_of<Cone>(u, problem.friction, shift);
+    if (k >= check || best.due(k - told)) {
+      problem.velocity(step.z(), u);
+      if (best.report(k - told, step.z(), u)) return best.outcome(r);
+      told = k;
+      check = next_check(k);
+    }
+    if (!step.adapt()) return best.outcome(r);
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "admm",
+      .family = "optimisation",
+      .title = "ADMM with the shift in the loop",
+      .citation =
+          "Boyd et al. 2011; Tasora, Mangoni, Benatti & Garziera 2021; Xu, Figueiredo & Goldstein "
+          "2017",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::admm

@@ -1,0 +1,130 @@
+// APGD: Nesterov's accelerated projected gradient on the cone relaxation, de Saxce's shift
+// iterated.
+//
+//   s  = mu ||(W y + q)_T||                      (0 with shift = none)
+//   x+ = P_K(y - t (W y + q + s) / weight),      t by backtracking
+//   y  = x+ + beta (x+ - x),                     beta = 0 where the slope says uphill
+//
+// Mazhar, Heyn, Negrut, Tasora, "Using Nesterov's method to accelerate multibody dynamics with
+// friction and contact" (2015); Nesterov (1983); O'Donoghue & Candes (2015) for the restart.
+//
+// Differs from the papers in:
+// - the shift follows the iterates, so that Coulomb's law is solved; the papers' problem is the
+//   convex relaxation, an associated flow rule where sliding contacts separate. shift = none is
+//   that problem: its solution is not one of Coulomb's law where anything slides, the error says
+//   so, and the solver ends as stalled when it has it;
+// - steps are measured by tr(W_aa) / d of each contact, so that masses may differ;
+// - W x is kept with x, so that a step costs one product with W.
+
+#include <array>
+#include <cstdint>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/accelerated_gradient.hpp"
+#include "kernels/convex_residual.hpp"
+#include "solve/best_iterate.hpp"
+
+namespace fclib::apgd {
+
+namespace {
+
+enum class Shift { iterated, none };
+constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
+
+struct Options {
+  Shift shift = Shift::iterated;
+  bool restart = true;
+  double growth = 1.05;
+  double reduction = 0.7;
+  bool weights = true;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Shift>{.name = "shift",
+                              .member = &O::shift,
+                              .doc = "iterated: Coulomb's law; none: the convex relaxation, which "
+                                     "is NOT Coulomb's law where contacts slide",
+                              .choices = shifts},
+        OptionField<O, bool>{.name = "restart",
+                             .member = &O::restart,
+                             .doc = "start the momentum afresh where it goes uphill"},
+        OptionField<O, double>{.name = "growth",
+                               .member = &O::growth,
+                               .unit = "1",
+                               .doc = "factor of the step after each iteration",
+                               .lowest = 1,
+                               .highest = 10},
+        OptionField<O, double>{.name = "reduction",
+                               .member = &O::reduction,
+                               .unit = "1",
+                               .doc = "factor of the step, at most, where it was too long",
+                               .lowest = 0.1,
+                               .highest = 0.95},
+        OptionField<O, bool>{.name = "weights",
+                             .member = &O::weights,
+                             .doc = "a step for each contact by its own block of W, else the same "
+                                    "for all"},
+    };
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  const Cones<Cone> cones(problem.friction);
+  BestIterate<Cone> best(problem, settings, r);
+  Vector u(problem.m());
+  problem.velocity(r, u);
+  if (best.report(0, r, u)) return best.outcome(r);
+
+  AcceleratedGradient<Cone> gradient(
+      problem,
+      {.growth = options.growth, .reduction = options.reduction, .restart = options.restart},
+      options.weights);
+  Vector shift = Vector::Zero(problem.nc());
+  gradient.start(r, u);
+  while (true) {
+    if (options.shift == Shift::iterated) {
+      shift_of<Cone>(gradient.uy(), problem.friction, shift);
+    }
+    gradient.step(cones, shift);
+    if (best.report(1, gradient.x(), gradient.u())) return best.outcome(r);
+    if (options.shift == Shift::none &&
+        convex_residual(problem, cones, shift, gradient.x(), gradient.u()) <= best.tolerance()) {
+      return best.outcome(r);  // solved, and not Coulomb's law
+    }
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "apgd",
+      .family = "optimisation",
+      .title = "Accelerated projected gradient with the shift iterated",
+      .citation = "Mazhar, Heyn, Negrut & Tasora 2015; Nesterov 1983; O'Donoghue & Candes 2015",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::apgd

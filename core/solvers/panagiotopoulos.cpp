@@ -1,0 +1,124 @@
+// PANA: Panagiotopoulos' alternating method.
+//
+//   r_N <- argmin 1/2 r.W r + q.r  over  r_N >= 0,            r_T fixed
+//   r_T <- argmin 1/2 r.W r + q.r  over  ||r_T|| <= mu r_N,   r_N fixed
+//
+// Panagiotopoulos, "A nonlinear programming approach to the unilateral contact-, and
+// friction-boundary value problem in the theory of elasticity" (1975); section 5.2 of Acary,
+// Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and numerical
+// comparisons" (2018): PFP.
+//
+// Differs from the papers in:
+// - both convex problems are solved to a share of the current error of Coulomb's law, from the last
+//   solution;
+// - rolling friction is part of the tangential problem.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/convex_program.hpp"
+#include "solve/best_iterate.hpp"
+
+namespace fclib::panagiotopoulos {
+
+namespace {
+
+enum class Inner { gauss_seidel, projected_gradient };
+constexpr std::array<std::string_view, 2> inners{"gauss_seidel", "projected_gradient"};
+
+struct Options {
+  Inner inner = Inner::gauss_seidel;
+  double inner_accuracy = 0.1;
+  std::int64_t inner_iterations = 1000;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Inner>{.name = "inner",
+                              .member = &O::inner,
+                              .doc = "solver of the normal and of the tangential problem",
+                              .choices = inners},
+        OptionField<O, double>{.name = "inner_accuracy",
+                               .member = &O::inner_accuracy,
+                               .unit = "1",
+                               .doc = "of the two problems, as a share of the current error",
+                               .lowest = 1e-6,
+                               .highest = 1},
+        OptionField<O, std::int64_t>{.name = "inner_iterations",
+                                     .member = &O::inner_iterations,
+                                     .unit = "iterations",
+                                     .doc = "of the inner solver before the other problem's turn",
+                                     .lowest = 1,
+                                     .highest = 1e9},
+    };
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  using Set = Cylinders<Cone>;
+  Set normal(problem.friction);
+  normal.tangential = false;
+  Set tangential(problem.friction);
+  tangential.normal = false;
+  ConvexProgram<Set> program(problem);
+  BestIterate<Cone> best(problem, settings, r);
+  Vector u(problem.m());
+  problem.velocity(r, u);
+  best.report(0, r, u);
+  const auto due = [&](std::int64_t count) { return best.due(count); };
+  const auto follow = [&](std::int64_t count, const Vector& reaction, const Vector& velocity) {
+    return best.report(count, reaction, velocity);
+  };
+  const auto minimise = [&](const Set& set) {
+    const double accuracy = options.inner_accuracy * best.last_error();
+    if (options.inner == Inner::gauss_seidel) {
+      program.gauss_seidel(set, 2, accuracy, options.inner_iterations, r, u, due, follow);
+    } else {
+      program.projected_gradient(set, accuracy, options.inner_iterations, r, u, due, follow);
+    }
+    problem.velocity(r, u);
+  };
+  while (!best.stopped()) {
+    minimise(normal);
+    if (best.stopped()) break;
+    tangential.set_thresholds(r);
+    minimise(tangential);
+  }
+  return best.outcome(r);
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "panagiotopoulos",
+      .family = "optimisation",
+      .title = "Alternating normal and tangential problems",
+      .citation = "Panagiotopoulos 1975; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::panagiotopoulos

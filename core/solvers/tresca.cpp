@@ -1,0 +1,139 @@
+// Tresca: a fixed point on the threshold of friction.
+//
+//   g <- mu r_N
+//   r <- argmin 1/2 r.W r + q.r  over  r_N >= 0, ||r_T|| <= g      (a convex problem on cylinders)
+//
+// Panagiotopoulos (1975); Haslinger, "Approximation of the Signorini problem with friction, obeying
+// the Coulomb law" (1983); section 5.2 of Acary, Bremond, Huber, "On solving contact problems with
+// Coulomb friction: formulations and numerical comparisons" (2018): TFP.
+//
+// Differs from the papers in:
+// - the inner problem is solved to a share of the current error of Coulomb's law, from the last
+//   solution, and never to more than that;
+// - rolling friction has a threshold of its own.
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/convex_program.hpp"
+#include "solve/best_iterate.hpp"
+
+namespace fclib::tresca {
+
+namespace {
+
+enum class Inner { gauss_seidel, projected_gradient, admm };
+constexpr std::array<std::string_view, 3> inners{"gauss_seidel", "projected_gradient", "admm"};
+
+struct Options {
+  Inner inner = Inner::projected_gradient;
+  double inner_accuracy = 0.1;
+  std::int64_t inner_iterations = 1000;
+  std::int64_t local_iterations = 5;
+  double relaxation = 1;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Inner>{.name = "inner",
+                              .member = &O::inner,
+                              .doc = "solver of the convex problem on cylinders",
+                              .choices = inners},
+        OptionField<O, double>{.name = "inner_accuracy",
+                               .member = &O::inner_accuracy,
+                               .unit = "1",
+                               .doc = "of the convex problem, as a share of the current error",
+                               .lowest = 1e-6,
+                               .highest = 1},
+        OptionField<O, std::int64_t>{.name = "inner_iterations",
+                                     .member = &O::inner_iterations,
+                                     .unit = "iterations",
+                                     .doc = "of the inner solver before the threshold is updated",
+                                     .lowest = 1,
+                                     .highest = 1e9},
+        OptionField<O, std::int64_t>{.name = "local_iterations",
+                                     .member = &O::local_iterations,
+                                     .unit = "1",
+                                     .doc = "of Gauss-Seidel on a contact",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, double>{.name = "relaxation",
+                               .member = &O::relaxation,
+                               .unit = "1",
+                               .doc = "share of the new threshold in the next",
+                               .lowest = 0.01,
+                               .highest = 1},
+    };
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  Cylinders<Cone> cylinders(problem.friction);
+  ConvexProgram<Cylinders<Cone>> program(problem);
+  BestIterate<Cone> best(problem, settings, r);
+  Vector u(problem.m());
+  problem.velocity(r, u);
+  best.report(0, r, u);
+  const auto due = [&](std::int64_t count) { return best.due(count); };
+  const auto follow = [&](std::int64_t count, const Vector& reaction, const Vector& velocity) {
+    return best.report(count, reaction, velocity);
+  };
+  cylinders.set_thresholds(r);
+  while (!best.stopped()) {
+    const double accuracy = options.inner_accuracy * best.last_error();
+    const std::int64_t before = best.iterations();
+    switch (options.inner) {
+      case Inner::gauss_seidel:
+        program.gauss_seidel(cylinders, static_cast<int>(options.local_iterations), accuracy,
+                             options.inner_iterations, r, u, due, follow);
+        break;
+      case Inner::projected_gradient:
+        program.projected_gradient(cylinders, accuracy, options.inner_iterations, r, u, due,
+                                   follow);
+        break;
+      case Inner::admm:
+        program.admm(cylinders, {}, accuracy, options.inner_iterations, r, u, due, follow);
+        break;
+    }
+    if (best.iterations() == before) break;  // nothing could be done
+    cylinders.set_thresholds(r, options.relaxation);
+    problem.velocity(r, u);
+  }
+  return best.outcome(r);
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "tresca",
+      .family = "optimisation",
+      .title = "Fixed point on the friction threshold",
+      .citation = "Panagiotopoulos 1975; Haslinger 1983; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::tresca

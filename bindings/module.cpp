@@ -250,13 +250,25 @@ void bind_solvers(nb::module_& m) {
       .def_ro("solution", &Result::solution)
       .def_prop_ro(
           "status", [](const Result& r) { return std::string(name_of(r.status)); },
-          "converged, iteration_limit, time_limit, diverged, inaccurate, stalled or interrupted")
+          "converged, iteration_limit, time_limit, diverged, inaccurate, stalled, interrupted or\n"
+          "infeasible")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
       .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
+      .def_prop_ro(
+          "certificate",
+          [](nb::handle self) -> nb::object {
+            const auto& r = nb::cast<const Result&>(self);
+            return r.certificate.size() > 0 ? to_python(r.certificate, self) : nb::none();
+          },
+          nb::for_getter(
+              nb::sig("def certificate(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
+          "y >= 0 (nc) which proves that there is no solution where the status is infeasible: of\n"
+          "the local problem without bilateral constraints, -W^T E y is in K* and y . q_N < 0,\n"
+          "with E y the vector whose normal parts are y. Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
       .def("__repr__", [](const Result& r) {
         char text[160];

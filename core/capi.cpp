@@ -549,6 +549,8 @@ fclib_status status_in_c(Status status) {
       return FCLIB_INTERRUPTED;
     case Status::stalled:
       return FCLIB_STALLED;
+    case Status::infeasible:
+      return FCLIB_INFEASIBLE;
   }
   return FCLIB_DIVERGED;
 }

@@ -324,7 +324,8 @@ enum fclib_status {
   FCLIB_DIVERGED,        /**< an iterate was not finite */
   FCLIB_INACCURATE,      /**< the solver was content, MERIT_2 is not */
   FCLIB_INTERRUPTED,
-  FCLIB_STALLED /**< the solver has nothing left to try; its best iterate is returned */
+  FCLIB_STALLED,   /**< the solver has nothing left to try; its best iterate is returned */
+  FCLIB_INFEASIBLE /**< there is no solution, which the solver has proven */
 };
 
 /** New. What a solve says of itself. */

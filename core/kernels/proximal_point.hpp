@@ -46,6 +46,9 @@ class ProximalPoint {
     for (auto& size : inverse_size_) size = 1.0 / (size > 0 ? size : mean > 0 ? mean : 1.0);
   }
 
+  /// The last accepted step.
+  [[nodiscard]] const Vector& iterate() const { return r_; }
+
   /// Improves r. `report(error)` is told of each accepted step, and ends it by returning true.
   /// Returns the least error; r is the iterate that has it.
   template <class Report>

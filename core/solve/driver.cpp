@@ -56,6 +56,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = outcome.stages;
+    result.certificate = outcome.certificate;
     if (!r.allFinite()) {
       result.status = Status::diverged;
       r.setZero();

@@ -29,6 +29,7 @@ enum class Status {
   inaccurate,       ///< the solver was content, the merit of the original problem is not
   stalled,          ///< the solver has nothing left to try; its best iterate is returned
   interrupted,      ///< the callback asked to stop
+  infeasible,       ///< there is no solution, and a certificate proves it
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -47,6 +48,8 @@ constexpr std::string_view name_of(Status status) {
       return "stalled";
     case Status::interrupted:
       return "interrupted";
+    case Status::infeasible:
+      return "infeasible";
   }
   return "?";
 }
@@ -134,6 +137,7 @@ struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
   std::vector<Stage> stages = {};  ///< in the order of their first call; empty for plain solvers
+  Vector certificate = {};         ///< y (nc) of kernels/no_solution.hpp, where infeasible
 };
 
 /// The entry of a solver in the registry.

@@ -24,6 +24,7 @@
 #include "kernels/gauss_seidel.hpp"
 #include "kernels/interior_point.hpp"
 #include "kernels/natural_error.hpp"
+#include "kernels/no_solution.hpp"
 #include "kernels/proximal_point.hpp"
 #include "solve/solver.hpp"
 
@@ -65,6 +66,11 @@ struct Options {
   }
 };
 
+constexpr Index few_contacts = 10;
+
+/// A proof that there is no solution must hold for reactions this many times the usual size.
+constexpr double safe_bound = 1e7;
+
 /// Operations, about: of a sweep, and of a factorisation with its solve and the rest of an
 /// iteration.
 double sweep_cost(const Delassus& problem) {
@@ -83,6 +89,13 @@ class Tracker {
   [[nodiscard]] std::optional<Status> stopped() const { return stopped_; }
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
   [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
+
+  /// There is no solution: y (one for each contact of the island) proves it.
+  void prove(const Vector& y) {
+    certificate_ = y;
+    stopped_ = Status::infeasible;
+  }
+  [[nodiscard]] Vector& certificate() { return certificate_; }
 
   /// The squared error of all contacts but those worked on now.
   void set_others(double squared) { others_ = squared; }
@@ -124,6 +137,7 @@ class Tracker {
   std::int64_t iterations_ = 0;
   bool reported_ = false;
   std::optional<Status> stopped_;
+  Vector certificate_;
   std::vector<Stage> stages_;
 };
 
@@ -189,7 +203,12 @@ class Island {
     double last = error_;
     std::int64_t k = 0;
     while (k < limit) {
-      const std::int64_t count = std::min({interval, limit - k, tracker_.left()});
+      // some are solved by the first sweep, a few contacts by some
+      const bool few = problem_.nc() <= few_contacts;
+      const std::int64_t wanted = k == 0         ? 1
+                                  : k < interval ? (few ? k + 1 : interval - 1)
+                                                 : interval;
+      const std::int64_t count = std::min({wanted, limit - k, tracker_.left()});
       for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
       k += count;
       double error = error_of(u_, r_);
@@ -220,6 +239,9 @@ class Island {
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       if (!done()) stage("interior point", [&] { interior_point({}); });
       if (!done()) stage("associated", [&] { associated(); });
+    }
+    if (!done()) stage("no solution?", [&] { prove_no_solution(); });
+    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       // R and tau go down together, slowly: passes where the path of the first one folds
       if (!done()) {
         stage("interior point, patient",
@@ -328,6 +350,45 @@ class Island {
     });
   }
 
+  /// The proximal point iterates of the frictionless problem, which is convex, go to infinity along
+  /// a ray of proof where there is no solution (Pazy 1971), and converge where there is one.
+  void prove_no_solution() {
+    Delassus frictionless = problem_;
+    frictionless.friction.mu.setZero();
+    frictionless.friction.mu_r.setZero();
+    double trace = 0;
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      trace += problem_.W.template diagonal_block<D>(a).trace();
+    }
+    const double mean = trace / static_cast<double>(problem_.m());
+    const double usual = mean > 0 ? problem_.q.norm() / mean : 0;
+    CoupledSystem system(frictionless);
+    ProximalPoint<Cone> method(frictionless, system);
+    Vector r = Vector::Zero(problem_.m());
+    Vector y(problem_.nc());
+    const ProximalRules rules{.kappa = 100,
+                              .kappa_max = 1e12,
+                              .easy = 100,
+                              .hard = 0.1,
+                              .patience = std::numeric_limits<double>::infinity(),
+                              .max_factorisations = 60};
+    method.solve(rules, 1e-10, r, [&](double) {
+      double largest = 0;
+      for (Index a = 0; a < problem_.nc(); ++a) {
+        largest = std::max(largest, method.iterate()[D * a]);
+      }
+      for (Index a = 0; a < problem_.nc(); ++a) {
+        const double normal = method.iterate()[D * a];
+        y[a] = normal > 1e-9 * largest ? normal / largest : 0;
+      }
+      if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual) {
+        tracker_.prove(y);
+        return true;
+      }
+      return tracker_.report(1, error_);
+    });
+  }
+
   /// Where the associated problem's velocity tends to zero, its reactions solve this one. Else what
   /// it had on the way is where the proximal point starts.
   void associated() {
@@ -386,7 +447,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   Tracker tracker(settings);
   const auto outcome = [&] {
     return Outcome{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
-                   std::move(tracker.stages())};
+                   std::move(tracker.stages()), std::move(tracker.certificate())};
   };
   bool separating = true;
   for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
@@ -439,6 +500,13 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     const double error =
         Island<Cone>(part, options, tracker, share).solve(x, options.island_sweeps, false);
     sum += error * error;
+    if (tracker.certificate().size() > 0) {
+      Vector whole_certificate = Vector::Zero(nc);
+      for (Eigen::Index j = 0; j < size; ++j) {
+        whole_certificate[contacts[static_cast<std::size_t>(j)]] = tracker.certificate()[j];
+      }
+      tracker.certificate() = whole_certificate;
+    }
     for (Eigen::Index j = 0; j < size; ++j)
       r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);
   }

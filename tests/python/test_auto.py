@@ -1,0 +1,281 @@
+"""The default solver: what it must solve, what it says of itself, what it must never claim.
+
+Problems are made from bodies with a planted solution, so that each of them has one.
+"""
+
+from __future__ import annotations
+
+import hypothesis
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import strategies as st
+
+import fclib
+from helpers import (
+    contact_states,
+    dense,
+    judge,
+    local_problem,
+    planted_global,
+    planted_local,
+    project,
+)
+
+Array = npt.NDArray[np.float64]
+
+
+def bodies(
+    seed: int,
+    nc: int = 12,
+    d: int = 3,
+    ratio: float = 1.0,
+    mu: float = 0.5,
+    hyperstatic: bool = False,
+    duplicated: int = 0,
+    boundary: bool = False,
+) -> fclib.GlobalProblem:
+    """Bodies of masses from 1 to `ratio` in contact, with a planted solution.
+
+    `duplicated` contacts are there twice, `boundary` puts statuses on the cone's boundary: contacts
+    that graze, or stick at the limit of friction.
+    """
+    rng = np.random.default_rng(seed)
+    m = d * nc
+    n = max(3, m // 2 if hyperstatic else 2 * m)
+    mass = np.exp(rng.uniform(0, np.log(ratio), n)) if ratio > 1 else np.ones(n)
+    # a contact links two groups of coordinates, as the bodies that they are
+    H = np.zeros((n, m))
+    for a in range(nc):
+        rows = rng.choice(n, size=min(n, 2 * d), replace=False)
+        H[np.ix_(rows, range(d * a, d * a + d))] = rng.standard_normal((len(rows), d))
+    if duplicated:
+        H = np.hstack([H, H[:, : d * duplicated]])
+        nc += duplicated
+        m = d * nc
+    coefficients = np.full(nc, mu)
+    u, r, _ = contact_states(rng, d, coefficients)
+    if boundary:
+        for a in range(nc):
+            if (a % 2 and r[a, 0] == 0) or u[a, 0] == 0:
+                u[a] = 0  # grazes at rest, or sticks at the limit
+    if duplicated:  # the same velocity and law at both
+        k = nc - duplicated
+        u[k:], r[k:] = u[:duplicated], r[:duplicated]
+    v = rng.standard_normal(n)
+    return fclib.GlobalProblem(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=mass * v - H @ r.ravel(),
+        w=u.ravel() - H.T @ v,
+        mu=coefficients,
+    )
+
+
+def assert_honest(problem: fclib.Problem, result: fclib.Result, tol: float) -> None:
+    verdict = judge(problem, result.solution)
+    assert result.converged == (result.error <= tol)
+    assert result.error == pytest.approx(verdict.error, rel=1e-3, abs=1e-14)
+    if not result.converged:
+        assert result.status in {"stalled", "inaccurate", "iteration_limit", "time_limit"}
+    assert result.certificate is None
+
+
+def assert_proven(problem: fclib.LocalProblem, result: fclib.Result) -> None:
+    """Farkas: no r in K, however large it may be in practice, keeps all contacts from closing."""
+    assert result.status == "infeasible"
+    y = result.certificate
+    assert y is not None
+    assert (y >= 0).all()
+    d = problem.spacedim
+    normal = np.zeros((problem.nc, d))
+    normal[:, 0] = y
+    gain = -y @ problem.q[::d]
+    assert gain > 0
+    image = -(dense(problem.W).T @ normal.ravel()).reshape(-1, d)
+    # distance from K*, whose projection is x + P_K(-x)
+    distance = np.linalg.norm(project(-image, problem.mu))
+    usual = np.linalg.norm(problem.q) / max(np.trace(dense(problem.W)) / problem.m, 1e-300)
+    assert distance == 0 or gain / distance > 1e6 * usual
+
+
+@hypothesis.settings(deadline=None, max_examples=60, derandomize=True)
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1),
+    nc=st.integers(1, 25),
+    d=st.sampled_from([2, 3]),
+    ratio=st.sampled_from([1.0, 1e2, 1e4]),
+    mu=st.sampled_from([0.0, 0.05, 0.5, 1.0]),
+    duplicated=st.integers(0, 1),
+    boundary=st.booleans(),
+)
+def test_planted_bodies_are_solved(
+    seed: int, nc: int, d: int, ratio: float, mu: float, duplicated: int, boundary: bool
+) -> None:
+    problem = bodies(seed, nc, d, ratio, mu, duplicated=duplicated, boundary=boundary)
+    result = fclib.solve(problem, time_limit=20)
+    assert_honest(problem, result, 1e-8)
+    assert result.converged, (result, result.stages)
+
+
+@hypothesis.settings(deadline=None, max_examples=40, derandomize=True)
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1),
+    nc=st.integers(1, 15),
+    ratio=st.sampled_from([1e6, 1e8]),
+    mu=st.sampled_from([3.0, 10.0, 100.0]),
+    hyperstatic=st.booleans(),
+    duplicated=st.integers(0, 3),
+)
+def test_never_a_wrong_claim(
+    seed: int, nc: int, ratio: float, mu: float, hyperstatic: bool, duplicated: int
+) -> None:
+    problem = bodies(
+        seed, nc, 3, ratio, mu, hyperstatic=hyperstatic, duplicated=min(nc, duplicated)
+    )
+    result = fclib.solve(problem, time_limit=5, last_resort=400)
+    assert_honest(problem, result, 1e-8)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_islands_are_solved_one_by_one(d: int) -> None:
+    parts = [planted_local(seed, d=d, nc=5) for seed in range(4)]
+    separating = local_problem(np.eye(d), [1.0] + [0.5] * (d - 1), [0.3])
+    problems = [*(part.problem for part in parts), separating]
+    size = sum(problem.m for problem in problems)
+    W, q = np.zeros((size, size)), np.zeros(size)
+    at = 0
+    for problem in problems:
+        assert isinstance(problem, fclib.LocalProblem)
+        W[at : at + problem.m, at : at + problem.m] = dense(problem.W)
+        q[at : at + problem.m] = problem.q
+        at += problem.m
+    mu = np.concatenate([problem.mu for problem in problems])
+    whole = fclib.LocalProblem(spacedim=d, W=W, q=q, mu=mu)
+    result = fclib.solve(whole, tol=1e-12)
+    assert result.converged
+    expected = np.concatenate([part.solution.r for part in parts] + [np.zeros(d)])
+    np.testing.assert_allclose(result.solution.r, expected, atol=1e-9)
+
+
+def test_rows_of_zeros_are_left_alone() -> None:
+    case = planted_local(3, nc=5)
+    assert isinstance(case.problem, fclib.LocalProblem)
+    W = np.zeros((18, 18))
+    W[:15, :15] = dense(case.problem.W)
+    for normal, solvable in ((0.5, True), (0.0, True), (-0.5, False)):
+        q = np.concatenate([case.problem.q, [normal, 0, 0]])
+        problem = fclib.LocalProblem(W=W, q=q, mu=np.append(case.problem.mu, 0.4))
+        result = fclib.solve(problem, time_limit=5)
+        if solvable:
+            assert result.converged
+            assert_honest(problem, result, 1e-8)
+        else:
+            assert_proven(problem, result)
+
+
+@pytest.mark.parametrize("push", [0.0, 1.0])
+def test_a_pile_without_friction_is_solved(push: float) -> None:
+    problem = bodies(7, nc=20, mu=0.0)
+    problem = problem.replace(f=problem.f + push)
+    assert fclib.solve(problem, tol=1e-12).converged
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e-3, 1e3, 1e6])
+def test_units_leave_the_path_alone(size: float) -> None:
+    # the error itself depends on the units of mass, and with it the last iterations
+    for seed in range(4):
+        problem = bodies(seed, nc=20)
+        first = fclib.solve(problem)
+        faster = fclib.solve(problem.replace(f=problem.f * size, w=problem.w * size))
+        heavier = fclib.solve(problem.replace(M=problem.M * size, f=problem.f * size))
+        assert faster.iterations == first.iterations
+        assert faster.converged
+        assert heavier.converged
+        assert abs(heavier.iterations - first.iterations) <= max(10, first.iterations // 2)
+
+
+def test_a_warm_start_saves_work() -> None:
+    problem = bodies(5, nc=40, hyperstatic=True)
+    cold = fclib.solve(problem)
+    nearby = problem.replace(f=problem.f * (1 + 1e-9))
+    warm = fclib.solve(nearby, guess=cold.solution)
+    assert cold.converged
+    assert warm.converged
+    assert warm.iterations <= cold.iterations // 3
+
+
+def test_the_stages_add_up() -> None:
+    case = planted_global(2, nc=30)
+    trace: list[tuple[int, str]] = []
+    result = fclib.solve(
+        case.problem,
+        tol=1e-13,
+        callback=lambda iteration, error, seconds, stage: trace.append((iteration, stage)),
+    )
+    assert result.iterations == sum(stage.iterations for stage in result.stages)
+    assert {stage for _, stage in trace if stage} <= {stage.name for stage in result.stages}
+    for stage in result.stages:
+        assert 0 <= stage.solved <= stage.calls
+        assert stage.factorisations >= 0
+        assert stage.time >= 0
+    assert fclib.solve(case.problem, "nsgs").stages == []
+
+
+def test_the_same_call_takes_the_same_path() -> None:
+    problem = bodies(11, nc=30, hyperstatic=True)
+    first, second = fclib.solve(problem), fclib.solve(problem)
+    np.testing.assert_array_equal(first.solution.r, second.solution.r)
+    assert [stage.iterations for stage in first.stages] == [
+        stage.iterations for stage in second.stages
+    ]
+
+
+# ---- problems without a solution
+
+
+@hypothesis.settings(deadline=None, max_examples=40, derandomize=True)
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1),
+    others=st.integers(0, 12),
+    d=st.sampled_from([2, 3]),
+    mu=st.sampled_from([0.0, 0.3, 1.0]),
+    closing=st.floats(1e-3, 10),
+)
+def test_a_body_between_closing_walls_has_no_solution(
+    seed: int, others: int, d: int, mu: float, closing: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    n = 2 * d
+    wall = np.vstack([np.eye(d), np.zeros((n - d, d))])
+    opposite = wall * np.array([-1.0] + [1.0] * (d - 1))
+    H = np.hstack([wall, opposite, *(rng.standard_normal((n, d)) for _ in range(others))])
+    w = rng.standard_normal(H.shape[1])
+    w[0], w[d] = -closing, -0.5 * closing
+    problem = fclib.GlobalProblem(
+        spacedim=d, M=np.eye(n), H=H, f=np.zeros(n), w=w, mu=np.full(others + 2, mu)
+    )
+    local = problem.condense()
+    assert isinstance(local, fclib.LocalProblem)
+    assert_proven(local, fclib.solve(local))
+    assert fclib.solve(problem).status == "infeasible"
+
+
+def test_what_is_pressed_but_not_closing_is_not_refused() -> None:
+    # the same body between walls that stand still, squeezed by its own weight only
+    for speed in (0.0, 1e-9, 0.3):
+        H = np.hstack([np.eye(3), np.diag([-1.0, 1.0, 1.0])])
+        problem = fclib.GlobalProblem(
+            M=np.eye(3), H=H, f=[0, -1, 0], w=[0, 0, 0, speed, 0, 0], mu=[0.5, 0.5]
+        )
+        result = fclib.solve(problem)
+        assert result.status in {"converged", "stalled"}
+        assert result.certificate is None
+
+
+def test_a_contact_that_nothing_can_move() -> None:
+    problem = local_problem(np.zeros((3, 3)), [-1, 0, 0], [0.5])
+    result = fclib.solve(problem)
+    assert result.status == "infeasible"
+    np.testing.assert_array_equal(result.certificate, [1.0])

@@ -33,8 +33,8 @@ struct AlternatingDirectionsRules {
   double relaxation = 1.6;  ///< alpha
   PenaltyRule penalty = PenaltyRule::spectral;
   bool accelerate = false;
-  double eta = 0.999;          ///< share of the combined residual under which momentum is kept
-  std::int64_t interval = 10;  ///< iterations between changes of rho, at first
+  double eta = 0.999;         ///< share of the combined residual under which momentum is kept
+  std::int64_t interval = 5;  ///< iterations between changes of rho, at first
 };
 
 template <class Cone>
@@ -251,7 +251,7 @@ class AlternatingDirections {
   double primal_ = 0;  // ||x - z|| and rho ||z - z_old||, each relative to its size
   double dual_ = 0;
   std::int64_t since_ = 0;
-  std::int64_t due_ = 10;
+  std::int64_t due_ = 5;
   Vector x_, z_, w_, relaxed_, zh_, wh_, old_z_, old_w_;
   Vector dual_hat_, x0_, z0_, dual0_, dual_hat0_;  // of the spectral rule
 };

@@ -41,7 +41,7 @@ constexpr std::array<std::string_view, 2> accelerations{"none", "restart"};
 struct Options {
   double rho = 1;
   PenaltyRule penalty = PenaltyRule::spectral;
-  std::int64_t penalty_interval = 10;
+  std::int64_t penalty_interval = 5;
   double relaxation = 1.6;
   Acceleration acceleration = Acceleration::none;
   double restart = 0.999;

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import judge, local_problem, planted_global, planted_local
+from helpers import dense, judge, local_problem, planted_global, planted_local
 
 FAMILY = ["aclm", "admm", "apgd", "bb", "panagiotopoulos", "tresca"]
 OPTIONS: list[tuple[str, dict[str, Any]]] = [
@@ -71,7 +71,7 @@ def test_masses_may_differ(solver: str) -> None:
     assert isinstance(problem, fclib.LocalProblem)
     scale = np.repeat(10.0 ** np.linspace(-1, 1, problem.nc), 3)
     stretched = local_problem(
-        scale[:, None] * problem.W.toarray() * scale, problem.q * scale, problem.mu
+        scale[:, None] * dense(problem.W) * scale, problem.q * scale, problem.mu
     )
     assert fclib.solve(stretched, solver, 1e-8, time_limit=20).converged
 

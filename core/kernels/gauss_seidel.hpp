@@ -16,25 +16,29 @@ class GaussSeidel {
   using Vec = typename Cone::Vec;
   using Contact = ContactProblem<Cone>;
 
-  explicit GaussSeidel(const Delassus& problem) : problem_(problem) {
+  /// With omega, the contacts' problems are those of W_aa / omega: projected over-relaxation.
+  explicit GaussSeidel(const Delassus& problem, double omega = 1) : problem_(problem) {
     contacts_.reserve(static_cast<std::size_t>(problem.nc()));
     for (Index a = 0; a < problem.nc(); ++a) {
-      contacts_.emplace_back(problem.W.template diagonal_block<D>(a), Cone(problem.friction, a));
+      contacts_.emplace_back(problem.W.template diagonal_block<D>(a) / omega,
+                             Cone(problem.friction, a));
     }
   }
 
-  /// Solves the problem of contact a; `step(contact, b, next)` replaces next, r^a on entry.
+  /// Solves the problem of contact a; `step(contact, b, next)` replaces next, r^a on entry. The
+  /// change of r^a.
   template <class Step>
-  void update(Index a, Vector& r, Vector& u, const Step& step) {
+  Vec update(Index a, Vector& r, Vector& u, const Step& step) {
     Contact& contact = contacts_[static_cast<std::size_t>(a)];
     const Vec old = r.segment<D>(D * a);
     const Vec b = u.segment<D>(D * a) - contact.projected.block() * old;
     Vec next = old;
     step(contact, b, next);
     const Vec delta = next - old;
-    if ((delta.array() == 0).all()) return;
+    if ((delta.array() == 0).all()) return delta;
     r.segment<D>(D * a) = next;
     problem_.W.template add_column<D>(a, delta.data(), u.data());
+    return delta;
   }
 
   /// One sweep in the order of the contacts, each solved exactly or by 10 projections at most.

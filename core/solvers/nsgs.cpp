@@ -9,7 +9,9 @@
 // formulations and numerical comparisons" (2018).
 //
 // Differs from the papers in: the velocities are kept up to date by columns, so that contacts whose
-// reaction does not change cost nothing, and the natural map costs no product with W.
+// reaction does not change cost nothing, and the natural map costs no product with W; settled
+// contacts may be left alone for some sweeps (`freeze`), as in the paper's implementation, but for
+// a fixed number of sweeps and not at random.
 
 #include <algorithm>
 #include <array>
@@ -17,18 +19,16 @@
 #include <numeric>
 #include <random>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
 #include "kernels/gauss_seidel.hpp"
+#include "kernels/local_step.hpp"
 #include "kernels/natural_error.hpp"
+#include "kernels/schedule.hpp"
+#include "kernels/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::nsgs {
 
 namespace {
-
-enum class LocalSolver { exact, projection };
-constexpr std::array<std::string_view, 2> local_solvers{"exact", "projection"};
 
 enum class Shuffle { no, once, always };
 constexpr std::array<std::string_view, 3> shuffles{"no", "once", "always"};
@@ -40,17 +40,18 @@ struct Options {
   std::int64_t seed = 0;
   std::int64_t local_iterations = 10;
   double local_accuracy = 1e-14;
+  bool symmetric = false;
+  std::int64_t freeze = 0;
+  double freeze_below = 1e-6;
   std::int64_t error_interval = 0;
 
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, LocalSolver>{
-            .name = "local_solver",
-            .member = &O::local_solver,
-            .doc = "one-contact solver: exact (enumeration of statuses; rolling contacts have "
-                   "none) or projection (P_K with local iterations)",
-            .choices = local_solvers},
+        OptionField<O, LocalSolver>{.name = "local_solver",
+                                    .member = &O::local_solver,
+                                    .doc = local_solvers_doc,
+                                    .choices = local_solvers},
         OptionField<O, double>{.name = "relaxation",
                                .member = &O::relaxation,
                                .unit = "1",
@@ -68,16 +69,35 @@ struct Options {
                                      .unit = "1",
                                      .doc = "of the shuffling",
                                      .lowest = 0},
-        OptionField<O, std::int64_t>{.name = "local_iterations",
-                                     .member = &O::local_iterations,
-                                     .unit = "1",
-                                     .doc = "limit of the iterations of the projection",
-                                     .lowest = 1,
+        OptionField<O, std::int64_t>{
+            .name = "local_iterations",
+            .member = &O::local_iterations,
+            .unit = "1",
+            .doc = "limit of the iterations of the projection or of Newton",
+            .lowest = 1,
+            .highest = 1e6},
+        OptionField<O, double>{
+            .name = "local_accuracy",
+            .member = &O::local_accuracy,
+            .unit = "1",
+            .doc = "relative step at which the projection stops, relative residual of "
+                   "Newton",
+            .lowest = 0,
+            .highest = 1},
+        OptionField<O, bool>{.name = "symmetric",
+                             .member = &O::symmetric,
+                             .doc = "every second sweep runs backwards"},
+        OptionField<O, std::int64_t>{.name = "freeze",
+                                     .member = &O::freeze,
+                                     .unit = "sweeps",
+                                     .doc = "for which a settled contact is left alone",
+                                     .lowest = 0,
                                      .highest = 1e6},
-        OptionField<O, double>{.name = "local_accuracy",
-                               .member = &O::local_accuracy,
+        OptionField<O, double>{.name = "freeze_below",
+                               .member = &O::freeze_below,
                                .unit = "1",
-                               .doc = "relative step at which the projection stops",
+                               .doc = "relative change of its reaction under which a contact is "
+                                      "settled",
                                .lowest = 0,
                                .highest = 1},
         OptionField<O, std::int64_t>{
@@ -88,38 +108,6 @@ struct Options {
             .lowest = 0},
     };
   }
-};
-
-/// When to evaluate the error next: soon at first, then where the last two values say that the
-/// tolerance will be met, and never after more than a quarter of the sweeps done so far.
-class Schedule {
- public:
-  Schedule(std::int64_t interval, double tolerance) : interval_(interval), tolerance_(tolerance) {}
-
-  [[nodiscard]] bool due(std::int64_t sweep) const { return sweep >= next_; }
-
-  void evaluated(std::int64_t sweep, double error) {
-    std::int64_t step = interval_;
-    if (interval_ == 0) {
-      step = std::max<std::int64_t>(1, sweep / 4);
-      if (error < last_error_ && tolerance_ > 0) {
-        const double rate =
-            std::log(last_error_ / error) / static_cast<double>(sweep - last_sweep_);
-        const double left = std::log(error / tolerance_) / rate;
-        if (left < static_cast<double>(step)) step = std::max<std::int64_t>(1, std::llround(left));
-      }
-    }
-    last_sweep_ = sweep;
-    last_error_ = error;
-    next_ = sweep + step;
-  }
-
- private:
-  std::int64_t interval_;
-  double tolerance_;
-  std::int64_t next_ = 1;
-  std::int64_t last_sweep_ = 0;
-  double last_error_ = 0;
 };
 
 void shuffle_order(std::vector<Index>& order, std::mt19937_64& random) {
@@ -134,17 +122,18 @@ template <class Cone>
 Outcome iterate(const Delassus& problem, const Options& options, Monitor& monitor, Vector& r) {
   using Vec = typename Cone::Vec;
   GaussSeidel<Cone> contacts(problem);
+  const LocalStep<Cone> solve_local{options.local_solver, options.local_accuracy,
+                                    static_cast<int>(options.local_iterations)};
   const auto step = [&](ContactProblem<Cone>& contact, const Vec& b, Vec& next) {
     const Vec old = next;
-    if (options.local_solver == LocalSolver::projection || !contact.solve_exact(b, next)) {
-      contact.projected.solve(b, options.local_accuracy, static_cast<int>(options.local_iterations),
-                              next);
-    }
+    solve_local(contact, b, next);
     if (options.relaxation != 1.0) {
       next = contact.projected.cone().project(options.relaxation * next +
                                               (1.0 - options.relaxation) * old);
     }
   };
+  // contacts that are settled sleep for a while: the sweep at which each wakes
+  std::vector<std::int64_t> wakes(options.freeze > 0 ? problem.nc() : 0, 0);
   std::vector<Index> order(static_cast<std::size_t>(problem.nc()));
   std::iota(order.begin(), order.end(), 0);
   std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
@@ -163,7 +152,16 @@ Outcome iterate(const Delassus& problem, const Options& options, Monitor& monito
   Schedule schedule(options.error_interval, monitor.tolerance());
   for (std::int64_t sweep = 1;; ++sweep) {
     if (options.shuffle == Shuffle::always) shuffle_order(order, random);
-    for (const Index a : order) contacts.update(a, r, u, step);
+    if (options.symmetric && sweep > 1) std::reverse(order.begin(), order.end());
+    for (const Index a : order) {
+      if (options.freeze == 0) {
+        contacts.update(a, r, u, step);
+      } else if (auto& wake = wakes[static_cast<std::size_t>(a)]; sweep >= wake) {
+        const double change = contacts.update(a, r, u, step).norm();
+        const double size = r.segment<Cone::dim>(Cone::dim * a).norm();
+        if (change <= options.freeze_below * size) wake = sweep + 1 + options.freeze;
+      }
+    }
 
     if (sweep % refresh_interval == 0) problem.W.multiply_add(r, problem.q, u);
     if (schedule.due(sweep) || sweep >= monitor.max_iterations() ||
@@ -190,12 +188,8 @@ Outcome solve(const Delassus& problem, const OptionValues& values, const Setting
               Vector& r) {
   const auto options = parse_options<Options>(values);
   Monitor monitor(settings);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, monitor, r)
-                            : iterate<Rolling<5>>(problem, options, monitor, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, monitor, r)
-                          : iterate<Coulomb<3>>(problem, options, monitor, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, monitor, r); });
 }
 
 }  // namespace

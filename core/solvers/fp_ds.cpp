@@ -1,0 +1,83 @@
+// FP-DS: fixed-point projections with a constant step, the algorithm of de Saxce & Feng.
+//
+//   r_k+1 = P_K(r_k - rho u^_k),  u_k = W r_k + q
+//
+// de Saxce & Feng, "The bipotential method: a constructive approach to design the complete contact
+// law with friction and improved numerical algorithms" (1998); algorithm 1 of Acary, Bremond,
+// Huber, "On solving contact problems with Coulomb friction: formulations and numerical
+// comparisons" (2018).
+//
+// Differs from the paper in: rho is relative to 1 / ||W||, the largest eigenvalue by the power
+// method, so that one value suits all units; each contact may have a step of its own (`metric`).
+
+#include "kernels/variational_inequality.hpp"
+#include "kernels/with_cone.hpp"
+#include "solve/iterates.hpp"
+
+namespace fclib::fp_ds {
+
+namespace {
+
+struct Options {
+  Metric metric = Metric::contact;
+  double rho = 1.0;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Metric>{
+            .name = "metric", .member = &O::metric, .doc = metric_doc, .choices = metrics},
+        OptionField<O, double>{.name = "rho",
+                               .member = &O::rho,
+                               .unit = "1/||W||",
+                               .doc = "the step; without friction all below 2 converge",
+                               .lowest = 1e-6,
+                               .highest = 1e6},
+    };
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, Iterates& iterates,
+                const Vector& start) {
+  const VariationalInequality<Cone> vi(problem, options.metric);
+  const double rho = options.rho / vi.largest_eigenvalue();
+  VelocityPoint z = vi.point(start);
+  vi.evaluate(z);
+  if (const auto end = iterates.visit(0, vi.error(z), z.r)) return *end;
+
+  for (std::int64_t k = 1;; ++k) {
+    vi.project(z.r, rho, z.hat, z);
+    vi.evaluate(z);
+    if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  const Vector start = r;
+  Iterates iterates(settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, iterates, start); });
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "fp-ds",
+      .family = "variational inequality",
+      .title = "Fixed-point projection with a constant step",
+      .citation = "de Saxce & Feng 1998; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::fp_ds

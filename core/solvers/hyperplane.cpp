@@ -1,0 +1,192 @@
+// Hyperplane projection: a projection on K, a line search for a hyperplane that separates the
+// iterate from the solutions, and a projection on both.
+//
+//   y = P_K(z_k - rho F(z_k)),  F(r) = u^, u = W r + q
+//   x = z_k - alpha (z_k - y),  alpha = 1, 1/2, 1/4, ... the first with
+//         F(x) . (z_k - y) >= sigma / rho ||z_k - y||^2
+//   z_k+1 = P_{K and H}(z_k),  H = { s : F(x) . (s - x) <= 0 }
+//
+// Konnov, "Combined relaxation methods for finding equilibrium points and solving related problems"
+// (1993); Solodov & Svaiter, "A new projection method for variational inequality problems" (1999);
+// HP of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and
+// numerical comparisons" (2018).
+//
+// Differs from the paper in: rho follows the line search, as Solodov & Svaiter advise: it is
+// multiplied by alpha after one that had to go back, and grows after one that had not; velocities
+// are interpolated between z_k and y, so that the line search costs no product with W and an
+// iteration costs two; each contact may have a step of its own (`metric`); where no hyperplane is
+// found (F need not be monotone), or none can be found for rounding, y is the next iterate. The
+// last projection is that of Solodov & Svaiter; with `intersection` off it is Konnov's and the
+// paper's, P_K of the projection on H, whose steps are too short where contacts are open.
+
+#include <utility>
+
+#include "kernels/variational_inequality.hpp"
+#include "kernels/with_cone.hpp"
+#include "solve/iterates.hpp"
+
+namespace fclib::hyperplane {
+
+namespace {
+
+struct Options {
+  Metric metric = Metric::contact;
+  double rho = 1.0;
+  double sigma = 0.3;
+  double growth = 1.5;
+  std::int64_t line_search = 50;
+  bool intersection = true;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Metric>{
+            .name = "metric", .member = &O::metric, .doc = metric_doc, .choices = metrics},
+        OptionField<O, double>{.name = "rho",
+                               .member = &O::rho,
+                               .unit = "1/W_aa",
+                               .doc = "first step of the first projection",
+                               .lowest = 1e-12,
+                               .highest = 1e12},
+        OptionField<O, double>{.name = "sigma",
+                               .member = &O::sigma,
+                               .unit = "1",
+                               .doc = "how clearly the hyperplane must separate",
+                               .lowest = 1e-3,
+                               .highest = 0.999},
+        OptionField<O, double>{.name = "growth",
+                               .member = &O::growth,
+                               .unit = "1",
+                               .doc = "factor of rho after a full step; 1 keeps rho from growing",
+                               .lowest = 1,
+                               .highest = 10},
+        OptionField<O, std::int64_t>{.name = "line_search",
+                                     .member = &O::line_search,
+                                     .unit = "1",
+                                     .doc = "limit of the halvings of alpha",
+                                     .lowest = 1,
+                                     .highest = 1000},
+        OptionField<O, bool>{.name = "intersection",
+                             .member = &O::intersection,
+                             .doc = "project on the cone and the half-space together, and not on "
+                                    "one after the other"},
+    };
+  }
+};
+
+/// to.r = P_{K and H}(from), H = { s : f . (s - x) <= 0 }: the root of the falling function
+/// f . (P_K(from - lambda w f) - x), by false position (Illinois). `from_gap` = f . (from - x) > 0,
+/// and `lambda` the root where there is no cone. Leaves the root it found in to.r.
+template <class Cone>
+void project_on_both(const VariationalInequality<Cone>& vi, const Vector& from, const Vector& f,
+                     const Vector& x, double from_gap, double lambda, VelocityPoint& to) {
+  constexpr double accuracy = 1e-3;  // of the gap
+  constexpr int max_projections = 40;
+  const double level = f.dot(x);
+  double low = 0;
+  double low_gap = from_gap;
+  double high = 0;
+  double high_gap = 0;
+  bool bracketed = false;
+  for (int k = 0; k < max_projections; ++k) {
+    vi.project(from, lambda, f, to);
+    const double gap = f.dot(to.r) - level;
+    if (std::abs(gap) <= accuracy * from_gap) return;
+    if (gap > 0) {
+      low = lambda;
+      low_gap = gap;
+      if (bracketed) high_gap *= 0.5;
+    } else {
+      high = lambda;
+      high_gap = gap;
+      low_gap *= bracketed ? 0.5 : 1.0;
+      bracketed = true;
+    }
+    lambda = bracketed ? (low * high_gap - high * low_gap) / (high_gap - low_gap) : 4 * lambda;
+  }
+}
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, Iterates& iterates,
+                const Vector& start) {
+  constexpr double least = 1e-100;  // of rho
+  constexpr double most = 1e100;
+  constexpr double rounding = 1e-15;
+  const VariationalInequality<Cone> vi(problem, options.metric);
+  double rho = options.rho;
+  VelocityPoint z = vi.point(start);
+  VelocityPoint y = z;
+  VelocityPoint x = z;
+  vi.evaluate(z);
+  if (const auto end = iterates.visit(0, vi.error(z), z.r)) return *end;
+
+  for (std::int64_t k = 1;; ++k) {
+    vi.project(z.r, rho, z.hat, y);
+    vi.evaluate(y);
+    const double enough = options.sigma / rho * vi.distance_squared(z.r, y.r);
+
+    // near the solution the products below are all rounding: the plain projection goes on from
+    // there
+    if (enough <= rounding * z.hat.norm() * z.r.norm()) {
+      std::swap(z, y);
+      if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+      continue;
+    }
+
+    // F(x) . (z_k - y) for ever smaller alpha
+    double alpha = 1;
+    double separation = 0;
+    for (std::int64_t halving = 0; halving <= options.line_search; ++halving) {
+      if (halving > 0) alpha *= 0.5;
+      x.u = z.u + alpha * (y.u - z.u);
+      vi.modify(x);
+      separation = x.hat.dot(z.r - y.r);
+      if (separation >= enough) break;
+    }
+
+    const double norm = vi.velocity_squared(x.hat);
+    if (separation >= enough && separation > 0 && norm > 0) {
+      const double gap = alpha * separation;  // F(x) . (z_k - x)
+      if (options.intersection) {
+        x.r = z.r + alpha * (y.r - z.r);
+        project_on_both(vi, z.r, x.hat, x.r, gap, gap / norm, y);
+      } else {
+        vi.project(z.r, gap / norm, x.hat, y);
+      }
+      vi.evaluate(y);
+    }
+    std::swap(z, y);
+    rho = alpha < 1 ? std::max(rho * std::max(alpha, 0.5), least)
+                    : std::min(rho * options.growth, most);
+    if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  const Vector start = r;
+  Iterates iterates(settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, iterates, start); });
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "hyperplane",
+      .family = "variational inequality",
+      .title = "Hyperplane projection",
+      .citation = "Konnov 1993; Solodov & Svaiter 1999; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::hyperplane

@@ -16,7 +16,7 @@ class Iterates {
   Iterates(const Settings& settings, Vector& r) : monitor_(settings), best_(r) {}
 
   /// Takes note of an iterate. What the solver returns, if it is to stop. The monitor is told of
-  /// every 16th iterate, of the last one, and now and then.
+  /// every 16th iterate, of the last one, and of large problems whenever it wants to know.
   std::optional<Outcome> visit(std::int64_t iteration, double error, const Vector& r) {
     if (error <= error_) {
       error_ = error;
@@ -24,6 +24,7 @@ class Iterates {
     }
     const bool told = iteration % 16 == 0 || error <= monitor_.tolerance() ||
                       iteration >= monitor_.max_iterations() ||
+                      (r.size() > large && monitor_.due()) ||
                       !(error < std::numeric_limits<double>::infinity());
     if (!told) return std::nullopt;
     if (const auto stop = monitor_.report(iteration, error)) return Outcome{*stop, iteration};
@@ -31,6 +32,8 @@ class Iterates {
   }
 
  private:
+  static constexpr Eigen::Index large = 1000;  // its iterations take longer than to read a clock
+
   Monitor monitor_;
   Vector& best_;
   double error_ = std::numeric_limits<double>::infinity();

@@ -12,6 +12,7 @@ import pytest
 
 import fclib
 from helpers import dense
+from helpers import planted_rolling as planted
 
 Array = npt.NDArray[np.float64]
 CASES = [(d, seed) for d in (3, 5) for seed in range(6)]
@@ -42,35 +43,6 @@ def natural_error(u: Array, r: Array, q: Array, mu: Array, mu_r: Array, d: int) 
         factor = np.minimum(1.0, limit * high / np.where(size > 0, size, 1.0))
         projection[:, part] *= factor[:, None]
     return float(np.linalg.norm(reaction - projection) / np.linalg.norm(q))
-
-
-def planted(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingProblem, Array]:
-    """A problem and its reactions: open, sticking, sliding, rolling, and both, in turn."""
-    rng = np.random.default_rng(seed)
-    half = (d - 1) // 2
-    mu, mu_r = rng.uniform(0.2, 0.8, nc), rng.uniform(0.02, 0.3, nc)
-    r, u = np.zeros((nc, d)), np.zeros((nc, d))
-    for k in range(nc):
-        status = k % 5
-        if status == 0:
-            u[k] = rng.normal(size=d)
-            u[k, 0] = abs(u[k, 0]) + 0.1
-            continue
-        r[k, 0] = rng.uniform(0.5, 2)
-        for part, limit, moves in (
-            (slice(1, 1 + half), mu[k], status in (2, 4)),
-            (slice(1 + half, d), mu_r[k], status in (3, 4)),
-        ):
-            direction = rng.normal(size=half)
-            direction /= np.linalg.norm(direction)
-            r[k, part] = limit * r[k, 0] * direction * (1.0 if moves else 0.5)
-            u[k, part] = -direction * rng.uniform(0.5, 2) if moves else 0.0
-    root = rng.normal(size=(nc * d, nc * d)) / np.sqrt(nc * d)
-    W = root @ root.T + 0.5 * np.eye(nc * d)
-    problem = fclib.LocalRollingProblem(
-        spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), mu=mu, mu_r=mu_r
-    )
-    return problem, r.ravel()
 
 
 def as_global(problem: fclib.LocalRollingProblem) -> fclib.GlobalRollingProblem:

@@ -1,0 +1,183 @@
+"""What is specific to the splitting and the projection methods: options, agreement, limits."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from helpers import dense, local_problem, planted_local, planted_rolling
+
+LOCAL_SOLVERS = (
+    "exact",
+    "projection",
+    "diagonal",
+    "alart-curnier",
+    "fischer-burmeister",
+    "hybrid",
+)
+PROJECTIONS = ("fp-ds", "fp-vi-upk", "fp-vi-upts", "fp-eg-upk", "fp-eg-upts", "hyperplane")
+METHODS = ("nsgs", "psor", *PROJECTIONS)
+SWEEPS: list[dict[str, Any]] = [
+    {"symmetric": True},
+    {"freeze": 3},
+    {"freeze": 10, "freeze_below": 1e-3, "symmetric": True},
+    {"freeze": 2, "shuffle": "always", "relaxation": 0.9},
+]
+
+
+def packing(stretch: float = 1.0) -> fclib.LocalProblem:
+    """Thirty contacts in a row, with masses that spread over `stretch` squared."""
+    problem = planted_local(11, nc=30).problem
+    assert isinstance(problem, fclib.LocalProblem)
+    scale = np.repeat(np.geomspace(1, stretch, problem.nc), 3)
+    W = scale[:, None] * dense(problem.W) * scale
+    return local_problem(W, problem.q * scale, problem.mu)
+
+
+# ---- the one-contact solvers of Gauss-Seidel
+
+
+@pytest.mark.parametrize("local_solver", LOCAL_SOLVERS)
+@pytest.mark.parametrize("method", ["nsgs", "psor"])
+@pytest.mark.parametrize("d", [2, 3])
+def test_local_solvers_agree(method: str, local_solver: str, d: int) -> None:
+    for seed in range(4):
+        case = planted_local(seed, d=d)
+        result = fclib.solve(
+            case.problem, method, 1e-11, local_solver=local_solver, max_iterations=20_000
+        )
+        assert result.converged
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-8)
+
+
+@pytest.mark.parametrize("local_solver", LOCAL_SOLVERS)
+@pytest.mark.parametrize("d", [3, 5])
+def test_local_solvers_take_rolling_contacts(local_solver: str, d: int) -> None:
+    problem, r = planted_rolling(d, seed=2)
+    result = fclib.solve(
+        problem, "nsgs", 1e-10, local_solver=local_solver, max_iterations=100_000, time_limit=20
+    )
+    assert result.converged
+    np.testing.assert_allclose(result.solution.r, r, atol=1e-7)
+
+
+def test_newton_takes_the_sweeps_of_the_exact_solver() -> None:
+    exact = fclib.solve(packing(), "nsgs", 1e-9)
+    for local_solver in ("alart-curnier", "hybrid"):
+        newton = fclib.solve(packing(), "nsgs", 1e-9, local_solver=local_solver)
+        assert newton.iterations == exact.iterations
+        np.testing.assert_allclose(newton.solution.r, exact.solution.r, atol=1e-8)
+
+
+@pytest.mark.parametrize("options", SWEEPS)
+def test_orders_of_sweeping_lead_to_the_same_solution(options: dict[str, Any]) -> None:
+    for seed in range(4):
+        case = planted_local(seed)
+        result = fclib.solve(case.problem, "nsgs", 1e-11, **options)
+        assert result.converged
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-8)
+
+
+def test_omega_1_is_gauss_seidel() -> None:
+    sweeps = fclib.solve(packing(), "nsgs", 1e-9)
+    psor = fclib.solve(packing(), "psor", 1e-9, omega=1)
+    np.testing.assert_allclose(psor.solution.r, sweeps.solution.r, atol=1e-12)
+    assert psor.iterations == sweeps.iterations
+
+
+@pytest.mark.parametrize("omega", [0.5, 0.9, 1.2])
+def test_relaxed_sweeps_stay_in_the_cone(omega: float) -> None:
+    for limit in (1, 2, 5):
+        result = fclib.solve(packing(), "psor", 0, omega=omega, max_iterations=limit)
+        r = result.solution.r.reshape(-1, 3)
+        excess = np.hypot(r[:, 1], r[:, 2]) - packing().mu * r[:, 0]
+        assert excess.max() <= 1e-12
+
+
+# ---- projections on the variational inequality
+
+
+@pytest.mark.parametrize("metric", ["contact", "uniform"])
+@pytest.mark.parametrize("method", PROJECTIONS)
+@pytest.mark.parametrize("d", [2, 3])
+def test_projections_agree_with_the_planted_solution(method: str, d: int, metric: str) -> None:
+    for seed in range(4):
+        case = planted_local(seed, d=d)
+        result = fclib.solve(case.problem, method, 1e-10, metric=metric, time_limit=20)
+        assert result.converged
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("d", [3, 5])
+def test_rolling_contacts(method: str, d: int) -> None:
+    problem, r = planted_rolling(d, seed=1)
+    result = fclib.solve(problem, method, 1e-9, time_limit=20)
+    assert result.converged
+    np.testing.assert_allclose(result.solution.r, r, atol=1e-6)
+
+
+@pytest.mark.parametrize("method", PROJECTIONS)
+def test_a_metric_of_each_contact_bears_unlike_masses(method: str) -> None:
+    problem = packing(stretch=30)
+    own = fclib.solve(problem, method, 1e-6, time_limit=30)
+    assert own.converged
+    same = fclib.solve(
+        problem, method, 1e-6, metric="uniform", max_iterations=4 * own.iterations, time_limit=30
+    )
+    assert not same.converged
+
+
+@pytest.mark.parametrize("method", PROJECTIONS[1:])
+@pytest.mark.parametrize("rho", [1e-6, 1e6])
+def test_the_first_step_hardly_matters(method: str, rho: float) -> None:
+    case = planted_local(3)
+    result = fclib.solve(case.problem, method, 1e-8, rho=rho)
+    assert result.converged
+    assert result.iterations <= 2 * fclib.solve(case.problem, method, 1e-8).iterations + 100
+
+
+def test_a_constant_step_that_is_too_long_is_not_called_converged() -> None:
+    result = fclib.solve(packing(), "fp-ds", 1e-8, rho=50, max_iterations=500)
+    assert not result.converged
+
+
+def test_the_hyperplane_is_better_met_inside_the_cone() -> None:
+    problem = packing()
+    both = fclib.solve(problem, "hyperplane", 1e-6)
+    in_turn = fclib.solve(
+        problem, "hyperplane", 1e-6, intersection=False, max_iterations=2 * both.iterations
+    )
+    assert both.converged
+    assert both.error <= in_turn.error
+
+
+# ---- limits and starts
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_time_limit_is_kept_in_the_middle_of_a_solve(method: str) -> None:
+    result = fclib.solve(packing(30), method, 0, max_iterations=10**12, time_limit=0.1)
+    assert result.status == "time_limit"
+    assert result.cpu_s < 1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_more_iterations_never_give_a_worse_result(method: str) -> None:
+    errors = [
+        fclib.solve(packing(), method, 0, max_iterations=limit).error for limit in (1, 4, 16, 64)
+    ]
+    assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_better_start_takes_fewer_iterations(method: str) -> None:
+    problem = packing()
+    rough = fclib.solve(problem, method, 1e-4)
+    cold = fclib.solve(problem, method, 1e-6)
+    warm = fclib.solve(problem, method, 1e-6, guess=rough.solution)
+    assert warm.converged
+    assert warm.iterations < cold.iterations

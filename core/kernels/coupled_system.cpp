@@ -24,12 +24,16 @@ constexpr Eigen::Index longest_column = 64;
 
 }  // namespace
 
-CoupledSystem::CoupledSystem(const Delassus& problem) : problem_(problem) {
+CoupledSystem::CoupledSystem(const Delassus& problem, Form form) : problem_(problem) {
   const auto d = static_cast<std::size_t>(problem.d());
   D_.assign(d * d * static_cast<std::size_t>(problem.nc()), 0.0);
   zero_ = Vector::Zero(problem.m());
   row_scale_ = Vector::Ones(problem.nc());
-  if (problem.primal != nullptr) on_bodies_ = plan_bodies();
+  if (form == Form::general) {
+    B_ = D_;
+  } else if (problem.primal != nullptr) {
+    on_bodies_ = plan_bodies();
+  }
   if (on_bodies_) {
     Multifrontal bodies = std::move(lu_);
     plan_contacts();
@@ -152,7 +156,10 @@ void CoupledSystem::fill_contacts() {
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Eigen::Map<const Block> block(blocks + std::ptrdiff_t{D * D} * a);
     const double size = block.norm() * problem_.W.template diagonal_block<D>(a).norm();
-    row_scale_[a] = 1.0 / std::max(1.0, size);
+    const double own =
+        B_.empty() ? 1.0 : Eigen::Map<const Block>(B_.data() + std::ptrdiff_t{D * D} * a).norm();
+    const double largest = std::max(own, size);
+    row_scale_[a] = largest > 0 ? 1.0 / largest : 1.0;
   }
   const std::int64_t* place = place_.data();
   problem_.W.template for_each_block<D>([&](Index row, Index, const auto& w) {
@@ -162,6 +169,11 @@ void CoupledSystem::fill_contacts() {
   });
   for (Index a = 0; a < problem_.nc(); ++a) {
     double* target = values_.data() + D * D * diagonal_[a];
+    if (!B_.empty()) {
+      Eigen::Map<Block>(target, D, D) +=
+          row_scale_[a] * Eigen::Map<const Block>(B_.data() + std::ptrdiff_t{D * D} * a);
+      continue;
+    }
     for (int c = 0; c < D; ++c) target[(D + 1) * c] += row_scale_[a];
   }
 }
@@ -204,14 +216,14 @@ bool CoupledSystem::factorise() {
   return lu_.factorise(values_);
 }
 
-void CoupledSystem::apply_blocks(const Vector& x, Vector& y) const {
+void CoupledSystem::apply(const std::vector<double>& blocks, const Vector& x, Vector& y) const {
   const int d = problem_.d();
   y.resize(x.size());
   with_dimension(d, [&](auto D) {
     using Block = Eigen::Matrix<double, D, D>;
     for (Index a = 0; a < problem_.nc(); ++a) {
       y.segment<D>(D * a).noalias() =
-          Eigen::Map<const Block>(D_.data() + std::ptrdiff_t{D * D} * a) * x.segment<D>(D * a);
+          Eigen::Map<const Block>(blocks.data() + std::ptrdiff_t{D * D} * a) * x.segment<D>(D * a);
     }
   });
 }
@@ -221,7 +233,7 @@ void CoupledSystem::solve_once(Vector& x) {
     body_ = problem_.primal->H * x;
     lu_.solve(body_);
     product_ = problem_.primal->H.transpose() * body_;
-    apply_blocks(product_, residual_);
+    apply(D_, product_, residual_);
     x -= residual_;
     return;
   }
@@ -233,10 +245,15 @@ void CoupledSystem::solve_once(Vector& x) {
 void CoupledSystem::solve(Vector& x) {
   rhs_ = x;
   solve_once(x);
-  // one step of refinement: r = h - x - D W x
+  // one step of refinement: r = h - B x - D W x
   problem_.W.multiply_add(x, zero_, product_);
-  apply_blocks(product_, residual_);
-  rhs_ -= x;
+  apply(D_, product_, residual_);
+  if (B_.empty()) {
+    rhs_ -= x;
+  } else {
+    apply(B_, x, body_);
+    rhs_ -= body_;
+  }
   rhs_ -= residual_;
   if (!rhs_.allFinite()) return;
   solve_once(rhs_);

@@ -1,9 +1,10 @@
 // The one linear system that Newton and interior-point methods solve here,
 //
-//   (I + D W) x = h,   D block-diagonal, d x d, possibly singular or not symmetric.
+//   (B + D W) x = h,   D and B block-diagonal, d x d, possibly singular or not symmetric.
 //
-// On the contacts it is factorised as it stands, each block row scaled. Where the problem is known
-// by its bodies, W = H^T M^-1 H, the same x comes from
+// B is the identity unless asked for. On the contacts the system is factorised as it stands, each
+// block row scaled. Where B is the identity and the problem is known by its bodies,
+// W = H^T M^-1 H, the same x comes from
 //
 //   (M + H D H^T) y = H h,   x = h - D H^T y
 //
@@ -19,17 +20,22 @@ namespace fclib {
 
 class CoupledSystem {
  public:
+  enum class Form { identity, general };  ///< of B
+
   /// Plans the factorisations; keeps a reference to the problem.
-  explicit CoupledSystem(const Delassus& problem);
+  explicit CoupledSystem(const Delassus& problem, Form form = Form::identity);
 
   /// The blocks of D, each d x d by columns, one after another (d d nc): to be filled before
   /// factorise().
   [[nodiscard]] std::vector<double>& blocks() { return D_; }
 
+  /// Those of B where it is general, likewise; zero at first.
+  [[nodiscard]] std::vector<double>& own_blocks() { return B_; }
+
   /// False where the blocks are not finite.
   bool factorise();
 
-  /// x <- (I + D W)^-1 x.
+  /// x <- (B + D W)^-1 x.
   void solve(Vector& x);
   /// The same without refinement, for iterations that mend it themselves.
   void solve_plain(Vector& x) { solve_once(x); }
@@ -43,7 +49,7 @@ class CoupledSystem {
   template <int D>
   void fill_contacts();
   void fill_bodies();
-  void apply_blocks(const Vector& x, Vector& y) const;
+  void apply(const std::vector<double>& blocks, const Vector& x, Vector& y) const;
   void solve_once(Vector& x);
   void plan_contacts();
   template <int D>
@@ -53,6 +59,7 @@ class CoupledSystem {
   const Delassus& problem_;
   Multifrontal lu_;
   std::vector<double> D_;
+  std::vector<double> B_;  // empty: the identity
   std::vector<double> values_;
   Vector row_scale_;                    // of each contact
   std::vector<std::int64_t> place_;     // of each block of W in the values, in W's order

@@ -21,6 +21,13 @@ namespace fclib {
 
 /// How kappa moves, and when to give up.
 struct ProximalRules {
+  enum class Law {
+    by_steps,  ///< grows as the inner problems are easy
+    by_error,  ///< 1 / (sigma error^nu), and less after failures; constant where nu is 0
+  };
+  Law law = Law::by_steps;
+  double sigma = 1;  ///< of by_error
+  double nu = 1;
   double kappa = 100;  ///< at first
   double kappa_max = 1e8;
   double easy = 3;        ///< factor after at most 2 Newton steps; after at most 4, its share 2/3
@@ -60,10 +67,15 @@ class ProximalPoint {
     problem_.velocity(r_, u_);
     error_ = error_of(u_, r_);
     double best = error_;
+    double share = 1;  // of what the law says, after failures
     while (best > tolerance && system_.factorisations() < stop_at) {
+      if (rules.law == ProximalRules::Law::by_error) {
+        kappa = std::min(share / (rules.sigma * std::pow(error_, rules.nu)), rules.kappa_max);
+      }
       const int steps = inner(kappa, stop_at);
       if (steps == 0) {  // failed
         kappa *= rules.hard;
+        share *= rules.hard;
         cautious = 3;
         if (kappa < 1e-6) break;
         continue;
@@ -82,6 +94,7 @@ class ProximalPoint {
         growth = std::min(growth, 1.5);
         --cautious;
       }
+      share = std::min(1.0, share * growth);
       kappa = std::min(kappa * growth, rules.kappa_max);
     }
     return best;

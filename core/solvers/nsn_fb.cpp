@@ -1,0 +1,59 @@
+// NSN-FB: nonsmooth Newton on the function of Fischer & Burmeister for
+// the second-order cone.
+//
+//   F(u, r) = x + y - (x o x + y o y)^(1/2),   x = (mu r_N, r_T),   y = rho (u^_N / mu, u_T)
+//   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
+//
+// t = 1, or from a line search on 1/2 ||F||^2 (kernels/semismooth_newton.hpp; F in
+// kernels/contact_functions.hpp).
+//
+// Fukushima, Luo & Tseng, "Smoothing functions for second-order-cone complementarity problems"
+// (2001); Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations
+// and numerical comparisons" (2018).
+//
+// Differs from the papers in: the element of the generalised Jacobian at kinks is that of the side
+// where a contact is open or sticks; W + delta I stands for W in the system, with delta going to
+// zero as the error does, without which a singular W has Newton wander; with a line search, minus
+// the gradient (W symmetric) is searched where Newton's step is no descent; where the error stands
+// still, Newton starts anew after sweeps of nonsmooth Gauss-Seidel (sweeps = 0: it ends).
+//
+// Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
+// factorised on the contacts, however few the bodies are.
+
+#include "solve/newton.hpp"
+
+namespace fclib::nsn_fb {
+
+namespace {
+
+struct Options : NewtonOptions {
+  static constexpr auto fields() { return fields_of<Options>(); }
+};
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  return problem.d() == 2
+             ? run_newton<FischerBurmeister<Coulomb<2>>>(problem, options, settings, r)
+             : run_newton<FischerBurmeister<Coulomb<3>>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "nsn-fb",
+      .family = "newton",
+      .title = "Nonsmooth Newton, Fischer and Burmeister",
+      .citation = "Fukushima, Luo & Tseng 2001; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {},
+      .options = describe_options<Options>(),
+      .max_iterations = 10'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::nsn_fb

@@ -1,0 +1,54 @@
+// NSN-NM: nonsmooth Newton on the natural map.
+//
+//   F(u, r) = r - P_K(r - rho u^),   u^ = u + [mu ||u_T||, 0, 0]
+//   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
+//
+// t = 1, or from a line search on 1/2 ||F||^2 (kernels/semismooth_newton.hpp; F in
+// kernels/contact_functions.hpp).
+//
+// De Saxce & Feng, "The bipotential method" (1998); Acary, Bremond, Huber, "On solving contact
+// problems with Coulomb friction: formulations and numerical comparisons" (2018).
+//
+// Differs from the papers in: the element of the generalised Jacobian at kinks is that of the side
+// where a contact is open or sticks; W + delta I stands for W in the system, with delta going to
+// zero as the error does, without which a singular W has Newton wander; with a line search, minus
+// the gradient (W symmetric) is searched where Newton's step is no descent; where the error stands
+// still, Newton starts anew after sweeps of nonsmooth Gauss-Seidel (sweeps = 0: it ends).
+//
+// Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
+// factorised on the contacts, however few the bodies are.
+
+#include "solve/newton.hpp"
+
+namespace fclib::nsn_nm {
+
+namespace {
+
+struct Options : NewtonOptions {
+  static constexpr auto fields() { return fields_of<Options>(); }
+};
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  return run_newton_on<NaturalMap>(problem, parse_options<Options>(values), settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "nsn-nm",
+      .family = "newton",
+      .title = "Nonsmooth Newton, natural map",
+      .citation = "De Saxce & Feng 1998; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 10'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::nsn_nm

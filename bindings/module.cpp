@@ -23,6 +23,7 @@
 #include "fields.hpp"
 #include "io/hdf5.hpp"
 #include "merit/merit.hpp"
+#include "python_solver.hpp"
 #include "solve/driver.hpp"
 #include "version.hpp"
 
@@ -182,23 +183,49 @@ template <class P>
 void bind_solve(nb::module_& m) {
   m.def(
       "solve",
-      [](const P& problem, const std::string& solver, double tolerance, std::int64_t max_iterations,
+      [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
          double time_limit, const OptionValues& options, const Solution* guess,
-         const nb::object& callback) {
+         const nb::object& callback, bool history) {
         Settings settings{.tolerance = tolerance,
                           .max_iterations = max_iterations,
                           .time_limit = time_limit,
                           .callback = make_callback(callback),
-                          .poll = poll_signals};
+                          .poll = poll_signals,
+                          .history = history};
         const Unlocked unlocked;
         return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
-      "guess"_a.none(), "callback"_a.none());
+      "guess"_a.none(), "callback"_a.none(), "history"_a);
+}
+
+nb::object history_of(const Result& result) {
+  if (!result.history) return nb::none();
+  nb::list points;
+  std::size_t longest = 1;
+  for (const HistoryPoint& point : *result.history) {
+    points.append(nb::make_tuple(point.iteration, point.error, point.time, point.stage));
+    longest = std::max(longest, point.stage.size());
+  }
+  nb::list type;
+  type.append(nb::make_tuple("iteration", "i8"));
+  type.append(nb::make_tuple("error", "f8"));
+  type.append(nb::make_tuple("time", "f8"));
+  type.append(nb::make_tuple("stage", "U" + std::to_string(longest)));
+  return nb::module_::import_("numpy").attr("array")(points, "dtype"_a = type);
 }
 
 void bind_solvers(nb::module_& m) {
   nb::class_<OptionInfo>(m, "OptionInfo", "An option of a solver.")
+      .def(
+          "__init__",
+          [](OptionInfo* self, const std::string& name, const std::string& type,
+             const OptionValue& default_value, const std::string& unit, const std::string& doc,
+             const std::vector<std::string>& choices, double lowest, double highest) {
+            new (self) OptionInfo{name, type, default_value, unit, doc, choices, lowest, highest};
+          },
+          nb::kw_only(), "name"_a, "type"_a, "default"_a, "unit"_a, "doc"_a, "choices"_a,
+          "lowest"_a, "highest"_a)
       .def_ro("name", &OptionInfo::name)
       .def_ro("type", &OptionInfo::type, "bool, int, float or choice")
       .def_ro("default", &OptionInfo::default_value)
@@ -208,14 +235,16 @@ void bind_solvers(nb::module_& m) {
       .def_ro("lowest", &OptionInfo::lowest)
       .def_ro("highest", &OptionInfo::highest);
   nb::class_<Solver>(m, "SolverInfo", "A solver of the registry.")
-      .def_prop_ro("name", [](const Solver& s) { return std::string(s.name); })
-      .def_prop_ro("family", [](const Solver& s) { return std::string(s.family); })
-      .def_prop_ro("title", [](const Solver& s) { return std::string(s.title); })
-      .def_prop_ro("citation", [](const Solver& s) { return std::string(s.citation); })
+      .def_ro("name", &Solver::name)
+      .def_ro("family", &Solver::family)
+      .def_ro("title", &Solver::title)
+      .def_ro("citation", &Solver::citation)
+      .def_ro("origin", &Solver::origin, "the package that it comes from")
       .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
       .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
               "the spacedims of rolling problems")
       .def_ro("options", &Solver::options)
+      .def_ro("max_iterations", &Solver::max_iterations, "where the caller sets none")
       .def(
           "check_options",
           [](const Solver& s, const OptionValues& options) { s.check_options(options); },
@@ -229,11 +258,12 @@ void bind_solvers(nb::module_& m) {
           result.append(nb::cast(solver, nb::rv_policy::reference));
         return result;
       },
-      nb::sig("def solvers() -> list[SolverInfo]"), "All solvers, by name.");
+      nb::sig("def solvers() -> list[SolverInfo]"), "The solvers of the core, by name.");
   m.def(
       "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
       nb::rv_policy::reference,
-      "The solver of this name. Raises OptionError, with the known names, where there is none.");
+      "The solver of this name in the core. Raises OptionError where there is none.");
+  bind_python_solvers(m);
 
   nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
       .def_prop_ro("name", [](const Stage& s) { return std::string(s.name); })
@@ -270,6 +300,10 @@ void bind_solvers(nb::module_& m) {
           "the local problem without bilateral constraints, -W^T E y is in K* and y . q_N < 0,\n"
           "with E y the vector whose normal parts are y. Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
+      .def_prop_ro("history", history_of,
+                   nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
+                   "Where fclib.solve was asked for it: what the solver reported, a structured "
+                   "array with iteration, error, time [s] and stage.")
       .def("__repr__", [](const Result& r) {
         char text[160];
         std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",

@@ -742,7 +742,7 @@ const char* fclib_solver_name(int k) {
   return guarded<const char*>(nullptr, [&]() -> const char* {
     const auto& all = solvers();
     if (k < 0 || static_cast<std::size_t>(k) >= all.size()) return nullptr;
-    return all[static_cast<std::size_t>(k)]->name.data();  // a literal
+    return all[static_cast<std::size_t>(k)]->name.c_str();
   });
 }
 

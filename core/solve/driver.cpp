@@ -49,10 +49,21 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
   const auto first_start = Clock::now();
+  const auto elapsed = [&] {
+    return std::chrono::duration<double>(Clock::now() - first_start).count();
+  };
+  if (settings.history) {
+    result.history.emplace();
+    settings.callback = [&](const Progress& progress) {
+      result.history->push_back({result.iterations + progress.iteration, progress.error, elapsed(),
+                                 std::string(progress.stage)});
+      return !request.settings.callback || request.settings.callback(progress);
+    };
+  }
   for (int correction = 0;; ++correction) {
     const double start = cpu_time();
     const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
-    result.cpu_s += cpu_time() - start;
+    result.cpu_s += outcome.cpu_s.value_or(cpu_time() - start);
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = outcome.stages;
@@ -70,8 +81,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     if (result.status != Status::converged) return result;
     // the limits hold for all the attempts together
     settings.max_iterations = max_iterations - result.iterations;
-    const std::chrono::duration<double> elapsed = Clock::now() - first_start;
-    settings.time_limit = request.settings.time_limit - elapsed.count();
+    settings.time_limit = request.settings.time_limit - elapsed();
     result.status = settings.max_iterations <= 0 ? Status::iteration_limit
                     : settings.time_limit <= 0   ? Status::time_limit
                                                  : Status::inaccurate;
@@ -91,8 +101,8 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
   }
   const auto& taken = P::rolling ? solver.rolling_dimensions : solver.dimensions;
   if (std::find(taken.begin(), taken.end(), problem.spacedim) == taken.end()) {
-    throw Error(ErrorKind::unsuitable, "solver " + std::string(solver.name) + " does not take " +
-                                           formulation(problem) + " problems");
+    throw Error(ErrorKind::unsuitable,
+                "solver " + solver.name + " does not take " + formulation(problem) + " problems");
   }
 }
 
@@ -133,15 +143,15 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
              });
 }
 
-/// What every solve does: finds the solver, checks, times.
+/// What every solve does: checks, times.
 template <class P, class Form>
-Result solve_any(const P& problem, std::string_view solver, const Settings& settings,
+Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
   const double start = cpu_time();
-  const Request request{find_solver(solver), settings, options};
+  const Request request{solver, settings, options};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
-  result.setup_s = cpu_time() - start - result.cpu_s;
+  result.setup_s = std::max(0.0, cpu_time() - start - result.cpu_s);
   return result;
 }
 
@@ -151,28 +161,28 @@ const Solver& find_solver(std::string_view name) {
   std::string known;
   for (const Solver* solver : solvers()) {
     if (solver->name == name) return *solver;
-    known += (known.empty() ? "" : ", ") + std::string(solver->name);
+    known += (known.empty() ? "" : ", ") + solver->name;
   }
   throw Error(ErrorKind::option, "unknown; there is: " + known,
               "solver '" + std::string(name) + "'");
 }
 
-Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings,
+Result solve(const LocalProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
   return solve_any(problem, solver, settings, options, guess, solve_local<LocalProblem>);
 }
 
-Result solve(const LocalRollingProblem& problem, std::string_view solver, const Settings& settings,
+Result solve(const LocalRollingProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
   return solve_any(problem, solver, settings, options, guess, solve_local<LocalRollingProblem>);
 }
 
-Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings,
+Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
   return solve_any(problem, solver, settings, options, guess, solve_global<GlobalProblem>);
 }
 
-Result solve(const GlobalRollingProblem& problem, std::string_view solver, const Settings& settings,
+Result solve(const GlobalRollingProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
   return solve_any(problem, solver, settings, options, guess, solve_global<GlobalRollingProblem>);
 }

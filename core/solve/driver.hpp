@@ -2,13 +2,23 @@
 // the formulation of the problem, and has the merit judge it.
 #pragma once
 
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "merit/merit.hpp"
 #include "problem.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib {
+
+/// A report of a solver, kept.
+struct HistoryPoint {
+  std::int64_t iteration = 0;
+  double error = 0;
+  double time = 0;  ///< wall clock since the first start of the solver [s]
+  std::string stage;
+};
 
 struct Result {
   Solution solution;
@@ -23,6 +33,7 @@ struct Result {
   Vector certificate;
   std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
   std::string solver;
+  std::optional<std::vector<HistoryPoint>> history;  ///< where the settings ask for it
 
   [[nodiscard]] bool converged() const { return status == Status::converged; }
 };
@@ -31,15 +42,22 @@ struct Result {
 ///
 /// Throws Error: (problem) for invalid data, (option) for an unknown solver or option,
 /// (unsuitable) where the problem cannot be brought to the form that the solver takes.
-Result solve(const LocalProblem& problem, std::string_view solver, const Settings& settings = {},
+Result solve(const LocalProblem& problem, const Solver& solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
-Result solve(const LocalRollingProblem& problem, std::string_view solver,
+Result solve(const LocalRollingProblem& problem, const Solver& solver,
              const Settings& settings = {}, const OptionValues& options = {},
              const Solution& guess = {});
-Result solve(const GlobalProblem& problem, std::string_view solver, const Settings& settings = {},
+Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
-Result solve(const GlobalRollingProblem& problem, std::string_view solver,
+Result solve(const GlobalRollingProblem& problem, const Solver& solver,
              const Settings& settings = {}, const OptionValues& options = {},
              const Solution& guess = {});
+
+/// The same by the name of a solver of the registry.
+template <class P>
+Result solve(const P& problem, std::string_view solver, const Settings& settings = {},
+             const OptionValues& options = {}, const Solution& guess = {}) {
+  return solve(problem, find_solver(solver), settings, options, guess);
+}
 
 }  // namespace fclib

@@ -173,4 +173,44 @@ std::vector<OptionInfo> describe_options() {
   return result;
 }
 
+/// The same checks for options that are known at run time alone: all of them, with the given values
+/// in place of the defaults, each of its own type.
+inline OptionValues parse_options(const std::vector<OptionInfo>& infos,
+                                  const OptionValues& values) {
+  struct Unknown {};
+  enum class Choice : std::size_t {};
+  const auto parse = []<class Value>(const OptionInfo& info, const OptionValue& value, Value) {
+    const std::vector<std::string_view> choices(info.choices.begin(), info.choices.end());
+    return detail::parse_option(OptionField<Unknown, Value>{.name = info.name,
+                                                            .member = nullptr,
+                                                            .choices = choices,
+                                                            .lowest = info.lowest,
+                                                            .highest = info.highest},
+                                value);
+  };
+  OptionValues result;
+  std::string known;
+  for (const OptionInfo& info : infos) {
+    known += (known.empty() ? "" : ", ") + info.name;
+    const auto found = values.find(info.name);
+    const OptionValue& value = found != values.end() ? found->second : info.default_value;
+    if (info.type == "bool") {
+      result[info.name] = parse(info, value, bool{});
+    } else if (info.type == "int") {
+      result[info.name] = parse(info, value, std::int64_t{});
+    } else if (info.type == "float") {
+      result[info.name] = parse(info, value, double{});
+    } else {
+      const Choice choice = parse(info, value, Choice{});
+      result[info.name] = info.choices[static_cast<std::size_t>(choice)];
+    }
+  }
+  for (const auto& [name, value] : values) {
+    if (!result.contains(name)) {
+      detail::bad_option(name, "unknown; this solver has: " + (known.empty() ? "none" : known));
+    }
+  }
+  return result;
+}
+
 }  // namespace fclib

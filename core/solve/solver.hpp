@@ -70,15 +70,23 @@ struct Settings {
   std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
   std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or
                                                   ///< iterations; false stops the solver
+  bool history = false;                           ///< whether the result keeps all reports
 };
 
 /// Watches over a solver: it reports its iterates, and learns whether to stop.
 class Monitor {
+  using Clock = std::chrono::steady_clock;
+
  public:
   explicit Monitor(const Settings& settings) : settings_(settings) {}
 
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
   [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
+
+  /// Wall clock since the solver started [s].
+  [[nodiscard]] double elapsed() const {
+    return std::chrono::duration<double>(Clock::now() - start_).count();
+  }
 
   /// Names the stage of the reports to come.
   void enter(std::string_view stage) { stage_ = stage; }
@@ -109,12 +117,7 @@ class Monitor {
   }
 
  private:
-  using Clock = std::chrono::steady_clock;
   static constexpr std::chrono::milliseconds poll_interval{100};
-
-  [[nodiscard]] double elapsed() const {
-    return std::chrono::duration<double>(Clock::now() - start_).count();
-  }
 
   const Settings& settings_;
   std::string_view stage_;
@@ -136,25 +139,28 @@ struct Stage {
 struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
-  std::vector<Stage> stages = {};  ///< in the order of their first call; empty for plain solvers
-  Vector certificate = {};         ///< y (nc) of kernels/no_solution.hpp, where infeasible
+  std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
+  Vector certificate = {};           ///< y (nc) of kernels/no_solution.hpp, where infeasible
+  std::optional<double> cpu_s = {};  ///< [s] where it is not that of the calling thread
 };
 
 /// The entry of a solver in the registry.
 struct Solver {
-  std::string_view name;
-  std::string_view family;
-  std::string_view title;
-  std::string_view citation;
+  std::string name;
+  std::string family;
+  std::string title;
+  std::string citation;
   std::vector<int> dimensions;          ///< the spacedims it takes
   std::vector<int> rolling_dimensions;  ///< ... of rolling problems
   std::vector<OptionInfo> options;
   std::int64_t max_iterations = 0;  ///< where the caller sets none
   /// Throws Error (option) at the first option that is unknown or has a wrong value.
-  void (*check_options)(const OptionValues& options);
+  std::function<void(const OptionValues& options)> check_options;
   /// Solves from the guess in r (length m), and leaves its best iterate there.
-  Outcome (*solve)(const Delassus& problem, const OptionValues& options, const Settings& settings,
-                   Vector& r);
+  std::function<Outcome(const Delassus& problem, const OptionValues& options,
+                        const Settings& settings, Vector& r)>
+      solve;
+  std::string origin = "fclib";  ///< the package that it comes from
 };
 
 /// All solvers, by name; generated from the files in solvers/.

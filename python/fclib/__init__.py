@@ -15,6 +15,7 @@ from fclib._core import (
     LocalRollingProblem,
     MatrixInfo,
     Merit,
+    Monitor,
     OptionError,
     OptionInfo,
     ProblemError,
@@ -24,19 +25,18 @@ from fclib._core import (
     SolverInfo,
     UnsuitableError,
     contents,
-    find_solver,
     merit,
     read,
     read_guesses,
     read_siconos,
     read_solution,
-    solvers,
     write,
     write_guesses,
     write_siconos,
     write_solution,
 )
 from fclib._core import version as __version__
+from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
 __all__ = [
@@ -48,6 +48,8 @@ __all__ = [
     "LocalRollingProblem",
     "MatrixInfo",
     "Merit",
+    "Monitor",
+    "Option",
     "OptionError",
     "OptionInfo",
     "Problem",
@@ -55,6 +57,7 @@ __all__ = [
     "ProblemInfo",
     "Result",
     "Solution",
+    "SolverError",
     "SolverInfo",
     "UnsuitableError",
     "__version__",
@@ -66,6 +69,7 @@ __all__ = [
     "read_siconos",
     "read_solution",
     "solve",
+    "solver",
     "solvers",
     "write",
     "write_guesses",
@@ -74,6 +78,6 @@ __all__ = [
 ]
 
 # messages and tracebacks show the names that users import
-for _error in (Error, FileError, OptionError, ProblemError, UnsuitableError):
+for _error in (Error, FileError, OptionError, ProblemError, SolverError, UnsuitableError):
     _error.__module__ = __name__
 del _error

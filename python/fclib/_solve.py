@@ -9,6 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from fclib import _core
+from fclib._registry import find_solver
 
 Problem: TypeAlias = (
     _core.LocalProblem
@@ -27,6 +28,7 @@ def solve(
     time_limit: float | None = None,
     guess: _core.Solution | None = None,
     callback: Callable[[int, float, float, str], bool | None] | None = None,
+    history: bool = False,
     **options: bool | int | float | str,
 ) -> _core.Result:
     """Solve a frictional contact problem of any formulation.
@@ -41,6 +43,7 @@ def solve(
         callback: called as ``callback(iteration, error, seconds, stage)`` where the solver
             evaluates its error; returning False stops it. ``stage`` is empty but for solvers that
             chain others, as ``auto`` does.
+        history: whether ``Result.history`` keeps all that a callback is told.
         **options: the solver's own options, see ``fclib solvers``.
 
     Returns:
@@ -51,6 +54,7 @@ def solve(
         ProblemError: the data of the problem or of the guess is not valid.
         OptionError: unknown solver or option, or a value out of range.
         UnsuitableError: the problem cannot be brought to the form that the solver takes.
+        SolverError: a solver that is not of fclib failed.
     """
     if not tol >= 0:
         raise _core.OptionError(f"tol: {tol} is not a positive number")
@@ -61,13 +65,14 @@ def solve(
     values = {name: _plain(name, value) for name, value in options.items()}
     return _core.solve(
         problem,
-        solver,
+        find_solver(solver),
         tol,
         max_iterations or 0,
         math.inf if time_limit is None else time_limit,
         values,
         guess,
         callback,
+        history,
     )
 
 

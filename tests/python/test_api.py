@@ -17,14 +17,16 @@ HEAVY = ("scipy", "mujoco", "typer", "rich", "matplotlib", "h5py", "dask", "plot
 
 
 def loaded_after(code: str) -> set[str]:
-    script = f"import sys\n{code}\nprint(*{{name.partition('.')[0] for name in sys.modules}})"
+    script = f"import sys\n{code}\nprint(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    return set(run.stdout.split())
+    names = run.stdout.split()
+    return {*names, *(name.partition(".")[0] for name in names)}
 
 
 def test_import_loads_nothing_heavy() -> None:
     assert "fclib" in loaded_after("import fclib")
     assert loaded_after("import fclib").isdisjoint(HEAVY)
+    assert "fclib.external" not in loaded_after("import fclib")
 
 
 def test_reading_and_solving_load_no_more_than_they_need(tmp_path: Path) -> None:
@@ -55,7 +57,9 @@ def test_stubs_are_installed_and_say_what_there_is() -> None:
     assert (folder / "py.typed").is_file()
     stub = (folder / "_core.pyi").read_text()
     for name in fclib.__all__:
-        if name not in {"Problem", "solve", "__version__", *errors()}:
+        if name in {"Problem", "__version__", *errors()}:
+            continue
+        if getattr(fclib, name).__module__ == "fclib._core":
             assert f"class {name}" in stub or f"def {name}(" in stub, name
     for field in ("W", "V", "R", "q", "mu", "s", "M", "H", "G", "f", "w", "b", "v", "u", "r", "l"):
         assert f"def {field}(self" in stub, field
@@ -70,10 +74,18 @@ def errors() -> dict[str, type[Exception]]:
 
 
 def test_errors_are_those_of_python_too() -> None:
-    assert set(errors()) == {"Error", "FileError", "ProblemError", "OptionError", "UnsuitableError"}
+    assert set(errors()) == {
+        "Error",
+        "FileError",
+        "OptionError",
+        "ProblemError",
+        "SolverError",
+        "UnsuitableError",
+    }
     for error in errors().values():
         assert issubclass(error, fclib.Error)
     assert issubclass(fclib.FileError, OSError)
+    assert issubclass(fclib.SolverError, RuntimeError)
     for error in (fclib.ProblemError, fclib.OptionError, fclib.UnsuitableError):
         assert issubclass(error, ValueError)
 

@@ -39,11 +39,12 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 
 # what a part of the Python package may import: "api" is fclib itself
 PYTHON: dict[str, set[str]] = {
-    "_solve": {"_core"},
-    "__init__": {"_core", "_solve"},
+    "_registry": {"_core"},
+    "_solve": {"_core", "_registry"},
+    "__init__": {"_core", "_registry", "_solve"},
     "scenes": set(),
     "simulate": {"api", "scenes"},
-    "external": {"api"},
+    "external": {"api", "_registry"},
     "bench": {"api", "external"},
     "report": {"bench"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},

@@ -1,6 +1,7 @@
 """The commands: what they print, what they write, and their exit status."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -26,10 +27,13 @@ SOLVE_KEYS = [
 ]
 
 
-def run(*arguments: object, module: bool = True) -> subprocess.CompletedProcess[str]:
+def run(
+    *arguments: object, module: bool = True, env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
     script = Path(sys.executable).with_name("fclib")
     program = [sys.executable, "-m", "fclib"] if module else [str(script)]
-    return subprocess.run([*program, *map(str, arguments)], capture_output=True, text=True)
+    command = [*program, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, env=env)
 
 
 def records(result: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
@@ -237,8 +241,9 @@ def test_check_without_a_solution_fails(tmp_path: Path) -> None:
 def test_solvers_lists_them_with_their_options() -> None:
     result = run("solvers", "--json")
     assert result.returncode == 0
-    for record, solver in zip(records(result), fclib.solvers(), strict=True):
-        for name in ("family", "title", "citation", "dimensions"):
+    told = [record for record in records(result) if "solver" in record]
+    for record, solver in zip(told, fclib.solvers(), strict=True):
+        for name in ("origin", "family", "title", "citation", "dimensions"):
             assert record[name] == getattr(solver, name)
         assert record["solver"] == solver.name
         for shown, option in zip(record["options"], solver.options, strict=True):
@@ -249,8 +254,28 @@ def test_solvers_lists_them_with_their_options() -> None:
     table = run("solvers")
     assert table.returncode == 0
     for solver in fclib.solvers():
-        for text in (solver.name, solver.citation, *(option.name for option in solver.options)):
+        for text in (solver.name, solver.family, solver.title):
             assert text in table.stdout
+
+
+def test_solvers_shows_one_in_full() -> None:
+    names = [solver.name for solver in fclib.solvers() if solver.origin == "fclib"]
+    result = run("solvers", *names)
+    assert result.returncode == 0
+    for name in names:
+        solver = fclib.find_solver(name)
+        for text in (name, solver.citation, *(option.name for option in solver.options)):
+            assert text in result.stdout
+    (record,) = records(run("solvers", names[0], "--json"))
+    assert record["solver"] == names[0]
+
+
+def test_solvers_names_what_is_absent() -> None:
+    nowhere = os.environ | {"FCLIB_SICONOS_PYTHON": "/nowhere/python"}
+    table = run("solvers", env=nowhere)
+    assert table.returncode == 0
+    assert "Not here: siconos:" in table.stdout
+    assert "FCLIB_SICONOS_PYTHON" in table.stdout
 
 
 # ---- errors and usage
@@ -298,7 +323,7 @@ def test_a_bad_file_does_not_stop_the_others(command: str, files: list[Path], ba
         ["solve", "--option", "problem=1", "FILE"],
         ["solve", "--option", "guess=1", "FILE"],
         ["solve", "--option", "max_iterations=many", "FILE"],
-        ["solvers", "FILE"],
+        ["solvers", "unknown"],
     ],
     ids=" ".join,
 )

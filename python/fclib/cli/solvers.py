@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 import fclib
-from fclib.cli._output import Json, Report, make_table, out
+from fclib import external
+from fclib.cli._output import Json, Report, make_table, out, usage_error
 
 
 def describe(option: fclib.OptionInfo) -> dict[str, Any]:
@@ -19,27 +22,83 @@ def describe(option: fclib.OptionInfo) -> dict[str, Any]:
     }
 
 
-def command(as_json: Json = False) -> None:
-    """List the solvers with their options."""
+def taken(solver: fclib.SolverInfo) -> str:
+    """The problems that a solver takes: "2D 3D rolling"."""
+    plain = [f"{d}D" for d in solver.dimensions]
+    return " ".join([*plain, *(["rolling"] if solver.rolling_dimensions else [])])
+
+
+def record_of(solver: fclib.SolverInfo) -> dict[str, Any]:
+    """All that is known of a solver."""
+    return {
+        "solver": solver.name,
+        "origin": solver.origin,
+        "family": solver.family,
+        "title": solver.title,
+        "citation": solver.citation,
+        "dimensions": solver.dimensions,
+        "rolling_dimensions": solver.rolling_dimensions,
+        "max_iterations": solver.max_iterations,
+        "options": [describe(option) for option in solver.options],
+    }
+
+
+def show(solver: fclib.SolverInfo) -> None:
+    """A solver in full."""
+    rolling = {3: "planar", 5: "spatial"}
+    takes = [f"{d}D" for d in solver.dimensions]
+    takes += [f"{rolling[d]} rolling" for d in solver.rolling_dimensions]
+    out.print(f"[bold]{solver.name}[/]  {solver.title}", highlight=False)
+    lines = {
+        "family": solver.family,
+        "from": solver.origin,
+        "citation": solver.citation,
+        "takes": f"{', '.join(takes)}; global and mixed problems in their reduced form",
+        "iterations": f"at most {solver.max_iterations}, where no other limit is given",
+    }
+    for name, text in lines.items():
+        if text:
+            out.print(f"  {name:10}  {text}", markup=False, highlight=False)
+    if solver.options:
+        out.print(make_table([describe(option) for option in solver.options]))
+    else:
+        out.print("  no options")
+    out.print()
+
+
+def command(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Show these in full.", show_default=False)
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """List the solvers, or show some of them with their options."""
     report = Report(as_json)
-    for solver in fclib.solvers():
-        options = [describe(option) for option in solver.options]
-        if as_json:
-            report.add(
-                {
-                    "solver": solver.name,
-                    "family": solver.family,
-                    "title": solver.title,
-                    "citation": solver.citation,
-                    "dimensions": solver.dimensions,
-                    "rolling_dimensions": solver.rolling_dimensions,
-                    "options": options,
-                }
-            )
-            continue
-        takes = ", ".join(f"{d}D" for d in solver.dimensions)
-        if solver.rolling_dimensions:
-            takes += ", rolling"
-        out.print(f"[bold]{solver.name}[/]  {solver.title} ({solver.family}; {takes})")
-        out.print(f"  {solver.citation}\n", highlight=False)
-        out.print(make_table(options))
+    try:
+        chosen = [fclib.find_solver(name) for name in names] if names else fclib.solvers()
+    except fclib.OptionError as error:
+        usage_error(error)
+    if as_json:
+        for solver in chosen:
+            report.add(record_of(solver))
+        for absent in [] if names else external.absent():
+            report.add({"absent": absent.solvers, "missing": absent.missing})
+        return
+    if names:
+        for solver in chosen:
+            show(solver)
+        return
+    rows = [
+        {
+            "solver": solver.name,
+            "family": solver.family,
+            "takes": taken(solver),
+            "title": solver.title,
+        }
+        for solver in chosen
+    ]
+    out.print(make_table(rows))
+    out.print("\nfclib solvers NAME shows one with its options and its citation.")
+    out.print("Any program is one, too: cmd:PROGRAM {input} {output}", highlight=False)
+    for absent in external.absent():
+        out.print(f"Not here: {absent.solvers}: {absent.missing}", markup=False, highlight=False)

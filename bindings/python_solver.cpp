@@ -1,0 +1,247 @@
+#include "python_solver.hpp"
+
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <cmath>
+#include <ctime>
+#include <memory>
+#include <utility>
+
+#include "arrays.hpp"
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/natural_error.hpp"
+#include "problem.hpp"
+#include "solve/solver.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+
+namespace fclib::bindings {
+
+namespace {
+
+double cpu_time() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+/// Calls visit with the dimension of a contact as a constant.
+template <class Visitor>
+auto with_dimension(int d, Visitor&& visit) {
+  if (d == 2) return visit(std::integral_constant<int, 2>{});
+  if (d == 3) return visit(std::integral_constant<int, 3>{});
+  return visit(std::integral_constant<int, 5>{});
+}
+
+double natural_error(const Delassus& problem, const Vector& r) {
+  Vector u(problem.m());
+  problem.velocity(r, u);
+  const double squared = with_dimension(problem.d(), [&]<int d>(std::integral_constant<int, d>) {
+    if constexpr (d != 2) {
+      if (problem.rolling()) return natural_map_squared<Rolling<d>>(u, r, problem.friction);
+    }
+    if constexpr (d != 5) return natural_map_squared<Coulomb<d>>(u, r, problem.friction);
+    return std::nan("");
+  });
+  return std::sqrt(squared) / problem.scale;
+}
+
+/// All d x d blocks, by rows; what is zero in a block is stored.
+Matrix by_rows(const BlockMatrix& blocks) {
+  const int d = blocks.block_size();
+  const auto rows = static_cast<std::size_t>(blocks.block_count());
+  const auto square = static_cast<std::size_t>(d) * static_cast<std::size_t>(d);
+  const auto size = [](Index k) { return static_cast<std::size_t>(k); };
+  Matrix a{.storage = Storage::csr, .rows = d * blocks.block_count()};
+  a.cols = a.rows;
+  with_dimension(d, [&]<int D>(std::integral_constant<int, D>) {
+    std::vector<std::size_t> first(rows + 1, 0);
+    blocks.for_each_block<D>([&](Index row, Index, const auto&) { ++first[size(row) + 1]; });
+    for (std::size_t row = 0; row < rows; ++row) first[row + 1] += first[row];
+    a.p.push_back(0);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const auto length = static_cast<Index>(first[row + 1] - first[row]);
+      for (int k = 0; k < D; ++k) a.p.push_back(a.p.back() + D * length);
+    }
+    a.i.resize(square * first[rows]);
+    a.x.resize(square * first[rows]);
+    std::vector<std::size_t> done(rows, 0);
+    blocks.for_each_block<D>([&](Index row, Index col, const auto& block) {
+      const std::size_t position = D * done[size(row)]++;
+      for (int k = 0; k < D; ++k) {
+        const std::size_t start = size(a.p[size(D * row + k)]) + position;
+        for (int c = 0; c < D; ++c) {
+          a.i[start + static_cast<std::size_t>(c)] = D * col + c;
+          a.x[start + static_cast<std::size_t>(c)] = block(k, c);
+        }
+      }
+    });
+    return 0;
+  });
+  return a;
+}
+
+nb::object local_problem(const Delassus& reduced) {
+  const auto fill = [&]<class P>(P problem) {
+    problem.spacedim = reduced.d();
+    problem.W = by_rows(reduced.W);
+    problem.q = reduced.q;
+    problem.mu = reduced.friction.mu;
+    if constexpr (P::rolling) problem.mu_r = reduced.friction.mu_r;
+    return nb::cast(std::move(problem));
+  };
+  return reduced.rolling() ? fill(LocalRollingProblem{}) : fill(LocalProblem{});
+}
+
+/// What a solver in Python talks to while it works: fclib::Monitor, and the error of its iterates.
+class Watch {
+ public:
+  Watch(const Delassus& problem, const Settings& settings)
+      : settings_(settings), monitor_(settings_), problem_(&problem) {}
+  Watch(const Watch&) = delete;
+
+  [[nodiscard]] const Settings& settings() const { return settings_; }
+  [[nodiscard]] double time_left() const { return settings_.time_limit - monitor_.elapsed(); }
+  [[nodiscard]] double scale() const { return problem().scale; }
+  /// The solve is over: what is left of it is no longer there.
+  void close() { problem_ = nullptr; }
+
+  [[nodiscard]] Vector checked(nb::handle object) const {
+    Vector r = vector_from(object, "r");
+    if (r.size() != problem().m()) {
+      throw Error(ErrorKind::problem,
+                  "has " + std::to_string(r.size()) +
+                      " entries, expected m = " + std::to_string(problem().m()),
+                  "r");
+    }
+    return r;
+  }
+
+  double error(nb::handle object) const {
+    const Vector r = checked(object);
+    return r.allFinite() ? natural_error(problem(), r) : std::numeric_limits<double>::infinity();
+  }
+
+  bool stop(nb::handle r, const std::optional<std::int64_t>& iteration) {
+    iterations = iteration.value_or(started_ ? iterations + 1 : 0);
+    started_ = true;
+    const double reached = error(r);
+    try {
+      reason_ = monitor_.report(iterations, reached);
+    } catch (nb::python_error& raised) {
+      failure = nb::borrow(raised.value());
+      throw;
+    }
+    return reason_.has_value();
+  }
+
+  void set_status(const std::string& name) {
+    for (int k = 0; k <= static_cast<int>(Status::interrupted); ++k) {
+      claim_ = static_cast<Status>(k);
+      if (name_of(*claim_) == name) return;
+    }
+    throw Error(ErrorKind::option, "there is no status '" + name + "'", "status");
+  }
+  /// Why the solver ended: what it says, or why it was told to stop, or content.
+  [[nodiscard]] Status status() const {
+    return claim_ ? *claim_ : reason_.value_or(Status::converged);
+  }
+
+  std::int64_t iterations = 0;
+  std::optional<double> cpu_s;
+  nb::object failure = nb::none();  ///< what the callback raised
+
+ private:
+  [[nodiscard]] const Delassus& problem() const {
+    if (problem_ == nullptr) throw std::runtime_error("the solve of this monitor is over");
+    return *problem_;
+  }
+
+  Settings settings_;
+  Monitor monitor_;
+  const Delassus* problem_;
+  bool started_ = false;
+  std::optional<Status> reason_;
+  std::optional<Status> claim_;
+};
+
+/// Runs function(problem, r, monitor, options) -> r.
+Outcome run(const nb::object& function, const std::vector<OptionInfo>& infos,
+            const Delassus& reduced, const OptionValues& values, const Settings& settings,
+            Vector& r) {
+  const nb::gil_scoped_acquire gil;
+  const OptionValues options = parse_options(infos, values);
+  const nb::object problem = local_problem(reduced);
+  const nb::object guess = to_python(r, nb::handle()).attr("copy")();
+  auto* watch = new Watch(reduced, settings);
+  const nb::object monitor = nb::cast(watch, nb::rv_policy::take_ownership);
+  struct Closer {
+    Watch* watch;
+    ~Closer() { watch->close(); }
+  } closer{watch};
+  const double start = cpu_time();
+  const nb::object answer = function(problem, guess, monitor, options);
+  const double cpu_s = cpu_time() - start;
+  r = watch->checked(answer);
+  return {watch->status(), watch->iterations, {}, watch->cpu_s.value_or(cpu_s)};
+}
+
+Solver python_solver(const std::string& name, const std::string& family, const std::string& title,
+                     const std::string& citation, const std::string& origin,
+                     const std::vector<int>& dimensions, const std::vector<int>& rolling_dimensions,
+                     const std::vector<OptionInfo>& options, std::int64_t max_iterations,
+                     const nb::object& function) {
+  return {
+      .name = name,
+      .family = family,
+      .title = title,
+      .citation = citation,
+      .dimensions = dimensions,
+      .rolling_dimensions = rolling_dimensions,
+      .options = options,
+      .max_iterations = max_iterations,
+      .check_options = [options](const OptionValues& values) { parse_options(options, values); },
+      .solve = [function, options](
+                   const Delassus& problem, const OptionValues& values, const Settings& settings,
+                   Vector& r) { return run(function, options, problem, values, settings, r); },
+      .origin = origin};
+}
+
+}  // namespace
+
+void bind_python_solvers(nb::module_& m) {
+  nb::class_<Watch>(m, "Monitor", "Watches over a solver written in Python.")
+      .def("stop", &Watch::stop, "r"_a, "iteration"_a = nb::none(),
+           nb::sig("def stop(self, r: numpy.typing.ArrayLike, iteration: int | None = None) -> "
+                   "bool"),
+           "Reports an iterate, and says whether to stop: at the tolerance, at a limit, or because "
+           "the caller asks for it. Iterations count from 0, the starting point, one a call, where "
+           "no number is given.")
+      .def("error", &Watch::error, "r"_a,
+           nb::sig("def error(self, r: numpy.typing.ArrayLike) -> float"),
+           "The error that the tolerance bounds: ||r - P_K(r - u^)|| / scale; inf where r is not "
+           "finite.")
+      .def_prop_ro("tolerance", [](const Watch& w) { return w.settings().tolerance; })
+      .def_prop_ro("max_iterations", [](const Watch& w) { return w.settings().max_iterations; })
+      .def_prop_ro("time_left", &Watch::time_left, "[s] wall clock, inf where there is no limit")
+      .def_prop_ro("scale", &Watch::scale, "what errors are relative to: ||q|| of the problem")
+      .def_rw("iterations", &Watch::iterations, "that the result will state")
+      .def_rw("cpu_s", &Watch::cpu_s, nb::arg().none(),
+              "[s] to be set where the time is not that of the calling thread")
+      .def_prop_rw(
+          "status", [](const Watch& w) { return std::string(name_of(w.status())); },
+          [](Watch& w, const std::string& name) { w.set_status(name); },
+          "why the solver ends; what it claims is judged afterwards")
+      .def_ro("failure", &Watch::failure, "what the caller's callback raised");
+  m.def("python_solver", &python_solver, nb::kw_only(), "name"_a, "family"_a, "title"_a,
+        "citation"_a, "origin"_a, "dimensions"_a, "rolling_dimensions"_a, "options"_a,
+        "max_iterations"_a, "function"_a, "A solver that calls a function of Python.");
+}
+
+}  // namespace fclib::bindings

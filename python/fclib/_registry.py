@@ -1,0 +1,276 @@
+"""All solvers by their names: those of the core, users' own, and those of other packages.
+
+A user's solver is a function with the decorator ``solver``. It is found once its module is
+imported, or at any time where an installed package names it in the entry point group
+``fclib.solvers``; ``fclib.external`` is such an entry point itself. The driver of the core runs it
+like any other: conversions, limits, history and the judgement are the same.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import types
+import typing
+import warnings
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib import _core
+
+GROUP = "fclib.solvers"
+Function = TypeVar("Function", bound=Callable[..., Any])
+RESERVED = {
+    "problem",
+    "solver",
+    "tol",
+    "max_iterations",
+    "time_limit",
+    "guess",
+    "callback",
+    "history",
+}
+OPTION_TYPES = {bool: "bool", int: "int", float: "float"}
+
+
+class SolverError(_core.Error, RuntimeError):
+    """A solver from outside of the core failed: it raised, crashed, or returned no solution."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is to be said of an option of a solver: ``Annotated[float, Option("step", unit="1")]``.
+
+    Args:
+        doc: its meaning.
+        unit: 1 where it has none.
+        lowest: values below are refused.
+        highest: values above are refused.
+    """
+
+    doc: str = ""
+    unit: str = "1"
+    lowest: float = -math.inf
+    highest: float = math.inf
+
+
+class Provider(Protocol):
+    """What an entry point may be beside a decorated function or its module: many solvers."""
+
+    def solvers(self) -> Sequence[_core.SolverInfo]:
+        """Those that can be used."""
+
+    def find(self, name: str) -> _core.SolverInfo | None:
+        """The solver of this name, where it is one of the provider's; also unlisted ones."""
+
+
+_registered: dict[str, _core.SolverInfo] = {}
+
+
+def solver(
+    name: str,
+    *,
+    family: str = "user",
+    title: str = "",
+    citation: str = "",
+    dimensions: Iterable[int] = (2, 3),
+    rolling_dimensions: Iterable[int] = (),
+    max_iterations: int = 1_000_000,
+) -> Callable[[Function], Function]:
+    """Make a solver of a function, for ``fclib.solve``, the command line and the bench.
+
+    The function is called as ``function(problem, r, monitor, **options)``. The problem is a
+    ``LocalProblem`` (or a ``LocalRollingProblem``) without bilateral constraints, whatever the
+    user's is; r the starting point, its own copy. It calls ``monitor.stop(r)`` in every iteration,
+    which is true when it is time to stop, and returns r, or None where it has changed r in place.
+
+    The options are its keyword-only parameters, of type bool, int, float or ``Literal`` of texts,
+    with a default; ``Annotated[float, fclib.Option(...)]`` gives meaning, unit and bounds.
+
+    Args:
+        name: by which it is called.
+        family: of algorithms.
+        title: the first line of the function's docstring where it is empty.
+        citation: where the algorithm is from.
+        dimensions: the spacedims it takes, of 2 and 3.
+        rolling_dimensions: the spacedims of rolling problems it takes, of 3 and 5.
+        max_iterations: where the caller sets none.
+
+    Raises:
+        OptionError: the name is that of a solver of the core.
+        TypeError: the function does not have such parameters.
+    """
+
+    def decorate(function: Function) -> Function:
+        register(
+            make_solver(
+                function,
+                name=name,
+                family=family,
+                title=title or (inspect.getdoc(function) or name).splitlines()[0],
+                citation=citation,
+                origin=function.__module__.partition(".")[0],
+                dimensions=tuple(dimensions),
+                rolling_dimensions=tuple(rolling_dimensions),
+                max_iterations=max_iterations,
+            )
+        )
+        return function
+
+    return decorate
+
+
+def make_solver(
+    function: Callable[..., Any],
+    *,
+    name: str,
+    family: str,
+    title: str,
+    citation: str,
+    origin: str,
+    dimensions: Sequence[int],
+    rolling_dimensions: Sequence[int],
+    max_iterations: int,
+) -> _core.SolverInfo:
+    """The entry of a function, which is not registered by that."""
+
+    @functools.wraps(function)
+    def guarded(
+        problem: _core.LocalProblem | _core.LocalRollingProblem,
+        r: npt.NDArray[np.float64],
+        monitor: _core.Monitor,
+        options: dict[str, Any],
+    ) -> npt.NDArray[np.float64]:
+        try:
+            answer = function(problem, r, monitor, **options)
+            result = np.asarray(r if answer is None else answer, dtype=float)
+        except Exception as error:
+            # what the caller's own callback raises is not the solver's, nor is a refusal
+            if error is monitor.failure or isinstance(error, (_core.UnsuitableError, SolverError)):
+                raise
+            raise SolverError(f"solver {name}: {type(error).__name__}: {error}") from error
+        if result.shape != (problem.m,):
+            raise SolverError(
+                f"solver {name}: returned an array of shape {result.shape}, "
+                f"expected r of shape ({problem.m},)"
+            )
+        return result
+
+    return _core.python_solver(
+        name=name,
+        family=family,
+        title=title,
+        citation=citation,
+        origin=origin,
+        dimensions=list(dimensions),
+        rolling_dimensions=list(rolling_dimensions),
+        options=_options_of(function),
+        max_iterations=max_iterations,
+        function=guarded,
+    )
+
+
+def _options_of(function: Callable[..., Any]) -> list[_core.OptionInfo]:
+    """The keyword-only parameters of a function."""
+    parameters = inspect.signature(function).parameters.values()
+    keywords = [p for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY]
+    if len(parameters) - len(keywords) != 3:
+        raise TypeError(
+            f"{function.__qualname__}: a solver is a function (problem, r, monitor, *, options)"
+        )
+    annotations = {p.name: p.annotation for p in keywords if p.annotation is not p.empty}
+    hints = typing.get_type_hints(
+        types.SimpleNamespace(__annotations__=annotations),
+        globalns=getattr(function, "__globals__", {}),
+        include_extras=True,
+    )
+    infos = []
+    for parameter in keywords:
+        where = f"{function.__qualname__}: option {parameter.name}"
+        if parameter.name in RESERVED:
+            raise TypeError(f"{where}: is a name that fclib.solve has itself")
+        if parameter.default is inspect.Parameter.empty:
+            raise TypeError(f"{where}: has no default")
+        hint = hints.get(parameter.name, type(parameter.default))
+        described = [x for x in getattr(hint, "__metadata__", ()) if isinstance(x, Option)]
+        about = described[0] if described else Option()
+        hint = hint.__origin__ if hasattr(hint, "__metadata__") else hint
+        choices = [
+            str(x) for x in typing.get_args(hint) if typing.get_origin(hint) is typing.Literal
+        ]
+        if not choices and hint not in OPTION_TYPES:
+            raise TypeError(f"{where}: is neither bool, int, float nor Literal of texts")
+        type_name = "choice" if choices else OPTION_TYPES[hint]
+        infos.append(
+            _core.OptionInfo(
+                name=parameter.name,
+                type=type_name,
+                default=float(parameter.default) if type_name == "float" else parameter.default,
+                unit=about.unit if type_name in ("int", "float") else "",
+                doc=about.doc,
+                choices=choices,
+                lowest=about.lowest,
+                highest=about.highest,
+            )
+        )
+    return infos
+
+
+def register(info: _core.SolverInfo) -> None:
+    """Put a solver beside those of the core, in place of an own one of the same name."""
+    if any(info.name == built_in.name for built_in in _core.solvers()):
+        raise _core.OptionError(f"solver '{info.name}': there is one of this name in fclib")
+    _registered[info.name] = info
+
+
+@functools.cache
+def _providers() -> tuple[Provider, ...]:
+    """Load the entry points, once. One that cannot be loaded is said, and left out."""
+    from importlib.metadata import entry_points
+
+    providers = []
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        try:
+            loaded = point.load()
+        except Exception as error:
+            message = f"entry point {point.name} of {GROUP} cannot be loaded: {error!r}"
+            warnings.warn(message, RuntimeWarning, stacklevel=3)
+            continue
+        if hasattr(loaded, "find") and hasattr(loaded, "solvers"):
+            providers.append(loaded)
+    return tuple(providers)
+
+
+def solvers() -> list[_core.SolverInfo]:
+    """All solvers that can be used, by name: those of fclib, registered and external ones."""
+    found = {info.name: info for info in _core.solvers()}
+    for provider in _providers():
+        found |= {info.name: info for info in provider.solvers()}
+    found |= _registered
+    return [found[name] for name in sorted(found)]
+
+
+def find_solver(name: str) -> _core.SolverInfo:
+    """The solver of this name: of fclib, registered, or external.
+
+    Raises:
+        OptionError: there is none, with the known names, or with what is missing.
+    """
+    for info in _core.solvers():
+        if info.name == name:
+            return info
+    if name in _registered:
+        return _registered[name]
+    for provider in _providers():
+        found = provider.find(name)
+        if found is not None:
+            return found
+    if name in _registered:  # by an entry point
+        return _registered[name]
+    known = ", ".join(info.name for info in solvers())
+    raise _core.OptionError(f"solver '{name}': unknown; there is: {known}")

@@ -1,0 +1,67 @@
+"""Runs solvers of Siconos for fclib.external.siconos, in an interpreter that has siconos.numerics.
+
+Knows nothing of fclib. A line of JSON in, a line of JSON out; what Siconos prints goes nowhere.
+"""
+
+import ctypes
+import json
+import os
+import signal
+import sys
+import time
+from typing import Any
+
+del sys.path[0]  # the folder of this file, which has modules of the same names as packages
+
+KINDS = {
+    "fc2d": ("frictionContact_new_from_filename", "fc2d_driver"),
+    "fc3d": ("frictionContact_new_from_filename", "fc3d_driver"),
+    "rolling_fc2d": ("rollingFrictionContact_new_from_filename", "rolling_fc2d_driver"),
+    "rolling_fc3d": ("rollingFrictionContact_new_from_filename", "rolling_fc3d_driver"),
+}
+
+
+def solve(sn: Any, np: Any, order: Any) -> Any:
+    """One solve; the time is that of the driver alone."""
+    read, driver = (getattr(sn, name) for name in KINDS[order["kind"]])
+    problem = read(order["path"])
+    options = sn.SolverOptions(getattr(sn, order["solver"]))
+    options.iparam[0] = order["max_iterations"]
+    options.dparam[0] = order["tolerance"]
+    r = np.array(order["r"], dtype=float)
+    u = np.zeros(r.size)
+    start = time.process_time()
+    answer = driver(problem, r, u, options)
+    cpu_s = time.process_time() - start
+    info = answer[0] if isinstance(answer, (tuple, list)) else answer
+    return {
+        "info": int(info),
+        "iterations": int(options.iparam[1]),
+        "cpu_s": cpu_s,
+        "r": r.tolist(),
+        "u": u.tolist(),
+    }
+
+
+def main() -> None:
+    """Answer until the input ends."""
+    # ends with the process that started it, however that ends
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+    replies = os.fdopen(os.dup(1), "w")
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nothing, 1)
+    import numpy as np
+    import siconos.numerics as sn
+
+    replies.write("ready\n")
+    replies.flush()
+    for line in sys.stdin:
+        try:
+            reply = solve(sn, np, json.loads(line))
+        except Exception as error:
+            reply = {"failure": f"{type(error).__name__}: {error}"}
+        replies.write(json.dumps(reply) + "\n")
+        replies.flush()
+
+
+main()

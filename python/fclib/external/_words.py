@@ -1,0 +1,3 @@
+"""What several adapters say."""
+
+RELAXATION = "not Coulomb's law but its convex relaxation, exact where nothing slides"

@@ -1,0 +1,69 @@
+"""SCS, an operator-splitting method for conic programs: a wheel of PyPI.
+
+O'Donoghue, "Operator splitting for a homogeneous embedding of the linear complementarity problem"
+(2021). It is meant for moderate accuracy.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import fclib
+
+PREFIX = "scs:"
+SOLVERS = "scs:aclm, scs:relaxation"
+MAX_ITERATIONS = 20_000  # of one convex problem
+
+
+def missing() -> str:
+    """What is to be installed."""
+    return "" if importlib.util.find_spec("scs") else "pip install scs"
+
+
+@functools.cache
+def solvers() -> Sequence[fclib.SolverInfo]:
+    """The entries."""
+    from fclib.external import _convex
+
+    return _convex.entries("scs", "the splitting conic solver SCS", "O'Donoghue 2021", Conic)
+
+
+def find(name: str) -> fclib.SolverInfo | None:
+    """The entry of a name."""
+    return next((info for info in solvers() if info.name == name), None)
+
+
+class Conic:
+    """One program for several c, each solve from the last one's solution."""
+
+    def __init__(self, program: Any, tolerance: float) -> None:
+        self.package = importlib.import_module("scs")
+        self.program = program
+        self.tolerance = max(tolerance, 1e-14)
+        self.solver: Any = None
+
+    def solve(self, c: Any, x: Any, time_left: float) -> Any:
+        """The solution."""
+        program = self.program
+        if self.solver is None:
+            data = {"P": program.P, "A": program.A, "b": np.zeros(program.A.shape[0]), "c": c}
+            cones = {"z": program.zeros, "l": program.nonnegatives, "q": list(program.cones)}
+            self.solver = self.package.SCS(
+                data,
+                cones,
+                verbose=False,
+                eps_abs=self.tolerance,
+                eps_rel=0.0,
+                max_iters=MAX_ITERATIONS,
+                time_limit_secs=time_left if math.isfinite(time_left) else 0.0,
+            )
+            return self.solver.solve(warm_start=True, x=x)["x"]
+        self.solver.update(c=c)
+        return self.solver.solve(warm_start=True)["x"]

@@ -1,0 +1,601 @@
+"""Users' own solvers, programs and other packages behind the contract: what they may do wrong."""
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import pytest
+
+import fclib
+from capi_library import compile_program
+from fclib import bench, external
+from fclib.external import command, siconos
+from helpers import local_problem, planted_global, planted_local
+
+DOCS = "docs/solvers-of-your-own.md"
+
+
+def problem_of(nc: int = 4, d: int = 3) -> fclib.Problem:
+    return planted_local(3, d=d, nc=nc).problem
+
+
+def exact(d: int = 3) -> Any:
+    return planted_local(3, d=d, nc=4).solution.r
+
+
+# ---- users' own solvers
+
+
+@fclib.solver("t-liar", title="says it is done")
+def liar(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    return r + 1.0
+
+
+@fclib.solver("t-nan")
+def not_a_number(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    r[0] = np.nan
+    return r
+
+
+@fclib.solver("t-raises")
+def raises(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    raise KeyError("no such thing")
+
+
+@fclib.solver("t-shape")
+def shape(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    return r[:-1]
+
+
+@fclib.solver("t-options", family="test", citation="nobody 2000", dimensions=(3,))
+def options(
+    problem: fclib.LocalProblem,
+    r: Any,
+    monitor: fclib.Monitor,
+    *,
+    step: Annotated[float, fclib.Option("how far", unit="kg", lowest=0.5, highest=2)] = 1,
+    count: int = 3,
+    fast: bool = False,
+    kind: Literal["left", "right"] = "right",
+) -> None:
+    """Keeps what it was given.
+
+    Not this.
+    """
+    seen.append((step, count, fast, kind))
+    monitor.status = "stalled"
+
+
+@fclib.solver("t-slow")
+def slow(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> None:
+    while not monitor.stop(r):
+        time.sleep(0.002)
+
+
+seen: list[tuple[Any, ...]] = []
+kept: list[fclib.Monitor] = []
+
+
+def test_a_liar_is_found_out() -> None:
+    result = fclib.solve(problem_of(), "t-liar")
+    assert result.status == "inaccurate"
+    assert result.error == fclib.merit(problem_of(), result.solution).error > 1e-8
+
+
+def test_what_is_no_number_has_diverged() -> None:
+    result = fclib.solve(problem_of(), "t-nan")
+    assert result.status == "diverged"
+    assert np.isfinite(result.solution.r).all()
+
+
+def test_an_exception_comes_with_the_name_of_the_solver() -> None:
+    with pytest.raises(fclib.SolverError, match="t-raises: KeyError: 'no such thing'") as info:
+        fclib.solve(problem_of(), "t-raises")
+    assert isinstance(info.value.__cause__, KeyError)
+
+
+def test_a_wrong_answer_is_said() -> None:
+    with pytest.raises(fclib.SolverError, match=r"t-shape: returned an array of shape \(11,\)"):
+        fclib.solve(problem_of(), "t-shape")
+
+
+def test_what_a_callback_raises_is_not_the_solvers() -> None:
+    def stop(*_: object) -> bool:
+        raise ZeroDivisionError("mine")
+
+    with pytest.raises(ZeroDivisionError, match="mine"):
+        fclib.solve(problem_of(), "t-slow", callback=stop)
+
+
+def test_limits_and_callbacks_reach_a_users_solver() -> None:
+    assert fclib.solve(problem_of(), "t-slow", max_iterations=3).status == "iteration_limit"
+    assert fclib.solve(problem_of(), "t-slow", time_limit=0.02).status == "time_limit"
+    assert fclib.solve(problem_of(), "t-slow", callback=lambda *_: False).status == "interrupted"
+
+
+def test_options_are_keyword_parameters() -> None:
+    entry = fclib.find_solver("t-options")
+    assert (entry.family, entry.title, entry.citation) == (
+        "test",
+        "Keeps what it was given.",
+        "nobody 2000",
+    )
+    step, count, fast, kind = entry.options
+    assert (step.type, step.default, step.unit, step.doc) == ("float", 1.0, "kg", "how far")
+    assert (step.lowest, step.highest) == (0.5, 2)
+    assert (count.type, fast.type, kind.type) == ("int", "bool", "choice")
+    assert kind.choices == ["left", "right"]
+    result = fclib.solve(problem_of(), "t-options", count="4", fast=True, kind="left")
+    assert result.status == "stalled"
+    assert seen[-1] == (1.0, 4, True, "left")
+    assert isinstance(seen[-1][0], float)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"step": 3.0}, {"step": "far"}, {"count": 1.5}, {"fast": "no"}, {"kind": "up"}, {"tempo": 1}],
+    ids=str,
+)
+def test_wrong_options_are_refused_by_name(wrong: dict[str, Any]) -> None:
+    with pytest.raises(fclib.OptionError, match=next(iter(wrong))):
+        fclib.solve(problem_of(), "t-options", **wrong)
+
+
+def test_other_dimensions_are_refused() -> None:
+    with pytest.raises(fclib.UnsuitableError, match="t-options"):
+        fclib.solve(problem_of(d=2), "t-options")
+    rolling = fclib.LocalRollingProblem(
+        spacedim=5, W=np.eye(5), q=[-1.0, 0, 0, 0, 0], mu=[0.5], mu_r=[0.1]
+    )
+    with pytest.raises(fclib.UnsuitableError, match="t-options"):
+        fclib.solve(rolling, "t-options")
+
+
+def test_functions_that_are_no_solvers_are_refused() -> None:
+    def few(problem: Any, r: Any) -> None: ...
+    def without(problem: Any, r: Any, monitor: Any, *, step: float) -> None: ...
+    def text(problem: Any, r: Any, monitor: Any, *, name: str = "") -> None: ...
+    def taken(problem: Any, r: Any, monitor: Any, *, tol: float = 1.0) -> None: ...
+
+    for function in (few, without, text, taken):
+        with pytest.raises(TypeError, match=function.__name__):
+            fclib.solver("t-wrong")(function)
+    with pytest.raises(fclib.OptionError, match="auto"):
+        fclib.solver("auto")(liar)
+
+
+def test_a_solver_sees_the_reduced_problem_and_the_guess() -> None:
+    told: dict[str, Any] = {}
+
+    @fclib.solver("t-sees", rolling_dimensions=(3, 5))
+    def sees(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> None:
+        told.update(problem=problem, r=r.copy(), error=monitor.error(r), monitor=monitor)
+        told.update(scale=monitor.scale, tolerance=monitor.tolerance)
+        r[:] = 0
+
+    for case in (planted_local(1, nc=3), planted_global(2, d=2, nc=3, p=2)):
+        result = fclib.solve(case.problem, "t-sees", tol=1e-5, guess=case.solution)
+        reduced = case.problem
+        if isinstance(reduced, fclib.GlobalProblem):
+            reduced = reduced.condense()
+        assert isinstance(reduced, fclib.LocalProblem)
+        q = reduced.q
+        reduced = reduced.eliminate() if reduced.p else reduced
+        seen_problem = told["problem"]
+        np.testing.assert_allclose(
+            seen_problem.W.toarray(), reduced.with_storage("dense").W, atol=1e-12
+        )
+        np.testing.assert_allclose(seen_problem.q, reduced.q, atol=1e-12)
+        np.testing.assert_array_equal(told["r"], case.solution.r)
+        assert told["error"] < 1e-10
+        assert told["scale"] == pytest.approx(float(np.linalg.norm(q)))
+        assert not result.solution.r.any()
+    with pytest.raises(RuntimeError, match="over"):
+        told["monitor"].error(told["r"])
+    rolling = fclib.LocalRollingProblem(
+        spacedim=5, W=np.eye(5), q=[-1.0, 0, 0, 0, 0], mu=[0.5], mu_r=[0.1]
+    )
+    fclib.solve(rolling, "t-sees")
+    assert isinstance(told["problem"], fclib.LocalRollingProblem)
+    np.testing.assert_array_equal(told["problem"].mu_r, [0.1])
+
+
+def test_large_problems_are_given_sparse() -> None:
+    blocks = np.arange(1.0, 3 * 200 + 1)
+    problem = fclib.LocalProblem(
+        W=np.diag(blocks), q=np.tile([-1.0, 0.1, 0], 200), mu=np.full(200, 0.5)
+    )
+    nnz: list[int] = []
+
+    @fclib.solver("t-sparse")
+    def sparse(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+        W: Any = problem.W
+        nnz.append(W.nnz)
+        np.testing.assert_array_equal(W.diagonal(), blocks)
+        return -problem.q / blocks
+
+    assert fclib.solve(problem, "t-sparse").converged
+    assert nnz == [3 * 3 * 200]
+
+
+def test_own_solvers_are_listed_found_and_benched() -> None:
+    names = [entry.name for entry in fclib.solvers()]
+    assert "t-liar" in names
+    assert names == sorted(names)
+    assert fclib.find_solver("t-liar").title == "says it is done"
+    run = bench.run("planted", problem_of(), "t-liar")
+    assert (run.solver, run.status) == ("t-liar", "inaccurate")
+    with pytest.raises(fclib.OptionError, match=r"unknown; there is: .*t-liar"):
+        fclib.find_solver("t-nobody")
+
+
+# ---- history
+
+
+@pytest.mark.parametrize("solver", ["nsgs", "auto", "t-slow"])
+def test_the_history_is_what_a_callback_is_told(solver: str) -> None:
+    told: list[tuple[int, float, str]] = []
+
+    def callback(iteration: int, error: float, seconds: float, stage: str) -> None:
+        told.append((iteration, error, stage))
+
+    result = fclib.solve(problem_of(10), solver, callback=callback, history=True, max_iterations=30)
+    history: Any = result.history
+    assert history.dtype.names == ("iteration", "error", "time", "stage")
+    assert [(int(h["iteration"]), float(h["error"]), str(h["stage"])) for h in history] == told
+    assert (np.diff(history["time"]) >= 0).all()
+    assert fclib.solve(problem_of(), solver, max_iterations=1).history is None
+
+
+# ---- installed packages
+
+
+def test_entry_points_are_found(tmp_path: Path) -> None:
+    """A package that is installed in a folder of its own."""
+    (tmp_path / "a_contact_package.py").write_text(
+        textwrap.dedent(
+            """
+            import fclib
+
+            @fclib.solver("packaged")
+            def packaged(problem, r, monitor):
+                '''Comes with a package.'''
+                r[:] = -problem.q
+            """
+        )
+    )
+    for name, text in {
+        "a_contact_package": "[fclib.solvers]\npackaged = a_contact_package:packaged\n",
+        "a_broken_package": "[fclib.solvers]\nbroken = no_such_module\n",
+    }.items():
+        info = tmp_path / f"{name}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(text)
+    script = textwrap.dedent(
+        """
+        import numpy as np, fclib
+        problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5])
+        print(fclib.solve(problem, "packaged").status)
+        entry = {s.name: s for s in fclib.solvers()}["packaged"]
+        print(entry.origin, entry.title)
+        """
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", script],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert run.stdout.splitlines() == ["converged", "a_contact_package Comes with a package."]
+    assert "broken" in run.stderr  # is said, and stops nothing
+
+
+# ---- the documentation
+
+
+def test_the_documented_solver_is_the_example_and_runs(root: Path, tmp_path: Path) -> None:
+    example = root / "examples" / "python" / "own_solver.py"
+    text = (root / DOCS).read_text()
+    (code,) = (part.partition("```")[0] for part in text.split("```python\n")[1:2])
+    assert code in example.read_text()
+    path = tmp_path / "problem.hdf5"
+    fclib.write(path, problem_of())
+    run = subprocess.run(
+        [sys.executable, str(example), str(path)], capture_output=True, text=True, check=True
+    )
+    assert "Result my-pgs: converged" in run.stdout
+    assert "Result auto: converged" in run.stdout
+
+
+# ---- programs
+
+
+def program(tmp_path: Path, body: str) -> str:
+    """The name of a solver that is a script."""
+    script = tmp_path / "program.py"
+    header = "import os, sys, time\nimport numpy as np\nimport fclib\n"
+    script.write_text(header + textwrap.dedent(body))
+    return f"cmd:{sys.executable} {script} {{input}} {{output}}"
+
+
+def test_a_program_solves(tmp_path: Path) -> None:
+    solver = program(
+        tmp_path,
+        """
+        problem = fclib.read(sys.argv[1])
+        assert problem.p == 0
+        guesses = fclib.read_guesses(sys.argv[1])
+        result = fclib.solve(problem, tol=1e-10, guess=guesses[0] if guesses else None)
+        fclib.write(sys.argv[2], problem, result.solution)
+        """,
+    )
+    for case in (planted_local(1, nc=3), planted_global(2, d=2, nc=3, p=2)):
+        result = fclib.solve(case.problem, solver, tol=1e-8, history=True)
+        assert result.status == "converged"
+        assert result.solver == solver
+        assert result.error <= 1e-8
+        assert result.cpu_s > 0.01
+        assert result.history is not None
+    guess = fclib.Solution(r=exact() + 1e-3)
+    assert fclib.solve(problem_of(), solver, guess=guess).converged
+
+
+def test_a_program_may_write_into_its_input(tmp_path: Path) -> None:
+    script = tmp_path / "program.py"
+    script.write_text(
+        "import sys, fclib\n"
+        "problem = fclib.read(sys.argv[1])\n"
+        "result = fclib.solve(problem, tol=float(sys.argv[2]))\n"
+        "fclib.write_solution(sys.argv[1], result.solution)\n"
+    )
+    solver = f"cmd:{sys.executable} '{script}' {{input}} {{tol}}"
+    assert fclib.solve(problem_of(), solver, 1e-6).converged
+    path = tmp_path / "problem.hdf5"
+    fclib.write(path, problem_of())
+    run = subprocess.run(
+        [sys.executable, "-m", "fclib", "solve", "--solver", solver, str(path)],
+        capture_output=True,
+        text=True,
+    )
+    assert run.returncode == 0, run.stderr
+    assert "converged" in run.stdout
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    return state != "Z"
+
+
+def test_a_program_that_takes_too_long_is_killed_with_its_children(tmp_path: Path) -> None:
+    solver = program(
+        tmp_path,
+        f"""
+        import subprocess
+        child = subprocess.Popen(["sleep", "60"])
+        open({str(tmp_path / "pid")!r}, "w").write(str(child.pid))
+        time.sleep(60)
+        """,
+    )
+    start = time.monotonic()
+    result = fclib.solve(problem_of(), solver, time_limit=2)
+    assert time.monotonic() - start < 10
+    assert result.status == "time_limit"
+    assert not result.solution.r.any()
+    pid = int((tmp_path / "pid").read_text())
+    end = time.monotonic() + 5
+    while alive(pid) and time.monotonic() < end:
+        time.sleep(0.01)
+    assert not alive(pid)
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("sys.exit('it is too hard')", "exit status 1: it is too hard"),
+        ("sys.exit(3)", "exit status 3"),
+        ("os.abort()", "signal 6"),
+        ("", "made no output"),
+        ("open(sys.argv[2], 'w').write('garbage')", "its output"),
+        ("fclib.write(sys.argv[2], fclib.read(sys.argv[1]))", "wrote no /solution"),
+        (
+            """
+            problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5])
+            fclib.write(sys.argv[2], problem, fclib.Solution(r=np.zeros(3)))
+            """,
+            "length 3, expected 12",
+        ),
+    ],
+    ids=["fails", "status", "crashes", "nothing", "garbage", "no solution", "another size"],
+)
+def test_a_program_that_fails_is_said(tmp_path: Path, body: str, said: str) -> None:
+    with pytest.raises(fclib.SolverError, match=said):
+        fclib.solve(problem_of(), program(tmp_path, body), time_limit=20)
+
+
+WRITE = """
+problem = fclib.read(sys.argv[1])
+fclib.write(sys.argv[2], problem, fclib.Solution(r=np.zeros(problem.m)))
+"""
+
+
+def test_a_program_that_lies_is_found_out(tmp_path: Path) -> None:
+    result = fclib.solve(problem_of(), program(tmp_path, WRITE), time_limit=20)
+    assert result.status == "inaccurate"
+
+
+def test_a_program_that_writes_nan_has_diverged(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    assert h5py
+    body = "import h5py\n" + WRITE + "h5py.File(sys.argv[2], 'a')['solution/r'][0] = np.nan\n"
+    result = fclib.solve(problem_of(), program(tmp_path, body), time_limit=20)
+    assert result.status == "diverged"
+
+
+@pytest.mark.parametrize(
+    "name", ["cmd:", "cmd:true", "cmd:no-such-program {input}", "cmd:'{input}"]
+)
+def test_commands_that_cannot_be_run_are_refused(name: str) -> None:
+    with pytest.raises(fclib.OptionError, match="cmd:"):
+        fclib.find_solver(name)
+
+
+def test_ctrl_c_ends_a_program_too(tmp_path: Path) -> None:
+    def interrupt() -> None:
+        time.sleep(0.5)
+        signal.raise_signal(signal.SIGINT)
+
+    thread = threading.Thread(target=interrupt)
+    thread.start()
+    with pytest.raises(KeyboardInterrupt):
+        command.run(["sleep", "30"], 30.0)
+    thread.join()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_program_in_c(root: Path, tmp_path: Path, d: int) -> None:
+    solver = compile_program(root / "examples" / "c" / "pgs.c", tmp_path / "pgs", "-lm")
+    for case in (planted_local(3, d=d, nc=5), planted_global(4, d=d, nc=3, p=2)):
+        name = f"cmd:{solver} {{input}} {{tol}}"
+        result = fclib.solve(case.problem, name, 1e-8, time_limit=20)
+        assert result.status == "converged"
+        guessed = fclib.solve(case.problem, name, 1e-8, guess=fclib.Solution(r=result.solution.r))
+        assert guessed.converged
+
+
+# ---- other packages
+
+
+EXTERNAL = [entry.name for entry in external.solvers()]
+RELAXED = {name for name in EXTERNAL if "relaxation" in fclib.find_solver(name).title}
+# Siconos' own ways: these need far more iterations than the others, or fail on some problems
+UNRELIABLE = {"siconos:hp", "siconos:dsfp", "siconos:eg", "siconos:fp"}
+
+
+@pytest.mark.parametrize("name", EXTERNAL)
+def test_external_solvers_solve_what_is_easy(name: str) -> None:
+    entry = fclib.find_solver(name)
+    for d in entry.dimensions:
+        W = np.eye(d)
+        for q in ([-1, 0.2, 0], [1, 2, 0]):  # sticks, leaves
+            result = fclib.solve(local_problem(W, q[:d], [0.5]), name, 1e-6, time_limit=10)
+            assert result.converged, (q, result)
+        slides = fclib.solve(local_problem(W, [-1, 2, 0][:d], [0.5]), name, 1e-6, time_limit=2)
+        if name in RELAXED:
+            assert slides.status in {"inaccurate", "time_limit"}
+            continue
+        if name in UNRELIABLE:
+            continue
+        assert slides.converged
+        for case in (planted_local(3, d=d, nc=10), planted_global(3, d=d, nc=5, p=2)):
+            result = fclib.solve(case.problem, name, 1e-7, time_limit=20)
+            assert result.status == "converged"
+            assert result.error == fclib.merit(case.problem, result.solution).error
+            assert result.cpu_s > 0
+            guessed = fclib.solve(case.problem, name, 1e-5, guess=result.solution)
+            assert (guessed.status, guessed.iterations) == ("converged", 0)
+
+
+@pytest.mark.parametrize("name", EXTERNAL)
+def test_external_solvers_solve_rolling_problems(name: str) -> None:
+    entry = fclib.find_solver(name)
+    for d in entry.rolling_dimensions:
+        q = [-1.0, *[0.2] * (d - 1)]
+        problem = fclib.LocalRollingProblem(
+            spacedim=d, W=np.eye(2 * d), q=q * 2, mu=[0.8, 0.8], mu_r=[0.8, 0.8]
+        )
+        assert fclib.solve(problem, name, 1e-6, time_limit=10).converged
+
+
+@pytest.mark.parametrize("name", [n for n in EXTERNAL if n not in RELAXED])
+def test_external_solvers_are_honest_about_no_solution(name: str) -> None:
+    entry = fclib.find_solver(name)
+    for d in entry.dimensions:
+        problem = local_problem(np.zeros((d, d)), [-1, 0.5, 0][:d], [0.5])
+        try:
+            result = fclib.solve(problem, name, 1e-8, max_iterations=50, time_limit=2)
+        except fclib.SolverError as error:
+            assert name.partition(":")[0] in str(error)  # noqa: PT017
+        else:
+            assert not result.converged
+            assert np.isfinite(result.solution.r).all()
+
+
+@pytest.mark.parametrize("package", ["clarabel", "scs"])
+def test_conic_solvers_refuse_an_asymmetric_matrix(package: str) -> None:
+    pytest.importorskip(package)
+    with pytest.raises(fclib.UnsuitableError, match="asymmetric"):
+        fclib.solve(planted_local(7, skew=1.0).problem, f"{package}:aclm")
+
+
+def test_what_is_absent_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FCLIB_SICONOS_PYTHON", "/nowhere/python")
+    find_spec = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda n, *a: None if n == "scs" else find_spec(n, *a)
+    )
+    words = {absent.solvers: absent.missing for absent in external.absent()}
+    assert "FCLIB_SICONOS_PYTHON" in words[siconos.SOLVERS]
+    assert words["scs:aclm, scs:relaxation"] == "pip install scs"
+    assert not any(entry.origin in ("siconos", "scs") for entry in fclib.solvers())
+    with pytest.raises(fclib.OptionError, match="pip install scs"):
+        fclib.find_solver("scs:aclm")
+
+
+needs_siconos = pytest.mark.skipif(bool(siconos.missing()), reason=siconos.missing())
+
+
+@needs_siconos
+def test_the_worker_of_siconos_is_kept_and_is_killed_at_the_limit() -> None:
+    def worker() -> int:
+        assert siconos._worker.process is not None
+        return siconos._worker.process.pid
+
+    assert fclib.solve(problem_of(), "siconos:nsgs").converged
+    first = worker()
+    assert fclib.solve(problem_of(8), "siconos:nsgs").converged
+    assert worker() == first
+    endless = local_problem(
+        np.kron([[1, -1], [-1, 1]], np.eye(3)), [-1, 0, 0, -1, 0, 0], [0.5, 0.5]
+    )
+    start = time.monotonic()
+    result = fclib.solve(endless, "siconos:nsgs", time_limit=0.3)
+    assert time.monotonic() - start < 2
+    assert result.status == "time_limit"
+    assert result.cpu_s > 0.1
+    assert not alive(first)
+    assert fclib.solve(problem_of(), "siconos:nsgs").converged
+
+
+@needs_siconos
+def test_a_worker_that_dies_is_said_and_replaced() -> None:
+    assert fclib.solve(problem_of(), "siconos:nsgs").converged
+    assert siconos._worker.process is not None
+    pid = siconos._worker.process.pid
+    endless = local_problem(
+        np.kron([[1, -1], [-1, 1]], np.eye(3)), [-1, 0, 0, -1, 0, 0], [0.5, 0.5]
+    )
+    timer = threading.Timer(0.3, os.kill, (pid, signal.SIGKILL))
+    timer.start()
+    with pytest.raises(fclib.SolverError, match="signal 9"):
+        fclib.solve(endless, "siconos:nsgs", time_limit=10)
+    assert fclib.solve(problem_of(), "siconos:nsgs").converged
+
+
+@needs_siconos
+def test_unknown_solvers_of_siconos_come_with_the_known_ones() -> None:
+    with pytest.raises(fclib.OptionError, match="siconos:nsgs"):
+        fclib.find_solver("siconos:magic")

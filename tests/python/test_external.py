@@ -178,8 +178,9 @@ def test_a_solver_sees_the_reduced_problem_and_the_guess() -> None:
     @fclib.solver("t-sees", rolling_dimensions=(3, 5))
     def sees(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> None:
         told.update(problem=problem, r=r.copy(), error=monitor.error(r), monitor=monitor)
-        told.update(scale=monitor.scale, tolerance=monitor.tolerance)
+        told.update(scale=monitor.scale)
         r[:] = 0
+        monitor.status = "stalled"
 
     for case in (planted_local(1, nc=3), planted_global(2, d=2, nc=3, p=2)):
         result = fclib.solve(case.problem, "t-sees", tol=1e-5, guess=case.solution)

@@ -6,7 +6,8 @@ for /usr/bin/python3. Another interpreter is named by the environment variable
 ``FCLIB_SICONOS_PYTHON``.
 
 One worker process serves all solves, is killed at the time limit and started anew. W is passed in
-d x d blocks, the storage that Siconos uses itself (dense to the planar solvers); the time is the
+3 x 3 blocks, the storage that Siconos uses itself (dense to the planar solvers, and by columns to
+those of rolling problems, which take no blocks); the time is the
 CPU time of its driver alone, with one thread.
 
 Siconos' tolerance is relative to max(||q||, ||r||, ||u||). Where the error relative to ||q|| ends
@@ -44,6 +45,8 @@ DEFAULT = "/usr/bin/python3"
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 START_LIMIT = 60.0  # [s]
 BIG = 10**6
+# by rows is written in blocks
+STORAGES = {"fc2d": "dense", "fc3d": "csr", "rolling_fc3d": "csc"}
 Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
 HUBER = "Acary, Bremond & Huber 2018"
 
@@ -147,7 +150,7 @@ def _solve(kind: str, identifier: str, problem: Local, r: Any, monitor: fclib.Mo
         return r
     with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
         path = Path(folder) / "problem.dat"
-        fclib.write_siconos(path, problem.with_storage("dense" if kind == "fc2d" else "csr"))
+        fclib.write_siconos(path, problem.with_storage(STORAGES[kind]))
         order = {
             "path": str(path),
             "kind": kind,

@@ -242,7 +242,11 @@ def test_solvers_lists_them_with_their_options() -> None:
     result = run("solvers", "--json")
     assert result.returncode == 0
     told = [record for record in records(result) if "solver" in record]
-    for record, solver in zip(told, fclib.solvers(), strict=True):
+    # those that tests have registered are not there
+    names = {record["solver"] for record in told}
+    assert names >= {solver.name for solver in fclib.solvers() if solver.origin == "fclib"}
+    for record in told:
+        solver = fclib.find_solver(record["solver"])
         for name in ("origin", "family", "title", "citation", "dimensions"):
             assert record[name] == getattr(solver, name)
         assert record["solver"] == solver.name
@@ -253,7 +257,8 @@ def test_solvers_lists_them_with_their_options() -> None:
             assert shown["unit"] == option.unit
     table = run("solvers")
     assert table.returncode == 0
-    for solver in fclib.solvers():
+    for name in names:
+        solver = fclib.find_solver(name)
         for text in (solver.name, solver.family, solver.title):
             assert text in table.stdout
 

@@ -6,9 +6,9 @@ for /usr/bin/python3. Another interpreter is named by the environment variable
 ``FCLIB_SICONOS_PYTHON``.
 
 One worker process serves all solves, is killed at the time limit and started anew. W is passed in
-3 x 3 blocks, the storage that Siconos uses itself (dense to the planar solvers, and by columns to
-those of rolling problems, which take no blocks); the time is the
-CPU time of its driver alone, with one thread.
+3 x 3 blocks, the storage that Siconos uses itself; dense to the planar solvers, and by columns to
+those of rolling problems, which take no blocks. The time is the CPU time of its driver alone, with
+one thread.
 
 Siconos' tolerance is relative to max(||q||, ||r||, ||u||). Where the error relative to ||q|| ends
 above the tolerance, it runs again from the same point with its tolerance scaled to mean the same,

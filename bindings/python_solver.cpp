@@ -189,7 +189,9 @@ Outcome run(const nb::object& function, const std::vector<OptionInfo>& infos,
   const nb::object answer = function(problem, guess, monitor, options);
   const double cpu_s = cpu_time() - start;
   r = watch->checked(answer);
-  return {watch->status(), watch->iterations, {}, watch->cpu_s.value_or(cpu_s)};
+  return {.status = watch->status(),
+          .iterations = watch->iterations,
+          .cpu_s = watch->cpu_s.value_or(cpu_s)};
 }
 
 Solver python_solver(const std::string& name, const std::string& family, const std::string& title,

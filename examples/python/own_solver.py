@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 import fclib
 
@@ -17,7 +18,7 @@ def solve(
     problem: fclib.LocalProblem, r: Array, monitor: fclib.Monitor, *, step: Step = 1.0
 ) -> None:
     """Projected Gauss-Seidel: u = W r + q, and r <- P_K(r - rho u^) contact by contact."""
-    d, W = problem.spacedim, problem.W
+    d, W = problem.spacedim, sp.csr_array(problem.W)
     contacts = []
     for number, mu in enumerate(problem.mu):
         k = slice(d * number, d * (number + 1))

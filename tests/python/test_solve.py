@@ -411,7 +411,7 @@ def test_every_configuration_solves(options: dict[str, Any]) -> None:
 
 def test_the_seed_chooses_the_order() -> None:
     def iterate(seed: int) -> Any:
-        options = {"shuffle": "always", "seed": seed}
+        options: dict[str, Any] = {"shuffle": "always", "seed": seed}
         return fclib.solve(hard(), "nsgs", tol=0, max_iterations=3, **options).solution.r
 
     np.testing.assert_array_equal(iterate(1), iterate(1))

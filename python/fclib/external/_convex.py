@@ -152,7 +152,7 @@ def entries(
 
     return (
         entry(aclm, "convex fixed point", f"Fixed point of convex problems, by {title}"),
-        entry(relaxation, "convex relaxation", f"One convex problem, by {title}; {RELAXATION}"),
+        entry(relaxation, "relaxation", f"One convex problem, by {title}; {RELAXATION}"),
     )
 
 

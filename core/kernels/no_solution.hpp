@@ -11,7 +11,8 @@
 //
 // In floating point -W^T E y is in K* up to a distance e, and the proof holds for all reactions
 // with
-// ||r|| < -y . q_N / e.
+// ||r|| < -y . q_N / e. A heavy body needs large reactions, so that a small e alone is none: e must
+// be the rounding of terms that cancel, at each contact.
 #pragma once
 
 #include <cmath>
@@ -26,20 +27,27 @@ namespace fclib {
 template <class Cone>
 double no_solution_bound(const Delassus& problem, const Vector& y) {
   constexpr int D = Cone::dim;
+  constexpr double rounding = 1e-8;  // relative to the terms that cancel
   double gain = 0;
-  Vector normal = Vector::Zero(problem.m());
+  double terms = 0;
   for (Index a = 0; a < problem.nc(); ++a) {
     if (!(y[a] >= 0)) return 0;
-    normal[D * a] = y[a];
     gain -= y[a] * problem.q[D * a];
+    terms += y[a] * std::abs(problem.q[D * a]);
   }
-  if (!(gain > 0)) return 0;
-  Vector image;
-  problem.W.multiply_transposed(normal, image);
+  if (!(gain > rounding * terms)) return 0;
+  Vector image = Vector::Zero(problem.m());  // -W^T E y
+  Vector size = Vector::Zero(problem.nc());
+  problem.W.template for_each_block<D>([&](Index row, Index col, const auto& block) {
+    image.template segment<D>(D * col) -= y[row] * block.row(0).transpose();
+    size[col] += y[row] * block.row(0).norm();
+  });
   double squared = 0;
   for (Index a = 0; a < problem.nc(); ++a) {
-    const typename Cone::Vec part = -image.template segment<D>(D * a);
-    squared += std::pow(dual_violation(Cone(problem.friction, a), part), 2);
+    const typename Cone::Vec part = image.template segment<D>(D * a);
+    const double distance = dual_violation(Cone(problem.friction, a), part);
+    if (!(distance <= rounding * size[a])) return 0;
+    squared += distance * distance;
   }
   return squared > 0 ? gain / std::sqrt(squared) : std::numeric_limits<double>::infinity();
 }

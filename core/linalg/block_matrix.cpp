@@ -101,22 +101,6 @@ void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y) cons
   }
 }
 
-void BlockMatrix::multiply_transposed(const Vector& x, Vector& y) const {
-  y.setZero(x.size());
-  const auto add = [&]<int D>() {
-    for_each_block<D>([&](Index row, Index col, const auto& block) {
-      y.segment<D>(D * col).noalias() += block.transpose() * x.segment<D>(D * row);
-    });
-  };
-  if (d_ == 2) {
-    add.template operator()<2>();
-  } else if (d_ == 3) {
-    add.template operator()<3>();
-  } else {
-    add.template operator()<5>();
-  }
-}
-
 std::vector<Index> BlockMatrix::components() const {
   std::vector<Index> group(static_cast<std::size_t>(nc_), dense_ ? 0 : -1);
   if (dense_) return group;

@@ -43,9 +43,6 @@ class BlockMatrix {
   /// y = W x + q, all of length d nc.
   void multiply_add(const Vector& x, const Vector& q, Vector& y) const;
 
-  /// y = W^T x.
-  void multiply_transposed(const Vector& x, Vector& y) const;
-
   /// Calls visit(row, col, block) for each stored block, a D x D matrix.
   template <int D, class Visitor>
   void for_each_block(Visitor&& visit) const;

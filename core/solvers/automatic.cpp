@@ -69,7 +69,7 @@ struct Options {
 constexpr Index few_contacts = 10;
 
 /// A proof that there is no solution must hold for reactions this many times the usual size.
-constexpr double safe_bound = 1e7;
+constexpr double safe_bound = 1e4;
 
 /// Operations, about: of a sweep, and of a factorisation with its solve and the rest of an
 /// iteration.

@@ -97,7 +97,7 @@ def assert_proven(problem: fclib.LocalProblem, result: fclib.Result) -> None:
     # distance from K*, whose projection is x + P_K(-x)
     distance = np.linalg.norm(project(-image, problem.mu))
     usual = np.linalg.norm(problem.q) / max(np.trace(dense(problem.W)) / problem.m, 1e-300)
-    assert distance == 0 or gain / distance > 1e6 * usual
+    assert distance == 0 or gain / distance > 1e4 * usual
 
 
 @hypothesis.settings(deadline=None, max_examples=60, derandomize=True)
@@ -272,6 +272,20 @@ def test_what_is_pressed_but_not_closing_is_not_refused() -> None:
         result = fclib.solve(problem)
         assert result.status in {"converged", "stalled"}
         assert result.certificate is None
+
+
+@pytest.mark.parametrize("ratio", [1e4, 1e8, 1e12])
+def test_a_heavy_body_is_not_taken_for_a_wall(ratio: float) -> None:
+    # a heavy body on the ground with a light one on it: reactions far above those of the light one
+    H = np.zeros((6, 6))
+    H[:3, :3] = np.eye(3)
+    H[:3, 3:], H[3:, 3:] = -np.eye(3), np.eye(3)
+    mass = np.repeat([ratio, 1.0], 3)
+    problem = fclib.GlobalProblem(
+        M=np.diag(mass), H=H, f=mass * np.tile([-1, 0.5, 0], 2), w=np.zeros(6), mu=[0.3, 0.3]
+    )
+    result = fclib.solve(problem, last_resort=50)
+    assert result.status != "infeasible"
 
 
 def test_a_contact_that_nothing_can_move() -> None:

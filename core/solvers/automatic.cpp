@@ -377,13 +377,16 @@ class Island {
       for (Index a = 0; a < problem_.nc(); ++a) {
         largest = std::max(largest, method.iterate()[D * a]);
       }
-      for (Index a = 0; a < problem_.nc(); ++a) {
-        const double normal = method.iterate()[D * a];
-        y[a] = normal > 1e-9 * largest ? normal / largest : 0;
-      }
-      if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual) {
-        tracker_.prove(y);
-        return true;
+      // contacts outside the ray keep small parts, which are left out
+      for (const double least : {1e-9, 1e-6, 1e-3}) {
+        for (Index a = 0; a < problem_.nc(); ++a) {
+          const double normal = method.iterate()[D * a];
+          y[a] = normal > least * largest ? normal / largest : 0;
+        }
+        if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual) {
+          tracker_.prove(y);
+          return true;
+        }
       }
       return tracker_.report(1, error_);
     });

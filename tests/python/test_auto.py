@@ -48,7 +48,7 @@ def bodies(
     H = np.zeros((n, m))
     for a in range(nc):
         rows = rng.choice(n, size=min(n, 2 * d), replace=False)
-        H[np.ix_(rows, range(d * a, d * a + d))] = rng.standard_normal((len(rows), d))
+        H[np.ix_(rows, np.arange(d * a, d * a + d))] = rng.standard_normal((len(rows), d))
     if duplicated:
         H = np.hstack([H, H[:, : d * duplicated]])
         nc += duplicated
@@ -252,7 +252,7 @@ def test_a_body_between_closing_walls_has_no_solution(
     opposite = wall * np.array([-1.0] + [1.0] * (d - 1))
     H = np.hstack([wall, opposite, *(rng.standard_normal((n, d)) for _ in range(others))])
     w = rng.standard_normal(H.shape[1])
-    w[0], w[d] = -closing, -0.5 * closing
+    w[[0, d]] = [-closing, -0.5 * closing]
     problem = fclib.GlobalProblem(
         spacedim=d, M=np.eye(n), H=H, f=np.zeros(n), w=w, mu=np.full(others + 2, mu)
     )

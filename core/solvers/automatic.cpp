@@ -365,6 +365,8 @@ class Island {
     CoupledSystem system(frictionless);
     ProximalPoint<Cone> method(frictionless, system);
     Vector r = Vector::Zero(problem_.m());
+    Vector last = r;
+    Vector step = r;
     Vector y(problem_.nc());
     const ProximalRules rules{.kappa = 100,
                               .kappa_max = 1e12,
@@ -373,15 +375,15 @@ class Island {
                               .patience = std::numeric_limits<double>::infinity(),
                               .max_factorisations = 60};
     method.solve(rules, 1e-10, r, [&](double) {
+      // the steps tend to the ray, free of the part of r that stays
+      step = method.iterate() - last;
+      last = method.iterate();
       double largest = 0;
-      for (Index a = 0; a < problem_.nc(); ++a) {
-        largest = std::max(largest, method.iterate()[D * a]);
-      }
+      for (Index a = 0; a < problem_.nc(); ++a) largest = std::max(largest, step[D * a]);
       // contacts outside the ray keep small parts, which are left out
       for (const double least : {1e-9, 1e-6, 1e-3}) {
         for (Index a = 0; a < problem_.nc(); ++a) {
-          const double normal = method.iterate()[D * a];
-          y[a] = normal > least * largest ? normal / largest : 0;
+          y[a] = step[D * a] > least * largest ? step[D * a] / largest : 0;
         }
         if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual) {
           tracker_.prove(y);

@@ -251,8 +251,8 @@ def test_a_body_between_closing_walls_has_no_solution(
     wall = np.vstack([np.eye(d), np.zeros((n - d, d))])
     opposite = wall * np.array([-1.0] + [1.0] * (d - 1))
     H = np.hstack([wall, opposite, *(rng.standard_normal((n, d)) for _ in range(others))])
-    w = rng.standard_normal(H.shape[1])
-    w[[0, d]] = [-closing, -0.5 * closing]
+    w: Array = rng.standard_normal((H.shape[1],))
+    w[[0, d]] = np.array([-closing, -0.5 * closing])
     problem = fclib.GlobalProblem(
         spacedim=d, M=np.eye(n), H=H, f=np.zeros(n), w=w, mu=np.full(others + 2, mu)
     )

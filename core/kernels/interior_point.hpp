@@ -12,8 +12,8 @@
 // problem of an associated flow rule.
 //
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
-// mechanics using interior point algorithm" (2023), for the convex part; the shift in the Newton
-// system is ours.
+// mechanics using interior point algorithm" (2023), for the convex part, to
+// which the shift in the Newton system is added.
 //
 // All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
 #pragma once

@@ -3,11 +3,13 @@
 //
 //   0  r = 0, where nothing approaches
 //   1  Gauss-Seidel sweeps on the whole, then on each island (contacts linked through W) left over
-//   2  conjugate gradients on W r = -q, where all seems to stick and rest
+//   2  conjugate gradients on W r = -q, before the sweeps of an island: all may stick and rest
 //   3  proximal Newton ("polish"), where the error is small already
 //   4  interior point with the shift in the Newton system, polished as it comes near
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
-//   6  proximal point with an accurate inner solution, the last resort
+//   6  a proof that there is no solution (kernels/no_solution.hpp)
+//   7  interior point again, residual and gap held together: passes folds of the first one's path
+//   8  proximal point with an accurate inner solution, the last resort
 //
 // Every stage starts from, and returns to, the best iterate so far; each island is held to its
 // share of the tolerance. What a stage may cost is counted in operations, not in time: the same
@@ -66,6 +68,7 @@ struct Options {
   }
 };
 
+/// Up to here the error is evaluated often: a few sweeps may do, and cost no more than it.
 constexpr Index few_contacts = 10;
 
 /// A proof that there is no solution must hold for reactions this many times the usual size.

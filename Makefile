@@ -66,7 +66,8 @@ $(VENV)/.build-tools: $(VENV)/.system pyproject.toml
 $(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
 	@echo "== building and installing fclib into $(VENV) (two minutes the first time)"
 	@$(BIN)/pip install --no-build-isolation \
-	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON .
+	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
+	  '.[analysis,collection,bench,solvers]'
 	@touch $@
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml

@@ -36,6 +36,7 @@ from fclib._core import (
     write_solution,
 )
 from fclib._core import version as __version__
+from fclib._digest import digest
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
@@ -62,6 +63,7 @@ __all__ = [
     "UnsuitableError",
     "__version__",
     "contents",
+    "digest",
     "find_solver",
     "merit",
     "read",

@@ -41,7 +41,8 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 PYTHON: dict[str, set[str]] = {
     "_registry": {"_core"},
     "_solve": {"_core", "_registry"},
-    "__init__": {"_core", "_registry", "_solve"},
+    "_digest": set(),
+    "__init__": {"_core", "_digest", "_registry", "_solve"},
     "scenes": set(),
     "simulate": {"api", "scenes"},
     "external": {"api", "_registry"},

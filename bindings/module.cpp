@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <initializer_list>
 
+#include "arrangements.hpp"
 #include "conversions.hpp"
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
@@ -506,6 +507,7 @@ NB_MODULE(_core, m) {
 
   for_each_formulation([&]<class P>(std::type_identity<P>) { bind_problem<P>(m); });
   bind_conversions(m);
+  bind_arrangements(m);
   bind_solvers(m);
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     bind_solve<P>(m);

@@ -32,7 +32,8 @@ def project(x: Array, mu: Array) -> Array:
     rays = np.column_stack([np.ones_like(mu), mu[:, None] * directions])
     rays /= np.sqrt(1 + mu**2)[:, None]
     along = np.maximum(np.sum(rays * x, axis=1), 0)
-    return np.where((norm <= mu * x[:, 0])[:, None], x, along[:, None] * rays)
+    inside = (x[:, 0] >= 0) & (norm <= mu * x[:, 0])
+    return np.where(inside[:, None], x, along[:, None] * rays)
 
 
 def modified(u: Array, mu: Array) -> Array:

@@ -41,7 +41,7 @@ class Coulomb {
 
   [[nodiscard]] Vec project(const Vec& x) const {
     const Real norm = tangential_norm(x);
-    if (norm <= mu_ * x[0]) return x;
+    if (x[0] >= 0 && norm <= mu_ * x[0]) return x;  // mu = 0: a ray, not a line
     if (mu_ * norm <= -x[0]) return Vec::Zero();
     Vec result;
     result[0] = (x[0] + mu_ * norm) / (1 + mu_ * mu_);

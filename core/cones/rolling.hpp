@@ -45,7 +45,7 @@ class Rolling {
   [[nodiscard]] Vec project(const Vec& x) const {
     const Real t = tangential_norm(x);
     const Real r = rolling_norm(x);
-    if (t <= mu_ * x[0] && r <= mu_r_ * x[0]) return x;
+    if (x[0] >= 0 && t <= mu_ * x[0] && r <= mu_r_ * x[0]) return x;
     if (x[0] + mu_ * t + mu_r_ * r <= 0) return Vec::Zero();
     const Real free_t = t > 0 ? t / mu_ : Real(0);
     const Real free_r = r > 0 ? r / mu_r_ : Real(0);

@@ -78,6 +78,9 @@ SOLVABLE: dict[str, Callable[[int], fclib.Problem]] = {
     "sticks": lambda d: local_problem(np.eye(d), [-1, 0.2, 0][:d], [0.5]),
     "slides": lambda d: local_problem(np.eye(d), [-1, 2, 0][:d], [0.5]),
     "leaves": lambda d: local_problem(np.eye(d), [1, 2, 0][:d], [0.5]),
+    "leaves without friction": lambda d: local_problem(
+        np.eye(2 * d), ([1.0] + [0.0] * (d - 1)) * 2, [0.0, 0.5]
+    ),
     "one contact": lambda d: planted_local(1, d=d, nc=1).problem,
     "two contacts": lambda d: planted_local(2, d=d, nc=2).problem,
     "ten contacts": lambda d: planted_local(3, d=d, nc=10).problem,
@@ -95,6 +98,11 @@ OTHERS: dict[str, Callable[[int], fclib.Problem]] = {
     ),
     "asymmetric": lambda d: planted_local(7, d=d, skew=1.0).problem,
     "a zero block": with_zero_block,
+    "limits of joints": lambda d: local_problem(
+        np.kron([[2, 1], [1, 2]], np.diag([1.0] + [0.0] * (d - 1))),
+        ([-1.0] + [0.0] * (d - 1)) + ([2.0] + [0.0] * (d - 1)),
+        [0.0, 0.0],
+    ),
     "all zero": lambda d: local_problem(np.zeros((2 * d, 2 * d)), np.zeros(2 * d), [0.5, 0.5]),
     "zero q": lambda d: local_problem(np.eye(2 * d), np.zeros(2 * d), [0.5, 0.5]),
     "redundant": redundant,

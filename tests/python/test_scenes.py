@@ -68,7 +68,7 @@ def test_boxes_stack_has_its_boxes(boxes: int) -> None:
 
 
 def test_boxes_stack_lands_on_four_points_a_box() -> None:
-    scene = scenes.get("BoxesStack")(boxes=3, gap=0.005).scene(seed=1)
+    scene = scenes.get("BoxesStack")(boxes=3, gap=0.005, time_step=5e-3).scene(seed=1)
     *_, last = simulate(scene, 25)
     assert last.problem.nc == 12
     pairs, counts = np.unique(last.contacts.pair, axis=0, return_counts=True)

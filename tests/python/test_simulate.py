@@ -86,7 +86,7 @@ def run(xml: str, steps: int, **options: Any) -> list[Any]:
 
 def velocities(steps: list[Any]) -> Any:
     """The velocity (steps x n) at the end of each step."""
-    return np.array([step.result.solution.v for step in steps])
+    return np.array([step.velocity for step in steps])
 
 
 def energies(scene: Scene, steps: int, **options: Any) -> Iterator[float]:
@@ -258,8 +258,39 @@ def test_forces_are_mujocos() -> None:
     mujoco.mj_forward(model.model, model.data)
     np.testing.assert_allclose(acceleration, model.data.qacc_smooth, rtol=1e-9, atol=1e-9)
 
-    problem, _ = MoreauJean(h=H).problem(system, v)
-    np.testing.assert_allclose(problem.f, system.M @ (v + H * acceleration), rtol=1e-9, atol=1e-9)
+    problem: Any = MoreauJean(h=H).problem(system, v).problem
+    expected = system.M @ (v + H * acceleration) + H * system.C @ v
+    np.testing.assert_allclose(problem.f, expected, rtol=1e-9, atol=1e-9)
+    matrix = system.M + H * system.C + H**2 * system.K
+    np.testing.assert_allclose(problem.M.toarray(), matrix.toarray(), atol=1e-14)
+
+
+def test_springs_and_dampers_are_the_derivatives_of_the_force() -> None:
+    bodies = ARM.replace('name="elbow"', 'name="elbow" stiffness="3" damping="0.4"')
+    rest = '<actuator><position joint="elbow" kp="5" kv="0.2" gear="2"/></actuator>'
+    model = moving_model(mjcf(bodies, floor=False, gravity="0 0 0", rest=rest))
+    elbow = int(model.model.jnt_dofadr[1])
+    system, v = model.assemble(H), model.velocity
+    model.data.qvel[:] = 0  # no gyroscopic terms
+    at_rest = model.assemble(H).force
+    model.data.qvel[elbow] = step = 1e-6
+    moving = model.assemble(H).force
+    np.testing.assert_allclose((at_rest - moving)[elbow] / step, 0.4 + 0.2 * 2**2, rtol=1e-5)
+    np.testing.assert_allclose(system.C.toarray()[elbow, elbow], 0.4 + 0.2 * 2**2)
+    assert system.C.nnz == 1
+    model.integrate(step, np.eye(v.size)[elbow])
+    model.data.qvel[:] = 0
+    np.testing.assert_allclose((at_rest - model.assemble(H).force)[elbow] / step, 23, rtol=1e-5)
+    np.testing.assert_allclose(system.K.toarray()[elbow, elbow], 3 + 5 * 2**2)
+
+
+def test_stiff_damper_does_not_blow_up() -> None:
+    """Damping worth 1e3 times the inertia in a step: an explicit scheme would diverge."""
+    stiff = '<body><joint axis="0 0 1" damping="1e3"/><geom size="0.1" mass="1"/></body>'
+    xml = mjcf(stiff, floor=False, rest=start("0", "2"))
+    speeds = np.abs(velocities(run(xml, 20)))[:, 0]
+    assert np.all(np.diff(speeds) <= 0)
+    assert speeds[-1] < 1e-9
 
 
 def test_contact_columns_give_the_velocity_of_contact_points() -> None:
@@ -380,7 +411,7 @@ def test_runs_are_equal_bit_for_bit() -> None:
 
 
 def test_problem_is_regenerated_from_its_description() -> None:
-    scene = scenes.get("BoxesStack")(boxes=2, gap=0.004).scene(seed=11)
+    scene = scenes.get("BoxesStack")(boxes=2, gap=0.004, time_step=H).scene(seed=11)
     *_, last = simulate(scene, 12, tol=1e-9, warm_start=False, max_iterations=500)
     assert last.problem.nc
     assert "BoxesStack" in last.problem.info.description
@@ -453,8 +484,6 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
     ("xml", "message"),
     [
         (mjcf(SPHERE, more='condim="4"'), "condim 4"),
-        (mjcf(SPHERE, more='condim="6"'), "condim 6"),
-        (mjcf(LIMITED), "limits"),
         (mjcf(ARM.replace('name="elbow"', 'name="elbow" frictionloss="1"')), "dry friction"),
         (mjcf(SPHERE, more='adhesion="1"'), "adhesion"),
         (mjcf(SPHERE, more='surfacevel="1 0 0 0 0 0"'), "surfacevel"),
@@ -468,7 +497,7 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
     ],
 )
 def test_what_is_not_supported_is_named(xml: str, message: str) -> None:
-    with pytest.raises(UnsupportedSceneError, match=f"^test: not supported yet: .*{message}"):
+    with pytest.raises(UnsupportedSceneError, match=f"^test: not supported: .*{message}"):
         simulate(Scene(name="test", xml=xml), 1)
 
 
@@ -478,11 +507,113 @@ def test_anisotropic_friction_is_named() -> None:
         run(mjcf(SLAB, more='name="box"', rest=pair), 1)
 
 
-def test_limits_are_left_out_on_demand_and_said() -> None:
-    steps = run(mjcf(LIMITED), 2, ignore=("limits",))
-    assert provenance(steps[0].problem.info)["ignore"] == ["limits"]
-    with pytest.raises(ValueError, match="cannot ignore contacts; only frictionloss, limits"):
+def test_what_is_left_out_on_demand_is_said() -> None:
+    steps = run(mjcf(SPHERE, z=0.1, more='condim="4"'), 2, ignore=("torsion",))
+    assert provenance(steps[0].problem.info)["ignore"] == ["torsion"]
+    assert steps[0].problem.formulation == "G3DFC"
+    with pytest.raises(ValueError, match="cannot ignore contacts; only activation, anisotropy"):
         run(mjcf(LIMITED), 2, ignore=("contacts",))
+
+
+# ---- limits of joints and tendons: contacts without friction
+
+
+def test_limit_stops_a_joint() -> None:
+    bar = (
+        '<body pos="0 0 1"><joint axis="0 1 0" limited="true" range="-0.5 0.3"/>'
+        '<geom type="capsule" size="0.02" fromto="0 0 0 0.5 0 0" mass="1"/></body>'
+    )
+    steps = run(mjcf(bar, floor=False), 120)
+    angles = np.array([step.position[0] for step in steps])
+    # falls to the limit, at most a step beyond it, and stays
+    assert 0.3 - 1e-9 < angles[-1] < 0.3 + 0.5 * H * 5
+    assert np.ptp(angles[-20:]) < 1e-9
+    last = steps[-1]
+    assert last.problem.nc == 1
+    np.testing.assert_array_equal(last.problem.mu, 0.0)
+    assert last.problem.H.nnz == 1  # no tangents
+    np.testing.assert_array_equal(last.contacts.pair[0], [-1 - 3, 0])
+    # its impulse is the moment of the weight about the joint
+    moment = G * 0.25 * math.cos(angles[-1]) * H
+    np.testing.assert_allclose(last.result.solution.r, [moment, 0, 0], rtol=1e-6)
+
+
+def test_limit_of_a_tendon() -> None:
+    bars = (
+        '<body pos="0 0 1"><joint name="a" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/>'
+        '</body><body pos="0 0 2"><joint name="b" type="slide" axis="1 0 0"/>'
+        '<geom size="0.1" mass="1"/></body>'
+    )
+    tendon = (
+        '<tendon><fixed limited="true" range="-0.1 0.1"><joint joint="a" coef="1"/>'
+        '<joint joint="b" coef="-1"/></fixed></tendon>'
+    )
+    steps = run(mjcf(bars, floor=False, gravity="0 0 0", rest=tendon + start("0 0", "2 0")), 40)
+    # the first drags the second: momentum is kept, and shared
+    np.testing.assert_allclose(velocities(steps)[-1], [1, 1], rtol=1e-9)
+
+
+# ---- rolling friction
+
+
+def test_rolling_resistance_stops_a_ball() -> None:
+    """On a level floor, a ball that rolls slows down by mu_r g / R and the inertia it carries."""
+    mu_r, radius, speed = 1e-3, 0.1, 1.0
+    xml = mjcf(
+        SPHERE,
+        z=radius,
+        more=f'condim="6" friction="0.5 0 {mu_r}"',
+        rest=start(f"0 0 {radius - 1e-6} 1 0 0 0", f"{speed} 0 0 0 {speed / radius} 0"),
+    ).replace('friction="0.5" condim', "condim")
+    steps = run(xml, 100)
+    assert {step.problem.formulation for step in steps} == {"GR3DFC"}
+    assert steps[0].problem.spacedim == 5
+    np.testing.assert_array_equal(steps[0].problem.mu_r, mu_r)
+    v = velocities(steps)
+    # m dv = F dt, I domega = (- M_r - F R) dt, v = omega R, M_r = mu_r m g, I = 2/5 m R^2
+    slowing = mu_r * G / (1.4 * radius)
+    np.testing.assert_allclose(v[:, 0], speed - slowing * H * np.arange(1, 101), atol=1e-5)
+    np.testing.assert_allclose(v[:, 4], v[:, 0] / radius, atol=1e-4)
+
+
+def test_rolling_columns_are_the_relative_spin_about_the_tangents() -> None:
+    model = moving_model(mjcf(SPHERE, z=0.1, more='condim="6"'))
+    system, v = model.assemble(H), model.velocity
+    assert system.H.shape == (6, 5)
+    mujoco.mj_kinematics(model.model, model.data)
+    omega = model.data.xmat[1].reshape(3, 3) @ v[3:]
+    np.testing.assert_allclose((system.H.T @ v)[3:], system.contacts.frame[0, 1:] @ omega)
+
+
+# ---- what contacts do not move
+
+
+def test_free_bodies_are_left_out_of_the_problem() -> None:
+    bodies = SPHERE.replace("{z}", "0.0999") + SPHERE.replace('"0 0 {z}"', '"1 0 5"')
+    steps = run(mjcf(bodies), 30)
+    for step in steps:
+        assert step.problem.nc == 1
+        np.testing.assert_array_equal(step.dofs, np.arange(6))
+        assert step.problem.M.shape == (6, 6)
+        np.testing.assert_allclose(step.velocity[6:9], [0, 0, -G * H * (step.index + 1)])
+        np.testing.assert_array_equal(step.velocity[:6], step.result.solution.v)
+
+
+def test_free_bodies_keep_their_bilateral_constraints() -> None:
+    ball = '<body name="{0}" pos="{1} 0 5"><freejoint/><geom size="0.1" mass="1"/></body>'
+    bodies = SPHERE.replace("{z}", "0.0999") + ball.format("left", 1) + ball.format("right", 1.5)
+    pivot = '<equality><connect body1="left" body2="right" anchor="0.25 0 0"/></equality>'
+    at = "0 0 0.0999 1 0 0 0 1 0 5 1 0 0 0 1.5 0 5 1 0 0 0"
+    steps = run(mjcf(bodies, rest=pivot + start(at, "0 0 0 0 0 0  0 1 0 0 0 0  0 0 0 0 0 0")), 5)
+    for step in steps:
+        assert step.problem.nc == 1
+        assert step.problem.G is None
+        assert step.problem.M.shape == (6, 6)
+    model = steps[-1].model
+    system = model.assemble(H)
+    drift = np.abs(system.G.T @ steps[-1].velocity)
+    assert drift.max() < 0.05  # of a speed of 1 m/s, turned by one step
+    np.testing.assert_allclose(steps[-1].velocity[[7, 13]].sum(), 1.0, rtol=1e-9)
 
 
 def test_bad_mjcf_is_one_line() -> None:

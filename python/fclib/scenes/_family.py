@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
 
@@ -30,8 +30,28 @@ class Scene:
     seed: int | None = None
     title: str = ""
     description: str = ""
+    application: str = ""  # field of application
+    authors: str = ""  # of the original
+    friction: str = ""  # the law of friction, in words
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
+
+    @classmethod
+    def of(cls, family: Any, seed: int, xml: str) -> Scene:
+        """The scene of a family: its parameters and all that it says of itself."""
+        return cls(
+            name=type(family).__name__,
+            xml=xml,
+            time_step=family.time_step,
+            restitution=family.restitution,
+            parameters=asdict(family),
+            seed=seed,
+            title=family.title,
+            description=family.description,
+            application=family.application,
+            authors=family.authors,
+            friction=family.friction,
+        )
 
     @classmethod
     def from_file(
@@ -65,13 +85,20 @@ class Scene:
 
 
 class Family(Protocol):
-    """A frozen dataclass whose fields, all with defaults, are the parameters of its scenes."""
+    """A frozen dataclass whose fields, all with defaults, are the parameters of its scenes.
+
+    Among them are `restitution` and `time_step` [s].
+    """
 
     title: ClassVar[str]
     description: ClassVar[str]
     application: ClassVar[str]  # field of application
     authors: ClassVar[str]  # of the original family
     friction: ClassVar[str]  # the law of friction, in words
+    collection: ClassVar[str]  # the set that it belongs to
+    problems: ClassVar[int]  # steps with contact that the set takes of its default scene
+    restitution: float
+    time_step: float
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init__(self, **parameters: Any) -> None: ...

@@ -7,7 +7,11 @@ Numbers are written with `repr`, so that text and float are the same to the last
 from __future__ import annotations
 
 import colorsys
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+import numpy as np
 
 # the looks do not act on the mechanics; angles in radians everywhere
 _DOCUMENT = """\
@@ -34,10 +38,11 @@ _DOCUMENT = """\
   <worldbody>
     <light type="directional" pos="0 0 0" dir="-0.72 0.22 -0.85"
            diffuse="0.56 0.55 0.52" specular="0.15 0.15 0.15" castshadow="true"/>
-    <geom name="floor" type="plane" size="0 0 1" material="floor" condim="3"
-          friction="{floor_mu!r}"/>
+    <geom name="floor" type="plane" size="0 0 1" pos="0 0 {floor_z!r}" material="floor"
+          condim="{condim}" friction="{floor_mu!r} 0 {floor_mu_r!r}"/>
 {bodies}
   </worldbody>
+{rest}
 </mujoco>
 """
 
@@ -51,12 +56,22 @@ def document(
     gravity: float,
     floor_mu: float,
     tile: float,
+    floor_z: float = 0.0,
+    condim: int = 3,
+    floor_mu_r: float = 0.0,
+    rest: Iterable[str] = (),
+    velocity: Iterable[float] | None = None,
 ) -> str:
-    """An MJCF document: the bodies above a horizontal floor at z = 0.
+    """An MJCF document: the bodies above a horizontal floor.
 
-    time_step in s, gravity (downwards) in m/s^2, floor_mu without unit; tile is the edge of the
-    floor's squares in m. MuJoCo takes for a contact the larger friction of its two geometries.
+    time_step in s, gravity (downwards) in m/s^2, floor_mu without unit, floor_mu_r in m, floor_z
+    the floor's height in m; tile is the edge of the floor's squares in m; velocity at the start
+    (n); rest: further elements, as equality constraints. MuJoCo takes for a contact the larger
+    friction of its two geometries.
     """
+    elements = list(rest)
+    if velocity is not None:
+        elements.append(f'<keyframe><key name="start" qvel="{numbers(*velocity)}"/></keyframe>')
     return _DOCUMENT.format(
         name=name,
         time_step=time_step,
@@ -66,6 +81,10 @@ def document(
         tiles=0.5 / tile,
         assets=indent(assets),
         bodies=indent(bodies),
+        floor_z=floor_z,
+        condim=condim,
+        floor_mu_r=floor_mu_r,
+        rest=indent(elements),
     )
 
 
@@ -78,13 +97,13 @@ def numbers(*values: float) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-def cube_mesh(name: str, edge: float) -> str:
-    """A cube as a mesh: its faces touch in the corners of their overlap, 4 for a cube on a plane.
+def block_mesh(name: str, length: float, width: float, height: float) -> str:
+    """A block as a mesh: faces touch in the corners of their overlap, 4 for a block on a plane.
 
     The box primitive gives up to 8 points for the same pair.
     """
-    a = 0.5 * edge
-    corners = [numbers(x, y, z) for x in (-a, a) for y in (-a, a) for z in (-a, a)]
+    a, b, c = 0.5 * length, 0.5 * width, 0.5 * height
+    corners = [numbers(x, y, z) for x in (-a, a) for y in (-b, b) for z in (-c, c)]
     return f'<mesh name="{name}" vertex="{"  ".join(corners)}"/>'
 
 
@@ -95,3 +114,46 @@ def shade(index: int, count: int) -> str:
     lightness = 0.52 + 0.08 * (index % 2)
     red, green, blue = colorsys.hls_to_rgb(hue, lightness, 0.45)
     return f"{red:.3f} {green:.3f} {blue:.3f} 1"
+
+
+def walls(reach: float, height: float, mu: float, condim: int = 3) -> list[str]:
+    """Four walls without end, at x = +-reach and y = +-reach [m], drawn as a frame of some height.
+
+    A plane hides what is behind it, so the walls themselves are not drawn.
+    """
+    elements = [
+        f'<geom name="wall{side}" type="plane" size="0 0 1" pos="{numbers(*place)}"'
+        f' zaxis="{numbers(*(-np.sign(place)))}" condim="{condim}" friction="{mu!r}"'
+        ' rgba="0 0 0 0"/>'
+        for side, place in enumerate(
+            reach * np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+        )
+    ]
+    ring = reach * np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)])
+    top = np.array([0, 0, height])
+    for i, corner in enumerate(ring):
+        following = ring[(i + 1) % 4]
+        for start, end in ((corner, corner + top), (corner + top, following + top)):
+            elements.append(
+                f'<geom type="capsule" size="{0.01 * reach!r}" contype="0" conaffinity="0" mass="0"'
+                f' fromto="{numbers(*start, *end)}" rgba="0.45 0.47 0.5 1"/>'
+            )
+    return elements
+
+
+def check(
+    family: object,
+    *,
+    positive: Iterable[str] = (),
+    non_negative: Iterable[str] = (),
+    at_least: Mapping[str, float] = MappingProxyType({}),
+) -> None:
+    """ValueError where a parameter of a family is out of its range."""
+    bounds = [(name, ">", 0.0) for name in positive] + [(name, ">=", 0.0) for name in non_negative]
+    bounds += [(name, ">=", bound) for name, bound in at_least.items()]
+    for name, relation, bound in bounds:
+        value = getattr(family, name)
+        if not (value > bound if relation == ">" else value >= bound) or not math.isfinite(value):
+            raise ValueError(
+                f"{type(family).__name__}: {name} must be {relation} {bound:g}, not {value}"
+            )

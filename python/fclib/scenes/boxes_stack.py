@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -30,27 +30,27 @@ class BoxesStack:
     application: ClassVar[str] = "multibody systems, masonry"
     authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "rt444"
+    problems: ClassVar[int] = 1514
 
     boxes: int = parameter(50, "1", "number of boxes, at least 1")
     size: float = parameter(2.0, "m", "edge of a box")
     mass: float = parameter(1.0, "kg", "mass of a box")
     mu: float = parameter(0.7, "1", "coefficient of friction")
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
-    gap: float = parameter(0.05, "m", "clearance below each box at the start")
+    gap: float = parameter(0.1, "m", "clearance below each box at the start")
     offset: float = parameter(0.05, "m", "largest horizontal offset of a box along x and along y")
     yaw: float = parameter(0.05, "rad", "largest rotation of a box about the vertical")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
-    time_step: float = parameter(5e-3, "s", "time step h")
+    time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        if self.boxes < 1:
-            raise ValueError(f"BoxesStack: boxes must be at least 1, not {self.boxes}")
-        for name in ("size", "mass", "time_step"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"BoxesStack: {name} must be positive, not {getattr(self, name)}")
-        for name in ("mu", "gap", "offset", "yaw"):
-            if not getattr(self, name) >= 0:
-                raise ValueError(f"BoxesStack: {name} must be >= 0, not {getattr(self, name)}")
+        _mjcf.check(
+            self,
+            positive=("size", "mass", "time_step"),
+            non_negative=("mu", "gap", "offset", "yaw"),
+            at_least={"boxes": 1},
+        )
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the offsets and the rotations."""
@@ -68,22 +68,16 @@ class BoxesStack:
                 f'<geom type="mesh" mesh="box" mass="{self.mass!r}" friction="{self.mu!r}"'
                 f' condim="3" material="solid" rgba="{_mjcf.shade(i, self.boxes)}"/></body>'
             )
-        xml = _mjcf.document(
-            "BoxesStack",
-            bodies=bodies,
-            assets=[_mjcf.cube_mesh("box", self.size)],
-            time_step=self.time_step,
-            gravity=self.gravity,
-            floor_mu=self.mu,
-            tile=self.size,
-        )
-        return Scene(
-            name="BoxesStack",
-            xml=xml,
-            time_step=self.time_step,
-            restitution=self.restitution,
-            parameters=asdict(self),
-            seed=seed,
-            title=self.title,
-            description=self.description,
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "BoxesStack",
+                bodies=bodies,
+                assets=[_mjcf.block_mesh("box", self.size, self.size, self.size)],
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=self.size,
+            ),
         )

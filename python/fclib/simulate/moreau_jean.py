@@ -1,14 +1,15 @@
 """Moreau-Jean time stepping of a mechanical system with contact, Coulomb friction and impacts.
 
-One step of length h, theta = 1, forces taken at its start:
+One step of length h, theta = 1, springs and dampers linearised, other forces taken at its start:
 
-    M (v' - v) = h F(q, v) + H r + G lambda         dynamics, r and lambda impulses
+    M (v' - v) = h F(q', v') + H r + G lambda       dynamics, r and lambda impulses
     u = H^T v' + w                                  local velocities, N, T1, T2 for each contact
     G^T v' + b = 0                                  bilateral constraints
     K* contains u^, u^ . r = 0, r in K              Coulomb's law on the active contacts
     q' = q (+) h v'                                 on the manifold of configurations
 
-which is the problem GM3DFC (G3DFC without bilateral constraints) with f = M v + h F.
+which is the problem GM3DFC (G3DFC without bilateral constraints) with the matrix
+M + h C + h^2 K and f = (M + h C) v + h F(q, v), since F(q', v') = F(q, v) - C (v' - v) - h K v'.
 
     q, v    configuration and velocity at t; v' the velocity at t + h
     gap     g, signed distance at a contact [m], < 0 where bodies penetrate
@@ -25,6 +26,12 @@ gap                 every contact within reach is active, with g + h u_N' >= 0, 
 
 A bilateral constraint with violation c is corrected by the same share: b = stabilization c / h.
 
+With rolling friction a contact has five components, N, T1, T2, R1, R2: the last two are the
+relative angular velocity about T1 and T2 [rad/s], and the rolling moment, ||r_R|| <= mu_r r_N.
+
+A problem holds what the contacts move: bodies that no chain of contacts, bilateral constraints and
+inertia links to a contact go their own way, M v' = M v + h F + G lambda.
+
 J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in Nonsmooth
   Mechanics and Applications, CISM 302, Springer, 1988.
 M. Jean, The non-smooth contact dynamics method, Computer Methods in Applied Mechanics and
@@ -40,6 +47,7 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 import fclib
 from fclib.scenes import Law
@@ -52,19 +60,31 @@ Sparse: TypeAlias = Any  # a SciPy sparse array
 class Contacts:
     """The geometry of nc contacts, in the order of the problem's blocks."""
 
-    pair: npt.NDArray[np.int64]  # (nc x 2) the two geometries; N points from the first to the other
+    # (nc x 2) the two geometries, N points from the first to the other; or a limit: < 0, see source
+    pair: npt.NDArray[np.int64]
     point: Vector  # (nc x 3) in the world [m], midway between the two
-    frame: Vector  # (nc x 3 x 3) rows N, T1, T2 in the world
-    gap: Vector  # (nc) signed distance [m]
+    frame: Vector  # (nc x 3 x 3) rows N, T1, T2 in the world; 0 for a limit
+    gap: Vector  # (nc) signed distance [m]; of a joint's limit, also [rad]
     mu: Vector  # (nc) coefficient of friction
+    mu_r: Vector | None = None  # (nc) coefficient of rolling friction [m]; None: no rolling
 
     def __len__(self) -> int:
         return len(self.gap)
 
     def __getitem__(self, which: npt.NDArray[Any]) -> Contacts:
         return Contacts(
-            self.pair[which], self.point[which], self.frame[which], self.gap[which], self.mu[which]
+            self.pair[which],
+            self.point[which],
+            self.frame[which],
+            self.gap[which],
+            self.mu[which],
+            None if self.mu_r is None else self.mu_r[which],
         )
+
+    @property
+    def dimension(self) -> int:
+        """Components of a contact: 5 with rolling friction, otherwise 3."""
+        return 3 if self.mu_r is None else 5
 
 
 @dataclass(frozen=True)
@@ -73,10 +93,13 @@ class System:
 
     M: Sparse  # (n x n) mass matrix
     force: Vector  # (n) F(q, v): all but the reactions, gyroscopic terms included
-    H: Sparse  # (n x 3 nc) contact directions
+    C: Sparse  # (n x n) damping, -dF/dv of the dampers
+    K: Sparse  # (n x n) stiffness, -dF/dq of the springs
+    H: Sparse  # (n x d nc) contact directions, d = 3 or 5
     contacts: Contacts  # nc
     G: Sparse  # (n x p) gradients of the bilateral constraints, d violation / dt = G^T v
     violation: Vector  # (p) of the bilateral constraints
+    tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
 
 
 class ContactModel(Protocol):
@@ -132,37 +155,104 @@ class MoreauJean:
 
     def problem(
         self, system: System, v: Vector, info: fclib.ProblemInfo | None = None
-    ) -> tuple[fclib.GlobalProblem, Contacts]:
-        """The problem of the step from velocity v (n), and its contacts: the active ones only."""
+    ) -> StepProblem:
+        """The problem of the step from velocity v (n): the active contacts and what they move."""
         h = self.h
         contacts, H = system.contacts, system.H
+        d = contacts.dimension
         if self.law == "velocity":
-            before = (H.T @ v)[0::3]
+            before = (H.T @ v)[0::d]
             active = np.flatnonzero(contacts.gap + 0.5 * h * before <= 0)
-            contacts, H = contacts[active], H[:, block_columns(active)]
+            contacts, H = contacts[active], H[:, block_columns(active, d)]
             w_n = self.restitution * before[active]
         else:
             share = np.where(contacts.gap > 0, 1.0, self.stabilization)
             w_n = share * contacts.gap / h
 
-        w = np.zeros(3 * len(contacts))
-        w[0::3] = w_n
-        bilateral = system.G.shape[1] > 0
-        problem = fclib.GlobalProblem(
-            M=system.M,
-            H=H,
-            G=system.G if bilateral else None,
-            f=system.M @ v + h * system.force,
-            w=w,
-            mu=contacts.mu,
-            b=self.stabilization / h * system.violation if bilateral else None,
-            spacedim=3,
-            info=info or fclib.ProblemInfo(),
-        )
-        return problem, contacts
+        w = np.zeros(d * len(contacts))
+        w[0::d] = w_n
+        M = system.M + h * system.C
+        f = M @ v + h * system.force
+        M = sp.csc_array(M + h**2 * system.K)
+        b = self.stabilization / h * system.violation
+
+        inside, rows = linked(system.tree, M, H, system.G)
+        apart = np.setdiff1d(np.arange(len(v)), inside)
+        fields: dict[str, Any] = {
+            "M": M[inside][:, inside],
+            "H": H[inside],
+            "G": system.G[inside][:, rows] if rows.size else None,
+            "f": f[inside],
+            "w": w,
+            "mu": contacts.mu,
+            "b": b[rows] if rows.size else None,
+            "spacedim": d,
+            "info": info or fclib.ProblemInfo(),
+        }
+        problem: fclib.GlobalProblem | fclib.GlobalRollingProblem
+        if contacts.mu_r is None:
+            problem = fclib.GlobalProblem(**fields)
+        else:
+            problem = fclib.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
+        velocity = np.zeros_like(v)
+        if apart.size:
+            others = np.setdiff1d(np.arange(len(b)), rows)
+            velocity[apart] = free_velocity(
+                M[apart][:, apart], system.G[apart][:, others], f[apart], b[others]
+            )
+        return StepProblem(problem, contacts, inside, velocity)
 
 
-def block_columns(blocks: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """The columns (3 nc) of the given contacts (nc)."""
-    columns: npt.NDArray[np.intp] = (3 * blocks[:, None] + np.arange(3)).ravel()
+@dataclass(frozen=True)
+class StepProblem:
+    """The problem of one step, and what it leaves out."""
+
+    problem: fclib.GlobalProblem | fclib.GlobalRollingProblem
+    contacts: Contacts  # nc, the active ones
+    dofs: npt.NDArray[np.int64]  # (n') degrees of freedom of the system that the problem has
+    free: Vector  # (n) velocity after the step of the others, 0 at `dofs`
+
+
+def linked(
+    tree: npt.NDArray[np.int64], M: Sparse, H: Sparse, G: Sparse
+) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
+    """The degrees of freedom linked to a contact, and the bilateral rows among them.
+
+    Trees of bodies are kept whole, whatever part of them a contact moves. All is there where
+    there is no contact: such a problem says that nothing touches.
+    """
+    n, p, trees = H.shape[0], G.shape[1], tree.max(initial=-1) + 1
+    if not H.shape[1]:
+        return np.arange(n), np.arange(p)
+    # a graph of trees and bilateral rows; a contact links the trees that its columns have
+    links = [sp.coo_array(M), sp.coo_array(H), sp.coo_array(G)]
+    ends = [
+        tree[links[0].col],
+        trees + p + links[1].col,
+        trees + links[2].col,
+    ]
+    starts = [tree[link.row] for link in links]
+    size = trees + p + H.shape[1]
+    first, second = np.concatenate(starts), np.concatenate(ends)
+    graph = sp.coo_array((np.ones(first.size), (first, second)), shape=(size, size))
+    _, label = sp.csgraph.connected_components(graph, directed=False)
+    touched = np.zeros(label.max() + 1, dtype=bool)
+    touched[label[starts[1]]] = True
+    return np.flatnonzero(touched[label[tree]]), np.flatnonzero(touched[label[trees : trees + p]])
+
+
+def free_velocity(M: Sparse, G: Sparse, f: Vector, b: Vector) -> Vector:
+    """Solve M v = f + G lambda, G^T v + b = 0 for v (n)."""
+    if not len(b):
+        v: Vector = sp.linalg.spsolve(sp.csc_array(M), f)
+        return np.atleast_1d(v)
+    alone = fclib.GlobalProblem(
+        M=M, H=sp.csc_array((len(f), 0)), G=G, f=f, w=[], mu=[], b=b, spacedim=3
+    )
+    return np.asarray(fclib.solve(alone).solution.v)
+
+
+def block_columns(blocks: npt.NDArray[np.intp], d: int) -> npt.NDArray[np.intp]:
+    """The columns (d nc) of the given contacts (nc)."""
+    columns: npt.NDArray[np.intp] = (d * blocks[:, None] + np.arange(d)).ravel()
     return columns

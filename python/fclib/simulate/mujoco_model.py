@@ -4,6 +4,10 @@ MuJoCo's rows of the constraint Jacobian are the columns of H and G: the three r
 are N, T1, T2 of its frame, N points from its first geometry to its second, and J v is the
 velocity of the second relative to the first. A row of an equality is the rate of the violation
 `efc_pos`. Only MuJoCo's own solver, its soft contacts and its integrator are left aside.
+
+A limit of a joint or a tendon is a contact without friction: its row is N, its tangents are zero,
+and its pair is (-1 - kind, index). Contacts of condim 6 make rolling problems; their spin
+friction, which FCLIB's law does not have, is left out.
 """
 
 from __future__ import annotations
@@ -20,12 +24,16 @@ from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
 
 MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
+REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
 ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
 
-# features that a scene may leave out knowingly, and the flag of MuJoCo that does so
+# features that a scene may leave out knowingly, and the flag of MuJoCo that does so, if any
 IGNORABLE: Final = {
     "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
     "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
+    "torsion": None,  # spin friction of condim 4: taken as condim 3
+    "anisotropy": None,  # two coefficients: their geometric mean
+    "activation": None,  # actuators with a state: it stays as it is at the start
 }
 
 
@@ -47,9 +55,12 @@ class MujocoModel:
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
         self._pattern = mass_pattern(m)
+        self.rolling = has_condim(m, 6)
         # every contact detected gives rows
         m.geom_gap[:] = 0
         m.pair_gap[:] = 0
+        m.jnt_margin[:] = REACH
+        m.tendon_margin[:] = REACH
 
         start = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_KEY, "start")
         if start >= 0:
@@ -93,9 +104,12 @@ class MujocoModel:
         self._check_warnings()
 
         rows = jacobian(m, d)
-        H, contacts = contact_columns(d, rows)
+        H, contacts = contact_columns(self, rows)
         G, violation = equality_columns(d, rows)
-        return System(self._pattern.fill(d.M), self._force(), H, contacts, G, violation)
+        force = self._force()
+        C, K = linear_forces(m, d)
+        tree = m.dof_treeid.astype(np.int64)
+        return System(self._pattern.fill(d.M), force, C, K, H, contacts, G, violation, tree)
 
     def integrate(self, h: float, v: Vector) -> None:
         """Take v (n) as the velocity and move by h v: q <- q (+) h v."""
@@ -194,36 +208,63 @@ def compile_scene(scene: Scene) -> Any:
     ):
         m.opt.enableflags &= ~int(flag)
     for feature in scene.ignore:
-        m.opt.disableflags |= int(IGNORABLE[feature])
+        flag = IGNORABLE[feature]
+        if flag is not None:
+            m.opt.disableflags |= int(flag)
     return m
 
 
+def has_condim(m: Any, condim: int) -> bool:
+    """Whether a contact of the model may have so many components."""
+    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+    return bool(condim in m.geom_condim[collides] or condim in m.pair_dim)
+
+
 def refuse_unsupported(scene: Scene, m: Any) -> None:
-    """Name all that the scene asks and no problem can hold yet, before the first step."""
+    """Name all that the scene asks and no problem can hold, before the first step."""
     lost = []
-    disabled = m.opt.disableflags
-    limits_off = disabled & int(IGNORABLE["limits"])
-    if not limits_off and (m.jnt_limited.any() or m.tendon_limited.any()):
-        lost.append('limits of joints or tendons (left out with ignore=("limits",))')
-    loss_off = disabled & int(IGNORABLE["frictionloss"])
+    loss_off = m.opt.disableflags & int(IGNORABLE["frictionloss"])
     if not loss_off and (m.dof_frictionloss.any() or m.tendon_frictionloss.any()):
         lost.append('dry friction in joints or tendons (left out with ignore=("frictionloss",))')
-    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-    for condim in (4, 6):
-        if condim in m.geom_condim[collides] or condim in m.pair_dim:
-            lost.append(f"contacts of condim {condim} (torsional and rolling friction)")
+    if has_condim(m, 4) and "torsion" not in scene.ignore:
+        lost.append('contacts of condim 4, torsional friction (left out with ignore=("torsion",))')
+    if m.na and "activation" not in scene.ignore:
+        lost.append('actuators with a state (held with ignore=("activation",))')
     if m.nflex:
         lost.append("deformable bodies (flex)")
     if m.flg_surfacevel:
         lost.append("surfaces with a prescribed velocity (surfacevel)")
     if m.flg_adhesion:
         lost.append("adhesion")
-    if m.na:
-        lost.append("actuators with a state of their own")
     if m.nplugin:
         lost.append("plugins")
     if lost:
-        raise UnsupportedSceneError(f"{scene.name}: not supported yet: {'; '.join(lost)}")
+        raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
+
+
+def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
+    """Damping and stiffness (n x n) of joints and of actuators that feed back their own state.
+
+    Both symmetric and positive semidefinite: what would push the body on stays explicit.
+    """
+    # springs of hinges and slides; those of balls and free bodies turn with the frame
+    plain = np.isin(m.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
+    springs = np.zeros(m.nv)
+    springs[m.jnt_dofadr[plain]] = m.jnt_stiffness[plain]
+    moment = sp.csr_array(
+        (d.actuator_moment, d.moment_colind, pointers(d.moment_rownnz)), shape=(m.nu, m.nv)
+    )
+    affine = m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+
+    def linear(diagonal: Vector, gain: Vector) -> Sparse:
+        feedback = sp.diags_array(np.where(affine, np.maximum(-gain, 0), 0.0))
+        matrix = sp.csc_array(sp.diags_array(diagonal.copy()) + moment.T @ feedback @ moment)
+        matrix.eliminate_zeros()
+        return matrix
+
+    # the bias of an actuator is p0 + p1 length + p2 velocity
+    bias = m.actuator_biasprm
+    return linear(m.dof_damping, bias[:, 2]), linear(springs, bias[:, 1])
 
 
 def frictionless_to_frictional(d: Any) -> None:
@@ -279,31 +320,60 @@ def pointers(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
     return np.concatenate(([0], np.cumsum(lengths, dtype=np.int64)))
 
 
-def contact_columns(d: Any, rows: Sparse) -> tuple[Sparse, Contacts]:
-    """H (n x 3 nc) and the contacts that give rows: all but those between fixed bodies."""
-    contact = d.contact
+def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
+    """H (n x d nc) and the contacts that give rows: all but those between fixed bodies.
+
+    The limits of joints and tendons come after the contacts.
+    """
+    m, data, scene = source.model, source.data, source.scene
+    contact = data.contact
     which = np.flatnonzero(contact.efc_address >= 0)
-    dims = sorted(set(contact.dim[which].tolist()) - {3})
-    if dims:
-        raise UnsupportedSceneError(f"not supported yet: contacts of condim {dims[0]}")
+    dim = contact.dim[which]
     friction = contact.friction[which]
-    if np.any(friction[:, 0] != friction[:, 1]):
-        raise UnsupportedSceneError("not supported yet: anisotropic friction (two coefficients)")
+    # sliding has two coefficients, rolling two more
+    for first, second, use in ((0, 1, dim > 1), (3, 4, dim == 6)):
+        differs = use & (friction[:, first] != friction[:, second])
+        if differs.any() and "anisotropy" not in scene.ignore:
+            raise UnsupportedSceneError(
+                f"{scene.name}: not supported: anisotropic friction, two coefficients"
+                ' (their mean is taken with ignore=("anisotropy",))'
+            )
+        friction[differs, first] = np.sqrt(friction[differs, first] * friction[differs, second])
 
     types = mujoco.mjtConstraint
-    known = (types.mjCNSTR_EQUALITY, types.mjCNSTR_CONTACT_ELLIPTIC)
-    for kind in set(d.efc_type.tolist()) - {int(k) for k in known}:
-        raise UnsupportedSceneError(f"not supported yet: constraint {types(kind).name}")
+    kind = data.efc_type
+    limits = np.flatnonzero(
+        (kind == int(types.mjCNSTR_LIMIT_JOINT)) | (kind == int(types.mjCNSTR_LIMIT_TENDON))
+    )
+    nc = len(which) + len(limits)
+    d = 5 if source.rolling else 3
+    # where a component has no row, this one of zeros
+    nothing = rows.shape[0]
+    source_row = np.full((nc, d), nothing)
+    source_row[: len(which), :3] = contact.efc_address[which][:, None] + np.arange(3)
+    if source.rolling:
+        # N, T1, T2, spin, R1, R2
+        rolls = np.flatnonzero(dim == 6)
+        source_row[rolls, 3:] = contact.efc_address[which[rolls]][:, None] + (4, 5)
+    source_row[len(which) :, 0] = limits
+    padded = sp.vstack([rows, sp.csr_array((1, m.nv))], format="csr")
+    H = padded[source_row.ravel()].T
 
-    address = contact.efc_address[which]
-    columns = (address[:, None] + np.arange(3)).ravel()
-    H = rows[columns].T
+    def with_limits(values: npt.NDArray[Any], of_limits: Any = 0.0) -> npt.NDArray[Any]:
+        tail = np.zeros((len(limits), *values.shape[1:]), dtype=values.dtype)
+        tail[:] = of_limits
+        return np.concatenate((values, tail))
+
     contacts = Contacts(
-        pair=contact.geom[which].astype(np.int64),
-        point=contact.pos[which],
-        frame=contact.frame[which].reshape(-1, 3, 3),
-        gap=contact.dist[which],
-        mu=friction[:, 0].copy(),
+        pair=with_limits(
+            contact.geom[which].astype(np.int64),
+            np.column_stack((-1 - kind[limits], data.efc_id[limits])),
+        ),
+        point=with_limits(contact.pos[which]),
+        frame=with_limits(contact.frame[which].reshape(-1, 3, 3)),
+        gap=with_limits(contact.dist[which], data.efc_pos[limits]),
+        mu=with_limits(friction[:, 0].copy()),
+        mu_r=with_limits(np.where(dim == 6, friction[:, 3], 0.0)) if source.rolling else None,
     )
     return H, contacts
 

@@ -83,7 +83,7 @@ def render(
         model, position, contacts = source.model, source.position, source.contacts
         r = source.result.solution.r if reactions is None else reactions
         # rows of a frame are N, T1, T2 in the world; an impulse over a step is a mean force
-        local = np.reshape(r, (-1, 3)) / model.time_step
+        local = np.reshape(r, (-1, contacts.dimension))[:, :3] / model.time_step
         forces = np.einsum("cij,ci->cj", contacts.frame, local)
 
     # a copy, since the looks of the bodies change with what is drawn

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 import fclib
 from fclib.scenes import Scene
@@ -22,8 +23,10 @@ class Step:
 
     index: int  # 0, 1, ...
     time: float  # at the start of the step [s]
-    problem: fclib.GlobalProblem  # nc is 0 where nothing touches
+    problem: fclib.GlobalProblem | fclib.GlobalRollingProblem  # nc is 0 where nothing touches
     result: fclib.Result  # its status tells whether the solver reached the tolerance
+    velocity: Vector  # v (n) of the whole system after the step
+    dofs: npt.NDArray[np.int64]  # (n') which of them the problem has: those that contacts move
     contacts: Contacts  # nc, the active ones, at the start of the step
     position: Vector  # q (nq) at the start of the step
     model: MujocoModel  # shared by all steps
@@ -71,31 +74,43 @@ def _march(
     last: Step | None = None
     for index in range(steps):
         info = describe(model.scene, scheme, settings, index)
-        problem, contacts = scheme.problem(scheme.assemble(model), model.velocity, info)
+        part = scheme.problem(scheme.assemble(model), model.velocity, info)
+        problem, contacts = part.problem, part.contacts
 
         options = dict(settings["options"])
         if settings["warm_start"] and last is not None and problem.nc:
             options["guess"] = fclib.Solution(r=carry_over(last, contacts))
         result = fclib.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
 
-        after = np.asarray(result.solution.v)
+        after = part.free
+        after[part.dofs] = result.solution.v
         if not np.isfinite(after).all():
             raise FloatingPointError(
                 f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
                 f" is not finite ({result.status})"
             )
-        last = Step(index, index * scheme.h, problem, result, contacts, model.position, model)
+        last = Step(
+            index,
+            index * scheme.h,
+            problem,
+            result,
+            after,
+            part.dofs,
+            contacts,
+            model.position,
+            model,
+        )
         yield last
         model.integrate(scheme.h, after)
 
 
 def carry_over(last: Step, contacts: Contacts) -> Vector:
-    """A guess of r (3 nc): the last step's impulses, pair by pair in the order of their points.
+    """A guess of r (d nc): the last step's impulses, pair by pair in the order of their points.
 
-    They are carried over in the world and turned into the new frames.
+    They are carried over in the world and turned into the new frames, forces and moments alike.
     """
-    local = np.reshape(last.result.solution.r, (-1, 3))
-    world = np.einsum("cij,ci->cj", last.contacts.frame, local)
+    d = contacts.dimension
+    local = np.reshape(last.result.solution.r, (-1, d))
     known: dict[tuple[int, int], list[int]] = {}
     for i, (first, second) in enumerate(last.contacts.pair.tolist()):
         known.setdefault((first, second), []).append(i)
@@ -105,9 +120,15 @@ def carry_over(last: Step, contacts: Contacts) -> Vector:
         candidates = known.get((first, second))
         if candidates:
             source[i] = candidates.pop(0)
-    r = np.zeros((len(contacts), 3))
+    r = np.zeros((len(contacts), d))
     found = source >= 0
-    r[found] = np.einsum("cij,cj->ci", contacts.frame[found], world[source[found]])
+    old, new = last.contacts.frame[source[found]], contacts.frame[found]
+    for part, axes in ((slice(0, 3), slice(0, 3)), (slice(3, d), slice(1, d - 2))):
+        world = np.einsum("cij,ci->cj", old[:, axes], local[source[found]][:, part])
+        r[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
+    # the frame of a limit is zero, its only component goes as it is
+    limit = found & (contacts.pair[:, 0] < 0)
+    r[limit] = local[source[limit]]
     return r.ravel()
 
 
@@ -134,14 +155,25 @@ def describe(
         "step": index,
         "time": index * scheme.h,
     }
+    words = [scene.description]
+    words += [
+        f"{name}: {text}."
+        for name, text in (
+            ("Field of application", scene.application),
+            ("Friction", scene.friction),
+            ("Authors of the original family", scene.authors),
+        )
+        if text
+    ]
     law = f"Newton impact e = {scheme.restitution:g}" if scheme.law == "velocity" else "gap law"
     return fclib.ProblemInfo(
         title=f"{scene.title or scene.name}, step {index}",
-        description=f"{scene.description}\n{json.dumps(origin, default=str)}".lstrip(),
+        description="\n".join([*words, json.dumps(origin, default=str)]).lstrip(),
         math_info=(
             f"Moreau-Jean step, theta = 1, h = {scheme.h:g} s; {law}; Coulomb friction;"
             " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
-            " v in m/s and rad/s, r in N s, components N, T1, T2"
+            " v in m/s and rad/s, r in N s, components N, T1, T2 (and R1, R2 of rolling,"
+            " r_R in N m s, mu_r in m)"
         ),
     )
 

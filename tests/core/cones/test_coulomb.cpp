@@ -13,9 +13,11 @@ void expect_projection(double mu, testing::RandomData& random) {
   const Coulomb<D> cone(mu);
   const double rounding = 1e-15 * (1 + mu);
   for (int k = 0; k < 1000; ++k) {
-    const ContactVector<D> x = random.vector(D);
+    ContactVector<D> x = random.vector(D);
+    if (k % 4 == 0) x.template tail<D - 1>().setZero();  // the axis, where mu = 0 is an edge
     const ContactVector<D> y = cone.project(x);
     const ContactVector<D> z = x - y;
+    EXPECT_GE(y[0], 0);
     EXPECT_LE(Coulomb<D>::tangential_norm(y), mu * y[0] + rounding);
     EXPECT_NEAR(y.dot(z), 0, rounding);
     EXPECT_LE(z[0] + mu * Coulomb<D>::tangential_norm(z), rounding);  // z . k <= 0 for all k in K

@@ -1,0 +1,99 @@
+"""Capsules dropped into a box: a random heap of round and slender bodies."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capsules:
+    """Equal capsules, layer above layer, that fall into an open box.
+
+    They start on a grid wide enough that they do not touch, in random directions near the
+    horizontal, and with a small random velocity.
+
+    After the family Capsules of V. Acary, M. Bremond, T. Koziara and F. Perignon, FCLIB: a
+    collection of discrete 3D Frictional Contact problems, Inria report RT-0444, 2014. Number,
+    sizes, masses and friction are its own; the box and the positions at the start are chosen here.
+    """
+
+    title: ClassVar[str] = "Capsules in a box"
+    description: ClassVar[str] = "Equal capsules dropped into an open box, under gravity."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "V. Acary, M. Bremond, T. Koziara, F. Perignon"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "rt444"
+    problems: ClassVar[int] = 1705
+
+    capsules: int = parameter(100, "1", "number of capsules, at least 1")
+    length: float = parameter(5.0, "m", "length of a capsule, caps included")
+    radius: float = parameter(1.0, "m", "radius of a capsule")
+    mass: float = parameter(1.0, "kg", "mass of a capsule")
+    mu: float = parameter(0.7, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    tilt: float = parameter(0.2, "rad", "largest slope of a capsule at the start")
+    gap: float = parameter(0.05, "m", "clearance of two layers at the start")
+    width: float = parameter(16.0, "m", "inner edge of the box, a square")
+    speed: float = parameter(1.0, "m/s", "largest component of a velocity at the start")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(2.5e-3, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(
+            self,
+            positive=("length", "radius", "mass", "width", "time_step"),
+            non_negative=("mu", "tilt", "gap", "speed"),
+            at_least={"capsules": 1},
+        )
+        if not self.length > 2 * self.radius:
+            raise ValueError(f"Capsules: length must be above {2 * self.radius}, not {self.length}")
+        if not self.width >= self.length:
+            raise ValueError(f"Capsules: width must be at least {self.length}, not {self.width}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the directions and the velocities."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        # one row a capsule, drawn at once: more capsules begin like fewer
+        draws = random.uniform(-1.0, 1.0, size=(self.capsules, 5))
+        heading, rise = math.pi * draws[:, 0], self.tilt * draws[:, 1]
+        directions = np.column_stack(
+            (np.cos(rise) * np.cos(heading), np.cos(rise) * np.sin(heading), np.sin(rise))
+        )
+        velocities = self.speed * draws[:, 2:]
+
+        side = int(self.width // self.length)
+        half = 0.5 * self.length - self.radius
+        height = 2 * (self.radius + half * math.sin(self.tilt)) + self.gap
+        cells = (np.arange(side) - 0.5 * (side - 1)) * self.width / side
+        bodies = []
+        for i, axis in enumerate(directions):
+            layer, cell = divmod(i, side * side)
+            x, y, z = cells[cell % side], cells[cell // side], (layer + 0.5) * height
+            ends = _mjcf.numbers(*(-half * axis), *(half * axis))
+            bodies.append(
+                f'<body name="capsule{i}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'
+                f'<geom type="capsule" size="{self.radius!r}" fromto="{ends}"'
+                f' mass="{self.mass!r}" friction="{self.mu!r}" condim="3" material="solid"'
+                f' rgba="{_mjcf.shade(i, self.capsules)}"/></body>'
+            )
+        bodies += _mjcf.walls(0.5 * self.width, self.width, self.mu)
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "Capsules",
+                bodies=bodies,
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=0.25 * self.width,
+                velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
+            ),
+        )

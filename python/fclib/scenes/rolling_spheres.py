@@ -1,0 +1,90 @@
+"""A pile of spheres with rolling friction, poured on a floor."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class RollingSpheres:
+    """Spheres of a few sizes that fall in a column and spread into a heap.
+
+    Without rolling friction they would roll away; with it the heap keeps a slope. A contact has
+    five components: N, T1, T2 and the rolling moments R1, R2.
+
+    The law is that of V. Acary and F. Bourrier, Coulomb friction with rolling resistance as a cone
+    complementarity problem, European Journal of Mechanics A/Solids 85, 2021.
+    """
+
+    title: ClassVar[str] = "Rolling spheres"
+    description: ClassVar[str] = "Spheres poured on a horizontal floor, with rolling friction."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "the authors of FCLIB"
+    friction: ClassVar[str] = "Coulomb and rolling, the same coefficients everywhere"
+    collection: ClassVar[str] = "rolling"
+    problems: ClassVar[int] = 500
+
+    spheres: int = parameter(100, "1", "number of spheres, at least 1")
+    radius: float = parameter(0.05, "m", "largest radius of a sphere")
+    spread: float = parameter(0.3, "1", "the smallest radius is smaller by this share, in [0, 1)")
+    density: float = parameter(2500.0, "kg/m^3", "mass density")
+    mu: float = parameter(0.5, "1", "coefficient of friction")
+    mu_r: float = parameter(5e-3, "m", "coefficient of rolling friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    per_layer: int = parameter(9, "1", "spheres of a layer of the column, a square number")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(2e-3, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(
+            self,
+            positive=("radius", "density", "time_step"),
+            non_negative=("mu", "mu_r", "spread"),
+            at_least={"spheres": 1, "per_layer": 1},
+        )
+        if not self.spread < 1:
+            raise ValueError(f"RollingSpheres: spread must be < 1, not {self.spread}")
+        if math.isqrt(self.per_layer) ** 2 != self.per_layer:
+            raise ValueError(f"RollingSpheres: per_layer must be a square, not {self.per_layer}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the radii and the offsets."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        # one row a sphere, drawn at once: more spheres begin like fewer
+        draws = random.uniform(size=(self.spheres, 3))
+        radii = self.radius * (1 - self.spread * draws[:, 0])
+        side = math.isqrt(self.per_layer)
+        pitch = 2.1 * self.radius
+        bodies = []
+        for i, radius in enumerate(radii.tolist()):
+            layer, cell = divmod(i, self.per_layer)
+            place = np.array([cell % side, cell // side]) - 0.5 * (side - 1)
+            x, y = pitch * place + 0.05 * self.radius * (2 * draws[i, 1:] - 1)
+            z = self.radius + layer * pitch
+            bodies.append(
+                f'<body name="sphere{i}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'
+                f'<geom type="sphere" size="{radius!r}" density="{self.density!r}"'
+                f' friction="{self.mu!r} 0 {self.mu_r!r}" condim="6" material="solid"'
+                f' rgba="{_mjcf.shade(i, self.spheres)}"/></body>'
+            )
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "RollingSpheres",
+                bodies=bodies,
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=4 * self.radius,
+                condim=6,
+                floor_mu_r=self.mu_r,
+            ),
+        )

@@ -44,7 +44,7 @@ def simulate(folder: Path, boxes: int, steps: int, picture: Path | None) -> Iter
     from fclib import simulate as simulation
 
     folder.mkdir(parents=True, exist_ok=True)
-    scene = scenes.get("BoxesStack")(boxes=boxes, gap=0.01).scene(seed=0)
+    scene = scenes.get("BoxesStack")(boxes=boxes, gap=0.01, time_step=5e-3).scene(seed=0)
     step = None
     for step in simulation.simulate(scene, steps):
         stored = Stored(

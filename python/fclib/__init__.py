@@ -6,6 +6,8 @@
 >>> fclib.merit(problem, result.solution).error
 """
 
+from typing import TYPE_CHECKING
+
 from fclib._core import (
     Error,
     FileError,
@@ -43,6 +45,48 @@ from fclib._digest import digest
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from fclib.collections import Collection
+
+
+def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Collection":
+    """The problems of a set or a family, a lazy sequence; built when they are first asked for.
+
+    Args:
+        name: a set or a family, as ``fclib collection list`` has them.
+        folder: where they lie; by default the user's cache, or what FCLIB_COLLECTION names.
+
+    Raises:
+        KeyError: there is no such set or family.
+    """
+    from fclib.collections import Collection
+
+    return Collection(name, folder)
+
+
+def load(name: str, form: str = "global", folder: "str | Path | None" = None) -> Problem:
+    """One problem of the collection, as ``fclib.load("rt444/KaplasTower/0100")``.
+
+    It is read from the user's folder; a family that is not there is built, in a minute or so, or
+    fetched from FCLIB_COLLECTION_URL.
+
+    Args:
+        name: SET/FAMILY/NUMBER.
+        form: "global" or "local".
+        folder: as ``collection`` has it.
+
+    Raises:
+        KeyError: there is no such problem.
+        ValueError: a form that is neither.
+    """
+    from fclib import collections
+
+    problem: Problem = collections.load(name, form, folder)
+    return problem
+
+
 __all__ = [
     "Error",
     "FileError",
@@ -66,10 +110,12 @@ __all__ = [
     "SolverInfo",
     "UnsuitableError",
     "__version__",
+    "collection",
     "component_order",
     "contents",
     "digest",
     "find_solver",
+    "load",
     "merge",
     "merit",
     "read",

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from fclib import scenes
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 
-from fclib.simulate import MujocoModel, simulate
+from fclib.simulate import MujocoModel, Step, simulate
 
 FAMILIES = scenes.families()
 
@@ -77,7 +78,7 @@ def test_boxes_stack_lands_on_four_points_a_box() -> None:
 
 
 def test_boxes_stack_seed_draws_the_offsets() -> None:
-    family = scenes.get("BoxesStack")
+    family: Any = scenes.get("BoxesStack")
     low, high = family(boxes=3).scene(seed=0), family(boxes=5).scene(seed=0)
     start = [MujocoModel(scene).position.reshape(-1, 7) for scene in (low, high)]
     np.testing.assert_array_equal(start[0], start[1][:3])
@@ -92,3 +93,101 @@ def test_boxes_stack_seed_draws_the_offsets() -> None:
 def test_boxes_stack_refuses_nonsense(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=name):
         scenes.get("BoxesStack")(**{name: value})
+
+
+# ---- the scenes stand; energy never grows without cause
+
+
+def last_of(scene: scenes.Scene, steps: int) -> Step:
+    *_, last = simulate(scene, steps)
+    return last
+
+
+def places(step: Step) -> Any:
+    """Where the bodies are (nb x 3) [m]; for scenes of free bodies."""
+    return step.position.reshape(-1, 7)[:, :3]
+
+
+def test_kaplas_tower_stands() -> None:
+    family: Any = scenes.get("KaplasTower")(levels=4)
+    scene = family.scene(seed=0)
+    start = places(next(iter(simulate(scene, 1))))
+    last = last_of(scene, 120)
+    assert last.problem.nc == 4 * (12 + 2 * 3 * 12)
+    moved = places(last) - start
+    assert np.abs(moved[:, :2]).max() < 5e-4
+    # each level has fallen by the gaps below it, and no further than a penetration
+    fallen = -moved[:, 2] - family.gap * np.repeat(np.arange(1, 5), 12)
+    assert np.abs(fallen).max() < 2e-4
+    assert last.contacts.gap.min() > -2e-4
+    assert np.abs(last.velocity).max() < 1e-3
+
+
+def test_chain_hangs() -> None:
+    family: Any = scenes.get("Chain")(gap=1e-3)
+    last = last_of(family.scene(seed=0), 400)
+    assert last.problem.n == 60
+    z = places(last)[:, 2]
+    pitch = (family.length - 2 * family.thickness) / family.links
+    np.testing.assert_allclose(z, -pitch * np.arange(1, family.links), atol=5e-3)
+    # the tip goes on at its speed
+    assert 0.8 * family.tip_speed < last.velocity[-6] < 1.2 * family.tip_speed
+    assert last.contacts.gap.min() > -0.1 * family.thickness
+
+
+def test_capsules_stay_in_the_box() -> None:
+    family: Any = scenes.get("Capsules")(capsules=12)
+    last = last_of(family.scene(seed=0), 500)
+    inside = 0.5 * family.width - family.radius + 0.1
+    assert np.abs(places(last)[:, :2]).max() < inside
+    assert places(last)[:, 2].min() > 0.9 * family.radius
+    assert last.contacts.gap.min() > -0.1 * family.radius
+
+
+def test_linkages_turn_and_stay_closed() -> None:
+    formulations = set()
+    for step in simulate(scenes.get("FourBar")(linkages=1).scene(seed=0), 300):
+        formulations.add(step.problem.formulation)
+        assert step.result.converged
+    # the linkage enters a problem when it touches a block
+    assert formulations == {"G3DFC", "GM3DFC"}
+    assert np.abs(step.model.assemble(1e-3).violation).max() < 1e-3
+
+
+def test_humanoid_stands_on_stones() -> None:
+    scene = scenes.get("Humanoid")().scene(seed=0)
+    last = last_of(scene, 300)
+    mass: Any = last.problem.M
+    M = mass.toarray()
+    assert np.count_nonzero(M - np.diag(np.diag(M))) > 23 * 8
+    # not fallen: the trunk is near where it began
+    assert last.position[2] > 0.7
+
+
+def test_rolling_spheres_come_to_rest_as_a_heap() -> None:
+    family: Any = scenes.get("RollingSpheres")(spheres=12, per_layer=4)
+    last = last_of(family.scene(seed=0), 700)
+    assert last.problem.spacedim == 5
+    speed = np.abs(last.velocity.reshape(-1, 6)[:, :3]).max()
+    assert speed < 0.5
+    assert last.contacts.gap.min() > -0.1 * family.radius
+
+
+@pytest.mark.parametrize(
+    ("name", "smaller"),
+    [
+        ("Chain", {"gap": 2e-3}),
+        ("Capsules", {"capsules": 9}),
+        ("KaplasTower", {"levels": 2}),
+        ("BoxesStack", {"boxes": 5}),
+        ("RollingSpheres", {"spheres": 12, "per_layer": 4}),
+    ],
+)
+def test_energy_does_not_grow(name: str, smaller: dict[str, Any]) -> None:
+    energy = np.array(
+        [
+            step.model.energy()
+            for step in simulate(scenes.get(name)(**smaller).scene(seed=0), 250, tol=1e-10)
+        ]
+    )
+    assert np.diff(energy).max() < 1e-7 * np.abs(energy).max()

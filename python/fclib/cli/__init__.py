@@ -1,6 +1,6 @@
-"""The command line: ``fclib info | check | solve | convert | solvers | demo``.
+"""The command line: ``fclib COMMAND``, one module for each command.
 
-Each command is one module with one function; all of them keep the same rules. Results go to the
+All of them keep the same rules. Results go to the
 standard output, as a table or with ``--json`` as one object a line; errors and progress go to the
 standard error. The exit status is 0 only if all went well, 1 if not, 2 for a usage error.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import typer
 
 import fclib
-from fclib.cli import check, convert, demo, info, solve, solvers
+from fclib.cli import check, collection, convert, demo, info, simulate, solve, solvers
 from fclib.cli._output import fail, print_version
 
 app = typer.Typer(
@@ -20,8 +20,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (info, check, solve, convert, solvers, demo):
+for module in (info, check, solve, convert, solvers, simulate, demo):
     app.command(module.__name__.rpartition(".")[2])(module.command)
+app.add_typer(collection.app, name="collection")
 app.callback(invoke_without_command=True)(print_version)
 
 

@@ -33,11 +33,13 @@ class Scene:
     application: str = ""  # field of application
     authors: str = ""  # of the original
     friction: str = ""  # the law of friction, in words
+    # what a picture shows: centre and radius [m]; None: all that moves
+    focus: tuple[float, float, float, float] | None = None
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
 
     @classmethod
-    def of(cls, family: Any, seed: int, xml: str) -> Scene:
+    def of(cls, family: Any, seed: int, xml: str, **more: Any) -> Scene:
         """The scene of a family: its parameters and all that it says of itself."""
         return cls(
             name=type(family).__name__,
@@ -51,6 +53,7 @@ class Scene:
             application=family.application,
             authors=family.authors,
             friction=family.friction,
+            **more,
         )
 
     @classmethod

@@ -46,11 +46,11 @@ class Chain:
     mu: float = parameter(0.3, "1", "coefficient of friction")
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
     tip_speed: float = parameter(0.05, "m/s", "speed of the lower end at the start, along x")
-    gap: float = parameter(5e-3, "m", "clearance of two links at the start")
+    gap: float = parameter(0.05, "m", "clearance of two links at the start")
     rods_above: int = parameter(5, "1", "rods of a link's upper end, at least 1")
     rods_below: int = parameter(6, "1", "rods of a link's lower end, at least 1")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
-    time_step: float = parameter(1e-3, "s", "time step h")
+    time_step: float = parameter(5e-4, "s", "time step h")
 
     def __post_init__(self) -> None:
         _mjcf.check(
@@ -106,6 +106,8 @@ class Chain:
                 tile=0.1 * self.length,
                 velocity=velocities,
             ),
+            # the joint in the middle: the whole chain would be a hair
+            focus=(0.0, 0.0, -(self.links // 2 - 0.5) * pitch, 2.5 * self.width),
         )
 
     def _rods(self, pitch: float, link: int) -> list[str]:

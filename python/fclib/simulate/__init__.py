@@ -18,7 +18,7 @@ Importing this package needs MuJoCo, in the version that `_mujoco.py` pins.
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel, UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
-from fclib.simulate.simulation import Step, provenance, simulate
+from fclib.simulate.simulation import State, Step, provenance, simulate
 
 __all__ = [
     "ContactModel",
@@ -26,6 +26,7 @@ __all__ = [
     "MoreauJean",
     "MujocoModel",
     "NoRenderer",
+    "State",
     "Step",
     "System",
     "UnsupportedSceneError",

@@ -83,6 +83,12 @@ class MujocoModel:
         v: Vector = self.data.qvel.copy()
         return v
 
+    @property
+    def trees(self) -> npt.NDArray[np.int64]:
+        """The body, or tree of bodies, of each degree of freedom (n)."""
+        trees: npt.NDArray[np.int64] = self.model.dof_treeid.astype(np.int64)
+        return trees
+
     def assemble(self, h: float, *, shared_speed: bool = False) -> System:
         """The system at (q, v), with every contact that may close within h.
 
@@ -108,14 +114,17 @@ class MujocoModel:
         G, violation = equality_columns(d, rows)
         force = self._force()
         C, K = linear_forces(m, d)
-        tree = m.dof_treeid.astype(np.int64)
-        return System(self._pattern.fill(d.M), force, C, K, H, contacts, G, violation, tree)
+        return System(self._pattern.fill(d.M), force, C, K, H, contacts, G, violation, self.trees)
+
+    def set_state(self, position: Vector, velocity: Vector) -> None:
+        """Take a configuration q (nq) and a velocity v (n)."""
+        self.data.qpos[:] = position
+        self.data.qvel[:] = velocity
 
     def integrate(self, h: float, v: Vector) -> None:
         """Take v (n) as the velocity and move by h v: q <- q (+) h v."""
         self.data.qvel[:] = v
         mujoco.mj_integratePos(self.model, self.data.qpos, v, h)
-        self.data.time += h
 
     def energy(self) -> float:
         """Kinetic plus potential energy [J] at (q, v)."""

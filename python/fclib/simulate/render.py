@@ -106,6 +106,11 @@ def render(
     m.vis.global_.fovy = FIELD_OF_VIEW
 
     points = corners(m, d, moving)
+    focus = model.scene.focus
+    if focus is not None:
+        points = np.array(focus[:3]) + focus[3] * np.array(
+            [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
+        )
     light_up(m, d, points)
     scene = mujoco.MjvScene(m, maxgeom=m.ngeom + m.nsite + m.ntendon * 100 + len(forces) + 1000)
     camera = framing_camera(points, width / height)

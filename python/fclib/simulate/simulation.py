@@ -18,6 +18,18 @@ from fclib.simulate.mujoco_model import MujocoModel
 
 
 @dataclass(frozen=True)
+class State:
+    """All that a simulation goes on from: the start of a step, and the last one's impulses."""
+
+    index: int  # of the step
+    position: Vector  # q (nq)
+    velocity: Vector  # v (n)
+    pair: npt.NDArray[np.int64]  # (nc x 2) of the last step's contacts
+    frame: Vector  # (nc x 3 x 3)
+    r: Vector  # (nc x d) their impulses [N s]
+
+
+@dataclass(frozen=True)
 class Step:
     """One step, from time to time + h: its problem and the solution that carried it on."""
 
@@ -29,6 +41,7 @@ class Step:
     dofs: npt.NDArray[np.int64]  # (n') which of them the problem has: those that contacts move
     contacts: Contacts  # nc, the active ones, at the start of the step
     position: Vector  # q (nq) at the start of the step
+    start: State  # from which `simulate` does this step again, and goes on
     model: MujocoModel  # shared by all steps
 
 
@@ -40,11 +53,14 @@ def simulate(
     tol: float = 1e-8,
     warm_start: bool = True,
     stabilization: float = 0.2,
+    start: State | None = None,
     **options: Any,
 ) -> Iterator[Step]:
     """Yield the steps of a scene, as they are computed.
 
     steps          number of steps
+    start          where to begin, as the `start` of a step that was: what follows is the same, bit
+                   for bit; by default the scene's own start
     solver, tol    of `fclib.solve`, with its further options
     warm_start     begin from the impulses that the same pairs of bodies had in the step before
     stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
@@ -65,21 +81,34 @@ def simulate(
         stabilization=stabilization,
     )
     settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
-    return _march(model, scheme, steps, settings)
+    if start is not None:
+        model.set_state(start.position, start.velocity)
+    return _march(model, scheme, steps, settings, start)
 
 
 def _march(
-    model: MujocoModel, scheme: MoreauJean, steps: int, settings: dict[str, Any]
+    model: MujocoModel,
+    scheme: MoreauJean,
+    steps: int,
+    settings: dict[str, Any],
+    start: State | None,
 ) -> Iterator[Step]:
-    last: Step | None = None
-    for index in range(steps):
+    state = start or State(
+        0,
+        model.position,
+        model.velocity,
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros((0, 3, 3)),
+        np.zeros((0, 3)),
+    )
+    for index in range(state.index, state.index + steps):
         info = describe(model.scene, scheme, settings, index)
         part = scheme.problem(scheme.assemble(model), model.velocity, info)
         problem, contacts = part.problem, part.contacts
 
         options = dict(settings["options"])
-        if settings["warm_start"] and last is not None and problem.nc:
-            options["guess"] = fclib.Solution(r=carry_over(last, contacts))
+        if settings["warm_start"] and problem.nc and len(state.r):
+            options["guess"] = fclib.Solution(r=carry_over(state, contacts))
         result = fclib.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
 
         after = part.free
@@ -89,7 +118,7 @@ def _march(
                 f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
                 f" is not finite ({result.status})"
             )
-        last = Step(
+        yield Step(
             index,
             index * scheme.h,
             problem,
@@ -97,22 +126,23 @@ def _march(
             after,
             part.dofs,
             contacts,
-            model.position,
+            state.position,
+            state,
             model,
         )
-        yield last
         model.integrate(scheme.h, after)
+        r = np.reshape(result.solution.r, (-1, contacts.dimension))
+        state = State(index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r)
 
 
-def carry_over(last: Step, contacts: Contacts) -> Vector:
+def carry_over(state: State, contacts: Contacts) -> Vector:
     """A guess of r (d nc): the last step's impulses, pair by pair in the order of their points.
 
     They are carried over in the world and turned into the new frames, forces and moments alike.
     """
     d = contacts.dimension
-    local = np.reshape(last.result.solution.r, (-1, d))
     known: dict[tuple[int, int], list[int]] = {}
-    for i, (first, second) in enumerate(last.contacts.pair.tolist()):
+    for i, (first, second) in enumerate(state.pair.tolist()):
         known.setdefault((first, second), []).append(i)
 
     source = np.full(len(contacts), -1)
@@ -122,13 +152,13 @@ def carry_over(last: Step, contacts: Contacts) -> Vector:
             source[i] = candidates.pop(0)
     r = np.zeros((len(contacts), d))
     found = source >= 0
-    old, new = last.contacts.frame[source[found]], contacts.frame[found]
+    old, new, local = state.frame[source[found]], contacts.frame[found], state.r[source[found]]
     for part, axes in ((slice(0, 3), slice(0, 3)), (slice(3, d), slice(1, d - 2))):
-        world = np.einsum("cij,ci->cj", old[:, axes], local[source[found]][:, part])
+        world = np.einsum("cij,ci->cj", old[:, axes], local[:, part])
         r[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
     # the frame of a limit is zero, its only component goes as it is
     limit = found & (contacts.pair[:, 0] < 0)
-    r[limit] = local[source[limit]]
+    r[limit] = state.r[source[limit]]
     return r.ravel()
 
 

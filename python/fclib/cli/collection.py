@@ -1,0 +1,308 @@
+"""``fclib collection``: families of problems, built, checked, published and fetched."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from fclib import collections, scenes
+from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
+from fclib.collections.archives import FetchError
+from fclib.collections.build import BuildError
+
+app = typer.Typer(
+    help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
+)
+
+
+class Form(str, Enum):
+    """The forms of a problem that are written."""
+
+    GLOBAL = "global"
+    LOCAL = "local"
+    BOTH = "both"
+
+
+class Select(str, Enum):
+    """Which problems are kept, where not all are."""
+
+    EVERY = "every"
+    HARD = "hard"
+
+
+Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
+Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
+Count = Annotated[
+    int | None, typer.Option(help="Problems kept of each family; all by default.", min=1)
+]
+Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
+FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
+SelectOption = Annotated[
+    Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
+]
+Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
+
+
+@contextmanager
+def many_bars() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar for each family on the standard error, where that is a terminal."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(name: str, done: int, total: int) -> None:
+            if name not in tasks:
+                tasks[name] = bars.add_task(name, total=total)
+            bars.update(tasks[name], completed=done, total=total)
+
+        yield show
+
+
+@app.command("list")
+def list_families(as_json: Json = False) -> None:
+    """The families, with their sets and numbers of problems."""
+    report = Report(as_json)
+    for name, family in scenes.families().items():
+        report.add(
+            {
+                "family": name,
+                "set": family.collection,
+                "problems": family.problems,
+                "title": family.title,
+                "application": family.application,
+            }
+        )
+    if not as_json:
+        out.print(make_table(report.records))
+
+
+@app.command()
+def show(
+    name: Annotated[str, typer.Argument(help="A family.")],
+    folder: Annotated[
+        Path | None, typer.Option("--in", help="A folder where it was built, for its ranges.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """A family: what it is, its parameters, and what a build gave."""
+    try:
+        family = scenes.get(name)
+    except KeyError as error:
+        usage_error(ValueError(error.args[0]))
+    record: dict[str, Any] = {
+        "family": name,
+        "set": family.collection,
+        "problems": family.problems,
+        "title": family.title,
+        "description": family.description,
+        "application": family.application,
+        "friction": family.friction,
+        "authors": family.authors,
+    }
+    parameters = [
+        {
+            "parameter": item.name,
+            "default": item.default,
+            "unit": item.metadata["unit"],
+            "meaning": item.metadata["doc"],
+        }
+        for item in dataclasses.fields(family)
+    ]
+    ranges = None
+    if folder is not None:
+        try:
+            rows = collections.read_catalog(folder).to_pylist()
+        except (collections.CatalogError, ImportError) as error:
+            fail(str(error))
+        ranges = [row for row in ranges_of(rows) if row["family"] == name]
+        if not ranges:
+            fail(f"{folder}: holds no problem of {name}")
+    if as_json:
+        Report(True).add(
+            record | {"parameters": parameters} | ({"built": ranges[0]} if ranges else {})
+        )
+        return
+    for key, value in record.items():
+        out.print(f"{key:12}{value}", highlight=False)
+    out.print()
+    out.print(make_table(parameters))
+    if ranges:
+        out.print()
+        out.print(make_table(ranges))
+
+
+def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A row for each family of a catalogue: how many problems, and from where to where."""
+    found = []
+    for family in dict.fromkeys(row["family"] for row in rows):
+        own = [row for row in rows if row["family"] == family]
+
+        def span(key: str, own: list[dict[str, Any]] = own) -> str:
+            values = [row[key] for row in own]
+            return f"{min(values):.4g} to {max(values):.4g}"
+
+        found.append(
+            {
+                "family": family,
+                "set": own[0]["collection"],
+                "problems": len(own),
+                "solved": sum(row["status"] == "converged" for row in own),
+                "dof": span("n"),
+                "contacts": span("nc"),
+                "density": span("density"),
+                "mu": span("mu_max"),
+                "largest error": max(row["error"] for row in own),
+            }
+        )
+    return found
+
+
+@app.command()
+def build(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Sets or families, see fclib collection list.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="All families of the set rt444.")] = False,
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
+        "collection"
+    ),
+    count: Count = None,
+    select: SelectOption = Select.EVERY,
+    form: FormOption = Form.BOTH,
+    jobs: Jobs = None,
+    seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
+    pictures: Pictures = True,
+    as_json: Json = False,
+) -> None:
+    """Simulate families and store their problems, solutions and catalogue; goes on after a kill."""
+    if every == bool(names):
+        raise typer.BadParameter("name sets or families, or say --all")
+    try:
+        families = collections.family_names(names or ["rt444"])
+    except KeyError as error:
+        usage_error(ValueError(error.args[0]))
+    plans = [
+        collections.Plan.of_family(family, seed, form=form.value, count=count, select=select.value)
+        for family in families
+    ]
+    run(plans, folder, jobs, pictures, as_json)
+
+
+def run(
+    plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
+) -> None:
+    """Build plans, and print what came of them; exit status 1 where a problem was not solved."""
+    try:
+        with many_bars() as bars:
+            table = collections.build(
+                plans,
+                folder,
+                jobs=jobs or len(os.sched_getaffinity(0)),
+                progress=bars,
+                pictures=pictures,
+            )
+    except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError) as error:
+        fail(str(error))
+    mine = {plan.name for plan in plans}
+    rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
+    report = Report(as_json)
+    for row in ranges_of(rows):
+        report.add(row, row["solved"] == row["problems"])
+    if not as_json:
+        if report.records:
+            out.print(make_table(report.records))
+        else:
+            out.print("Nothing touches in any step: no problem was stored.")
+        unsolved = [row for row in rows if row["status"] != "converged"]
+        if unsolved:
+            worst = max(unsolved, key=lambda row: float(row["error"]))
+            out.print(
+                f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
+                f" {worst['id']}, error {worst['error']:.1e}. The simulation went on from there."
+            )
+        out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
+    raise typer.Exit(int(report.failed))
+
+
+@app.command()
+def verify(folder: Folder, as_json: Json = False) -> None:
+    """Hash all files again, and judge their solutions from the data alone."""
+    report = Report(as_json)
+    try:
+        rows = collections.read_catalog(folder).to_pylist()
+        files = sum(len(collections.catalog.files_of(row)) for row in rows)
+        with progress_bar(files) as bar:
+            for verdict in collections.verify(folder, bar):
+                if not verdict.ok:
+                    err.print(f"fclib: {verdict.message}", style="red", markup=False)
+                if not verdict.ok or as_json:
+                    report.add(
+                        {
+                            "problem": verdict.path,
+                            "status": verdict.status,
+                            "error": verdict.error,
+                        },
+                        verdict.ok,
+                    )
+    except (collections.CatalogError, ImportError) as error:
+        fail(str(error))
+    if not as_json:
+        if report.records:
+            out.print(make_table(report.records))
+        bad = len(report.records)
+        out.print(
+            f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
+        )
+    raise typer.Exit(int(report.failed))
+
+
+@app.command()
+def publish(
+    folder: Folder,
+    site: Annotated[Path, typer.Option("--out", help="Folder that a web server serves.")],
+    as_json: Json = False,
+) -> None:
+    """Make an archive of each family, and the registry of their SHA-256."""
+    try:
+        files = collections.publish(folder, site)
+    except (collections.CatalogError, FetchError, ImportError) as error:
+        fail(str(error))
+    report = Report(as_json)
+    for path in files:
+        report.add({"file": path.name, "bytes": path.stat().st_size})
+    if not as_json:
+        out.print(make_table(report.records))
+        out.print(f"Serve {site}, then: fclib collection get NAME --from URL")
+
+
+@app.command()
+def get(
+    names: Names,
+    url: Annotated[str, typer.Option("--from", help="Where registry.txt lies.")],
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
+        "collection"
+    ),
+) -> None:
+    """Fetch published families, check them and unpack them; goes on where it broke off."""
+    try:
+        with many_bars() as bars:
+            families = collections.get(names, url, folder, bars)
+    except KeyError as error:
+        usage_error(ValueError(error.args[0]))
+    except (FetchError, collections.CatalogError, ImportError) as error:
+        fail(str(error))
+    rows = collections.read_catalog(folder).to_pylist()
+    out.print(make_table([row for row in ranges_of(rows) if row["family"] in families]))

@@ -1,0 +1,39 @@
+"""The collection: families of problems, built from scenes, with a catalogue.
+
+    fclib.collection("rt444")[100]      a problem, from the user's folder; built if it is not there
+    collections.build(...)              scenes ──> problems, solutions, files ──> catalogue
+    collections.verify(...)             files again as the catalogue says, solutions judged anew
+    collections.publish(...), get(...)  archives with their SHA-256 for any static web server
+
+A problem is named SET/FAMILY/NUMBER, as rt444/KaplasTower/0100; its number counts the steps of
+the family's scene that have a contact.
+
+plan.py       which families, which of their problems
+build.py      the simulation of a family into files, gone on with after a kill
+catalog.py    a row for each problem; catalog.parquet
+library.py    the user's folder: `fclib.collection` and `fclib.load`
+archives.py   publish and get
+figures.py    distributions and pictures
+"""
+
+from fclib.collections.archives import get, publish
+from fclib.collections.build import build
+from fclib.collections.catalog import CatalogError, read_catalog
+from fclib.collections.library import Collection, load
+from fclib.collections.plan import Plan, Selection, family_names, sets
+from fclib.collections.verify import verify
+
+__all__ = [
+    "CatalogError",
+    "Collection",
+    "Plan",
+    "Selection",
+    "build",
+    "family_names",
+    "get",
+    "load",
+    "publish",
+    "read_catalog",
+    "sets",
+    "verify",
+]

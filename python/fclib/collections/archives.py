@@ -1,0 +1,213 @@
+"""Archives of built families, for any static web server, and their download.
+
+SITE/registry.txt               SHA-256 of each file, as pooch reads it
+catalog.parquet            of all families
+rt444-KaplasTower.zip      a family: its files, and its part of the catalogue
+"""
+
+from __future__ import annotations
+
+import importlib
+import shutil
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from fclib.collections import catalog
+from fclib.collections.plan import family_names
+
+REGISTRY = "registry.txt"
+EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives
+TIMEOUT = 30.0  # longest silence of a server [s]
+TRIES = 3  # connections, for what broke off
+
+
+class FetchError(OSError):
+    """An archive that could not be fetched whole."""
+
+
+def pooch_module() -> Any:
+    """The module pooch. ImportError, with what to install, where it is not there."""
+    try:
+        return importlib.import_module("pooch")
+    except ImportError as error:
+        raise ImportError(
+            f"fetching needs pooch ({error}); install it with: pip install 'fclib[collection]'"
+        ) from error
+
+
+def cache_folder() -> Path:
+    """The user's cache folder for FCLIB."""
+    return Path(pooch_module().os_cache("fclib"))
+
+
+def publish(folder: str | Path, site: str | Path) -> list[Path]:
+    """Make the archives of all finished families of a folder, and their registry.
+
+    Args:
+        folder: what `build` made.
+        site: the folder that a web server serves; made where it is not there.
+
+    Returns:
+        The files written.
+
+    Raises:
+        CatalogError: the folder has no catalogue.
+        FetchError: a file is missing, or is not the one of the catalogue.
+    """
+    folder, site = Path(folder), Path(site)
+    rows = catalog.read_catalog(folder).to_pylist()
+    site.mkdir(parents=True, exist_ok=True)
+    families: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        families.setdefault(f"{row['collection']}/{row['family']}", []).append(row)
+
+    written = []
+    for name, own in families.items():
+        archive = site / f"{name.replace('/', '-')}.zip"
+        members = [pair for row in own for pair in catalog.files_of(row)]
+        for path, digest in members:
+            if not (folder / path).is_file() or catalog.sha256(folder / path) != digest:
+                raise FetchError(f"{folder / path}: is not the catalogue's file; build it anew")
+        part = f"{name}/{catalog.FILE}"
+        paths = [path for path, _ in members] + [part]
+
+        def pack(target: Path, paths: Sequence[str] = paths) -> None:
+            # the files are compressed already
+            with zipfile.ZipFile(target, "w", zipfile.ZIP_STORED) as zipped:
+                for path in paths:
+                    entry = zipfile.ZipInfo(path, date_time=EPOCH)
+                    entry.external_attr = 0o644 << 16
+                    zipped.writestr(entry, (folder / path).read_bytes())
+
+        catalog.replace_file(archive, pack)
+        written.append(archive)
+    shutil.copyfile(folder / catalog.FILE, site / catalog.FILE)
+    written.append(site / catalog.FILE)
+    lines = [f"{path.name} sha256:{catalog.sha256(path)}\n" for path in sorted(written)]
+    registry = site / REGISTRY
+    catalog.replace_file(registry, lambda target: target.write_text("".join(lines)))
+    return [*written, registry]
+
+
+def get(
+    names: Sequence[str],
+    url: str,
+    folder: str | Path,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> list[str]:
+    """Fetch families from a server, check them, and unpack them into a folder.
+
+    A download that broke off is gone on with, where the server lets one ask for the rest.
+
+    Args:
+        names: sets or families.
+        url: where `registry.txt` lies.
+        folder: the collection's folder; the archives are kept in its `.archives`.
+        progress: called with the archive's name, the bytes there are, and how many there will be.
+
+    Returns:
+        The families that are there now.
+
+    Raises:
+        KeyError: a name that is no set and no family, or is not published there.
+        FetchError: the server cannot be reached, or what came is not what the registry says.
+    """
+    pooch = pooch_module()
+    folder = Path(folder)
+    archives = folder / ".archives"
+    archives.mkdir(parents=True, exist_ok=True)
+    base = url if url.endswith("/") else url + "/"
+    (archives / REGISTRY).unlink(missing_ok=True)
+    download(base + REGISTRY, archives / REGISTRY)
+    # its words are for a console of its own
+    pooch.get_logger().setLevel("WARNING")
+    fetcher = pooch.create(path=archives, base_url=base, registry=None)
+    try:
+        fetcher.load_registry(archives / REGISTRY)
+    except OSError as error:
+        raise FetchError(f"{base}{REGISTRY}: is no registry: {error}") from error
+
+    published = {name: family for name in fetcher.registry for family in [family_of(name)]}
+    families = family_names(list(names))
+    for family in families:
+        found = [name for name, own in published.items() if own == family]
+        if not found:
+            raise KeyError(f"{family} is not published at {base}")
+
+        def fetch(url: str, output_file: str, _pooch: Any, archive: str = found[0]) -> None:
+            show = (lambda done, total: progress(archive, done, total)) if progress else None
+            # pooch's own file is new each time; ours stays, and is gone on with
+            target = archives / f"{archive}.part"
+            download(url, target, show)
+            shutil.move(target, output_file)
+
+        try:
+            path = fetcher.fetch(found[0], downloader=fetch)
+        except ValueError as error:
+            raise FetchError(f"{base}{found[0]}: is not what the registry says: {error}") from error
+        unpack(Path(path), folder)
+    from fclib.collections.build import gather
+
+    gather(folder)
+    return families
+
+
+def family_of(archive: str) -> str | None:
+    """The family of an archive's name, None for another file."""
+    if not archive.endswith(".zip"):
+        return None
+    return archive.removesuffix(".zip").rpartition("-")[2]
+
+
+def download(url: str, target: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Fetch a file, or the rest of it where a part is there. FetchError."""
+    requests = importlib.import_module("requests")
+    reason: object = None
+    for _ in range(TRIES):
+        there = target.stat().st_size if target.exists() else 0
+        try:
+            with requests.get(
+                url,
+                headers={"Range": f"bytes={there}-"} if there else {},
+                stream=True,
+                timeout=TIMEOUT,
+            ) as response:
+                if response.status_code == 416:  # nothing is left to ask for
+                    return
+                response.raise_for_status()
+                # 200 where a server knows no ranges: from the start
+                there = there if response.status_code == 206 else 0
+                length = response.headers.get("Content-Length")
+                total = there + int(length) if length else 0
+                with target.open("ab" if there else "wb") as file:
+                    for block in response.iter_content(1 << 13):
+                        file.write(block)
+                        there += len(block)
+                        if progress is not None:
+                            progress(there, total)
+            if not total or there == total:
+                return
+            reason = f"{there} of {total} bytes came"
+        except (
+            requests.ConnectionError,
+            requests.Timeout,
+            requests.exceptions.ChunkedEncodingError,  # broke off
+        ) as error:
+            reason = error
+        except requests.RequestException as error:
+            raise FetchError(f"{url}: {error}") from error
+    raise FetchError(f"{url}: cannot be fetched: {reason}")
+
+
+def unpack(archive: Path, folder: Path) -> None:
+    """Unpack a family; its part of the catalogue comes last, since it says that all is there."""
+    with zipfile.ZipFile(archive) as zipped:
+        for entry in sorted(zipped.infolist(), key=lambda e: e.filename.endswith(catalog.FILE)):
+            target = (folder / entry.filename).resolve()
+            if not target.is_relative_to(folder.resolve()):
+                raise FetchError(f"{archive}: {entry.filename!r} leads out of the folder")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            content = zipped.read(entry)
+            catalog.replace_file(target, lambda path, content=content: path.write_bytes(content))

@@ -1,0 +1,310 @@
+"""From plans to files: each scene is simulated in a process, and its problems are stored.
+
+    OUT/SET/FAMILY/0100-global.hdf5     problem and solution
+                   0100-local.hdf5
+                   catalog.parquet      of the family; there when it is finished
+                   .state/              while it is not: where to go on
+    OUT/catalog.parquet                 of all that is finished
+
+A build that was killed goes on from its last checkpoint, and ends with the same files.
+"""
+
+from __future__ import annotations
+
+import heapq
+import io
+import json
+import multiprocessing
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from queue import Empty
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import fclib
+from fclib.collections import catalog
+from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
+
+if TYPE_CHECKING:
+    from fclib.simulate import State, Step
+
+CHECKPOINT = 5.0  # seconds between two checkpoints
+STATE = ".state"
+
+Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, of how many
+
+
+class BuildError(Exception):
+    """What was built before does not fit what is asked for now."""
+
+
+def build(
+    plans: Sequence[Plan],
+    out: str | Path,
+    *,
+    jobs: int = 1,
+    progress: Progress | None = None,
+    pictures: bool = True,
+) -> Any:
+    """Build what the plans say into a folder, and return its catalogue (pyarrow.Table).
+
+    What is finished is left as it is; what was interrupted goes on.
+
+    Args:
+        plans: one for each scene.
+        out: the folder; made where it is not there.
+        jobs: processes; a scene is never spread over two.
+        progress: called with the plan's name, the problems done and their number.
+        pictures: also draw each scene's last state and its distribution of contacts.
+
+    Raises:
+        BuildError: a folder holds the same scene, built by another plan.
+        OSError, fclib.FileError: a file cannot be written.
+        ImportError: MuJoCo or pyarrow is missing.
+    """
+    catalog.arrow()
+    out = Path(out)
+    out.mkdir(parents=True, exist_ok=True)
+    todo = [plan for plan in plans if not is_finished(plan, out)]
+    report = progress or (lambda name, done, total: None)
+    for plan in plans:
+        if plan not in todo:
+            report(plan.name, plan.total, plan.total)
+    if jobs <= 1 or len(todo) <= 1:
+        for plan in todo:
+            build_scene(plan, out, report, pictures)
+    else:
+        build_in_processes(todo, out, jobs, report, pictures)
+    return gather(out)
+
+
+def build_in_processes(
+    plans: Sequence[Plan], out: Path, jobs: int, report: Progress, pictures: bool
+) -> None:
+    """Build each plan in a process of a pool."""
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as manager, ProcessPoolExecutor(jobs, mp_context=context) as pool:
+        messages = manager.Queue()
+        # the long ones first
+        ordered = sorted(plans, key=lambda plan: -plan.total)
+        waiting = {pool.submit(build_and_tell, plan, out, messages, pictures) for plan in ordered}
+        while waiting:
+            done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
+            try:
+                while True:
+                    report(*messages.get_nowait())
+            except Empty:
+                pass
+            for future in done:
+                future.result()
+
+
+def build_and_tell(plan: Plan, out: Path, messages: Any, pictures: bool) -> None:
+    """Build in a process of the pool; progress goes back as messages."""
+    build_scene(plan, out, lambda *progress: messages.put(progress), pictures)
+
+
+def is_finished(plan: Plan, out: Path) -> bool:
+    """Whether the scene is built. BuildError where another plan built it."""
+    folder = out / plan.name
+    part, state = folder / catalog.FILE, folder / STATE
+    if part.is_file():
+        found = catalog.read_catalog(part).schema.metadata.get(catalog.FINGERPRINT, b"").decode()
+    elif (state / "plan.json").is_file():
+        found = (state / "plan.json").read_text(encoding="utf-8")
+    else:
+        return False
+    if found != plan.fingerprint():
+        raise BuildError(
+            f"{folder}: was built with other settings ({difference(found, plan.fingerprint())});"
+            " remove it, or choose another folder"
+        )
+    return part.is_file()
+
+
+def difference(found: str, asked: str) -> str:
+    """The first settings that differ, in words."""
+    try:
+        old, new = json.loads(found), json.loads(asked)
+    except json.JSONDecodeError:
+        return "which cannot be read"
+    old, new = ({**plan.pop("parameters"), **plan} for plan in (old, new))
+    keys = [key for key in new if old.get(key) != new[key]]
+    return ", ".join(f"{key}: {old.get(key)}, now {new[key]}" for key in keys[:3])
+
+
+def gather(out: Path) -> Any:
+    """Join the catalogues of all finished scenes of a folder into its own."""
+    rows = [
+        row
+        for part in sorted(out.glob(f"*/*/{catalog.FILE}"))
+        for row in catalog.read_catalog(part).to_pylist()
+    ]
+    catalog.write_catalog(out / catalog.FILE, rows)
+    return catalog.read_catalog(out)
+
+
+@dataclass
+class Kept:
+    """The rows of the problems that are kept, and how many were looked at."""
+
+    plan: Plan
+    looked: int = 0
+    rows: dict[int, dict[str, Any]] = field(default_factory=dict)  # by number
+
+    def wants(self, number: int) -> bool:
+        """Whether the rule takes this number; with `hard` each is looked at."""
+        return self.plan.select == "hard" or number in self._numbers
+
+    def add(self, row: dict[str, Any]) -> list[dict[str, Any]]:
+        """Keep a problem, and return those that must go for it."""
+        self.rows[row["number"]] = row
+        if self.plan.select != "hard" or self.plan.count is None:
+            return []
+        cost = {number: (-row["nsgs_sweeps"], number) for number, row in self.rows.items()}
+        kept = heapq.nsmallest(self.plan.count, self.rows, key=cost.__getitem__)
+        return [self.rows.pop(number) for number in set(self.rows) - set(kept)]
+
+    def __post_init__(self) -> None:
+        self._numbers = set(self.plan.numbers().tolist())
+
+
+def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
+    """Simulate a scene and store its problems; go on where a build before was interrupted."""
+    from fclib.simulate import simulate
+
+    folder = out / plan.name
+    state_folder = folder / STATE
+    state_folder.mkdir(parents=True, exist_ok=True)
+    write_text(state_folder / "plan.json", plan.fingerprint())
+    kept = Kept(plan)
+    start = read_checkpoint(state_folder, kept)
+
+    # a scene that never touches anything would go on for ever
+    most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
+    done = start.index if start is not None else 0
+    steps = simulate(
+        plan.scene, most - done, solver=plan.solver, tol=plan.tol, start=start, **plan.options
+    )
+    last = time.monotonic()
+    step = None
+    for step in steps:
+        if time.monotonic() - last > CHECKPOINT:
+            write_checkpoint(state_folder, kept, step.start)
+            last = time.monotonic()
+        if step.problem.nc:
+            if kept.wants(kept.looked):
+                store(plan, kept, step, out)
+            kept.looked += 1
+            report(plan.name, kept.looked, plan.total)
+            if kept.looked == plan.problems:
+                break
+
+    if pictures and step is not None:
+        from fclib.collections import figures
+
+        figures.draw_scene(step, folder)
+        figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
+    catalog.write_catalog(
+        folder / catalog.FILE,
+        list(kept.rows.values()),
+        {catalog.FINGERPRINT: plan.fingerprint().encode()},
+    )
+    shutil.rmtree(state_folder)
+
+
+def store(plan: Plan, kept: Kept, step: Step, out: Path) -> None:
+    """Write a step's files, and remove those that it drives out."""
+    local = step.problem.condense()
+    sweeps = None
+    if plan.select == "hard":
+        trial = fclib.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
+        sweeps = trial.iterations
+    row = describe(plan, kept.looked, step) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
+    written = []
+    for form in plan.forms:
+        path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
+        problem = step.problem if form == "global" else local
+        solution = step.result.solution
+        if form == "local":
+            solution = fclib.Solution(r=solution.r, u=solution.u, l=solution.l)
+        fclib.write(out / path, problem, solution)
+        row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
+        written.append(path)
+    for gone in kept.add(row):
+        for form in plan.forms:
+            (out / gone[f"{form}_file"]).unlink(missing_ok=True)
+
+
+def describe(plan: Plan, number: int, step: Step) -> dict[str, Any]:
+    """The row of a step: all but its files."""
+    problem, result = step.problem, step.result
+    merit = fclib.merit(problem, result.solution)
+    mu = np.asarray(problem.mu)
+    return {
+        "id": f"{plan.name}/{number:04d}",
+        "collection": plan.collection,
+        "family": plan.scene.name,
+        "number": number,
+        "step": step.index,
+        "time": step.time,
+        "seed": plan.scene.seed,
+        "title": problem.info.title,
+        "formulation": problem.formulation,
+        "spacedim": problem.spacedim,
+        "n": problem.n,
+        "p": problem.p,
+        "nc": problem.nc,
+        "bodies": int(np.unique(step.model.trees[step.dofs]).size),
+        "density": problem.spacedim * problem.nc / problem.n,
+        "mu_min": float(mu.min()),
+        "mu_max": float(mu.max()),
+        "nnz_M": nnz(problem.M),
+        "nnz_H": nnz(problem.H),
+        "open": merit.open,
+        "stick": merit.stick,
+        "slide": merit.slide,
+        "solver": result.solver,
+        "status": str(result.status),
+        "tol": plan.tol,
+        "error": merit.error,
+        "digest": fclib.digest(problem),
+    }
+
+
+def nnz(matrix: Any) -> int:
+    """Entries of a sparse or dense matrix."""
+    return int(getattr(matrix, "nnz", np.size(matrix)))
+
+
+def write_checkpoint(folder: Path, kept: Kept, start: State) -> None:
+    """Store where to go on: the start of a step, and what was kept before it."""
+    content = io.BytesIO()
+    known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
+    np.savez(content, known=known, **{f.name: getattr(start, f.name) for f in fields(start)})
+    catalog.replace_file(folder / "state.npz", lambda path: path.write_bytes(content.getvalue()))
+
+
+def read_checkpoint(folder: Path, kept: Kept) -> State | None:
+    """The state to go on from, None for the scene's start; `kept` takes what was stored."""
+    from fclib.simulate import State
+
+    path = folder / "state.npz"
+    if not path.is_file():
+        return None
+    with np.load(path) as arrays:
+        values = {name: arrays[name] for name in arrays.files}
+    known = json.loads(str(values.pop("known")))
+    kept.looked = known["looked"]
+    kept.rows = {row["number"]: row for row in known["rows"]}
+    return State(**(values | {"index": int(values["index"])}))
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text whole, or leave the old one."""
+    catalog.replace_file(path, lambda beside: beside.write_text(text, encoding="utf-8"))

@@ -1,0 +1,141 @@
+"""The catalogue: a row for each problem, in a file catalog.parquet beside the problems.
+
+It holds nothing that depends on the machine or the hour: two builds give equal catalogues.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import os
+import tempfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+FILE = "catalog.parquet"
+# in a family's own part: what it was built by, as JSON
+FINGERPRINT = b"fclib.plan"
+
+# column, type of Arrow, meaning
+COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("id", "string", "SET/FAMILY/NUMBER"),
+    ("collection", "string", "the set"),
+    ("family", "string", "the scene's family, or the name of its MJCF file"),
+    ("number", "int32", "counts the steps that have a contact"),
+    ("step", "int32", "of the simulation"),
+    ("time", "float64", "at the start of the step [s]"),
+    ("seed", "int64", "of the scene; null for an MJCF file"),
+    ("title", "string", "of the problem"),
+    ("formulation", "string", "of the global form, in RT-0444's abbreviations"),
+    ("spacedim", "int32", "components of a contact"),
+    ("n", "int32", "degrees of freedom of the bodies that contacts move"),
+    ("p", "int32", "bilateral constraints"),
+    ("nc", "int32", "contacts"),
+    ("bodies", "int32", "bodies, or trees of bodies, among which the contacts are"),
+    ("density", "float64", "spacedim nc / n, contact components for a degree of freedom"),
+    ("mu_min", "float64", "smallest coefficient of friction"),
+    ("mu_max", "float64", "largest coefficient of friction"),
+    ("nnz_M", "int64", "entries of M"),
+    ("nnz_H", "int64", "entries of H"),
+    ("nnz_W", "int64", "entries of W"),
+    ("open", "int32", "contacts without reaction in the stored solution"),
+    ("stick", "int32", "sticking contacts in the stored solution"),
+    ("slide", "int32", "sliding contacts in the stored solution"),
+    ("solver", "string", "that found the stored solution"),
+    ("status", "string", "what it said"),
+    ("tol", "float64", "what it was asked for"),
+    ("error", "float64", "relative natural-map error of the stored solution, global form"),
+    ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
+    ("digest", "string", "fclib.digest of the global form"),
+    ("global_file", "string", "path from the catalogue's folder"),
+    ("global_sha256", "string", "of that file"),
+    ("local_file", "string", "path from the catalogue's folder"),
+    ("local_sha256", "string", "of that file"),
+)
+
+
+class CatalogError(Exception):
+    """A catalogue that is not there, or is not one."""
+
+
+def arrow() -> Any:
+    """The module pyarrow. ImportError, with what to install, where it is not there."""
+    try:
+        importlib.import_module("pyarrow.parquet")
+        return importlib.import_module("pyarrow")
+    except ImportError as error:
+        raise ImportError(
+            f"the catalogue needs pyarrow ({error});"
+            " install it with: pip install 'fclib[collection]'"
+        ) from error
+
+
+def write_catalog(
+    path: Path, records: Iterable[Mapping[str, Any]], metadata: Mapping[bytes, bytes] | None = None
+) -> None:
+    """Write the rows, in the order of their identifiers; the file is whole, or the old one."""
+    pa = arrow()
+    schema = pa.schema(
+        [
+            pa.field(name, pa.type_for_alias(kind), metadata={"doc": doc})
+            for name, kind, doc in COLUMNS
+        ],
+        metadata=dict(metadata or {}),
+    )
+    extra = sorted({key for row in records for key in row} - {name for name, *_ in COLUMNS})
+    rows = sorted(records, key=lambda row: str(row["id"]))
+    for key in extra:
+        values = pa.array([row.get(key) for row in rows])
+        schema = schema.append(pa.field(key, values.type))
+    table = pa.Table.from_pylist([dict(row) for row in rows], schema=schema)
+    replace_file(path, lambda target: pa.parquet.write_table(table, target, compression="zstd"))
+
+
+def read_catalog(path: str | Path) -> Any:
+    """The catalogue (pyarrow.Table) of a folder or a file. CatalogError where there is none."""
+    pa = arrow()
+    path = Path(path)
+    file = path / FILE if path.is_dir() else path
+    try:
+        # a file of its own, and no data set: names of folders are no columns
+        table = pa.parquet.ParquetFile(file).read()
+    except FileNotFoundError:
+        raise CatalogError(
+            f"{file}: there is no catalogue; make one with fclib collection build --out {path}"
+        ) from None
+    except (OSError, pa.ArrowInvalid) as error:
+        reason = str(error).splitlines()[0]
+        raise CatalogError(f"{file}: cannot be read as a catalogue: {reason}") from None
+    missing = [name for name, *_ in COLUMNS if name not in table.column_names]
+    if missing:
+        raise CatalogError(f"{file}: is no catalogue, it has no column {missing[0]!r}")
+    return table
+
+
+def replace_file(path: Path, write: Any) -> None:
+    """Call `write` with the path of a new file beside `path`, which then takes its place."""
+    descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    os.close(descriptor)
+    beside = Path(name)
+    try:
+        write(beside)
+        beside.chmod(0o644)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def files_of(row: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Path and SHA-256 of each file of a row."""
+    found = ((row[f"{form}_file"], row[f"{form}_sha256"]) for form in ("global", "local"))
+    return [(path, digest) for path, digest in found if path is not None]
+
+
+def sha256(path: Path) -> str:
+    """Of a file, in hexadecimal digits."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

@@ -1,0 +1,56 @@
+"""Pictures of a family: its scene, and how contacts and degrees of freedom are distributed."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fclib.simulate import Step
+
+BINS = 40
+# column, label
+MEASURES = (
+    ("nc", "contacts"),
+    ("n", "degrees of freedom"),
+    ("density", "contact components for a degree of freedom"),
+)
+
+
+def draw_scene(step: Step, folder: Path) -> Path | None:
+    """Write scene.png, the state of a step; None where nothing can draw here."""
+    from fclib.simulate import NoRenderer, render
+
+    target = folder / "scene.png"
+    try:
+        render(step.model, target)
+    except NoRenderer:
+        return None
+    return target
+
+
+def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: str) -> None:
+    """Write distribution.png and .svg: histograms as in RT-0444, problems over each measure.
+
+    Nothing is drawn where Matplotlib is not there.
+    """
+    try:
+        figure_module = importlib.import_module("matplotlib.figure")
+        matplotlib = importlib.import_module("matplotlib")
+    except ImportError:
+        return
+    # identifiers of an SVG are random otherwise
+    with matplotlib.rc_context({"svg.hashsalt": "fclib", "font.size": 9}):
+        figure = figure_module.Figure(figsize=(9, 2.6), layout="constrained")
+        axes = figure.subplots(1, len(MEASURES), sharey=True)
+        for axis, (column, label) in zip(axes, MEASURES, strict=True):
+            values = [row[column] for row in rows]
+            axis.hist(values, bins=BINS, color="#3b6ea5", linewidth=0)
+            axis.set_xlabel(label)
+            axis.spines[["top", "right"]].set_visible(False)
+        axes[0].set_ylabel("problems")
+        figure.suptitle(f"{title}: {len(rows)} problems", fontsize=10)
+        for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
+            figure.savefig(folder / f"distribution{suffix}", dpi=160, metadata=metadata)

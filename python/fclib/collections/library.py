@@ -1,0 +1,131 @@
+"""The user's folder: problems by their names, built or fetched when they are not there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, overload
+
+import fclib
+from fclib import scenes
+from fclib.collections import archives, catalog
+from fclib.collections.build import build
+from fclib.collections.plan import Plan, family_names
+
+FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
+SOURCE = "FCLIB_COLLECTION_URL"  # environment: where published archives lie
+
+
+def default_folder() -> Path:
+    """The folder that FCLIB_COLLECTION names, or one in the user's cache, by version."""
+    named = os.environ.get(FOLDER)
+    return Path(named) if named else archives.cache_folder() / f"collection-{fclib.__version__}"
+
+
+def ensure(family: str, folder: Path) -> None:
+    """Make a family be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most."""
+    part = folder / scenes.get(family).collection / family / catalog.FILE
+    if part.is_file():
+        return
+    source = os.environ.get(SOURCE)
+    if source:
+        archives.get([family], source, folder)
+    else:
+        build([Plan.of_family(family)], folder, pictures=False)
+
+
+class Collection(Sequence[Any]):
+    """The problems of a set or a family, in the order of their names; read when asked for.
+
+    >>> problems = fclib.collection("rt444")
+    >>> problems[0], problems["rt444/KaplasTower/0100"]
+    >>> problems.catalog.to_pandas()
+    """
+
+    def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
+        """KeyError, with the known names, where there is no such set or family."""
+        self.name = name
+        self.families = family_names([name])
+        self.folder = Path(folder) if folder is not None else default_folder()
+        self._catalog: Any = None
+
+    def __repr__(self) -> str:
+        return f"Collection({self.name!r}, {str(self.folder)!r})"
+
+    @property
+    def catalog(self) -> Any:
+        """The rows of these problems (pyarrow.Table); builds what is not there.
+
+        Raises:
+            ImportError: pyarrow or MuJoCo is missing.
+            OSError: the folder cannot be written, or the archive not fetched.
+        """
+        if self._catalog is None:
+            pa = catalog.arrow()
+            tables = []
+            for family in self.families:
+                ensure(family, self.folder)
+                collection = scenes.get(family).collection
+                tables.append(catalog.read_catalog(self.folder / collection / family))
+            self._catalog = pa.concat_tables(
+                [table.replace_schema_metadata(None) for table in tables], promote_options="default"
+            )
+        return self._catalog
+
+    @property
+    def ids(self) -> list[str]:
+        """The names of the problems."""
+        names: list[str] = self.catalog["id"].to_pylist()
+        return names
+
+    def path(self, which: int | str, form: str = "global") -> Path:
+        """The file of a problem, by its place or its name. IndexError, KeyError."""
+        ids = self.ids
+        if isinstance(which, str):
+            if which not in ids:
+                raise KeyError(f"{self.name} has no problem {which!r}; the first is {ids[0]!r}")
+            which = ids.index(which)
+        file: str | None = self.catalog[f"{form}_file"][which].as_py()
+        if file is None:
+            raise KeyError(f"the {form} form of {ids[which]} was not built")
+        return self.folder / file
+
+    def solution(self, which: int | str, form: str = "global") -> fclib.Solution | None:
+        """The stored solution of a problem."""
+        return fclib.read_solution(self.path(which, form))
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @overload
+    def __getitem__(self, which: int | str) -> Any: ...
+
+    @overload
+    def __getitem__(self, which: slice) -> list[Any]: ...
+
+    def __getitem__(self, which: int | str | slice) -> Any:
+        """The global form of a problem, by its place or its name."""
+        if isinstance(which, slice):
+            return [self[i] for i in range(*which.indices(len(self)))]
+        return fclib.read(self.path(which))
+
+
+def load(name: str, form: str = "global", folder: str | Path | None = None) -> Any:
+    """One problem by its name, as ``"rt444/KaplasTower/0100"``.
+
+    Args:
+        name: SET/FAMILY/NUMBER.
+        form: "global" or "local".
+        folder: where the collection lies; by default the user's cache.
+
+    Raises:
+        KeyError: there is no such problem.
+        ValueError: a form that is neither.
+    """
+    if form not in ("global", "local"):
+        raise ValueError(f'the form is "global" or "local", not {form!r}')
+    parts = name.split("/")
+    if len(parts) != 3:
+        raise KeyError(f"a problem is named SET/FAMILY/NUMBER, not {name!r}")
+    return fclib.read(Collection(parts[1], folder).path(name, form))

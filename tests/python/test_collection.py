@@ -1,0 +1,534 @@
+"""Collections: built the same twice and after a kill, verified, published and fetched."""
+
+import contextlib
+import functools
+import http.server
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fclib
+from fclib import scenes
+from fclib.cli import app
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pyarrow")
+
+from fclib import collections
+from fclib.collections import archives, catalog
+from fclib.collections.build import BuildError
+from fclib.collections.plan import Plan
+
+FAMILIES = scenes.families()
+
+
+# what they give is of one kind here
+read: Any = fclib.read
+read_solution: Any = fclib.read_solution
+
+
+def plan(boxes: int = 3, **settings: Any) -> Plan:
+    """A small stack that lands within a few steps."""
+    scene = scenes.get("BoxesStack")(boxes=boxes, gap=2e-3, time_step=5e-3).scene(seed=1)
+    settings = {"problems": 12} | settings
+    return Plan(scene=scene, collection="small", **settings)
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """What a folder holds, but for pictures."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.suffix in (".hdf5", ".parquet", ".json", ".npz")
+    }
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("built")
+    collections.build([plan()], folder, pictures=False)
+    return folder
+
+
+# ---- building
+
+
+def test_catalog_says_what_the_files_hold(built: Path) -> None:
+    rows = collections.read_catalog(built).to_pylist()
+    assert [row["id"] for row in rows] == [f"small/BoxesStack/{i:04d}" for i in range(12)]
+    assert [row["number"] for row in rows] == list(range(12))
+    for row in rows:
+        problem = read(built / row["global_file"])
+        solution = read_solution(built / row["global_file"])
+        merit = fclib.merit(problem, solution)
+        assert fclib.digest(problem) == row["digest"]
+        assert merit.error == row["error"] <= 1e-8
+        assert (merit.open, merit.stick, merit.slide) == (row["open"], row["stick"], row["slide"])
+        assert (problem.n, problem.nc, problem.p) == (row["n"], row["nc"], row["p"])
+        assert (problem.M.nnz, problem.H.nnz) == (row["nnz_M"], row["nnz_H"])
+        assert row["n"] == 6 * row["bodies"]
+        assert row["density"] == 3 * row["nc"] / row["n"]
+        assert problem.info.title == row["title"]
+
+        local = read(built / row["local_file"])
+        assert local.formulation == "3DFC"
+        assert local.W.nnz == row["nnz_W"]
+        assert fclib.merit(local, read_solution(built / row["local_file"])).error < 1e-7
+
+
+def test_info_carries_what_the_family_says(built: Path) -> None:
+    info = read(built / "small/BoxesStack/0003-global.hdf5").info
+    family = scenes.get("BoxesStack")
+    for text in (family.description, family.application, family.authors, family.friction):
+        assert text in info.description
+
+
+def test_two_builds_are_equal_byte_for_byte(built: Path, tmp_path: Path) -> None:
+    collections.build([plan()], tmp_path, pictures=False)
+    assert files(tmp_path) == files(built)
+
+
+def test_processes_give_the_same_as_one(tmp_path: Path) -> None:
+    plans = [plan(problems=4), plan(boxes=2, problems=4, form="local")]
+    # two plans need two names
+    other = scenes.Scene.of(scenes.get("BoxesStack")(boxes=2), 0, plans[1].scene.xml)
+    plans[1] = Plan(scene=other, collection="others", problems=4, form="local", count=2)
+    seen: set[str] = set()
+    for jobs in (1, 2):
+        collections.build(
+            plans,
+            tmp_path / str(jobs),
+            jobs=jobs,
+            progress=lambda name, *_: seen.add(name),
+            pictures=False,
+        )
+    assert files(tmp_path / "1") == files(tmp_path / "2")
+    assert seen == {"small/BoxesStack", "others/BoxesStack"}
+    rows = collections.read_catalog(tmp_path / "1").to_pylist()
+    assert {row["id"] for row in rows if row["collection"] == "others"} == {
+        "others/BoxesStack/0000",
+        "others/BoxesStack/0003",
+    }
+    assert all(row["global_file"] is None for row in rows if row["collection"] == "others")
+
+
+SLOW = """
+import importlib
+import sys
+from pathlib import Path
+module = importlib.import_module("fclib.collections.build")
+from fclib.collections.plan import Plan
+from fclib import scenes
+
+module.CHECKPOINT = 0.0  # at each step
+store = module.store
+
+def slow(plan, kept, step, out):
+    store(plan, kept, step, out)
+    print(kept.looked, flush=True)
+
+module.store = slow
+scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
+settings = {"count": 3, "select": "hard"} if sys.argv[2] == "hard" else {}
+plan = Plan(scene=scene, collection="small", problems=12, **settings)
+module.build([plan], Path(sys.argv[1]), pictures=False)
+"""
+
+
+@pytest.mark.parametrize("select", ["every", "hard"])
+def test_killed_builds_go_on_and_end_the_same(tmp_path: Path, select: str) -> None:
+    def start(folder: Path) -> subprocess.Popen[str]:
+        command = [sys.executable, "-c", SLOW, str(folder), select]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    whole, killed = tmp_path / "whole", tmp_path / "killed"
+    assert start(whole).wait(120) == 0
+    looked: list[int] = []
+    for after in (1, 3, 4):
+        process = start(killed)
+        assert process.stdout is not None
+        for lines, line in enumerate(process.stdout, start=1):
+            looked.append(int(line))
+            if lines == after:
+                process.send_signal(signal.SIGKILL)
+                break
+        process.wait(60)
+        process.stdout.close()
+    # each went on where the one before was, or a step behind
+    assert looked[-1] >= 5
+    assert start(killed).wait(120) == 0
+    assert files(killed) == files(whole)
+
+
+def test_finished_families_are_left_alone(built: Path) -> None:
+    path = built / "small/BoxesStack/0000-global.hdf5"
+    before = path.stat().st_mtime_ns
+    collections.build([plan()], built, pictures=False)
+    assert path.stat().st_mtime_ns == before
+
+
+def test_another_plan_in_the_same_folder_is_refused(built: Path) -> None:
+    with pytest.raises(BuildError, match=r"BoxesStack: .*parameters|count: None, now 3"):
+        collections.build([plan(count=3)], built, pictures=False)
+
+
+def test_count_keeps_problems_at_equal_distances(built: Path, tmp_path: Path) -> None:
+    table = collections.build([plan(count=4)], tmp_path, pictures=False)
+    assert table["number"].to_pylist() == [0, 4, 7, 11]
+    whole = {row["id"]: row for row in collections.read_catalog(built).to_pylist()}
+    assert all(row == whole[row["id"]] for row in table.to_pylist())
+
+
+def test_hard_keeps_what_costs_nsgs_most(built: Path, tmp_path: Path) -> None:
+    table = collections.build([plan(count=3, select="hard")], tmp_path, pictures=False)
+    sweeps = {}
+    for row in collections.read_catalog(built).to_pylist():
+        local = read(built / row["local_file"])
+        result = fclib.solve(local, "nsgs", tol=1e-6, max_iterations=2000)
+        sweeps[row["number"]] = result.iterations
+    hardest = sorted(sweeps, key=lambda number: (-sweeps[number], number))[:3]
+    assert table["number"].to_pylist() == sorted(hardest)
+    assert table["nsgs_sweeps"].to_pylist() == [sweeps[number] for number in sorted(hardest)]
+    # and nothing else is left behind
+    assert len(list(tmp_path.glob("small/BoxesStack/*.hdf5"))) == 6
+
+
+def test_a_scene_that_touches_nothing_ends(tmp_path: Path) -> None:
+    xml = '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>'
+    scene = scenes.Scene(name="alone", xml=xml)
+    table = collections.build([Plan(scene=scene, collection="none", steps=9, problems=3)], tmp_path)
+    assert table.num_rows == 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"), [({"count": 0}, "count"), ({"problems": None}, "number of problems")]
+)
+def test_nonsense_plans(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        plan(**settings)
+
+
+def test_names() -> None:
+    assert collections.family_names(["rt444", "Chain"]) == sorted(collections.sets()["rt444"])
+    with pytest.raises(KeyError, match=r"'rt44'; sets: .*rt444"):
+        collections.family_names(["rt44"])
+
+
+# ---- verifying
+
+
+def test_verify(built: Path, tmp_path: Path) -> None:
+    collections.build([plan()], tmp_path, pictures=False)
+    verdicts = list(collections.verify(tmp_path))
+    assert len(verdicts) == 24
+    assert all(verdict.ok for verdict in verdicts)
+
+    folder = tmp_path / "small/BoxesStack"
+    (folder / "0001-local.hdf5").unlink()
+    with (folder / "0002-global.hdf5").open("r+b") as file:
+        file.seek(100)
+        file.write(b"?")
+    wrong = {
+        verdict.path: verdict.status for verdict in collections.verify(tmp_path) if not verdict.ok
+    }
+    assert wrong == {
+        "small/BoxesStack/0001-local.hdf5": "missing",
+        "small/BoxesStack/0002-global.hdf5": "changed",
+    }
+
+
+@pytest.mark.parametrize("fault", ["solution", "problem", "nonsense"])
+def test_verify_judges_what_the_hash_does_not_tell(built: Path, tmp_path: Path, fault: str) -> None:
+    """A catalogue whose hashes fit, over files that are wrong all the same."""
+    row = dict(collections.read_catalog(built).to_pylist()[5])
+    source = built / row["global_file"]
+    problem, solution = read(source), read_solution(source)
+    target = tmp_path / row["global_file"]
+    target.parent.mkdir(parents=True)
+    if fault == "solution":
+        fclib.write(target, problem, solution.replace(r=1.01 * solution.r, u=None))
+    elif fault == "problem":
+        fclib.write(target, problem.replace(mu=1.5 * np.asarray(problem.mu)), solution)
+    else:
+        target.write_bytes(b"no file of ours")
+    row |= {"local_file": None, "local_sha256": None, "global_sha256": catalog.sha256(target)}
+    catalog.write_catalog(tmp_path / catalog.FILE, [row])
+    (verdict,) = collections.verify(tmp_path)
+    expected = {"solution": "worse", "problem": "wrong digest", "nonsense": "unreadable"}
+    assert verdict.status == expected[fault]
+
+
+def test_no_catalogue_is_named(tmp_path: Path) -> None:
+    with pytest.raises(collections.CatalogError, match="there is no catalogue"):
+        list(collections.verify(tmp_path))
+    (tmp_path / catalog.FILE).write_bytes(b"PAR1 nonsense")
+    with pytest.raises(collections.CatalogError, match="cannot be read as a catalogue"):
+        collections.read_catalog(tmp_path)
+
+
+# ---- archives
+
+
+class Server(http.server.SimpleHTTPRequestHandler):
+    """Serves a folder, knows ranges, and may break off in the middle of a file."""
+
+    break_at: int | None = None  # bytes of an archive after which the connection is closed
+    ranges = True
+    requests: list[tuple[str, str | None]]
+
+    def do_GET(self) -> None:
+        asked = self.headers.get("Range")
+        type(self).requests.append((self.path, asked))
+        path = Path(self.translate_path(self.path))
+        if not path.is_file():
+            self.send_error(404)
+            return
+        content = path.read_bytes()
+        total = len(content)
+        first = int(asked.removeprefix("bytes=").rstrip("-")) if asked and self.ranges else 0
+        if first >= total > 0:
+            self.send_error(416)
+            return
+        self.send_response(206 if first else 200)
+        self.send_header("Content-Length", str(total - first))
+        self.end_headers()
+        content = content[first:]
+        if type(self).break_at is not None and path.suffix == ".zip":
+            content, type(self).break_at = content[: type(self).break_at], None
+        with contextlib.suppress(OSError):
+            self.wfile.write(content)
+
+    def log_message(self, *args: object) -> None:
+        pass
+
+
+@pytest.fixture
+def site(built: Path, tmp_path: Path) -> Iterator[tuple[str, Path, type[Server]]]:
+    # under the name of a family, as `get` knows only those
+    folder = tmp_path / "site"
+    collections.publish(built, folder)
+
+    class Handler(Server):
+        requests: list[tuple[str, str | None]] = []  # noqa: RUF012
+
+    handler = functools.partial(Handler, directory=str(folder))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        thread = threading.Thread(target=server.serve_forever, daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{server.server_port}", folder, Handler
+        server.shutdown()
+
+
+def test_published_twice_is_equal(built: Path, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        collections.publish(built, tmp_path / name)
+    for path in (tmp_path / "one").iterdir():
+        assert path.read_bytes() == (tmp_path / "two" / path.name).read_bytes()
+
+
+def test_what_was_changed_is_not_published(tmp_path: Path) -> None:
+    collections.build([plan(problems=2)], tmp_path / "built", pictures=False)
+    (tmp_path / "built/small/BoxesStack/0000-global.hdf5").write_bytes(b"")
+    with pytest.raises(archives.FetchError, match=r"0000-global\.hdf5: is not the catalogue"):
+        collections.publish(tmp_path / "built", tmp_path / "site")
+
+
+def test_get_fetches_what_was_published(
+    site: tuple[str, Path, type[Server]], built: Path, tmp_path: Path
+) -> None:
+    url, _, _ = site
+    assert collections.get(["BoxesStack"], url, tmp_path / "copy") == ["BoxesStack"]
+    copied = {k: v for k, v in files(tmp_path / "copy").items() if not k.startswith(".archives")}
+    assert copied == files(built)
+
+
+@pytest.mark.parametrize("ranges", [True, False])
+def test_get_goes_on_where_it_broke_off(
+    site: tuple[str, Path, type[Server]], built: Path, tmp_path: Path, ranges: bool
+) -> None:
+    url, _, server = site
+    server.break_at, server.ranges = 50_000, ranges
+    collections.get(["BoxesStack"], url, tmp_path / "copy")
+    asked = [rest for path, rest in server.requests if path.endswith(".zip")]
+    # in blocks of 8 kB; asked again from the start where the server knows no ranges
+    assert asked == [None, f"bytes={50_000 // 8192 * 8192}-"]
+    assert all(verdict.ok for verdict in collections.verify(tmp_path / "copy"))
+
+
+def test_get_refuses_what_the_registry_does_not_say(
+    site: tuple[str, Path, type[Server]], tmp_path: Path
+) -> None:
+    url, folder, _ = site
+    with (folder / "small-BoxesStack.zip").open("r+b") as file:
+        file.seek(200)
+        file.write(b"tampered")
+    with pytest.raises(archives.FetchError, match="not what the registry says"):
+        collections.get(["BoxesStack"], url, tmp_path / "copy")
+    assert not list((tmp_path / "copy").glob("*/*/*.hdf5"))
+
+
+def test_get_of_what_is_not_there(site: tuple[str, Path, type[Server]], tmp_path: Path) -> None:
+    url, _, _ = site
+    with pytest.raises(KeyError, match="Chain is not published"):
+        collections.get(["Chain"], url, tmp_path / "copy")
+    with pytest.raises(archives.FetchError, match="404"):
+        collections.get(["Chain"], url + "/elsewhere", tmp_path / "copy")
+    with pytest.raises(archives.FetchError, match="cannot be fetched"):
+        collections.get(["Chain"], "http://127.0.0.1:9", tmp_path / "copy")
+
+
+# ---- in Python
+
+
+def test_collection_is_a_lazy_sequence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path))
+    monkeypatch.setattr(Plan, "of_family", lambda name: plan(boxes=2, problems=3))
+    family = scenes.get("BoxesStack")
+    monkeypatch.setattr(family, "collection", "small")
+    problems = fclib.collection("BoxesStack")
+    assert not list(tmp_path.iterdir())
+    assert len(problems) == 3
+    assert problems.ids[1] == "small/BoxesStack/0001"
+    assert [problem.nc for problem in problems] == problems.catalog["nc"].to_pylist()
+    assert fclib.digest(problems[-1]) == fclib.digest(problems["small/BoxesStack/0002"])
+    assert len(problems[1:]) == 2
+    solution: Any = problems.solution(0)
+    assert fclib.merit(problems[0], solution).error <= 1e-8
+    assert fclib.load("small/BoxesStack/0001", form="local").formulation == "3DFC"
+    with pytest.raises(KeyError, match="no problem 'small/BoxesStack/0009'"):
+        fclib.load("small/BoxesStack/0009")
+    with pytest.raises(KeyError, match="SET/FAMILY/NUMBER"):
+        fclib.load("BoxesStack")
+    with pytest.raises(ValueError, match="form"):
+        fclib.load("small/BoxesStack/0001", form="dual")
+
+
+# ---- the families
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_family_is_built_from_its_default_scene(name: str, tmp_path: Path) -> None:
+    few = Plan.of_family(name)
+    table = collections.build(
+        [Plan(scene=few.scene, collection=few.collection, problems=3, form="global")],
+        tmp_path,
+        pictures=False,
+    )
+    assert table["number"].to_pylist() == [0, 1, 2]
+    assert table["status"].to_pylist() == ["converged"] * 3
+    assert all(verdict.ok for verdict in collections.verify(tmp_path))
+
+
+# ---- the command line
+
+ROBOT = """
+<mujoco model="legs"><compiler angle="radian"/><option timestep="0.004"/>
+<worldbody><geom type="plane" size="0 0 1"/>
+<body pos="0 0 0.51"><freejoint/><geom type="box" size="0.1 0.1 0.05" mass="2"/>
+  <body pos="0 0.1 0"><joint axis="0 1 0" limited="true" range="-0.3 0.3" damping="50"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 0.02 0 -0.48" mass="0.5"/></body>
+  <body pos="0 -0.1 0"><joint axis="0 1 0" limited="true" range="-0.3 0.3" frictionloss="{loss}"/>
+    <geom type="capsule" size="0.03" fromto="0 0 0 -0.02 0 -0.48" mass="0.5"/></body>
+</body></worldbody></mujoco>
+"""
+
+
+def invoke(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:
+    path = tmp_path / "legs.xml"
+    path.write_text(ROBOT.format(loss=0), encoding="utf-8")
+    done = invoke("simulate", path, "--steps", 40, "--out", tmp_path / "out", "--no-pictures")
+    assert done.exit_code == 0, done.output
+    rows = collections.read_catalog(tmp_path / "out").to_pylist()
+    assert rows
+    assert {row["family"] for row in rows} == {"legs"}
+    problem = read(tmp_path / "out" / rows[-1]["global_file"])
+    M = problem.M.toarray()
+    assert np.abs(M - np.diag(np.diag(M))).max() > 1e-3  # one tree of bodies
+    assert invoke("collection", "verify", tmp_path / "out").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (ROBOT.format(loss=1), "dry friction in joints"),
+        ("<mujoco><nonsense/></mujoco>", "MuJoCo refuses the MJCF"),
+        (b"\xff\xfe\x00", "is no text"),
+    ],
+)
+def test_simulate_refuses_in_a_line(tmp_path: Path, content: str | bytes, message: str) -> None:
+    path = tmp_path / "bad.xml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    done = invoke("simulate", path, "--out", tmp_path / "out")
+    assert done.exit_code == 1
+    assert message in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_simulate_leaves_out_what_it_is_told_to(tmp_path: Path) -> None:
+    path = tmp_path / "legs.xml"
+    path.write_text(ROBOT.format(loss=1), encoding="utf-8")
+    done = invoke(
+        *("simulate", path, "--steps", 10, "--out", tmp_path / "out", "--no-pictures"),
+        *("--ignore", "frictionloss"),
+    )
+    assert done.exit_code == 0, done.output
+
+
+def test_list_and_show() -> None:
+    listed = invoke("collection", "list")
+    assert listed.exit_code == 0
+    for name in FAMILIES:
+        assert name in listed.output
+        shown = invoke("collection", "show", name)
+        assert shown.exit_code == 0
+        assert "time_step" in shown.output
+    assert invoke("collection", "show", "Boxes").exit_code == 2
+
+
+def test_build_verify_and_publish_by_commands(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = invoke("collection", "build", "Chain", "--count", 2, "--out", out, "--form", "local")
+    assert done.exit_code == 0, done.output
+    assert "Chain" in done.output
+    assert len(list(out.glob("rt444/Chain/*.hdf5"))) == 2
+    assert (out / "rt444/Chain/distribution.svg").is_file()
+    assert invoke("collection", "verify", out).exit_code == 0
+    assert invoke("collection", "publish", out, "--out", tmp_path / "site").exit_code == 0
+    assert (tmp_path / "site/registry.txt").is_file()
+    victim = next(out.glob("rt444/Chain/*.hdf5"))
+    victim.write_bytes(b"")
+    spoilt = invoke("collection", "verify", out)
+    assert spoilt.exit_code == 1
+    assert "changed" in spoilt.output
+
+
+@pytest.mark.parametrize("arguments", [(), ("--all", "Chain"), ("Chian",)])
+def test_build_needs_names(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    assert invoke("collection", "build", *arguments, "--out", tmp_path).exit_code == 2
+
+
+def test_unwritable_folder_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    command = [sys.executable, "-m", "fclib", "collection", "build", "Chain", "--count", "1"]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path / "file" / "below")],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "below" in done.stderr

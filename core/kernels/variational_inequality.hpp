@@ -28,6 +28,12 @@ struct VelocityPoint {
   Vector hat;  ///< F(r) = u^
 };
 
+/// What tells whether a step is too long, in the metric.
+enum class StepRatio {
+  khobotov,       ///< ||F(a) - F(b)|| / ||a - b||
+  solodov_tseng,  ///< (a - b) . (F(a) - F(b)) / ||a - b||^2
+};
+
 enum class Metric { contact, uniform };
 inline constexpr std::array<std::string_view, 2> metrics{"contact", "uniform"};
 inline constexpr std::string_view metric_doc =
@@ -38,6 +44,7 @@ template <class Cone>
 class VariationalInequality {
  public:
   static constexpr int D = Cone::dim;
+  using Vec = typename Cone::Vec;
 
   VariationalInequality(const Delassus& problem, Metric metric)
       : problem_(problem), weight_(problem.nc()) {
@@ -87,21 +94,21 @@ class VariationalInequality {
     return (rounding > swamped * problem_.scale ? std::max(map, rounding) : map) / problem_.scale;
   }
 
-  /// ||F(a) - F(b)|| / ||a - b||; 0 where a = b.
-  [[nodiscard]] double khobotov(const VelocityPoint& a, const VelocityPoint& b) const {
-    double change = 0;
-    double slope = 0;
+  /// Of the two points; 0 where they are the same.
+  [[nodiscard]] double ratio(StepRatio which, const VelocityPoint& a,
+                             const VelocityPoint& b) const {
+    double distance = 0;  // ||a - b||^2
+    double slope = 0;     // ||F(a) - F(b)||^2
+    double product = 0;   // (a - b) . (F(a) - F(b))
     for (Index k = 0; k < problem_.nc(); ++k) {
-      change += (a.r - b.r).template segment<D>(D * k).squaredNorm() / weight_[k];
-      slope += (a.hat - b.hat).template segment<D>(D * k).squaredNorm() * weight_[k];
+      const Vec r = a.r.segment<D>(D * k) - b.r.segment<D>(D * k);
+      const Vec f = a.hat.segment<D>(D * k) - b.hat.segment<D>(D * k);
+      distance += r.squaredNorm() / weight_[k];
+      slope += f.squaredNorm() * weight_[k];
+      product += r.dot(f);
     }
-    return change > 0 ? std::sqrt(slope / change) : 0.0;
-  }
-
-  /// (a - b) . (F(a) - F(b)) / ||a - b||^2; 0 where a = b.
-  [[nodiscard]] double solodov_tseng(const VelocityPoint& a, const VelocityPoint& b) const {
-    const double change = distance_squared(a.r, b.r);
-    return change > 0 ? (a.r - b.r).dot(a.hat - b.hat) / change : 0.0;
+    if (!(distance > 0)) return 0.0;
+    return which == StepRatio::khobotov ? std::sqrt(slope / distance) : product / distance;
   }
 
   /// ||a - b||^2 in the metric.

@@ -10,9 +10,7 @@
 // Differs from the paper in: rho is relative to 1 / ||W||, the largest eigenvalue by the power
 // method, so that one value suits all units; each contact may have a step of its own (`metric`).
 
-#include "kernels/variational_inequality.hpp"
-#include "kernels/with_cone.hpp"
-#include "solve/iterates.hpp"
+#include "solve/projections.hpp"
 
 namespace fclib::fp_ds {
 
@@ -44,39 +42,21 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
   const double rho = options.rho / vi.largest_eigenvalue();
   VelocityPoint z = vi.point(start);
   vi.evaluate(z);
-  if (const auto end = iterates.visit(0, vi.error(z), z.r)) return *end;
+  if (const auto end = iterates.visit(0, z.r, [&] { return vi.error(z); })) return *end;
 
   for (std::int64_t k = 1;; ++k) {
     vi.project(z.r, rho, z.hat, z);
     vi.evaluate(z);
-    if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+    if (const auto end = iterates.visit(k, z.r, [&] { return vi.error(z); })) return *end;
   }
-}
-
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  const Vector start = r;
-  Iterates iterates(settings, r);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, iterates, start); });
 }
 
 }  // namespace
 
 const Solver& solver() {
-  static const Solver entry{
-      .name = "fp-ds",
-      .family = "variational inequality",
-      .title = "Fixed-point projection with a constant step",
-      .citation = "de Saxce & Feng 1998; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {3, 5},
-      .options = describe_options<Options>(),
-      .max_iterations = 1'000'000,
-      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
-      .solve = solve,
-  };
+  static const Solver entry = projection_entry<Options>(
+      "fp-ds", "Fixed-point projection with a constant step", "de Saxce & Feng 1998",
+      []<class Cone>(auto&... arguments) { return iterate<Cone>(arguments...); });
   return entry;
 }
 

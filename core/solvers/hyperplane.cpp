@@ -21,9 +21,7 @@
 
 #include <utility>
 
-#include "kernels/variational_inequality.hpp"
-#include "kernels/with_cone.hpp"
-#include "solve/iterates.hpp"
+#include "solve/projections.hpp"
 
 namespace fclib::hyperplane {
 
@@ -118,7 +116,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
   VelocityPoint y = z;
   VelocityPoint x = z;
   vi.evaluate(z);
-  if (const auto end = iterates.visit(0, vi.error(z), z.r)) return *end;
+  if (const auto end = iterates.visit(0, z.r, [&] { return vi.error(z); })) return *end;
 
   for (std::int64_t k = 1;; ++k) {
     vi.project(z.r, rho, z.hat, y);
@@ -129,7 +127,7 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
     // there
     if (enough <= rounding * z.hat.norm() * z.r.norm()) {
       std::swap(z, y);
-      if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+      if (const auto end = iterates.visit(k, z.r, [&] { return vi.error(z); })) return *end;
       continue;
     }
 
@@ -158,34 +156,16 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
     std::swap(z, y);
     rho = alpha < 1 ? std::max(rho * std::max(alpha, 0.5), least)
                     : std::min(rho * options.growth, most);
-    if (const auto end = iterates.visit(k, vi.error(z), z.r)) return *end;
+    if (const auto end = iterates.visit(k, z.r, [&] { return vi.error(z); })) return *end;
   }
-}
-
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  const auto options = parse_options<Options>(values);
-  const Vector start = r;
-  Iterates iterates(settings, r);
-  return with_cone(problem,
-                   [&]<class Cone>() { return iterate<Cone>(problem, options, iterates, start); });
 }
 
 }  // namespace
 
 const Solver& solver() {
-  static const Solver entry{
-      .name = "hyperplane",
-      .family = "variational inequality",
-      .title = "Hyperplane projection",
-      .citation = "Konnov 1993; Solodov & Svaiter 1999; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {3, 5},
-      .options = describe_options<Options>(),
-      .max_iterations = 1'000'000,
-      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
-      .solve = solve,
-  };
+  static const Solver entry = projection_entry<Options>(
+      "hyperplane", "Hyperplane projection", "Konnov 1993; Solodov & Svaiter 1999",
+      []<class Cone>(auto&... arguments) { return iterate<Cone>(arguments...); });
   return entry;
 }
 

@@ -26,6 +26,8 @@ def solve(sn: Any, np: Any, order: Any) -> Any:
     read, driver = (getattr(sn, name) for name in KINDS[order["kind"]])
     problem = read(order["path"])
     options = sn.SolverOptions(getattr(sn, order["solver"]))
+    if order["one_contact"]:
+        sn.solver_options_update_internal(options, 0, getattr(sn, order["one_contact"]))
     options.iparam[0] = order["max_iterations"]
     options.dparam[0] = order["tolerance"]
     r = np.array(order["r"], dtype=float)

@@ -56,8 +56,16 @@ FC3D: dict[str, tuple[str, str, str, int]] = {
     "nsn-ac": ("NSN_AC", "Nonsmooth Newton, Alart-Curnier", "Alart & Curnier 1991", 10_000),
     "nsn-fb": ("NSN_FB", "Nonsmooth Newton, Fischer-Burmeister", "Fukushima et al. 2002", 10_000),
     "nsn-nm": ("NSN_NM", "Nonsmooth Newton, natural map", HUBER, 10_000),
+    "nsgs-quartic": (
+        "NSGS",
+        "Nonsmooth Gauss-Seidel, exact contacts",
+        "Bonnefon & Daviet 2011",
+        BIG,
+    ),
+    "nsgs-projection": ("NSGS", "Nonsmooth Gauss-Seidel by projections", "Jean & Moreau 1992", BIG),
     "prox": ("PROX", "Proximal point over nonsmooth Newton", HUBER, 100_000),
     "tfp": ("TFP", "Tresca fixed point", "Haslinger 1983", 100_000),
+    "pfp": ("PFP", "Panagiotopoulos fixed point", "Panagiotopoulos 1975", 100_000),
     "aclmfp": ("ACLMFP", "ACLM fixed point of convex problems", "Acary et al. 2011", 100_000),
     "dsfp": ("DSFP", "De Saxce fixed point", "De Saxce & Feng 1998", 10 * BIG),
     "hp": ("HP", "Hyperplane projection", HUBER, 10 * BIG),
@@ -71,6 +79,11 @@ FC3D: dict[str, tuple[str, str, str, int]] = {
 FC2D: dict[str, tuple[str, str, str, int]] = {
     "2d-nsgs": ("NSGS", "Planar nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
     "2d-cpg": ("CPG", "Planar conjugate projected gradient", "Renouf & Alart 2005", BIG),
+}
+# its solver of one contact, where that is not the default
+ONE_CONTACT = {
+    "nsgs-quartic": "FRICTION_3D_ONECONTACT_QUARTIC",
+    "nsgs-projection": "FRICTION_3D_ONECONTACT_ProjectionOnConeWithLocalIteration",
 }
 
 
@@ -128,8 +141,9 @@ def _entry(
     name: str, kind: str, prefix: str, identifier: str, title: str, citation: str, iterations: int
 ) -> fclib.SolverInfo:
     def function(problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
-        return _solve(kind, f"SICONOS_{prefix}_{identifier}", problem, r, monitor)
+        return _solve(kind, f"SICONOS_{prefix}_{identifier}", one_contact, problem, r, monitor)
 
+    one_contact = f"SICONOS_{ONE_CONTACT[name]}" if name in ONE_CONTACT else ""
     rolling = kind.startswith("rolling")
     return make_solver(
         function,
@@ -144,7 +158,9 @@ def _entry(
     )
 
 
-def _solve(kind: str, identifier: str, problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
+def _solve(
+    kind: str, identifier: str, one_contact: str, problem: Local, r: Any, monitor: fclib.Monitor
+) -> Any:
     """One solve, or two where the tolerances do not mean the same."""
     if monitor.stop(r) or problem.nc == 0:
         return r
@@ -155,6 +171,7 @@ def _solve(kind: str, identifier: str, problem: Local, r: Any, monitor: fclib.Mo
             "path": str(path),
             "kind": kind,
             "solver": identifier,
+            "one_contact": one_contact,
             "max_iterations": min(monitor.max_iterations, 2**31 - 1),
             "tolerance": monitor.tolerance,
             "r": r.tolist(),

@@ -29,13 +29,15 @@ class Coulomb {
     if constexpr (D == 2) {
       return std::abs(x[1]);
     } else {
-      return x.template tail<D - 1>().norm();
+      // by components: vector loads of what was just stored by components stall
+      return std::sqrt(x[1] * x[1] + x[2] * x[2]);
     }
   }
 
   [[nodiscard]] Vec modified(const Vec& u) const {
-    Vec result = u;
-    result[0] += mu_ * tangential_norm(u);
+    Vec result;
+    result[0] = u[0] + mu_ * tangential_norm(u);
+    for (int k = 1; k < D; ++k) result[k] = u[k];
     return result;
   }
 
@@ -46,7 +48,7 @@ class Coulomb {
     Vec result;
     result[0] = (x[0] + mu_ * norm) / (1 + mu_ * mu_);
     const Real scale = norm > 0 ? mu_ * result[0] / norm : Real(0);
-    result.template tail<D - 1>() = scale * x.template tail<D - 1>();
+    for (int k = 1; k < D; ++k) result[k] = scale * x[k];
     return result;
   }
 

@@ -19,10 +19,9 @@
 #include <array>
 #include <cstdint>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
 #include "kernels/accelerated_gradient.hpp"
 #include "kernels/convex_residual.hpp"
+#include "kernels/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 
 namespace fclib::apgd {
@@ -101,12 +100,8 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
 Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

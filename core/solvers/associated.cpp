@@ -17,6 +17,7 @@
 // where an iterate before it was nearer to Coulomb's law.
 
 #include "kernels/interior_point.hpp"
+#include "solve/shared_options.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::associated {
@@ -24,33 +25,7 @@ namespace fclib::associated {
 namespace {
 
 struct Options : InteriorPointRules {
-  static constexpr auto fields() {
-    using O = Options;
-    return std::tuple{
-        OptionField<O, double>{.name = "step_cap",
-                               .member = &O::step_cap,
-                               .unit = "1",
-                               .doc = "highest share of the step to the boundary of the cones",
-                               .lowest = 0.1,
-                               .highest = 0.9999},
-        OptionField<O, double>{.name = "delta",
-                               .member = &O::delta,
-                               .unit = "mean of tr(W_aa) / d",
-                               .doc = "regularisation of the system at first",
-                               .lowest = 1e-8,
-                               .highest = 1},
-        OptionField<O, bool>{.name = "delta_follows",
-                             .member = &O::delta_follows,
-                             .doc = "whether delta is at most 1e4 times the complementarity"},
-        OptionField<O, double>{.name = "balance",
-                               .member = &O::balance,
-                               .unit = "1",
-                               .doc = "the complementarity is held where the residual exceeds it "
-                                      "this many times",
-                               .lowest = 1,
-                               .highest = 1e12},
-    };
-  }
+  static constexpr auto fields() { return interior_point_fields<Options>(); }
 };
 
 /// Of the tolerance, for complementarity and residual.

@@ -17,10 +17,10 @@
 #include <cmath>
 #include <vector>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
 #include "kernels/contact_problem.hpp"
 #include "kernels/natural_error.hpp"
+#include "kernels/with_cone.hpp"
+#include "solve/shared_options.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsgs {
@@ -30,52 +30,33 @@ namespace {
 enum class Rule { error, constant };
 constexpr std::array<std::string_view, 2> rules{"error", "constant"};
 
-struct Options {
+struct Options : ProximalOptions {
   Rule rule = Rule::error;
-  double alpha = 0.1;
-  double sigma = 5;
-  double nu = 1;
   double inner_accuracy = 0.1;
   std::int64_t inner_sweeps = 100;
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple{
-        OptionField<O, Rule>{.name = "rule",
-                             .member = &O::rule,
-                             .doc = "of alpha: sigma error^nu (at most sigma), or constant",
-                             .choices = rules},
-        OptionField<O, double>{.name = "alpha",
-                               .member = &O::alpha,
-                               .unit = "mean of tr(W_aa) / d",
-                               .doc = "where it is constant",
-                               .lowest = 1e-12,
-                               .highest = 1e6},
-        OptionField<O, double>{.name = "sigma",
-                               .member = &O::sigma,
-                               .unit = "mean of tr(W_aa) / d",
-                               .doc = "of sigma error^nu",
-                               .lowest = 1e-9,
-                               .highest = 1e9},
-        OptionField<O, double>{.name = "nu",
-                               .member = &O::nu,
-                               .unit = "1",
-                               .doc = "of sigma error^nu",
-                               .lowest = 0,
-                               .highest = 4},
-        OptionField<O, double>{.name = "inner_accuracy",
-                               .member = &O::inner_accuracy,
-                               .unit = "1",
-                               .doc = "error of an inner solution over that of the outer one",
-                               .lowest = 1e-6,
-                               .highest = 0.99},
-        OptionField<O, std::int64_t>{.name = "inner_sweeps",
-                                     .member = &O::inner_sweeps,
-                                     .unit = "sweeps",
-                                     .doc = "limit of an inner solution",
-                                     .lowest = 1,
-                                     .highest = 1e6},
-    };
+    return std::tuple_cat(
+        std::tuple{
+            OptionField<O, Rule>{.name = "rule",
+                                 .member = &O::rule,
+                                 .doc = "of alpha: sigma error^nu (at most sigma), or constant",
+                                 .choices = rules}},
+        proximal_fields<O>("mean of tr(W_aa) / d", "where it is constant"),
+        std::tuple{
+            OptionField<O, double>{.name = "inner_accuracy",
+                                   .member = &O::inner_accuracy,
+                                   .unit = "1",
+                                   .doc = "error of an inner solution over that of the outer one",
+                                   .lowest = 1e-6,
+                                   .highest = 0.99},
+            OptionField<O, std::int64_t>{.name = "inner_sweeps",
+                                         .member = &O::inner_sweeps,
+                                         .unit = "sweeps",
+                                         .doc = "limit of an inner solution",
+                                         .lowest = 1,
+                                         .highest = 1e6}});
   }
 };
 
@@ -187,12 +168,8 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
 Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

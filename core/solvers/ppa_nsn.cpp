@@ -17,9 +17,9 @@
 
 #include <array>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
 #include "kernels/proximal_point.hpp"
+#include "kernels/with_cone.hpp"
+#include "solve/shared_options.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsn {
@@ -29,47 +29,26 @@ namespace {
 enum class Rule { steps, error, constant };
 constexpr std::array<std::string_view, 3> rules{"steps", "error", "constant"};
 
-struct Options {
+struct Options : ProximalOptions {
   Rule rule = Rule::steps;
-  double alpha = 0.1;
-  double sigma = 5;
-  double nu = 1;
   double alpha_min = 1e-8;
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple{
-        OptionField<O, Rule>{.name = "rule",
-                             .member = &O::rule,
-                             .doc =
-                                 "of alpha: less as Newton takes fewer steps, sigma error^nu, or "
-                                 "constant",
-                             .choices = rules},
-        OptionField<O, double>{.name = "alpha",
-                               .member = &O::alpha,
-                               .unit = "tr(W_aa) / d",
-                               .doc = "at first, and where it is constant",
-                               .lowest = 1e-12,
-                               .highest = 1e6},
-        OptionField<O, double>{.name = "sigma",
-                               .member = &O::sigma,
-                               .unit = "tr(W_aa) / d",
-                               .doc = "of sigma error^nu",
-                               .lowest = 1e-9,
-                               .highest = 1e9},
-        OptionField<O, double>{.name = "nu",
-                               .member = &O::nu,
-                               .unit = "1",
-                               .doc = "of sigma error^nu",
-                               .lowest = 0,
-                               .highest = 4},
-        OptionField<O, double>{.name = "alpha_min",
-                               .member = &O::alpha_min,
-                               .unit = "tr(W_aa) / d",
-                               .doc = "least alpha",
-                               .lowest = 1e-15,
-                               .highest = 1},
-    };
+    return std::tuple_cat(
+        std::tuple{OptionField<O, Rule>{
+            .name = "rule",
+            .member = &O::rule,
+            .doc = "of alpha: less as Newton takes fewer steps, sigma error^nu, or "
+                   "constant",
+            .choices = rules}},
+        proximal_fields<O>("tr(W_aa) / d", "at first, and where it is constant"),
+        std::tuple{OptionField<O, double>{.name = "alpha_min",
+                                          .member = &O::alpha_min,
+                                          .unit = "tr(W_aa) / d",
+                                          .doc = "least alpha",
+                                          .lowest = 1e-15,
+                                          .highest = 1}});
   }
 
   [[nodiscard]] ProximalRules to_rules() const {
@@ -108,12 +87,8 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
 Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

@@ -16,10 +16,10 @@
 #include <array>
 #include <cstdint>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
 #include "kernels/convex_program.hpp"
+#include "kernels/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/shared_options.hpp"
 
 namespace fclib::tresca {
 
@@ -28,45 +28,19 @@ namespace {
 enum class Inner { gauss_seidel, projected_gradient, admm };
 constexpr std::array<std::string_view, 3> inners{"gauss_seidel", "projected_gradient", "admm"};
 
-struct Options {
+struct Options : FixedPointOptions {
+  Options() { local_iterations = 5; }
+
   Inner inner = Inner::projected_gradient;
-  double inner_accuracy = 0.1;
-  std::int64_t inner_iterations = 1000;
-  std::int64_t local_iterations = 5;
-  double relaxation = 1;
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple{
-        OptionField<O, Inner>{.name = "inner",
-                              .member = &O::inner,
-                              .doc = "solver of the convex problem on cylinders",
-                              .choices = inners},
-        OptionField<O, double>{.name = "inner_accuracy",
-                               .member = &O::inner_accuracy,
-                               .unit = "1",
-                               .doc = "of the convex problem, as a share of the current error",
-                               .lowest = 1e-6,
-                               .highest = 1},
-        OptionField<O, std::int64_t>{.name = "inner_iterations",
-                                     .member = &O::inner_iterations,
-                                     .unit = "iterations",
-                                     .doc = "of the inner solver before the threshold is updated",
-                                     .lowest = 1,
-                                     .highest = 1e9},
-        OptionField<O, std::int64_t>{.name = "local_iterations",
-                                     .member = &O::local_iterations,
-                                     .unit = "1",
-                                     .doc = "of Gauss-Seidel on a contact",
-                                     .lowest = 1,
-                                     .highest = 1e6},
-        OptionField<O, double>{.name = "relaxation",
-                               .member = &O::relaxation,
-                               .unit = "1",
-                               .doc = "share of the new threshold in the next",
-                               .lowest = 0.01,
-                               .highest = 1},
-    };
+    return std::tuple_cat(
+        std::tuple{OptionField<O, Inner>{.name = "inner",
+                                         .member = &O::inner,
+                                         .doc = "solver of the convex problem on cylinders",
+                                         .choices = inners}},
+        fixed_point_fields<O>());
   }
 };
 
@@ -110,12 +84,8 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
 Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import inspect
+import math
 from typing import Annotated, Any
 
 import typer
+from rich.padding import Padding
+from rich.text import Text
 
 import fclib
 from fclib import external
 from fclib.cli._output import Json, Report, make_table, out, usage_error
+
+DEFAULT = inspect.signature(fclib.solve).parameters["solver"].default
 
 
 def describe(option: fclib.OptionInfo) -> dict[str, Any]:
@@ -18,8 +24,28 @@ def describe(option: fclib.OptionInfo) -> dict[str, Any]:
         "type": " | ".join(option.choices) or option.type,
         "default": option.default,
         "unit": option.unit,
+        "lowest": option.lowest,
+        "highest": option.highest,
         "meaning": option.doc,
     }
+
+
+def default_of(option: fclib.OptionInfo) -> str:
+    """The default as it is given on the command line."""
+    default = option.default
+    return str(default).lower() if isinstance(default, bool) else f"{default}"
+
+
+def domain_of(option: fclib.OptionInfo) -> str:
+    """The values that an option takes: "float in [0.1, 1], unit 1/||W||"."""
+    if option.choices:
+        return "one of: " + " | ".join(option.choices)
+    text = option.type
+    ends = [option.lowest, option.highest]
+    if any(map(math.isfinite, ends)):
+        low, high = (f"{end:g}" if math.isfinite(end) else "..." for end in ends)
+        text += f" in [{low}, {high}]"
+    return text + (f", unit {option.unit}" if option.unit not in ("", "1") else "")
 
 
 def taken(solver: fclib.SolverInfo) -> str:
@@ -53,14 +79,20 @@ def show(solver: fclib.SolverInfo) -> None:
         "family": solver.family,
         "from": solver.origin,
         "citation": solver.citation,
-        "takes": f"{', '.join(takes)}; global and mixed problems in their reduced form",
-        "iterations": f"at most {solver.max_iterations}, where no other limit is given",
+        "takes": f"{', '.join(takes)}; global and mixed problems are brought to the local form",
+        "iterations": f"at most {solver.max_iterations:,}, where no other limit is given",
     }
     for name, text in lines.items():
         if text:
             out.print(f"  {name:10}  {text}", markup=False, highlight=False)
+    for option in solver.options:
+        out.print(f"  [bold]{option.name}[/] = {default_of(option)}", highlight=False)
+        for line in (domain_of(option), option.doc):
+            out.print(Padding(Text(line), (0, 0, 0, 6), expand=False))
     if solver.options:
-        out.print(make_table([describe(option) for option in solver.options]))
+        first = solver.options[0]
+        given = f"--option {first.name}={default_of(first)}"
+        out.print(f"  as in: fclib solve --solver {solver.name} {given} FILE", highlight=False)
     else:
         out.print("  no options")
     out.print()
@@ -88,6 +120,8 @@ def command(
         for solver in chosen:
             show(solver)
         return
+    # the default, the built-in ones by family, then those of others
+    chosen.sort(key=lambda s: (s.name != DEFAULT, s.origin != "fclib", s.origin, s.family, s.name))
     rows = [
         {
             "solver": solver.name,
@@ -98,7 +132,7 @@ def command(
         for solver in chosen
     ]
     out.print(make_table(rows))
-    out.print("\nfclib solvers NAME shows one with its options and its citation.")
+    out.print("\nfclib solvers NAME... shows them with their options and citations.")
     out.print("Any program is one, too: cmd:PROGRAM {input} {output}", highlight=False)
     for absent in external.absent():
         out.print(f"Not here: {absent.solvers}: {absent.missing}", markup=False, highlight=False)

@@ -151,8 +151,8 @@ def entries(
         )
 
     return (
-        entry(aclm, "convex fixed point", f"Fixed point of convex problems, by {title}"),
-        entry(relaxation, "relaxation", f"One convex problem, by {title}; {RELAXATION}"),
+        entry(aclm, "optimisation", f"Fixed point of convex problems, by {title}"),
+        entry(relaxation, "relaxation", f"Convex relaxation, by {title}: {RELAXATION}"),
     )
 
 

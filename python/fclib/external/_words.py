@@ -1,3 +1,3 @@
 """What several adapters say."""
 
-RELAXATION = "not Coulomb's law but its convex relaxation, exact where nothing slides"
+RELAXATION = "does not solve Coulomb's law, but where nothing slides"

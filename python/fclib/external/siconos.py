@@ -49,36 +49,49 @@ BIG = 10**6
 STORAGES = {"fc2d": "dense", "fc3d": "csr", "rolling_fc3d": "csc"}
 Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
 HUBER = "Acary, Bremond & Huber 2018"
+# families, as those of fclib
+SPLIT = "splitting"
+NEWTON = "newton"
+CONVEX = "optimisation"
+VI = "variational inequality"
 
-# name: kind of problem, solver of Siconos, title, citation, iterations where the caller sets none
-FC3D: dict[str, tuple[str, str, str, int]] = {
-    "nsgs": ("NSGS", "Nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
-    "nsn-ac": ("NSN_AC", "Nonsmooth Newton, Alart-Curnier", "Alart & Curnier 1991", 10_000),
-    "nsn-fb": ("NSN_FB", "Nonsmooth Newton, Fischer-Burmeister", "Fukushima et al. 2002", 10_000),
-    "nsn-nm": ("NSN_NM", "Nonsmooth Newton, natural map", HUBER, 10_000),
-    "nsgs-quartic": (
+# name: family, solver of Siconos, title, citation, iterations where the caller sets none
+Rows: TypeAlias = dict[str, tuple[str, str, str, str, int]]
+FC3D: Rows = {
+    "nsgs": (SPLIT, "NSGS", "Nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
+    "nsgs-quartic": (SPLIT, "NSGS", "Nonsmooth Gauss-Seidel, exact", "Bonnefon & Daviet 2011", BIG),
+    "nsgs-projection": (
+        SPLIT,
         "NSGS",
-        "Nonsmooth Gauss-Seidel, exact contacts",
-        "Bonnefon & Daviet 2011",
+        "Nonsmooth Gauss-Seidel, projections",
+        "Jean & Moreau 1992",
         BIG,
     ),
-    "nsgs-projection": ("NSGS", "Nonsmooth Gauss-Seidel by projections", "Jean & Moreau 1992", BIG),
-    "prox": ("PROX", "Proximal point over nonsmooth Newton", HUBER, 100_000),
-    "tfp": ("TFP", "Tresca fixed point", "Haslinger 1983", 100_000),
-    "pfp": ("PFP", "Panagiotopoulos fixed point", "Panagiotopoulos 1975", 100_000),
-    "aclmfp": ("ACLMFP", "ACLM fixed point of convex problems", "Acary et al. 2011", 100_000),
-    "dsfp": ("DSFP", "De Saxce fixed point", "De Saxce & Feng 1998", 10 * BIG),
-    "hp": ("HP", "Hyperplane projection", HUBER, 10 * BIG),
-    "soclcp": ("SOCLCP", f"Second-order cone problem; {RELAXATION}", HUBER, BIG),
-    "admm": ("ADMM", "ADMM", "Acary, Armand & Nguyen 2022", 10 * BIG),
-    "vi-eg": ("VI_EG", "Extragradient of the variational inequality", "Khobotov 1987", 10 * BIG),
-    "vi-fp": ("VI_FPP", "Fixed point of the variational inequality", HUBER, 10 * BIG),
-    "fp": ("FPP", "Fixed point and projection", HUBER, 10 * BIG),
-    "eg": ("EG", "Extragradient", HUBER, 10 * BIG),
+    "nsn-ac": (NEWTON, "NSN_AC", "Nonsmooth Newton, Alart-Curnier", "Alart & Curnier 1991", 10_000),
+    "nsn-fb": (
+        NEWTON,
+        "NSN_FB",
+        "Nonsmooth Newton, Fischer-Burmeister",
+        "Fukushima et al. 2002",
+        10_000,
+    ),
+    "nsn-nm": (NEWTON, "NSN_NM", "Nonsmooth Newton, natural map", HUBER, 10_000),
+    "prox": ("proximal point", "PROX", "Proximal point over nonsmooth Newton", HUBER, 100_000),
+    "tfp": (CONVEX, "TFP", "Tresca fixed point", "Haslinger 1983", 100_000),
+    "pfp": (CONVEX, "PFP", "Panagiotopoulos fixed point", "Panagiotopoulos 1975", 100_000),
+    "aclmfp": (CONVEX, "ACLMFP", "Fixed point of convex problems", "Acary et al. 2011", 100_000),
+    "admm": (CONVEX, "ADMM", "ADMM", "Acary, Armand & Nguyen 2022", 10 * BIG),
+    "soclcp": ("relaxation", "SOCLCP", f"Convex relaxation: {RELAXATION}", HUBER, BIG),
+    "dsfp": (VI, "DSFP", "De Saxce fixed point", "De Saxce & Feng 1998", 10 * BIG),
+    "hp": (VI, "HP", "Hyperplane projection", HUBER, 10 * BIG),
+    "vi-eg": (VI, "VI_EG", "Extragradient, for any inequality", "Khobotov 1987", 10 * BIG),
+    "vi-fp": (VI, "VI_FPP", "Fixed point, for any inequality", HUBER, 10 * BIG),
+    "fp": (VI, "FPP", "Fixed point and projection", HUBER, 10 * BIG),
+    "eg": (VI, "EG", "Extragradient", HUBER, 10 * BIG),
 }
-FC2D: dict[str, tuple[str, str, str, int]] = {
-    "2d-nsgs": ("NSGS", "Planar nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
-    "2d-cpg": ("CPG", "Planar conjugate projected gradient", "Renouf & Alart 2005", BIG),
+FC2D: Rows = {
+    "2d-nsgs": (SPLIT, "NSGS", "Planar nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
+    "2d-cpg": (CONVEX, "CPG", "Planar conjugate projected gradient", "Renouf & Alart 2005", BIG),
 }
 # its solver of one contact, where that is not the default
 ONE_CONTACT = {
@@ -124,6 +137,7 @@ def solvers() -> Sequence[fclib.SolverInfo]:
             "rolling-nsgs",
             "rolling_fc3d",
             "ROLLING_FRICTION_3D",
+            SPLIT,
             "NSGS",
             "Nonsmooth Gauss-Seidel with rolling friction",
             "Acary & Bourrier 2021",
@@ -138,7 +152,14 @@ def find(name: str) -> fclib.SolverInfo | None:
 
 
 def _entry(
-    name: str, kind: str, prefix: str, identifier: str, title: str, citation: str, iterations: int
+    name: str,
+    kind: str,
+    prefix: str,
+    family: str,
+    identifier: str,
+    title: str,
+    citation: str,
+    iterations: int,
 ) -> fclib.SolverInfo:
     def function(problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
         return _solve(kind, f"SICONOS_{prefix}_{identifier}", one_contact, problem, r, monitor)
@@ -148,8 +169,8 @@ def _entry(
     return make_solver(
         function,
         name=PREFIX + name,
-        family="siconos",
-        title=f"{title}, of Siconos",
+        family=family,
+        title=title,
         citation=citation if citation == HUBER else f"{citation}; {HUBER}",
         origin="siconos",
         dimensions=() if rolling else (2 if kind == "fc2d" else 3,),

@@ -6,7 +6,6 @@ import hashlib
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
 # what Coulomb's law is asked of: matrices, vectors and coefficients, in this order
 FIELDS = ("M", "H", "G", "W", "V", "R", "f", "w", "b", "q", "s", "mu", "mu_r")
@@ -22,6 +21,8 @@ def digest(problem: Any) -> str:
     Args:
         problem: any formulation.
     """
+    import scipy.sparse as sp  # takes a while, and not everyone needs it
+
     sha = hashlib.sha256(f"{problem.kind} {problem.spacedim}".encode())
     for name in FIELDS:
         value = getattr(problem, name, None)

@@ -225,6 +225,71 @@ def test_starts_from_the_guess(solver: str) -> None:
         assert result.iterations <= 1
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_refuses_a_guess_that_is_not_finite(solver: str, value: float) -> None:
+    for d in SOLVERS[solver].dimensions:
+        problem = PROBLEMS["ten contacts"](d)
+        r = np.zeros(problem.m)
+        r[-1] = value
+        with pytest.raises(fclib.ProblemError, match="guess r"):
+            fclib.solve(problem, solver, guess=fclib.Solution(r=r))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_the_history_is_what_the_callback_was_told(solver: str) -> None:
+    for d in SOLVERS[solver].dimensions:
+        problem = PROBLEMS["ten contacts"](d)
+        told: list[tuple[int, float]] = []
+
+        def callback(iteration: int, error: float, *_: object, told: Any = told) -> None:
+            told.append((iteration, error))
+
+        result = fclib.solve(problem, solver, 1e-6, history=True, callback=callback)
+        assert result.history is not None
+        assert [(row["iteration"], row["error"]) for row in result.history] == told
+        assert told
+        iterations = [iteration for iteration, _ in told]
+        assert iterations == sorted(iterations)
+        assert 0 <= iterations[0] <= iterations[-1] <= result.iterations
+        times = list(result.history["time"])
+        assert times == sorted(times)
+        if result.converged:
+            # the solver's own last error is the judge's, but for rounding
+            assert told[-1][1] <= 1e-6
+        assert fclib.solve(problem, solver, 1e-6).history is None
+
+
+@pytest.mark.parametrize("speed", [1e-12, 1e12])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_solves_in_any_unit_of_speed(solver: str, speed: float) -> None:
+    # the law and the error are homogeneous: q, u and r are multiplied together
+    for d in SOLVERS[solver].dimensions:
+        problem = in_units(1, speed)(d)
+        result = fclib.solve(problem, solver, 1e-6, time_limit=20)
+        assert_honest(problem, result, 1e-6)
+        assert result.converged or solver in RELAXATIONS
+
+
+@pytest.mark.parametrize(
+    "solver", [n for n in SOLVERS if any(o.name == "seed" for o in SOLVERS[n].options)]
+)
+def test_a_seed_is_a_path(solver: str) -> None:
+    choices = {
+        option.name: option.choices[-1] for option in SOLVERS[solver].options if option.choices
+    }
+    shuffled = {name: value for name, value in choices.items() if name == "shuffle"}
+    for d in SOLVERS[solver].dimensions:
+        problem = PROBLEMS["ten contacts"](d)
+        results = [
+            fclib.solve(problem, solver, 1e-15, max_iterations=3, seed=seed, **shuffled)
+            for seed in (1, 1, 2)
+        ]
+        first, same, other = (result.solution.r for result in results)
+        np.testing.assert_array_equal(first, same)
+        assert not np.array_equal(first, other)
+
+
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_leaves_its_problem_and_its_guess_alone(solver: str) -> None:
     for d in SOLVERS[solver].dimensions:

@@ -275,7 +275,7 @@ def test_solves_in_any_unit_of_speed(solver: str, speed: float) -> None:
     "solver", [n for n in SOLVERS if any(o.name == "seed" for o in SOLVERS[n].options)]
 )
 def test_a_seed_is_a_path(solver: str) -> None:
-    choices = {
+    choices: dict[str, Any] = {
         option.name: option.choices[-1] for option in SOLVERS[solver].options if option.choices
     }
     shuffled = {name: value for name, value in choices.items() if name == "shuffle"}

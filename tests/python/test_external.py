@@ -482,8 +482,8 @@ def test_the_program_in_c(root: Path, tmp_path: Path, d: int) -> None:
 
 EXTERNAL = [entry.name for entry in external.solvers()]
 RELAXED = {name for name in EXTERNAL if "relaxation" in fclib.find_solver(name).title}
-# Siconos' own ways: these need far more iterations than the others, or fail on some problems
-UNRELIABLE = {"siconos:hp", "siconos:dsfp", "siconos:eg", "siconos:fp"}
+# Siconos' own ways: these need far more iterations than the others, or lose digits, or fail
+UNRELIABLE = {"siconos:nsgs-quartic", "siconos:hp", "siconos:dsfp", "siconos:eg", "siconos:fp"}
 
 
 @pytest.mark.parametrize("name", EXTERNAL)

@@ -133,7 +133,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
         if problem.G is not None:
             G, b = columns(problem.G), problem.b
             assert b is not None
-            bilateral = relative(G.T @ v + b, sizes(G.T, v), b)
+            bilateral = relative(G.T @ v + b, sizes(G.T, v), sizes(G.T, solve(f)), b)
         u = H.T @ v + w
         velocity_terms = [sizes(H.T, v), w]
         q = H.T @ solve(f) + w

@@ -149,10 +149,14 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
     result.dynamics = relative((product(problem.M, v) - momentum).norm(),
                                {size_of_product(problem.M, v), largest});
   }
+  // of the condensed problem, whose terms do not vanish with v where bodies come to rest
+  const RealVector free = mass.solve(problem.f).cast<Real>();
   if (is_mixed(problem)) {
     const RealVector b = problem.b.cast<Real>();
-    result.bilateral = relative((product_transposed(problem.G, v) + b).norm(),
-                                {size_of_product(problem.G, v, true), b.norm()});
+    result.bilateral =
+        relative((product_transposed(problem.G, v) + b).norm(),
+                 {size_of_product(problem.G, v, true), size_of_product(problem.G, free, true),
+                  b.norm()});
   }
 
   // u = H^T v + w
@@ -163,7 +167,7 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
         relative((given - u).norm(), {given.norm(), size_of_product(problem.H, v, true), w.norm()});
   }
 
-  const RealVector q = product_transposed(problem.H, mass.solve(problem.f).cast<Real>()) + w;
+  const RealVector q = product_transposed(problem.H, free) + w;
   RealVector scale = RealVector::Zero(problem.mu.size());
   const SparseColumns h = to_eigen(problem.H);
   const SparseColumns y = mass.is_cholesky() ? mass.half_solve(h) : mass.solve(h);

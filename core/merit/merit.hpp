@@ -49,7 +49,8 @@ struct Merit {
                          .doc = "||M v - H r - G lambda - f|| over its largest term"},
         Field<M, double>{.name = "bilateral",
                          .member = &M::bilateral,
-                         .doc = "||G^T v + b|| or ||V^T r + R lambda + s|| over its largest term"},
+                         .doc = "||G^T v + b|| or ||V^T r + R lambda + s|| over its largest term, "
+                                "G^T M^-1 f among them"},
         Field<M, double>{.name = "kinematics",
                          .member = &M::kinematics,
                          .doc = "distance of the solution's u from the recomputed one, over the "

@@ -8,6 +8,7 @@ SECONDS := 60
 
 # what the installed package is made of
 SOURCES := CMakeLists.txt pyproject.toml README.md \
+           $(wildcard campaigns/*.toml) \
            $(shell find core bindings cmake python include -type f \
              \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.map' -o -name '*.py' \
                 -o -name py.typed \))

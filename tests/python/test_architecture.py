@@ -46,7 +46,7 @@ PYTHON: dict[str, set[str]] = {
     "scenes": set(),
     "simulate": {"api", "scenes"},
     "external": {"api", "_registry"},
-    "bench": {"api", "external"},
+    "bench": {"api", "external", "scenes", "simulate"},
     "collections": {"api", "scenes", "simulate"},
     "report": {"bench"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},

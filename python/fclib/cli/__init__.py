@@ -10,7 +10,7 @@ from __future__ import annotations
 import typer
 
 import fclib
-from fclib.cli import check, collection, convert, demo, info, simulate, solve, solvers
+from fclib.cli import bench, check, collection, convert, demo, info, simulate, solve, solvers
 from fclib.cli._output import fail, print_version
 
 app = typer.Typer(
@@ -23,6 +23,7 @@ app = typer.Typer(
 for module in (info, check, solve, convert, solvers, simulate, demo):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.add_typer(collection.app, name="collection")
+app.add_typer(bench.app, name="bench")
 app.callback(invoke_without_command=True)(print_version)
 
 

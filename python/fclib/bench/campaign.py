@@ -1,0 +1,357 @@
+"""A campaign: problems x solvers with options x tolerances x repeats, under limits.
+
+It is a TOML file (docs/bench.md), or made from the flags of the command line. `plan` makes the
+jobs of it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.metadata
+import math
+import random
+import shlex
+import shutil
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import fclib
+from fclib.bench import problems
+from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
+from fclib.bench.store import Store
+from fclib.bench.worker import load_modules
+
+PUBLISHED = Path(__file__).with_name("campaigns")
+NUMBERS = ("time_limit", "wall_limit", "memory")  # that a group of problems may set for itself
+KNOWN = {
+    "name",
+    "title",
+    "tolerances",
+    *NUMBERS,
+    "repeats",
+    "threads",
+    "seed",
+    "history",
+    "modules",
+    "solvers",
+    "problems",
+}
+KNOWN_OF_PROBLEMS = {"family", "files", "sample", "simulate", "planted", "tolerances", *NUMBERS}
+KNOWN_OF_SOLVER = {"name", "options", "label", "optional"}
+MADE = {
+    "simulate": {"family", "parameters", "steps", "seed"},
+    "planted": {"count", "contacts", "spacedim", "seed"},
+}
+
+
+class CampaignError(fclib.Error, ValueError):
+    """A campaign asks for what cannot be done, or what is not understood."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Problems of a campaign that share tolerances and limits."""
+
+    tolerances: tuple[float, ...]
+    limits: Limits
+    family: str = ""
+    files: tuple[str, ...] = ()
+    sample: int | None = None
+    simulate: Mapping[str, Any] | None = None
+    planted: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What is to be run."""
+
+    name: str
+    solvers: tuple[SolverChoice, ...]
+    groups: tuple[Group, ...]
+    title: str = ""
+    repeats: int = 1
+    threads: int = 1
+    seed: int = 0
+    history: bool = False
+    modules: tuple[str, ...] = ()
+    base: Path = field(default_factory=Path.cwd)  # what paths are relative to
+    text: str = ""  # as it was written
+    missing: tuple[str, ...] = ()  # optional solvers that are not here, and why
+
+    @classmethod
+    def read(
+        cls,
+        path: str | Path,
+        changes: Mapping[str, Any] = MappingProxyType({}),
+        sample: int | None = None,
+    ) -> Campaign:
+        """The campaign of a TOML file, or the published one of that name.
+
+        Args:
+            path: the file, or the name.
+            changes: entries that take the place of the file's, in its groups of problems too.
+            sample: so many problems of each group, where it is given.
+
+        Raises:
+            CampaignError: there is none, or it is not valid; the message names the entry.
+        """
+        file = Path(path)
+        if not file.exists() and (PUBLISHED / f"{path}.toml").exists():
+            file = PUBLISHED / f"{path}.toml"
+        try:
+            text = file.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            word = error.strerror if isinstance(error, OSError) else "is no text"
+            known = ", ".join(sorted(p.stem for p in PUBLISHED.glob("*.toml")))
+            raise CampaignError(f"{file}: {word}; published campaigns: {known}") from None
+        try:
+            entries = _toml().loads(text)
+        except ValueError as error:
+            raise CampaignError(f"{file}: {error}") from None
+        # what a published campaign names is found from where it is run
+        base = Path.cwd() if file.parent == PUBLISHED else file.resolve().parent
+        try:
+            groups = [
+                {key: value for key, value in row.items() if key not in changes}
+                | ({"sample": sample} if sample else {})
+                for row in entries.get("problems", ())
+            ]
+            return cls.of({"name": file.stem, **entries, "problems": groups, **changes}, base, text)
+        except CampaignError as error:
+            raise CampaignError(f"{file}: {error}") from None
+
+    @classmethod
+    def of(cls, entries: Mapping[str, Any], base: Path | None = None, text: str = "") -> Campaign:
+        """The campaign of the entries of a TOML file.
+
+        Raises:
+            CampaignError: an entry is unknown, missing, or has a wrong value.
+        """
+        base = base or Path.cwd()
+        _only(entries, KNOWN, "")
+        modules = tuple(str((base / m).resolve()) for m in _texts(entries, "modules"))
+        try:
+            load_modules(list(modules))
+        except fclib.SolverError as error:
+            raise CampaignError(f"modules: {error}") from None
+        choices, missing = _solvers(entries.get("solvers", ()), modules)
+        rows = entries.get("problems", ())
+        if not isinstance(rows, Sequence) or not rows:
+            raise CampaignError("problems: there is no [[problems]]")
+        return cls(
+            name=str(entries.get("name", "campaign")),
+            title=str(entries.get("title", "")),
+            solvers=choices,
+            groups=tuple(_group(row, entries, k) for k, row in enumerate(rows)),
+            repeats=_count(entries, "repeats", 1),
+            threads=_count(entries, "threads", 1),
+            seed=int(entries.get("seed", 0)),
+            history=bool(entries.get("history", False)),
+            modules=modules,
+            base=base,
+            text=text,
+            missing=missing,
+        )
+
+    def plan(
+        self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
+    ) -> list[Job]:
+        """The jobs, in the order in which they are to be done: repeat by repeat, each shuffled.
+
+        Args:
+            store: what it knows of files is not found out again.
+            tell: is called with the name of each file that is looked at.
+
+        Raises:
+            fclib.Error: a problem cannot be found, made or read.
+            ImportError: a problem is to be simulated, and MuJoCo is not there.
+        """
+        found: list[tuple[ProblemFacts, Group]] = []
+        for group in self.groups:
+            for path in problems.sample(self._paths(group), group.sample):
+                tell(path.name)
+                facts = store.known(path) if store else None
+                if facts is None:
+                    facts = problems.look(path, group.family)
+                    if store:
+                        store.note(path, facts)
+                found.append((replace(facts, family=group.family or facts.family), group))
+        random_order = random.Random(self.seed)
+        jobs: dict[str, Job] = {}
+        for repeat in range(self.repeats):
+            ours = [
+                Job(
+                    problem=facts,
+                    solver=choice,
+                    tol=tol,
+                    limits=group.limits,
+                    repeat=repeat,
+                    threads=self.threads,
+                    history=self.history,
+                    modules=self.modules,
+                )
+                for facts, group in found
+                for choice in self.solvers
+                for tol in group.tolerances
+            ]
+            random_order.shuffle(ours)
+            for job in ours:
+                jobs.setdefault(job.key, job)  # one problem under two names is run once
+        return list(jobs.values())
+
+    def _paths(self, group: Group) -> list[Path]:
+        paths = problems.files_of(group.files, self.base) if group.files else []
+        if group.simulate is not None:
+            paths += problems.simulated(
+                family=group.simulate["family"],
+                parameters=group.simulate.get("parameters", {}),
+                steps=group.simulate["steps"],
+                seed=group.simulate.get("seed", 0),
+            )
+        if group.planted is not None:
+            paths += problems.planted(
+                count=group.planted["count"],
+                contacts=group.planted["contacts"],
+                spacedim=group.planted.get("spacedim", 3),
+                seed=group.planted.get("seed", 0),
+            )
+        return paths
+
+
+def _toml() -> Any:
+    return importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
+
+
+def _only(entries: object, known: set[str], where: str) -> None:
+    if not isinstance(entries, Mapping):
+        raise CampaignError(f"{where or 'the file'}: is no table")
+    for name in entries:
+        if name not in known:
+            raise CampaignError(
+                f"{where}{name}: is not known here; there is: {', '.join(sorted(known))}"
+            )
+
+
+def _texts(entries: Mapping[str, Any], name: str) -> list[str]:
+    value = entries.get(name, [])
+    value = [value] if isinstance(value, str) else value
+    if not isinstance(value, list) or not all(isinstance(x, str) for x in value):
+        raise CampaignError(f"{name}: is neither a text nor a list of texts")
+    return list(value)
+
+
+def _positive(value: object, where: str) -> float:
+    number = float(value) if isinstance(value, (int, float)) else math.nan
+    if not number > 0 or isinstance(value, bool):
+        raise CampaignError(f"{where}: {value!r} is not a positive number")
+    return number
+
+
+def _count(entries: Mapping[str, Any], name: str, default: int) -> int:
+    value = entries.get(name, default)
+    if not isinstance(value, int) or isinstance(value, bool) or value < 1:
+        raise CampaignError(f"{name}: {value!r} is not a number of times, 1 or more")
+    return value
+
+
+def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
+    where = f"problems[{number}]."
+    _only(row, KNOWN_OF_PROBLEMS, where)
+    if not {"files", "simulate", "planted"} & set(row):
+        raise CampaignError(f"{where[:-1]}: has neither files, simulate nor planted")
+    for kind, known in MADE.items():
+        if kind in row:
+            _only(row[kind], known, f"{where}{kind}.")
+            needed = known - {"seed", "parameters", "spacedim"}
+            if absent := sorted(needed - set(row[kind])):
+                raise CampaignError(f"{where}{kind}: has no {absent[0]}")
+    values = {name: row.get(name, entries.get(name)) for name in ("tolerances", *NUMBERS)}
+    tolerances = values["tolerances"] or [1e-8]
+    if not isinstance(tolerances, list):
+        tolerances = [tolerances]
+    time = _positive(values["time_limit"] or 10.0, f"{where}time_limit")
+    return Group(
+        tolerances=tuple(_positive(x, f"{where}tolerances") for x in tolerances),
+        limits=Limits(
+            time=time,
+            wall=_positive(values["wall_limit"] or time, f"{where}wall_limit"),
+            memory=_positive(values["memory"] or 4000.0, f"{where}memory"),
+        ),
+        family=str(row.get("family", "")),
+        files=tuple(_texts(row, "files")),
+        sample=_count(row, "sample", 1) if "sample" in row else None,
+        simulate=row.get("simulate"),
+        planted=row.get("planted"),
+    )
+
+
+def _solvers(
+    rows: object, modules: Sequence[str]
+) -> tuple[tuple[SolverChoice, ...], tuple[str, ...]]:
+    if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
+        raise CampaignError("solvers: there is none")
+    choices: dict[str, SolverChoice] = {}
+    missing = []
+    for number, row in enumerate(rows):
+        where = f"solvers[{number}]."
+        entries = parse_solver(row) if isinstance(row, str) else row
+        _only(entries, KNOWN_OF_SOLVER, where)
+        if "name" not in entries:
+            raise CampaignError(f"{where[:-1]}: has no name")
+        name, options = str(entries["name"]), entries.get("options", {})
+        try:
+            info = fclib.find_solver(name)
+            info.check_options(options)
+        except fclib.OptionError as error:
+            if not entries.get("optional", False):
+                raise CampaignError(f"{where[:-1]}: {error}") from None
+            missing.append(str(error))
+            continue
+        choice = SolverChoice(
+            name=name,
+            options=options,
+            version=version_of(info, modules),
+            family=info.family,
+            origin=info.origin,
+            label=str(entries.get("label", "")),
+        )
+        if choice.title in choices:
+            raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")
+        choices[choice.title] = choice
+    if not choices:
+        raise CampaignError(f"solvers: none of them is here: {'; '.join(missing)}")
+    return tuple(choices.values()), tuple(missing)
+
+
+def parse_solver(text: str) -> dict[str, Any]:
+    """A solver as one text: "nsgs relaxation=1.2"; a command, "cmd:...", is taken as it is."""
+    if text.startswith("cmd:"):
+        return {"name": text}
+    name, *pairs = shlex.split(text) or [""]
+    options = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not (key and equals and value):
+            raise CampaignError(f"solver {text!r}: '{pair}' is not of the form name=value")
+        options[key] = value
+    return {"name": name, "options": options}
+
+
+def version_of(info: fclib.SolverInfo, modules: Sequence[str] = ()) -> str:
+    """What tells two versions of a solver apart: its package's, or the digest of its file."""
+    if info.origin == "fclib":
+        return fclib.__version__
+    file: str | None = next((path for path in modules if Path(path).stem == info.origin), None)
+    if info.name.startswith("cmd:"):
+        file = shutil.which(shlex.split(info.name.removeprefix("cmd:"))[0])
+    if file is not None:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
+    try:
+        return importlib.metadata.version(info.origin)
+    except (importlib.metadata.PackageNotFoundError, ValueError):
+        return ""

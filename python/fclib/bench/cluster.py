@@ -1,0 +1,198 @@
+"""Jobs on a Dask cluster: the same campaign on many machines.
+
+A task is a job; in the worker of Dask it is done by a keeper, as on one machine, so that no solver
+harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by others. The
+records come back to the one process that writes the store.
+
+The problems are read from where the campaign found them, a folder that all machines share, or are
+sent: then each worker gets the bytes of a file once, and keeps it in its cache folder.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib
+import os
+import tempfile
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import fclib
+from fclib.bench import problems
+from fclib.bench.conduct import Runner
+from fclib.bench.job import Job, Record
+from fclib.bench.pool import Hand
+
+AHEAD = 3  # jobs a thread of the cluster that are on their way at once
+PATIENCE = 20.0  # [s] for a scheduler to answer
+RETRIES = 5  # of a job whose worker of Dask dies
+
+# ---- in the workers of Dask
+
+_idle: list[Hand] = []  # one keeper for each thread that has been at work
+_lock = threading.Lock()
+
+
+def do(job: Job, data: bytes | None = None) -> Record:
+    """Do a job in this worker; data: the file of its problem, where it is not shared."""
+    if data is not None:
+        path = _kept(job.problem.hash, data)
+        job = dataclasses.replace(job, problem=dataclasses.replace(job.problem, path=str(path)))
+    with _lock:
+        hand = _idle.pop() if _idle else Hand(job.threads)
+    try:
+        return hand.do(job)
+    finally:
+        with _lock:
+            _idle.append(hand)
+
+
+def _kept(name: str, data: bytes) -> Path:
+    """The file of these bytes in the cache folder."""
+    folder = problems.cache_folder() / "sent"
+    path = folder / f"{name}.hdf5"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=folder, prefix=f".{name}-")
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+        Path(part).replace(path)
+    return path
+
+
+# ---- in the campaign
+
+
+def runner(client: Any, send: bool = False) -> Runner:
+    """What `conduct` needs to run its jobs on a cluster.
+
+    Args:
+        client: a ``distributed.Client``.
+        send: whether the problems are sent, because the machines share no folder.
+    """
+
+    def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        waiting: dict[Any, Job] = {}
+        sent: dict[str, Any] = {}
+        number = 0
+
+        def submit() -> Any:
+            nonlocal number
+            job = next(jobs, None)
+            if job is None:
+                return None
+            data = None
+            if send:
+                if job.problem.hash not in sent:
+                    data = Path(job.problem.path).read_bytes()
+                    sent[job.problem.hash] = client.scatter(data, hash=False)
+                data = sent[job.problem.hash]
+            number += 1
+            name = f"fclib-{job.key}-{number}"
+            future = client.submit(do, job, data, key=name, pure=False, retries=RETRIES)
+            waiting[future] = job
+            return future
+
+        def capacity() -> int:
+            return AHEAD * max(1, sum(map(int, client.nthreads().values())))
+
+        done = as_completed()
+        try:
+            while True:
+                # workers may come and go
+                while len(waiting) < capacity() and (future := submit()) is not None:
+                    done.add(future)
+                if not waiting:
+                    return
+                future = next(done)
+                job = waiting.pop(future)
+                try:
+                    record = future.result()
+                except KilledWorker as error:
+                    record = Record("killed", f"the workers of Dask that tried it died: {error}")
+                future.release()
+                yield job, record
+        finally:
+            client.cancel(list(waiting))
+
+    return run
+
+
+@contextmanager
+def on_scheduler(address: str, send: bool = False) -> Iterator[Runner]:
+    """The cluster of a Dask scheduler, which `dask scheduler` has started.
+
+    Raises:
+        fclib.Error: it does not answer.
+    """
+    from distributed import Client
+
+    try:
+        client = Client(address, timeout=PATIENCE)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise fclib.Error(f"{address}: no Dask scheduler answers: {error}") from None
+    with client:
+        yield runner(client, send)
+
+
+def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
+    """A cluster of Slurm jobs, none of them submitted yet, and how many workers are wanted.
+
+    Args:
+        options: ``workers`` (processes of Dask in all), and what ``dask_jobqueue.SLURMCluster``
+            has: ``queue``, ``account``, ``cores`` and ``processes`` of a job, ``memory``,
+            ``walltime``. Where a job has no number of processes, there is one for each core. Others
+            go to sbatch as they are: ``constraint=cascade`` as ``--constraint=cascade``.
+
+    Raises:
+        fclib.OptionError: a number is none.
+    """
+    SLURMCluster = importlib.import_module("dask_jobqueue").SLURMCluster
+
+    given = dict(options)
+    try:
+        workers = int(given.pop("workers", "1"))
+        cores = int(given.pop("cores", "1"))
+        processes = int(given.pop("processes", cores))
+    except ValueError as error:
+        raise fclib.OptionError(
+            f"slurm: workers, cores and processes are numbers: {error}"
+        ) from None
+    known = {name: given.pop(name) for name in ("queue", "account", "walltime") if name in given}
+    threads = (f"export {name}=1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"))
+    cluster = SLURMCluster(
+        cores=cores,
+        processes=processes,
+        memory=given.pop("memory", "4GB"),
+        job_extra_directives=[f"--{name}={value}" for name, value in given.items()],
+        job_script_prologue=list(threads),
+        **known,
+    )
+    return cluster, workers
+
+
+@contextmanager
+def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]:
+    """A cluster of Slurm jobs, submitted for this campaign.
+
+    Raises:
+        fclib.Error: Slurm is not here, or refuses the jobs.
+    """
+    from distributed import Client
+
+    cluster, workers = slurm_cluster(options)
+    try:
+        cluster.scale(workers)
+        with Client(cluster) as client:
+            yield runner(client, send)
+    except (OSError, RuntimeError) as error:
+        raise fclib.Error(f"slurm: {error}") from error
+    finally:
+        with suppress(Exception):
+            cluster.close()

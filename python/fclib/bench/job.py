@@ -1,0 +1,176 @@
+"""What travels between a campaign and the processes that run it: a job there, a record back."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from types import MappingProxyType
+from typing import Any
+
+# how a run may end; the first group is said by the solver and confirmed by the merit
+STATUSES: Mapping[str, str] = MappingProxyType(
+    {
+        "converged": "the recomputed error is at most the tolerance, within the limits",
+        "iteration_limit": "stopped itself at its limit of iterations",
+        "time_limit": "stopped itself at the time limit, or came too late",
+        "stalled": "gave up: nothing left to try",
+        "diverged": "says itself that it diverged",
+        "infeasible": "proved that the problem has no solution",
+        "interrupted": "stopped for another reason",
+        "inaccurate": "said to be done, and the recomputed error is above the tolerance",
+        "invalid": "returned numbers that are not finite",
+        "nothing": "returned no solution: none at all, or the starting point as it was",
+        "garbage": "returned what is no solution of this problem: another shape, another format",
+        "unsuitable": "does not take problems of this kind, and said so",
+        "error": "raised an exception, or ended with an exit status other than 0",
+        "cpu_limit": "was killed: it had used the CPU time, and did not stop",
+        "wall_limit": "was killed: the wall clock had run out, and it did not stop",
+        "memory": "ran out of the memory that it was allowed",
+        "crashed": "was ended by a signal of its own making, as a segmentation fault",
+        "killed": "was killed from outside, by the system or by a person",
+        "unreadable": "the problem cannot be read, or its file has changed: not the solver's fault",
+    }
+)
+# after these a worker is kept; after any other, who knows what the solver did to its process
+ORDERLY = frozenset(
+    (
+        "converged",
+        "iteration_limit",
+        "time_limit",
+        "stalled",
+        "diverged",
+        "infeasible",
+        "interrupted",
+        "unsuitable",
+    )
+)
+MERITS = (
+    "error",
+    "natural",
+    "scaled_natural",
+    "dynamics",
+    "bilateral",
+    "kinematics",
+    "cone",
+    "dual_cone",
+    "complementarity",
+    "open",
+    "stick",
+    "slide",
+)
+
+
+@dataclass(frozen=True)
+class ProblemFacts:
+    """A problem as campaigns know it: where it is, and what it is."""
+
+    hash: str  # fclib.digest
+    name: str
+    family: str
+    path: str  # absolute
+    kind: str  # which of the problems of the file
+    formulation: str
+    spacedim: int
+    n: int  # degrees of freedom, 0 for a local problem
+    p: int  # bilateral constraints
+    nc: int  # contacts
+    nnz: int  # of W, or of M
+    title: str
+
+
+@dataclass(frozen=True)
+class SolverChoice:
+    """A solver with the options that are set; an option left out has its default."""
+
+    name: str
+    options: Mapping[str, Any]
+    version: str = ""
+    family: str = ""
+    origin: str = ""
+    label: str = ""  # what tables call it
+
+    @property
+    def title(self) -> str:
+        """The label, or the name with its options: "nsgs relaxation=1.2"."""
+        words = (f"{key}={value}" for key, value in self.options.items())
+        return self.label or " ".join((self.name, *words))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a run may take."""
+
+    time: float  # [s] of CPU, all of its processes together
+    wall: float  # [s]
+    memory: float  # [MB] resident, beyond the idle worker
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run to be done."""
+
+    problem: ProblemFacts
+    solver: SolverChoice
+    tol: float
+    limits: Limits
+    repeat: int
+    threads: int
+    history: bool = False
+    modules: tuple[str, ...] = ()  # files of Python to be imported before, with users' solvers
+
+    @property
+    def key(self) -> str:
+        """What makes two runs the same; a store has no two rows of one key from one machine."""
+        parts = [
+            self.problem.hash,
+            self.solver.name,
+            sorted((name, repr(value)) for name, value in self.solver.options.items()),
+            self.solver.version,
+            repr(float(self.tol)),
+            [repr(float(x)) for x in (self.limits.time, self.limits.wall, self.limits.memory)],
+            self.threads,
+            self.repeat,
+        ]
+        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
+
+    def order(self) -> dict[str, Any]:
+        """The job as a worker is told it, in JSON's types."""
+        return {
+            "path": self.problem.path,
+            "kind": self.problem.kind,
+            "hash": self.problem.hash,
+            "solver": self.solver.name,
+            "options": dict(self.solver.options),
+            "tol": self.tol,
+            "limits": asdict(self.limits),
+            "history": self.history,
+            "modules": list(self.modules),
+        }
+
+
+@dataclass
+class Record:
+    """What came of a job; None is what is not known, as the error of a run that was killed."""
+
+    status: str
+    message: str = ""
+    iterations: int | None = None
+    cpu_s: float | None = None  # [s] of the solver alone, as the driver measures it
+    setup_s: float | None = None  # [s] of conversions and judgement inside the solve
+    total_cpu_s: float | None = None  # [s] of all processes of the run, measured by the bench
+    wall_s: float | None = None  # [s]
+    memory: float | None = None  # [MB] largest resident size of the run's processes, together
+    merits: Mapping[str, float] | None = None  # by MERITS, recomputed by the bench
+    stages: str | None = None  # JSON, of a solver that chains others
+    history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage
+    machine: Mapping[str, Any] | None = None
+    load: float | None = None  # [1] mean load of the last minute, at the start
+    frequency: float | None = None  # [MHz] at the start
+    started: float = 0.0  # [s] since 1970
+
+    @property
+    def solved(self) -> bool:
+        """Whether the error, recomputed, met the tolerance within the limits."""
+        return self.status == "converged"

@@ -1,0 +1,287 @@
+"""The process that keeps a worker: it hands it a job, watches it, kills it, and judges its answer.
+
+``python -m fclib.bench.keeper FD`` serves jobs from a socket until that is closed. The keeper never
+runs a solver: that is done by the worker that it forks, and renews after every failure. The
+solution comes back as numbers, and the keeper recomputes every merit from its own copy of the
+problem, so that nothing a solver does in its process changes the verdict.
+
+A run is killed with all processes that descend from it, in whatever group or session they are: what
+loses its parent becomes a child of the keeper.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib.bench import machine, processes
+from fclib.bench.job import MERITS, ORDERLY, Record
+from fclib.bench.worker import GRACE, Problems, of_signal, one_line, send, serve
+
+READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
+LOOKS = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
+LONGEST = 1 << 40  # [bytes] of a message
+
+
+class CampaignGone(Exception):  # noqa: N818 (no error)
+    """The campaign has ended."""
+
+
+class WorkerEnded(Exception):  # noqa: N818 (no error of ours)
+    """The worker has: on its own, or because it overran."""
+
+    def __init__(self, status: str, message: str) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class Watch:
+    """What a worker may take from now on, and what it takes."""
+
+    def __init__(
+        self, pid: int, wall: float = READY_LIMIT, cpu: float = math.inf, memory: float = math.inf
+    ) -> None:
+        self.pid = pid
+        self.limits = wall, cpu, memory
+        self.start = time.monotonic()
+        self.cpu_before, self.memory_before = processes.usage(pid)
+        self.cpu, self.memory = 0.0, self.memory_before
+
+    @property
+    def wall(self) -> float:
+        """[s] since the start."""
+        return time.monotonic() - self.start
+
+    def check(self) -> None:
+        """Look at the worker and what it has started.
+
+        Raises:
+            WorkerEnded: it has overrun.
+        """
+        cpu, memory = processes.usage(self.pid)
+        self.cpu = max(self.cpu, cpu - self.cpu_before)
+        self.memory = max(self.memory, memory)
+        most_wall, most_cpu, most_memory = self.limits
+        if self.memory - self.memory_before > most_memory:
+            raise WorkerEnded("memory", f"killed above {most_memory:g} MB")
+        if self.cpu > most_cpu + GRACE:
+            raise WorkerEnded("cpu_limit", f"killed after {self.cpu:.1f} s of CPU time")
+        if self.wall > most_wall + GRACE:
+            raise WorkerEnded("wall_limit", f"killed after {self.wall:.1f} s")
+
+
+class Keeper:
+    """A worker, and the problems that its answers are judged by."""
+
+    def __init__(self, campaign: Connection) -> None:
+        self.campaign = campaign
+        self.problems = Problems()
+        self.pid = 0
+        self.link: socket.socket | None = None  # to the worker
+        self.words = -1  # the standard error of the worker
+        self.said = b""
+
+    def start(self) -> socket.socket:
+        """The link to the worker, which is forked where there is none."""
+        if self.link is not None:
+            return self.link
+        ours, theirs = socket.socketpair()
+        reading, writing = os.pipe()
+        self.pid = os.fork()
+        if self.pid == 0:
+            try:
+                for unused in (ours, self.campaign):
+                    unused.close()
+                os.close(reading)
+                nothing = os.open(os.devnull, os.O_RDWR)
+                for number, to in enumerate((nothing, nothing, writing)):
+                    os.dup2(to, number)
+                os.setpgid(0, 0)
+                serve(theirs, self.problems)
+            except BaseException as error:
+                os.write(2, f"{type(error).__name__}: {error}\n".encode())
+            finally:
+                os._exit(1)
+        theirs.close()
+        os.close(writing)
+        self.words, self.said = reading, b""
+        self.link = ours
+        return ours
+
+    def stop(self) -> int | None:
+        """Kill the worker and all that it has started; its exit status where it has one."""
+        if self.link is None:
+            return None
+        status = processes.kill_all(self.pid)
+        while select.select([self.words], [], [], 0)[0] and self.listen():
+            pass
+        self.link.close()
+        os.close(self.words)
+        self.link, self.pid = None, 0
+        return status
+
+    def listen(self) -> bool:
+        """Take what the worker says on its standard error, whose end is kept; False at the last."""
+        heard = os.read(self.words, 1 << 16)
+        self.said = (self.said + heard)[-2000:]
+        return bool(heard)
+
+    def last_words(self) -> str:
+        """The last line of the worker's standard error."""
+        lines = self.said.decode(errors="replace").strip().splitlines()
+        return f": {lines[-1][:300]}" if lines else ""
+
+    def receive(self, watch: Watch) -> bytes:
+        """The next message of the worker, which is watched meanwhile.
+
+        Raises:
+            WorkerEnded: there will be none.
+            CampaignGone: the campaign is over.
+        """
+        assert self.link is not None
+        link, pause = self.link, LOOKS[0]
+        hears: list[Any] = [link, self.campaign, self.words]
+        got, size = bytearray(), 8
+        whole = False  # whether the length has been read
+        while True:
+            ready = select.select(hears, [], [], pause)[0]
+            if self.campaign in ready:  # nothing is sent while a job is being done
+                raise CampaignGone
+            if self.words in ready and not self.listen():
+                hears.remove(self.words)
+            if link in ready:
+                try:
+                    part = link.recv(min(size - len(got), 1 << 22))
+                except OSError:
+                    part = b""
+                if not part:
+                    raise self.ended()
+                got += part
+                if len(got) == size and not whole:
+                    size, whole = int.from_bytes(got, "little"), True
+                    got.clear()
+                    if size > LONGEST:
+                        raise WorkerEnded("garbage", "the worker sent no answer")
+                if len(got) == size and whole:
+                    return bytes(got)
+            if link not in ready or not whole:
+                watch.check()
+                pause = min(1.5 * pause, LOOKS[1])
+
+    def ended(self) -> WorkerEnded:
+        """Why a worker that has closed its link has ended."""
+        end = time.monotonic() + 1.0
+        leave = os.WEXITED | os.WNOHANG | os.WNOWAIT
+        while os.waitid(os.P_PID, self.pid, leave) is None:
+            if time.monotonic() > end:
+                return WorkerEnded("garbage", "the worker closed its link, and went on")
+            time.sleep(1e-3)
+        how = self.stop()
+        assert how is not None
+        if os.WIFSIGNALED(how):
+            number = os.WTERMSIG(how)
+            name = signal.Signals(number).name
+            return WorkerEnded(of_signal(number), f"ended by {name}{self.last_words()}")
+        return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{self.last_words()}")
+
+    def do(self, order: dict[str, Any]) -> Record:
+        """Do a job."""
+        record = Record(
+            "error",
+            started=time.time(),
+            load=os.getloadavg()[0],
+            frequency=machine.frequency(),
+            machine=machine.facts(),
+        )
+        try:
+            vectors = self.ask(order, record)
+        except WorkerEnded as end:
+            self.stop()
+            record.status, record.message = end.status, str(end)
+            return record
+        if vectors:
+            self.judge(order, record, vectors)
+        if record.status in ORDERLY:
+            processes.kill_orphans(but=self.pid)
+        else:
+            self.stop()
+        return record
+
+    def ask(self, order: dict[str, Any], record: Record) -> dict[str, Any]:
+        """Have the worker do a job: what it says goes into the record, its solution is returned.
+
+        Raises:
+            WorkerEnded: it has ended, or was to be ended; what is known of it is in the record.
+        """
+        link = self.start()
+        self.said = b""
+        try:
+            send(link, json.dumps(order).encode())
+        except OSError:
+            raise self.ended() from None
+        reply = self.receive(Watch(self.pid))
+        if reply == b"started":
+            limits = order["limits"]
+            watch = Watch(self.pid, limits["wall"], limits["time"], limits["memory"])
+            try:
+                reply = self.receive(watch)
+            finally:
+                record.wall_s, record.total_cpu_s = watch.wall, watch.cpu
+                record.memory = watch.memory
+        said = json.loads(reply)
+        said["memory"] = max(said.get("memory", 0.0), record.memory or 0.0) or None
+        names = said.pop("vectors", [])
+        for name, value in said.items():
+            setattr(record, name, value)
+        return {name: np.frombuffer(self.receive(Watch(self.pid))) for name in names}
+
+    def judge(self, order: dict[str, Any], record: Record, vectors: dict[str, Any]) -> None:
+        """Recompute every merit, and let it decide."""
+        try:
+            problem = self.problems.get(order)
+            merit = fclib.merit(problem, fclib.Solution(**vectors))
+        except fclib.FileError as error:
+            record.status, record.message = "unreadable", one_line(error)
+            return
+        except (fclib.Error, TypeError, ValueError) as error:
+            record.status, record.message = "garbage", one_line(error)
+            return
+        record.merits = {name: float(getattr(merit, name)) for name in MERITS}
+        if record.status != "converged":
+            return
+        limits = order["limits"]
+        if not merit.error <= order["tol"]:
+            record.status = "inaccurate"
+        elif (record.cpu_s or 0.0) > limits["time"] or (record.wall_s or 0.0) > limits["wall"]:
+            record.status, record.message = "time_limit", "solved, but too late"
+
+
+def main() -> None:
+    """Serve the campaign at the other end of a socket."""
+    campaign = Connection(int(sys.argv[1]))
+    processes.adopt_orphans()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    keeper = Keeper(campaign)
+    try:
+        while True:
+            order = campaign.recv()
+            campaign.send(keeper.do(order))
+    except (EOFError, OSError, CampaignGone):
+        pass
+    finally:
+        keeper.stop()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+"""The problems of a campaign: files, folders, and small ones that are made on the spot.
+
+What is made goes into a cache folder, under a name that says how it was made, so that it is made
+once; the same recipe gives the same problems, bit for bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib.bench.job import ProblemFacts
+
+SUFFIXES = (".hdf5", ".h5")
+
+
+def cache_folder() -> Path:
+    """Where problems that are made are kept: $FCLIB_CACHE, or fclib in the user's cache."""
+    own = os.environ.get("FCLIB_CACHE")
+    if own:
+        return Path(own)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fclib"
+
+
+def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
+    """The FCLIB files that patterns stand for: files, folders with all that is below, globs.
+
+    Raises:
+        fclib.FileError: a pattern stands for nothing.
+    """
+    found: dict[Path, None] = {}
+    for pattern in patterns:
+        path = Path(os.path.expandvars(pattern)).expanduser()
+        path = path if path.is_absolute() else base / path
+        if path.is_dir():
+            matches = [p for p in path.rglob("*") if p.suffix in SUFFIXES]
+        elif path.is_file():
+            matches = [path]
+        else:
+            matches = [p for p in _glob(path) if p.is_file()]
+        if not matches:
+            raise fclib.FileError(f"{path}: there is no such file, and none in such a folder")
+        found |= dict.fromkeys(sorted(match.resolve() for match in matches))
+    return list(found)
+
+
+def _glob(path: Path) -> Iterator[Path]:
+    parts = path.parts
+    fixed = next((k for k, part in enumerate(parts) if any(c in part for c in "*?[")), len(parts))
+    folder = Path(*parts[:fixed])
+    return folder.glob(str(Path(*parts[fixed:]))) if fixed < len(parts) else iter(())
+
+
+def sample(paths: list[Path], count: int | None) -> list[Path]:
+    """So many of them, evenly spread over their order; all where count is None."""
+    if count is None or count >= len(paths):
+        return paths
+    chosen = np.linspace(0, len(paths) - 1, count).round().astype(int)
+    return [paths[k] for k in chosen]
+
+
+def look(path: Path, family: str = "") -> ProblemFacts:
+    """What a campaign has to know of the problem of a file; of several the global one.
+
+    Args:
+        path: an FCLIB file.
+        family: where it is empty, the scene that the problem says to be from, or the folder's name.
+
+    Raises:
+        fclib.Error: it cannot be read.
+    """
+    kinds = [name for name in fclib.contents(path) if name not in ("solution", "guesses")]
+    kind = "global" if "global" in kinds else kinds[0] if kinds else None
+    problem = fclib.read(path, kind)
+    matrix: Any = getattr(problem, "W", None)
+    if matrix is None:
+        matrix = getattr(problem, "M", None)
+    return ProblemFacts(
+        hash=fclib.digest(problem),
+        name=path.stem,
+        family=family or _scene_of(problem.info) or path.parent.name,
+        path=str(path),
+        kind=problem.kind,
+        formulation=problem.formulation,
+        spacedim=problem.spacedim,
+        n=problem.n,
+        p=problem.p,
+        nc=problem.nc,
+        nnz=int(getattr(matrix, "nnz", getattr(matrix, "size", 0))),
+        title=problem.info.title,
+    )
+
+
+def _scene_of(info: fclib.ProblemInfo) -> str:
+    """The family that a simulated problem names in the last line of its description."""
+    lines = info.description.splitlines()
+    try:
+        return str(json.loads(lines[-1])["scene"])
+    except (IndexError, KeyError, TypeError, ValueError):
+        return ""
+
+
+# ---- problems that are made
+
+
+def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
+    """The files of a recipe; make(folder) writes them where they are not there yet."""
+    text = json.dumps({"fclib": fclib.__version__, **recipe}, sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:16]
+    folder = cache_folder() / "problems" / name
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder.parent))
+        try:
+            make(part)
+            (part / "recipe.json").write_text(text)
+            try:
+                part.rename(folder)
+            except OSError:
+                if not folder.is_dir():  # else another campaign was faster
+                    raise
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES)
+
+
+def simulated(
+    family: str, parameters: Mapping[str, Any], steps: Sequence[int], seed: int
+) -> list[Path]:
+    """The local problems of some steps of a scene; steps without contact are left out.
+
+    Raises:
+        ImportError: MuJoCo is not there.
+        fclib.OptionError: there is no such family, or it refuses the parameters.
+    """
+    wanted = set(steps)
+    recipe = {
+        "scene": family,
+        "parameters": dict(parameters),
+        "steps": sorted(wanted),
+        "seed": seed,
+    }
+
+    def make(folder: Path) -> None:
+        from fclib import scenes, simulate
+
+        try:
+            scene = scenes.get(family)(**parameters).scene(seed)
+        except (KeyError, TypeError, ValueError) as error:
+            raise fclib.OptionError(f"simulate {family}: {error}") from None
+        for step in simulate.simulate(scene, max(wanted) + 1):
+            if step.index in wanted and step.problem.nc:
+                local = step.problem.condense().replace(info=step.problem.info)
+                fclib.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
+
+    return made(recipe, make)
+
+
+def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
+    """Random local problems around a solution in which contacts are open, stick and slide in turn.
+
+    W = A A^T + I / 2 with A sparse, about 6 blocks a row; u and r obey Coulomb's law, and
+    q = u - W r.
+    """
+    recipe = {"planted": count, "contacts": contacts, "spacedim": spacedim, "seed": seed}
+
+    def make(folder: Path) -> None:
+        for number in range(count):
+            problem = _plant(contacts, spacedim, seed + number)
+            fclib.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
+
+    return made(recipe, make)
+
+
+def _plant(nc: int, d: int, seed: int) -> fclib.LocalProblem:
+    import scipy.sparse as sp
+
+    random = np.random.Generator(np.random.PCG64([seed, nc, d]))
+    mu = random.uniform(0.2, 0.8, nc)
+    u, r = np.zeros((nc, d)), np.zeros((nc, d))
+    for k in range(nc):
+        tangent = random.standard_normal(d - 1)
+        tangent /= np.linalg.norm(tangent)
+        normal = random.uniform(0.5, 2.0)
+        if k % 3 == 0:  # open
+            u[k] = [random.uniform(0.1, 1.0), *random.uniform(-1, 1, d - 1)]
+        elif k % 3 == 1:  # sticks
+            r[k] = [normal, *(random.uniform(0, 0.9) * mu[k] * normal * tangent)]
+        else:  # slides
+            r[k] = [normal, *(mu[k] * normal * tangent)]
+            u[k] = [0.0, *(-random.uniform(0.1, 1.0) * tangent)]
+    rows = np.repeat(np.arange(nc), 3)
+    columns = random.integers(0, nc, rows.size)
+    blocks = random.standard_normal((rows.size, d, d)) / np.sqrt(3 * d)
+    i = (d * rows[:, None, None] + np.arange(d)[:, None]) + np.zeros((1, 1, d), int)
+    j = (d * columns[:, None, None] + np.arange(d)) + np.zeros((1, d, 1), int)
+    A = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(d * nc, d * nc))
+    W = sp.csr_array(A @ A.T + 0.5 * sp.eye_array(d * nc))
+    return fclib.LocalProblem(
+        spacedim=d,
+        W=W,
+        q=u.ravel() - W @ r.ravel(),
+        mu=mu,
+        info=fclib.ProblemInfo(title=f"Planted, {nc} contacts, seed {seed}"),
+    )

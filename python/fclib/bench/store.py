@@ -1,0 +1,467 @@
+"""The store of a campaign: one SQLite file, one row a run.
+
+Tables: runs, and what they refer to by number: problems, solvers, machines, campaigns; history has
+the reports of runs for which they were asked. The view `results` has all of a run in one row. The
+columns and their units are in docs/bench.md, and `SCHEMA` below is what that says.
+
+A run is identified by its key (`fclib.bench.job.Job.key`). `Store.add` inserts it in one statement
+unless there is one of that key: a run is stored once, whatever is interrupted and however many
+campaigns write. The file is in WAL mode, which needs a local file system.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import json
+import os
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fclib
+from fclib.bench.job import MERITS, Job, ProblemFacts, Record
+
+VERSION = 1  # of the schema
+APPLICATION = 0x46434C42  # "FCLB"
+PATIENCE = 60.0  # [s] to wait for another writer
+
+SCHEMA = """
+CREATE TABLE campaigns (
+    id INTEGER PRIMARY KEY, name TEXT, text TEXT, planned INTEGER, skipped INTEGER, pid INTEGER,
+    node TEXT, started REAL, seen REAL, ended REAL
+);
+CREATE TABLE problems (
+    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, name TEXT, family TEXT, path TEXT, kind TEXT,
+    formulation TEXT, spacedim INTEGER, n INTEGER, p INTEGER, nc INTEGER, nnz INTEGER, title TEXT
+);
+CREATE TABLE solvers (
+    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, label TEXT, name TEXT, options TEXT,
+    version TEXT, family TEXT, origin TEXT
+);
+CREATE TABLE machines (
+    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, node TEXT, cpu TEXT, cores INTEGER,
+    memory_gb REAL, facts TEXT
+);
+CREATE TABLE runs (
+    id INTEGER PRIMARY KEY, key TEXT NOT NULL,
+    campaign INTEGER REFERENCES campaigns, problem INTEGER NOT NULL REFERENCES problems,
+    solver INTEGER NOT NULL REFERENCES solvers, machine INTEGER NOT NULL REFERENCES machines,
+    tol REAL, time_limit REAL, wall_limit REAL, memory_limit REAL, threads INTEGER, repeat INTEGER,
+    status TEXT NOT NULL, message TEXT, solved INTEGER NOT NULL, iterations INTEGER,
+    cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
+    {merits}, stages TEXT, load REAL, frequency_mhz REAL, started REAL,
+    UNIQUE (key, machine)
+);
+CREATE INDEX runs_by_campaign ON runs (campaign);
+CREATE TABLE history (
+    run INTEGER NOT NULL REFERENCES runs, iteration INTEGER, error REAL, time REAL, stage TEXT
+);
+CREATE INDEX history_by_run ON history (run);
+CREATE TABLE files (
+    path TEXT PRIMARY KEY, size INTEGER, modified INTEGER, problem INTEGER REFERENCES problems
+);
+CREATE VIEW results AS SELECT
+    runs.id AS run, runs.key, campaigns.name AS campaign,
+    problems.name AS problem, problems.family, problems.formulation, problems.spacedim, problems.n,
+    problems.p, problems.nc, problems.nnz, problems.title, problems.hash,
+    solvers.label AS solver, solvers.name AS solver_name, solvers.options, solvers.version,
+    solvers.family AS solver_family, solvers.origin,
+    runs.tol, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads, runs.repeat,
+    runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s, runs.setup_s,
+    runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits}, runs.stages,
+    machines.node, machines.cpu, machines.hash AS machine, runs.load, runs.frequency_mhz,
+    runs.started
+FROM runs
+JOIN problems ON problems.id = runs.problem
+JOIN solvers ON solvers.id = runs.solver
+JOIN machines ON machines.id = runs.machine
+LEFT JOIN campaigns ON campaigns.id = runs.campaign;
+""".format(
+    merits=", ".join(f"{name} REAL" for name in MERITS),
+    run_merits=", ".join(f"runs.{name}" for name in MERITS),
+)
+PROBLEM = tuple(field.name for field in dataclasses.fields(ProblemFacts))
+SOLVER = ("hash", "label", "name", "options", "version", "family", "origin")
+MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
+RUN = (
+    *("key", "campaign", "problem", "solver", "machine"),
+    *("tol", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
+    *("status", "message", "solved", "iterations"),
+    *("cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
+    *(*MERITS, "stages", "load", "frequency_mhz", "started"),
+)
+
+
+class StoreError(fclib.Error, ValueError):
+    """A file is no store, or one of another version."""
+
+
+@dataclass(frozen=True)
+class Status:
+    """How far a campaign is."""
+
+    name: str
+    planned: int
+    done: int
+    solved: int
+    statuses: dict[str, int]
+    started: float  # [s] since 1970
+    seen: float  # when it last said that it is alive
+    ended: float | None
+    node: str
+    pid: int
+    done_before: int  # of the runs planned, those that were there at the start
+
+    @property
+    def rate(self) -> float:
+        """Runs a second, since it was started."""
+        return (self.done - self.done_before) / max(1e-9, (self.ended or self.seen) - self.started)
+
+
+class Store:
+    """An open store; ``with Store(path) as store``."""
+
+    def __init__(self, path: str | Path, create: bool = True) -> None:
+        """Open a store, or make it.
+
+        Raises:
+            StoreError: the file is no store, or there is none and none is to be made.
+        """
+        self.path = Path(path)
+        if not create and not self.path.exists():
+            raise StoreError(f"{self.path}: there is no such store")
+        self._ids: dict[tuple[str, str], int] = {}
+        try:
+            self.db = sqlite3.connect(self.path, timeout=PATIENCE, isolation_level=None)
+            self._prepare()
+        except sqlite3.DatabaseError as error:
+            raise StoreError(f"{self.path}: {error}") from None
+
+    def _prepare(self) -> None:
+        db = self.db
+        version = db.execute("PRAGMA user_version").fetchone()[0]
+        empty = not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone()
+        if not empty and version != VERSION:
+            db.close()
+            if version == 0:
+                raise StoreError(f"{self.path}: is a database, but no store of fclib bench")
+            raise StoreError(
+                f"{self.path}: is of version {version}, this fclib knows {VERSION}; "
+                "read it with the fclib that made it"
+            )
+        db.execute("PRAGMA journal_mode = WAL")
+        db.execute("PRAGMA synchronous = NORMAL")
+        if empty:
+            with self.transaction():
+                # another may have made it meanwhile
+                if not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
+                    for statement in SCHEMA.split(";\n"):
+                        db.execute(statement)
+                    db.execute(f"PRAGMA application_id = {APPLICATION}")
+                    db.execute(f"PRAGMA user_version = {VERSION}")
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.db.close()
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """All or nothing of what is done in it."""
+        self.db.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+        except BaseException:
+            self.db.execute("ROLLBACK")
+            self._ids.clear()
+            raise
+        self.db.execute("COMMIT")
+
+    def _id(self, table: str, names: Sequence[str], values: Sequence[Any]) -> int:
+        """The number of a row of a table whose first column is its hash; it is made if needed."""
+        key = table, values[0]
+        if key not in self._ids:
+            marks = ", ".join("?" * len(names))
+            self.db.execute(
+                f"INSERT INTO {table} ({', '.join(names)}) VALUES ({marks}) ON CONFLICT DO NOTHING",
+                values,
+            )
+            query = f"SELECT id FROM {table} WHERE hash = ?"
+            self._ids[key] = int(self.db.execute(query, (values[0],)).fetchone()[0])
+        return self._ids[key]
+
+    def begin(self, name: str, text: str, planned: int, skipped: int, node: str) -> int:
+        """Note that a campaign starts; `skipped` of its `planned` runs are there. Its number."""
+        now = time.time()
+        cursor = self.db.execute(
+            "INSERT INTO campaigns (name, text, planned, skipped, pid, node, started, seen)"
+            " VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            (name, text, planned, skipped, os.getpid(), node, now, now),
+        )
+        assert cursor.lastrowid is not None
+        return cursor.lastrowid
+
+    def alive(self, campaign: int, ended: bool = False) -> None:
+        """Note that a campaign is at work, or has ended."""
+        now = time.time()
+        self.db.execute(
+            "UPDATE campaigns SET seen = ?, ended = ? WHERE id = ?",
+            (now, now if ended else None, campaign),
+        )
+
+    def keys(self) -> set[str]:
+        """The keys of all runs."""
+        return {key for (key,) in self.db.execute("SELECT key FROM runs")}
+
+    def has(self, key: str) -> bool:
+        """Whether there is a run of a key."""
+        return self.db.execute("SELECT 1 FROM runs WHERE key = ?", (key,)).fetchone() is not None
+
+    def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
+        """Store a run; False where there is one of its key."""
+        merits = record.merits or {}
+        with self.transaction():
+            problem = self._id(
+                "problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM]
+            )
+            choice = job.solver
+            options = json.dumps(dict(choice.options), sort_keys=True)
+            solver = self._id(
+                "solvers",
+                SOLVER,
+                [
+                    "\n".join((choice.title, choice.name, options, choice.version)),
+                    choice.title,
+                    choice.name,
+                    options,
+                    choice.version,
+                    choice.family,
+                    choice.origin,
+                ],
+            )
+            facts = dict(record.machine or {})
+            text = json.dumps(facts, sort_keys=True)
+            machine = self._id(
+                "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
+            )
+            values = [
+                job.key,
+                campaign,
+                problem,
+                solver,
+                machine,
+                job.tol,
+                job.limits.time,
+                job.limits.wall,
+                job.limits.memory,
+                job.threads,
+                job.repeat,
+                record.status,
+                record.message,
+                int(record.solved),
+                record.iterations,
+                record.cpu_s,
+                record.setup_s,
+                record.total_cpu_s,
+                record.wall_s,
+                record.memory,
+                *(merits.get(name) for name in MERITS),
+                record.stages,
+                record.load,
+                record.frequency,
+                record.started,
+            ]
+            marks = ", ".join("?" * len(RUN))
+            cursor = self.db.execute(
+                f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
+                " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
+                [*values, job.key],
+            )
+            if cursor.rowcount == 0:
+                return False
+            if record.history:
+                run = cursor.lastrowid
+                self.db.executemany(
+                    "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
+                    [(run, *report) for report in record.history],
+                )
+        return True
+
+    # ---- what is known of files, so that a campaign need not read them again
+
+    def known(self, path: Path) -> ProblemFacts | None:
+        """The problem of a file that has not changed since it was noted."""
+        info = path.stat()
+        row = self.db.execute(
+            f"SELECT {', '.join('problems.' + name for name in PROBLEM)} FROM files"
+            " JOIN problems ON problems.id = files.problem"
+            " WHERE files.path = ? AND size = ? AND modified = ?",
+            (str(path), info.st_size, info.st_mtime_ns),
+        ).fetchone()
+        if row is None:
+            return None
+        return ProblemFacts(**dict(zip(PROBLEM, row, strict=True)) | {"path": str(path)})
+
+    def note(self, path: Path, facts: ProblemFacts) -> None:
+        """Note what a file holds."""
+        info = path.stat()
+        with self.transaction():
+            problem = self._id("problems", PROBLEM, [getattr(facts, name) for name in PROBLEM])
+            self.db.execute(
+                "INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?)",
+                (str(path), info.st_size, info.st_mtime_ns, problem),
+            )
+
+    # ---- what others read
+
+    def columns(self) -> list[str]:
+        """The columns of `results`."""
+        return [row[1] for row in self.db.execute("PRAGMA table_info(results)")]
+
+    def results(self, where: str = "", values: Sequence[Any] = ()) -> list[dict[str, Any]]:
+        """All runs, a row each, in the order in which they were stored.
+
+        Args:
+            where: a condition of SQL on the columns of `results`, with a ? for each of the values.
+            values: in their order.
+        """
+        condition = f" WHERE {where}" if where else ""
+        cursor = self.db.execute(f"SELECT * FROM results{condition} ORDER BY run", values)
+        names = [column[0] for column in cursor.description]
+        return [dict(zip(names, row, strict=True)) for row in cursor]
+
+    def history(self, run: int) -> list[tuple[int, float, float, str]]:
+        """The reports of a run: iteration, error, time [s], stage."""
+        query = "SELECT iteration, error, time, stage FROM history WHERE run = ? ORDER BY rowid"
+        return list(self.db.execute(query, (run,)))
+
+    def status(self) -> list[Status]:
+        """The campaigns that have written here, the last one first."""
+        found = []
+        rows = self.db.execute(
+            "SELECT id, name, planned, skipped, started, seen, ended, node, pid FROM campaigns"
+            " ORDER BY id DESC"
+        ).fetchall()
+        for number, name, planned, skipped, started, seen, ended, node, pid in rows:
+            counts = dict(
+                self.db.execute(
+                    "SELECT status, COUNT(*) FROM runs WHERE campaign = ? GROUP BY status",
+                    (number,),
+                )
+            )
+            done = sum(counts.values())
+            found.append(
+                Status(
+                    name=name,
+                    planned=planned,
+                    done=skipped + done,
+                    solved=counts.get("converged", 0),
+                    statuses=counts,
+                    started=started,
+                    seen=seen,
+                    ended=ended,
+                    node=node,
+                    pid=pid,
+                    done_before=skipped,
+                )
+            )
+        return found
+
+    def merge(self, others: Iterable[str | Path]) -> int:
+        """Take over the runs of other stores, those of other machines beside the own ones.
+
+        A run of the same key from the same machine is taken once.
+
+        Returns:
+            How many were new.
+
+        Raises:
+            StoreError: one of them is no store.
+        """
+        added = 0
+        for path in others:
+            if Path(path).resolve() == self.path.resolve():
+                raise StoreError(f"{path}: is the store that the others are to be merged into")
+            with Store(path, create=False) as other, self.transaction():
+                added += self._take(other)
+        return added
+
+    def _take(self, other: Store) -> int:
+        numbers: dict[str, dict[int, int]] = {}
+        for table, names in (("problems", PROBLEM), ("solvers", SOLVER), ("machines", MACHINE)):
+            rows = other.db.execute(f"SELECT id, {', '.join(names)} FROM {table}")
+            numbers[table] = {row[0]: self._id(table, names, row[1:]) for row in rows}
+        campaigns: dict[int | None, int | None] = {None: None}
+        columns = "name, text, planned, skipped, pid, node, started, seen, ended"
+        for number, *row in other.db.execute(f"SELECT id, {columns} FROM campaigns"):
+            same = "SELECT id FROM campaigns WHERE name IS ? AND node IS ? AND started IS ?"
+            found = self.db.execute(same, (row[0], row[5], row[6])).fetchone()
+            campaigns[number] = (
+                found[0]
+                if found
+                else self.db.execute(
+                    f"INSERT INTO campaigns ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row
+                ).lastrowid
+            )
+        added = 0
+        marks = ", ".join("?" * len(RUN))
+        for number, *values in other.db.execute(f"SELECT id, {', '.join(RUN)} FROM runs"):
+            run = dict(zip(RUN, values, strict=True))
+            run["campaign"] = campaigns[run["campaign"]]
+            for column, table in (
+                ("problem", "problems"),
+                ("solver", "solvers"),
+                ("machine", "machines"),
+            ):
+                run[column] = numbers[table][run[column]]
+            cursor = self.db.execute(
+                f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({marks}) ON CONFLICT DO NOTHING",
+                list(run.values()),
+            )
+            if cursor.rowcount:
+                added += 1
+                new = cursor.lastrowid
+                self.db.executemany(
+                    "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
+                    [(new, *report) for report in other.history(number)],
+                )
+        return added
+
+    def export(self, path: str | Path) -> int:
+        """Write `results` as .csv or .parquet, whole or not at all; the number of rows.
+
+        Raises:
+            StoreError: the name ends otherwise.
+            ImportError: Parquet needs pyarrow.
+        """
+        path = Path(path)
+        rows, columns = self.results(), self.columns()
+        part = path.with_name(f".{path.name}.part")
+        try:
+            if path.suffix == ".csv":
+                with part.open("w", newline="") as file:
+                    writer = csv.DictWriter(file, columns)
+                    writer.writeheader()
+                    writer.writerows(rows)
+            elif path.suffix == ".parquet":
+                import pyarrow as pa
+                import pyarrow.parquet as pq
+
+                table = pa.table({name: [row[name] for row in rows] for name in columns})
+                pq.write_table(table, part)
+            else:
+                raise StoreError(f"{path}: a store is exported to .csv or .parquet")
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+        return len(rows)

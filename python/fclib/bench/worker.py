@@ -1,0 +1,275 @@
+"""The process that solves: it is limited, watched and never trusted.
+
+It is forked by a keeper, and talks to it over a socket, in JSON and in the bytes of arrays. It
+reads the problem, sets its own limits, says that it starts, runs the solver, and sends what that
+returned; the keeper judges it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import os
+import re
+import resource
+import signal
+import sys
+import time
+from collections import OrderedDict
+from pathlib import Path
+from socket import MSG_WAITALL, socket
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import fclib
+from fclib.bench import processes
+
+GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
+CACHE = 256e6  # [bytes] of problems that a process keeps
+VECTORS = ("v", "u", "r", "l")
+STAGE = ("name", "calls", "solved", "iterations", "time")
+HISTORY = 500  # reports that are kept of a run, the first and the last among them
+
+# what solvers that are not of the core say through fclib.SolverError
+BY_SIGNAL = re.compile(r"(?:was ended by signal|ended with signal) (\d+)")
+NOTHING = ("made no output", "wrote no /solution")
+GARBAGE = ("its output", "its solution has", "returned an array of shape")
+
+
+class Problems:
+    """The problems read last, while they are small enough together."""
+
+    def __init__(self) -> None:
+        self.kept: OrderedDict[tuple[str, str], tuple[fclib.Problem, int]] = OrderedDict()
+
+    def get(self, order: dict[str, Any]) -> fclib.Problem:
+        """The problem of an order.
+
+        Raises:
+            fclib.Error: it cannot be read, or is another one than it was.
+        """
+        key = (order["path"], order["hash"])
+        if key not in self.kept:
+            problem = fclib.read(order["path"], order["kind"])
+            if fclib.digest(problem) != order["hash"]:
+                raise fclib.FileError(
+                    f"{order['path']}: has changed since the campaign looked at it; start it again"
+                )
+            self.kept[key] = problem, Path(order["path"]).stat().st_size
+        self.kept.move_to_end(key)
+        while len(self.kept) > 1 and sum(size for _, size in self.kept.values()) > CACHE:
+            self.kept.popitem(last=False)
+        return self.kept[key][0]
+
+
+def load_modules(paths: list[str]) -> None:
+    """Import files of Python, once, so that the solvers in them are registered.
+
+    Raises:
+        fclib.SolverError: a file cannot be imported.
+    """
+    for path in paths:
+        name = Path(path).stem
+        known = sys.modules.get(name)
+        if known is not None and getattr(known, "__file__", None) == path:
+            continue
+        spec = importlib.util.spec_from_file_location(name, path)
+        if spec is None or spec.loader is None:
+            raise fclib.SolverError(f"{path}: is no file of Python")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        try:
+            spec.loader.exec_module(module)
+        except Exception as error:
+            del sys.modules[name]
+            raise fclib.SolverError(f"{path}: {type(error).__name__}: {error}") from error
+
+
+def send(link: socket, message: bytes) -> None:
+    """Send a message: its length (8 bytes), and itself."""
+    link.sendall(len(message).to_bytes(8, "little") + message)
+
+
+def receive(link: socket) -> bytes:
+    """The next message; EOFError where there is none."""
+
+    def exactly(size: int) -> bytes:
+        got = link.recv(size, MSG_WAITALL)
+        if len(got) < size:
+            raise EOFError
+        return got
+
+    return exactly(int.from_bytes(exactly(8), "little"))
+
+
+def limit(order: dict[str, Any]) -> None:
+    """Limits of the kernel, which hold where the keeper's watch should fail.
+
+    The keeper kills at the limits of the order; these are beyond.
+    """
+    limits = order["limits"]
+    if math.isfinite(limits["time"]):
+        _lower(resource.RLIMIT_CPU, math.ceil(time.process_time() + limits["time"] + GRACE) + 1)
+    if math.isfinite(limits["memory"]):
+        _lower(resource.RLIMIT_AS, processes.address_space() + int(2 * limits["memory"] * 1e6))
+
+
+def _lower(kind: int, value: int) -> None:
+    hard = resource.getrlimit(kind)[1]
+    resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def unlimit() -> None:
+    """Lift the limits between runs."""
+    for kind in (resource.RLIMIT_CPU, resource.RLIMIT_AS):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (hard, hard))
+
+
+def serve(keeper: socket, problems: Problems) -> None:
+    """Do what comes, until the keeper is gone."""
+    processes.die_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the campaign's
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    while True:
+        try:
+            order = json.loads(receive(keeper))
+        except (EOFError, OSError):
+            os._exit(0)
+        reply, arrays = answer(order, problems, keeper)
+        unlimit()
+        send(keeper, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
+        for array in arrays:
+            send(keeper, array.tobytes())
+
+
+def answer(
+    order: dict[str, Any], problems: Problems, keeper: socket
+) -> tuple[dict[str, Any], list[npt.NDArray[np.float64]]]:
+    """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
+    try:
+        problem = problems.get(order)
+    except (fclib.Error, OSError, MemoryError) as error:
+        return {"status": "unreadable", "message": one_line(error)}, []
+    try:
+        load_modules(order["modules"])
+        solver = fclib.find_solver(order["solver"])
+        solver.check_options(order["options"])
+    except fclib.Error as error:
+        return {"status": "error", "message": one_line(error)}, []
+
+    processes.forget_peak()
+    me = os.getpid()
+    limit(order)
+    send(keeper, b"started")
+    before = total_cpu(me)
+    start = time.perf_counter()
+    result: fclib.Result | None = None
+    try:
+        result = fclib.solve(
+            problem,
+            order["solver"],
+            order["tol"],
+            time_limit=order["limits"]["wall"],
+            history=order["history"],
+            **order["options"],
+        )
+        status, message = result.status, ""
+    except Exception as error:
+        status, message = classify(error), one_line(error)
+    wall = time.perf_counter() - start
+    unlimit()
+    reply: dict[str, Any] = {
+        "status": status,
+        "message": message,
+        "wall_s": wall,
+        "total_cpu_s": total_cpu(me) - before,
+        "memory": processes.peak_memory(),
+    }
+    arrays: list[npt.NDArray[np.float64]] = []
+    if result is not None:
+        solution = result.solution
+        # the driver puts zeros in the place of what is not finite
+        if status == "diverged" and not solution.r.any():
+            reply["status"] = "invalid"
+        if status == "inaccurate" and not solution.r.any() and problem.nc:
+            reply["status"] = "nothing"
+        vectors = {name: getattr(solution, name) for name in VECTORS}
+        vectors = {name: value for name, value in vectors.items() if value is not None}
+        arrays = [np.ascontiguousarray(value, dtype=float) for value in vectors.values()]
+        stages = [{name: getattr(stage, name) for name in STAGE} for stage in result.stages]
+        reply |= {
+            "vectors": list(vectors),
+            "iterations": result.iterations,
+            "cpu_s": result.cpu_s,
+            "setup_s": result.setup_s,
+            "stages": json.dumps(stages) if stages else None,
+            "history": thinned(result.history) if result.history is not None else None,
+        }
+    return reply, arrays
+
+
+def total_cpu(pid: int) -> float:
+    """[s] of CPU that this process and its descendants have used, all threads."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    own = time.process_time() + ended.ru_utime + ended.ru_stime
+    return own + processes.cpu_of_children(pid)
+
+
+def classify(error: Exception) -> str:
+    """The status of a run that ended with an exception."""
+    if isinstance(error, fclib.UnsuitableError):
+        return "unsuitable"
+    causes: list[BaseException] = [error]
+    while (cause := causes[-1].__cause__) is not None:
+        causes.append(cause)
+    if any(isinstance(cause, MemoryError) for cause in causes):
+        return "memory"
+    text = str(error)
+    if found := BY_SIGNAL.search(text):
+        return of_signal(int(found[1]))
+    if any(words in text for words in NOTHING):
+        return "nothing"
+    if isinstance(error, fclib.SolverError):
+        if any(words in text for words in GARBAGE):
+            return "garbage"
+        # not the solver has raised, but the conversion of its answer into numbers
+        trace = causes[-1].__traceback__
+        if isinstance(causes[-1], (TypeError, ValueError)) and trace and not trace.tb_next:
+            return "garbage"
+    return "error"
+
+
+def of_signal(number: int) -> str:
+    """The status of a process that a signal has ended, where the keeper has not sent it."""
+    if number == signal.SIGXCPU:
+        return "cpu_limit"
+    return "killed" if number in (signal.SIGKILL, signal.SIGTERM) else "crashed"
+
+
+def one_line(error: BaseException) -> str:
+    """What an exception says."""
+    text = " ".join(str(error).split())
+    known = isinstance(error, (fclib.Error, OSError))
+    return (text if known and text else f"{type(error).__name__}: {text}")[:500]
+
+
+def thinned(history: npt.NDArray[np.void]) -> list[tuple[int, float, float, str]]:
+    """The history, of a long one those at evenly spaced logarithms of the iteration."""
+    count = len(history)
+    chosen = list(range(count))
+    if count > HISTORY:
+        spaced = np.geomspace(1, count, HISTORY).astype(int) - 1
+        chosen = sorted({0, count - 1, *spaced.tolist()})
+    return [
+        (
+            int(history["iteration"][k]),
+            float(history["error"][k]),
+            float(history["time"][k]),
+            str(history["stage"][k]),
+        )
+        for k in chosen
+    ]

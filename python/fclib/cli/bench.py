@@ -1,0 +1,258 @@
+"""``fclib bench``: campaigns of thousands of runs, their state, and their stores."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
+from rich.text import Text
+from typer.core import TyperGroup
+
+import fclib
+from fclib import bench
+from fclib.bench.campaign import parse_solver
+from fclib.bench.store import Status
+from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
+
+SILENT = 30.0  # [s] after which a campaign that gives no sign of life is taken for dead
+
+
+class WithDefault(TyperGroup):
+    """A group of commands in which `run` need not be written: ``fclib bench CAMPAIGN``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put `run` before what is neither a command nor the wish for help."""
+        if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=WithDefault,
+    no_args_is_help=True,
+    help="Run campaigns: problems x solvers x tolerances, with hard limits.\n\n"
+    "CAMPAIGN is a TOML file, or the name of a published one; the word run may be left out.",
+)
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 0:12, 3:05:00."""
+    whole = round(max(0.0, seconds))
+    hours, rest = divmod(whole, 3600)
+    return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"
+
+
+@contextmanager
+def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
+    """Show how far a campaign is: a bar on a terminal, else a line every ten seconds."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[words]}"),
+    )
+    said = time.monotonic()
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
+        task = bar.add_task(name, total=None, words="")
+
+        def show(progress: bench.Progress) -> None:
+            nonlocal said
+            done = sum(progress.statuses.values())
+            left = (progress.planned - progress.done) / progress.rate if done else None
+            words = f"{progress.solved} solved, {done - progress.solved} not"
+            if left is not None:
+                words += f", {progress.rate:.1f}/s, {duration(left)} left"
+            bar.update(task, total=progress.planned, completed=progress.done, words=words)
+            if not quiet and not err.is_terminal and time.monotonic() - said > 10:
+                said = time.monotonic()
+                err.print(f"{name}: {progress.done} of {progress.planned}, {words}")
+
+        yield show
+
+
+@app.command("run")
+def run(
+    campaign: Annotated[
+        str | None, typer.Argument(help="A TOML file, or a published campaign.", show_default=False)
+    ] = None,
+    store: Annotated[
+        Path | None, typer.Option(help="Where the runs go.  [default: NAME.sqlite]")
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", help="Runs at once.", min=1)] = 1,
+    problems: Annotated[
+        list[str] | None, typer.Option("--problems", help="Files, folders, globs.")
+    ] = None,
+    solver: Annotated[
+        list[str] | None, typer.Option(help='A solver: "nsgs relaxation=1.2".')
+    ] = None,
+    tol: Annotated[list[float] | None, typer.Option(help="Tolerances.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option(help="[s] of CPU time a run.", min=0.0)
+    ] = None,
+    wall_limit: Annotated[
+        float | None, typer.Option(help="[s] of wall clock a run.", min=0.0)
+    ] = None,
+    memory: Annotated[float | None, typer.Option(help="[MB] a run.", min=0.0)] = None,
+    repeats: Annotated[int | None, typer.Option(help="Times each run is done.", min=1)] = None,
+    sample: Annotated[
+        int | None, typer.Option(help="So many problems of each group.", min=1)
+    ] = None,
+    history: Annotated[
+        bool, typer.Option("--history", help="Store how the error falls in each run.")
+    ] = False,
+    module: Annotated[
+        list[str] | None, typer.Option(help="A file of Python with solvers of your own.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Run on the Dask cluster of this address.")
+    ] = None,
+    slurm: Annotated[
+        list[str] | None,
+        typer.Option(help="Run on Slurm: workers=8 queue=short cores=16 memory=64GB ..."),
+    ] = None,
+    send: Annotated[
+        bool, typer.Option("--send", help="Send the problems: no folder is shared.")
+    ] = False,
+    status: Annotated[
+        Path | None, typer.Option(help="Show how far the campaigns of a store are.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run a campaign, or go on with it where it was interrupted."""
+    if status is not None:
+        show_status(status, as_json)
+        return
+    flags: dict[str, Any] = {
+        "tolerances": tol,
+        "time_limit": time_limit,
+        "wall_limit": wall_limit,
+        "memory": memory,
+        "repeats": repeats,
+        "history": history or None,
+        "modules": module,
+    }
+    flags = {name: value for name, value in flags.items() if value}
+    try:
+        if campaign is not None:
+            if problems or solver:
+                raise bench.CampaignError("a campaign names its own problems and solvers")
+            chosen = bench.Campaign.read(campaign, flags, sample)
+        else:
+            if not problems or not solver:
+                raise bench.CampaignError("name a campaign, or give --problems and --solver")
+            group: dict[str, Any] = {"files": problems} | ({"sample": sample} if sample else {})
+            rows = [parse_solver(text) for text in solver]
+            chosen = bench.Campaign.of(
+                {"name": "bench", "solvers": rows, "problems": [group], **flags}
+            )
+    except bench.CampaignError as error:
+        usage_error(error)
+    for word in () if as_json else chosen.missing:
+        err.print(f"left out: {word}", markup=False, highlight=False)
+
+    path = store or Path(f"{chosen.name}.sqlite")
+    with ExitStack() as stack:
+        runner = None
+        if scheduler or slurm:
+            try:
+                from fclib.bench import cluster
+
+                runner = stack.enter_context(
+                    cluster.on_slurm(parse_options(slurm), send)
+                    if slurm
+                    else cluster.on_scheduler(scheduler or "", send)
+                )
+            except ImportError as error:
+                fail(f'{error}; pip install "fclib[bench]"')
+        show = stack.enter_context(live(chosen.name, as_json))
+        try:
+            progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show)
+        except KeyboardInterrupt:
+            fail(f"interrupted; the same command goes on with {path}")
+        except ImportError as error:
+            fail(str(error))
+    record = {
+        "campaign": chosen.name,
+        "store": str(path),
+        "planned": progress.planned,
+        "there before": progress.skipped,
+        "solved": progress.solved,
+        **{name: count for name, count in progress.statuses.most_common() if name != "converged"},
+    }
+    report = Report(as_json)
+    report.add(record)
+    if not as_json:
+        out.print(make_table([record]))
+        out.print(f"fclib profile {path}", highlight=False)
+
+
+def describe(status: Status) -> dict[str, Any]:
+    """The record of a campaign."""
+    now = time.time()
+    running = status.ended is None and now - status.seen < SILENT
+    finished = status.ended is not None and status.done >= status.planned
+    state = "running" if running else "finished" if finished else "interrupted"
+    left = (status.planned - status.done) / status.rate if running and status.rate > 0 else None
+    return {
+        "campaign": status.name,
+        "state": state,
+        "runs": f"{status.done} of {status.planned}",
+        "solved": status.solved,
+        "others": {name: n for name, n in status.statuses.items() if name != "converged"},
+        "rate": round(status.rate, 2),
+        "left": duration(left) if left is not None else "-",
+        "started": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.started)),
+        "on": status.node,
+    }
+
+
+def show_status(path: Path, as_json: bool) -> None:
+    """The campaigns of a store."""
+    with bench.Store(path, create=False) as opened:
+        records = [describe(status) for status in opened.status()]
+    if as_json:
+        report = Report(True)
+        for record in records:
+            report.add(record)
+        return
+    if not records:
+        out.print(f"{path}: no campaign has written here")
+        return
+    for record in records:
+        others = ", ".join(f"{n} {name}" for name, n in record["others"].items())
+        record["others"] = Text(others or "-")
+    out.print(make_table(records))
+
+
+@app.command("merge")
+def merge(
+    store: Annotated[Path, typer.Argument(help="The store that takes them; made if needed.")],
+    others: Annotated[list[Path], typer.Argument(help="Stores, of other machines too.")],
+) -> None:
+    """Put the runs of several stores into one."""
+    with bench.Store(store) as opened:
+        added = opened.merge(others)
+        total = len(opened.keys())
+    out.print(f"{store}: {added} new runs, {total} different ones in all", highlight=False)
+
+
+@app.command("export")
+def export(
+    store: Annotated[Path, typer.Argument(help="A store.")],
+    table: Annotated[Path, typer.Argument(help="A file that ends in .csv or .parquet.")],
+) -> None:
+    """Write all runs of a store as a table."""
+    try:
+        with bench.Store(store, create=False) as opened:
+            count = opened.export(table)
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[bench]"')
+    except fclib.Error as error:
+        fail(str(error))
+    out.print(f"{table}: {count} runs", highlight=False)

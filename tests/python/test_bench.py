@@ -1,0 +1,458 @@
+"""Campaigns and their store: nothing is lost, nothing is done twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fclib
+from fclib import bench
+from fclib.bench.campaign import parse_solver
+from fclib.bench.job import MERITS, Job
+from helpers import planted_global, planted_local
+
+KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "6"))
+RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "400"))
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
+
+
+def campaign(**changes: Any) -> bench.Campaign:
+    entries: dict[str, Any] = {
+        "name": "small",
+        "solvers": ["nsgs", "auto", {"name": "nsgs", "options": {"relaxation": 1.2}}],
+        "tolerances": [1e-4, 1e-8],
+        "problems": [{"planted": {"count": 3, "contacts": 5, "seed": 1}, "family": "planted"}],
+    }
+    return bench.Campaign.of(entries | changes)
+
+
+def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fclib", "bench", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+# ---- what is run
+
+
+def test_a_campaign_is_run_once(tmp_path: Path) -> None:
+    path = tmp_path / "store.sqlite"
+    first = bench.conduct(campaign(), path, jobs=2)
+    assert (first.planned, first.skipped, first.solved) == (18, 0, 18)
+    again = bench.conduct(campaign(), path)
+    assert (again.planned, again.skipped, again.solved) == (18, 18, 0)
+    more = bench.conduct(campaign(repeats=2), path)
+    assert (more.planned, more.skipped, more.solved) == (36, 18, 18)
+    with bench.Store(path) as store:
+        rows = store.results()
+    assert len(rows) == 36
+    assert {row["solver"] for row in rows} == {"nsgs", "auto", "nsgs relaxation=1.2"}
+    assert {row["tol"] for row in rows} == {1e-4, 1e-8}
+    assert {row["family"] for row in rows} == {"planted"}
+    for row in rows:
+        assert row["error"] <= row["tol"]
+        assert row["cpu_s"] > 0
+        assert row["version"] == fclib.__version__
+        assert row["hash"]
+
+
+def test_the_merits_are_those_of_the_solution(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "one.hdf5", planted_global(3).problem)
+    path = tmp_path / "store.sqlite"
+    chosen = campaign(solvers=["nsgs"], tolerances=[1e-6], problems=[{"files": str(tmp_path)}])
+    bench.conduct(chosen, path)
+    with bench.Store(path) as store:
+        (row,) = store.results()
+    problem = fclib.read(tmp_path / "one.hdf5")
+    merit = fclib.merit(problem, fclib.solve(problem, "nsgs", 1e-6).solution)
+    assert {name: row[name] for name in MERITS} == {name: getattr(merit, name) for name in MERITS}
+    assert row["hash"] == fclib.digest(problem)
+    assert (row["problem"], row["family"], row["formulation"]) == (
+        "one",
+        tmp_path.name,
+        problem.formulation,
+    )
+
+
+def test_the_order_is_shuffled_repeat_by_repeat_and_the_same_each_time() -> None:
+    plan = campaign(repeats=3).plan()
+    assert [job.repeat for job in plan] == [0] * 18 + [1] * 18 + [2] * 18
+    orders = [[(j.problem.name, j.solver.title, j.tol) for j in plan[k : k + 18]] for k in (0, 18)]
+    assert orders[0] != orders[1]
+    assert sorted(orders[0]) == sorted(orders[1])
+    assert [job.key for job in campaign(repeats=3).plan()] == [job.key for job in plan]
+
+
+def test_the_key_tells_runs_apart() -> None:
+    (job, *_) = campaign().plan()
+    others: list[dict[str, Any]] = [
+        {"tol": 1e-5},
+        {"repeat": 1},
+        {"threads": 2},
+        {"limits": bench.Limits(1, 2, 3)},
+        {"solver": bench.SolverChoice("nsgs", {"relaxation": 1.3})},
+        {"solver": bench.SolverChoice("nsgs", {}, version="other")},
+    ]
+    keys = {Job(**{**vars(job), **other}).key for other in others}
+    assert len(keys | {job.key}) == len(others) + 1
+    # where a file lies and what a table calls a solver does not matter
+    moved = Job(
+        **{
+            **vars(job),
+            "problem": bench.ProblemFacts(**{**vars(job.problem), "path": "/else", "name": "x"}),
+            "solver": bench.SolverChoice(**{**vars(job.solver), "label": "other"}),
+        }
+    )
+    assert moved.key == job.key
+
+
+def test_problems_are_made_the_same_each_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    digests = []
+    for folder in ("a", "b"):
+        monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / folder))
+        digests.append(sorted(job.key for job in campaign().plan()))
+    assert digests[0] == digests[1]
+
+
+def test_history_on_request(tmp_path: Path) -> None:
+    for wanted in (False, True):
+        path = tmp_path / f"{wanted}.sqlite"
+        bench.conduct(campaign(history=wanted, solvers=["nsgs"], tolerances=[1e-8]), path)
+        with bench.Store(path) as store:
+            histories = [store.history(row["run"]) for row in store.results()]
+        assert all(bool(history) == wanted for history in histories)
+    for history in histories:
+        iterations = [report[0] for report in history]
+        assert iterations == sorted(iterations)
+        assert history[-1][1] <= 1e-8
+
+
+# ---- interrupted at any point
+
+
+TABLE = """
+name = "killed"
+solvers = ["nsgs", "auto"]
+tolerances = [1e-4]
+repeats = {repeats}
+[[problems]]
+planted = {{ count = 4, contacts = 4, seed = 5 }}
+"""
+
+
+def rows_of(path: Path) -> int:
+    """How many runs a store has, 0 where it is not there yet."""
+    if not path.exists():
+        return 0
+    database = sqlite3.connect(path)
+    try:
+        return int(database.execute("SELECT COUNT(*) FROM runs").fetchone()[0])
+    except sqlite3.OperationalError:
+        return 0
+    finally:
+        database.close()
+
+
+def children_of_the_dead(before: set[int]) -> list[int]:
+    """Keepers and workers that are still there, and were not before."""
+    return [pid for pid in keepers() if pid not in before]
+
+
+def keepers() -> set[int]:
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if "fclib.bench.keeper" in path.read_text():
+                found.add(int(path.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+def test_no_run_is_lost_or_doubled_by_kill_9(tmp_path: Path) -> None:
+    repeats = RUNS // 8
+    (tmp_path / "killed.toml").write_text(TABLE.format(repeats=repeats))
+    path = tmp_path / "store.sqlite"
+    command = [sys.executable, "-m", "fclib", "bench", tmp_path / "killed.toml"]
+    command += ["--store", path, "-j", "2", "--json"]
+    moments, before = random.Random(1), keepers()
+    counts = []
+    seen: dict[str, tuple[Any, ...]] = {}
+    for kill in range(KILLS):
+        process = subprocess.Popen(list(map(str, command)), stdout=subprocess.DEVNULL)
+        if kill % 4:  # at any moment of its work
+            end = time.monotonic() + 30
+            while rows_of(path) == len(seen) and time.monotonic() < end:
+                time.sleep(0.01)
+            time.sleep(moments.uniform(0, 4e-3 * RUNS / KILLS))
+        else:  # while it starts, makes the store, or looks at the problems
+            time.sleep(moments.uniform(0.2, 1.5))
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        if path.exists():
+            database = sqlite3.connect(path)
+            assert database.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+            try:
+                rows = database.execute("SELECT key, id, started, error FROM runs").fetchall()
+            except sqlite3.OperationalError:  # killed before it had made the tables
+                rows = []
+            database.close()
+            # what was there is there, as it was
+            now = {row[0]: row for row in rows}
+            assert len(now) == len(rows)
+            assert seen.items() <= now.items()
+            seen = now
+        counts.append(len(seen))
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with bench.Store(path) as store:
+        rows = store.results()
+        states = store.status()
+    assert len(rows) == len({row["key"] for row in rows}) == 8 * repeats
+    assert {(row["problem"], row["solver"], row["repeat"]) for row in rows} == {
+        (row["problem"], solver, repeat)
+        for row in rows
+        for solver in ("nsgs", "auto")
+        for repeat in range(repeats)
+    }
+    assert (
+        seen.items()
+        <= {
+            row["key"]: (row["key"], row["run"], row["started"], row["error"]) for row in rows
+        }.items()
+    )
+    # the kills came while it worked; each start went on where the last one was
+    assert max(counts) > 0
+    assert states[0].planned == states[0].done == 8 * repeats
+    assert len(states) > 1
+    # nobody is left of those that were killed
+    end = time.monotonic() + 20
+    while children_of_the_dead(before) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert not children_of_the_dead(before)
+
+
+def test_two_campaigns_write_one_store(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(TABLE.format(repeats=20))
+    path = tmp_path / "store.sqlite"
+    command = [sys.executable, "-m", "fclib", "bench", tmp_path / "two.toml", "--store", path]
+    both = [
+        subprocess.Popen(
+            [*map(str, command), "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        )
+        for _ in range(2)
+    ]
+    counts = []
+    for process in both:
+        words, errors = process.communicate(timeout=120)
+        assert process.returncode == 0, errors
+        counts.append(json.loads(words))
+    with bench.Store(path) as store:
+        keys = [row["key"] for row in store.results()]
+    assert len(keys) == len(set(keys)) == 160
+    assert sum(count["solved"] for count in counts) == 160
+
+
+# ---- the store
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FCLIB_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
+        path = tmp_path_factory.mktemp("small") / "store.sqlite"
+        bench.conduct(campaign(history=True), path, jobs=2)
+        yield path
+
+
+def elsewhere(source: Path, target: Path, node: str) -> None:
+    """A copy of a store, as another machine would have made it."""
+    with bench.Store(source) as store:
+        store.db.execute("VACUUM INTO ?", (str(target),))
+    database = sqlite3.connect(target)
+    with database:
+        database.execute("UPDATE machines SET node = ?1, hash = ?1", (node,))
+    database.close()
+
+
+def test_merge(small: Path, tmp_path: Path) -> None:
+    elsewhere(small, tmp_path / "other.sqlite", "other")
+    merged = tmp_path / "merged.sqlite"
+    done = run_cli("merge", merged, small, tmp_path / "other.sqlite")
+    assert done.returncode == 0, done.stderr
+    with bench.Store(merged) as store, bench.Store(small) as first:
+        rows, original = store.results(), first.results()
+        assert len(rows) == 2 * len(original)
+        assert len({row["node"] for row in rows}) == 2
+        kept = [name for name in original[0] if name != "run"]
+        mine = [row for row in rows if row["machine"] == original[0]["machine"]]
+        assert [[row[k] for k in kept] for row in mine] == [[r[k] for k in kept] for r in original]
+        for row, old in zip(mine, original, strict=True):
+            assert store.history(row["run"]) == first.history(old["run"]) != []
+        # once more changes nothing
+        assert store.merge([small, tmp_path / "other.sqlite"]) == 0
+        assert len(store.status()) == 1
+    assert run_cli("merge", merged, merged).returncode == 1
+
+
+def test_export(small: Path, tmp_path: Path) -> None:
+    pq = pytest.importorskip("pyarrow.parquet")
+    with bench.Store(small) as store:
+        rows, columns = store.results(), store.columns()
+    assert list(rows[0]) == columns
+    for name in ("runs.csv", "runs.parquet"):
+        done = run_cli("export", small, tmp_path / name)
+        assert done.returncode == 0, done.stderr
+    assert pq.read_table(tmp_path / "runs.parquet").to_pylist() == rows
+    import csv
+
+    with (tmp_path / "runs.csv").open() as file:
+        read = list(csv.DictReader(file))
+    assert [float(row["error"]) for row in read] == [row["error"] for row in rows]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "runs.csv", tmp_path / "runs.parquet"]
+    assert run_cli("export", small, tmp_path / "runs.txt").returncode == 1
+
+
+def test_status(small: Path) -> None:
+    done = run_cli("--status", small, "--json")
+    assert done.returncode == 0, done.stderr
+    (record,) = map(json.loads, done.stdout.splitlines())
+    assert (record["state"], record["runs"], record["solved"]) == ("finished", "18 of 18", 18)
+    assert "finished" in run_cli("--status", small).stdout
+
+
+def test_what_is_no_store_is_said(tmp_path: Path) -> None:
+    (tmp_path / "text.sqlite").write_text("no database, whatever its name\n" * 100)
+    with pytest.raises(bench.StoreError, match=r"text\.sqlite"):
+        bench.Store(tmp_path / "text.sqlite")
+    database = sqlite3.connect(tmp_path / "other.sqlite")
+    database.execute("CREATE TABLE runs (id INTEGER)")
+    database.commit()
+    database.close()
+    with pytest.raises(bench.StoreError, match="no store of fclib"):
+        bench.Store(tmp_path / "other.sqlite")
+    with bench.Store(tmp_path / "new.sqlite") as store:
+        store.db.execute("PRAGMA user_version = 99")
+    with pytest.raises(bench.StoreError, match="version 99"):
+        bench.Store(tmp_path / "new.sqlite")
+    assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
+    assert not (tmp_path / "absent.sqlite").exists()
+
+
+# ---- what is asked for
+
+
+@pytest.mark.parametrize(
+    ("changes", "word"),
+    [
+        ({"solvers": []}, "there is none"),
+        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss"),
+        ({"solvers": ["nsgs relaxation=-1"]}, "relaxation"),
+        ({"solvers": ["nsgs", "nsgs"]}, "two that are called 'nsgs'"),
+        ({"solvers": [{"options": {}}]}, "no name"),
+        ({"problems": []}, r"no \[\[problems\]\]"),
+        ({"problems": [{"family": "x"}]}, "neither files"),
+        ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
+        ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),
+        ({"tolerance": 1e-8}, "tolerance: is not known"),
+        ({"tolerances": [-1]}, "positive"),
+        ({"time_limit": "long"}, "time_limit.*long"),
+        ({"repeats": 0}, "repeats"),
+        ({"modules": ["absent.py"]}, r"absent\.py"),
+    ],
+)
+def test_a_campaign_that_is_not_understood(changes: dict[str, Any], word: str) -> None:
+    with pytest.raises(bench.CampaignError, match=word):
+        campaign(**changes)
+
+
+def test_solvers_that_may_be_missing() -> None:
+    chosen = campaign(solvers=["nsgs", {"name": "elsewhere:best", "optional": True}])
+    assert [choice.name for choice in chosen.solvers] == ["nsgs"]
+    assert "elsewhere:best" in chosen.missing[0]
+
+
+def test_solvers_as_texts() -> None:
+    parsed = parse_solver("nsgs relaxation=1.2 shuffle=true")
+    assert parsed == {"name": "nsgs", "options": {"relaxation": "1.2", "shuffle": "true"}}
+    assert parse_solver("cmd:./pgs {input} a=b") == {"name": "cmd:./pgs {input} a=b"}
+
+
+def test_groups_have_limits_of_their_own() -> None:
+    chosen = campaign(
+        time_limit=3.0,
+        problems=[
+            {"files": "a"},
+            {"files": "b", "time_limit": 7, "memory": 50, "tolerances": [1e-2]},
+        ],
+    )
+    assert [group.limits.time for group in chosen.groups] == [3, 7]
+    assert [group.limits.wall for group in chosen.groups] == [3, 7]
+    assert [group.limits.memory for group in chosen.groups] == [4000, 50]
+    assert [group.tolerances for group in chosen.groups] == [(1e-4, 1e-8), (1e-2,)]
+
+
+def test_files_folders_and_globs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for number in range(6):
+        folder = tmp_path / "deep" / f"family{number % 2}"
+        folder.mkdir(parents=True, exist_ok=True)
+        fclib.write(folder / f"{number}.hdf5", planted_local(number, nc=2).problem)
+    monkeypatch.setenv("WHERE", str(tmp_path / "deep"))
+    for files, expected in (
+        ("$WHERE", "024135"),
+        ("$WHERE/family1", "135"),
+        ("$WHERE/*/[0-2].hdf5", "021"),
+        (["$WHERE/family0/4.hdf5", "$WHERE/family0"], "402"),
+    ):
+        entries = {"files": files}
+        plan = campaign(solvers=["nsgs"], tolerances=[1e-4], problems=[entries]).plan()
+        assert sorted(job.problem.name for job in plan) == sorted(expected)
+        assert all(job.problem.family == f"family{int(job.problem.name) % 2}" for job in plan)
+    sampled = campaign(solvers=["nsgs"], problems=[{"files": "$WHERE", "sample": 3}]).plan()
+    assert {job.problem.name for job in sampled} == {"0", "4", "5"}
+    with pytest.raises(fclib.FileError, match="absent"):
+        campaign(problems=[{"files": "$WHERE/absent"}]).plan()
+
+
+def test_a_campaign_by_flags(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
+    path = tmp_path / "store.sqlite"
+    done = run_cli(
+        *("--problems", tmp_path / "*.hdf5", "--solver", "nsgs", "--solver", "nsgs relaxation=1.1"),
+        *("--tol", "1e-4", "--tol", "1e-6", "--time-limit", "5", "--store", path),
+    )
+    assert done.returncode == 0, done.stderr
+    with bench.Store(path) as store:
+        rows = store.results()
+    assert len(rows) == 4
+    assert {row["time_limit"] for row in rows} == {5}
+    assert run_cli("--problems", tmp_path).returncode == 2
+    assert run_cli("nowhere.toml").returncode == 2
+
+
+def test_the_published_campaigns_are_understood(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paths = sorted((root / "campaigns").glob("*.toml"))
+    assert "quick" in [path.stem for path in paths]
+    for path in paths:
+        read = bench.Campaign.read(path)
+        assert read.title
+        assert bench.Campaign.read(path.stem).solvers == read.solvers
+    assert len(bench.Campaign.read("quick").solvers) >= 12

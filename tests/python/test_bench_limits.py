@@ -1,0 +1,331 @@
+"""Solvers that do what no solver should: each gets its own status, in time."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import textwrap
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from fclib import bench
+from fclib.bench import problems
+from fclib.bench.job import Job
+from fclib.bench.pool import Hand
+from helpers import planted_local
+
+LIMIT = 0.5  # [s]
+MEMORY = 200.0  # [MB]
+LATE = 2.0  # [s] beyond the limit, when a run has ended and the next one may begin
+
+BAD = """
+    import ctypes, os, subprocess, sys, time
+    import numpy as np
+    import fclib
+
+    SPIN = os.environ.get("FCLIB_TEST_SPIN", "")
+
+
+    def bad(function):
+        return fclib.solver("bad-" + function.__name__)(function)
+
+
+    @bad
+    def sleeps(problem, r, monitor):
+        time.sleep(1000)
+
+
+    @bad
+    def spins(problem, r, monitor):
+        # in C, with the lock of the interpreter: no handler of Python ever runs
+        ctypes.PyDLL(SPIN).spin()
+
+
+    @bad
+    def ignores_signals(problem, r, monitor):
+        ctypes.PyDLL(SPIN).ignore()
+        ctypes.PyDLL(SPIN).spin()
+
+
+    @bad
+    def eats(problem, r, monitor):
+        kept = []
+        while True:
+            kept.append(np.ones(1_000_000))
+
+
+    @bad
+    def asks_for_much(problem, r, monitor):
+        np.ones(1 << 40)
+
+
+    @bad
+    def segfaults(problem, r, monitor):
+        print("about to read from nowhere", file=sys.stderr, flush=True)
+        ctypes.string_at(0)
+
+
+    @bad
+    def aborts(problem, r, monitor):
+        os.abort()
+
+
+    @bad
+    def exits(problem, r, monitor):
+        os._exit(7)
+
+
+    @bad
+    def is_killed(problem, r, monitor):
+        os.kill(os.getpid(), 9)
+
+
+    @bad
+    def returns_nan(problem, r, monitor):
+        return np.full(problem.m, np.nan)
+
+
+    @bad
+    def returns_nothing(problem, r, monitor):
+        pass
+
+
+    @bad
+    def returns_words(problem, r, monitor):
+        return "the solution"
+
+
+    @bad
+    def returns_too_much(problem, r, monitor):
+        return np.ones(problem.m + 1)
+
+
+    @bad
+    def lies(problem, r, monitor):
+        monitor.stop(r)
+        monitor.status = "converged"
+        return r + 1e-3
+
+
+    @bad
+    def cheats(problem, r, monitor):
+        # from now on this process takes anything for a solution
+        fclib.merit = lambda problem, solution: 0.0
+        fclib.solve.__globals__["_core"] = None
+        return r + 1.0
+
+
+    @bad
+    def chatters(problem, r, monitor):
+        for fd in (1, 2):
+            os.write(fd, b"garbage" * 1_000_000)
+        while not monitor.stop(r):
+            r[:] = SOLUTION
+
+
+    @bad
+    def closes_everything(problem, r, monitor):
+        os.closerange(0, 4096)
+        time.sleep(1000)
+
+
+    @bad
+    def raises(problem, r, monitor):
+        raise RuntimeError("no")
+
+
+    @bad
+    def leaves_a_child(problem, r, monitor):
+        # in a session of its own, and of nobody's
+        subprocess.Popen(["setsid", "sh", "-c", "sleep 12345 & sleep 12345"])
+        time.sleep(1000)
+
+
+    @bad
+    def works_in_a_child(problem, r, monitor):
+        subprocess.run([sys.executable, "-c", "while True: pass"])
+
+
+    @bad
+    def eats_in_a_child(problem, r, monitor):
+        eats = "x = []\\nwhile True: x.append(bytearray(10**6) + b'1')"
+        subprocess.run([sys.executable, "-c", eats])
+
+
+    @fclib.solver("bad-flat", dimensions=(2,))
+    def flat(problem, r, monitor):
+        pass
+"""
+EXPECTED = {
+    "sleeps": "wall_limit",
+    "spins": "cpu_limit",
+    "ignores_signals": "cpu_limit",
+    "eats": "memory",
+    "asks_for_much": "memory",
+    "segfaults": "crashed",
+    "aborts": "crashed",
+    "exits": "error",
+    "is_killed": "killed",
+    "returns_nan": "invalid",
+    "returns_nothing": "nothing",
+    "returns_words": "garbage",
+    "returns_too_much": "garbage",
+    "lies": "inaccurate",
+    "cheats": "inaccurate",
+    "closes_everything": "garbage",  # what it returns cannot be read
+    "raises": "error",
+    "leaves_a_child": "wall_limit",
+    "works_in_a_child": "cpu_limit",
+    "eats_in_a_child": "memory",
+    "flat": "unsuitable",
+}
+# of programs: what a shell does with {output}
+PROGRAMS = {
+    "true {input} {output}": "nothing",
+    "cp {input} {output}": "nothing",
+    "cp /dev/null {output} {input}": "error",
+    "sh -c 'echo garbage > $1' sh {output} {input}": "garbage",
+    "sh -c 'kill -SEGV $$' sh {input}": "crashed",
+    "sh -c 'exit 3' sh {input}": "error",
+    "sh -c 'while :; do :; done' sh {input} {output}": "cpu_limit",
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("bad")
+    planted = planted_local(3, nc=5)
+    fclib.write(folder / "problem.hdf5", planted.problem)
+    solution = f"\n\n    SOLUTION = np.array({planted.solution.r.tolist()!r})\n"
+    (folder / "bad.py").write_text(textwrap.dedent(BAD + solution))
+    source = "#include <signal.h>\nvoid spin(void) { for (volatile int k = 0;; k = !k); }\n"
+    source += "void ignore(void) { for (int k = 1; k < 65; ++k) signal(k, SIG_IGN); }\n"
+    (folder / "spin.c").write_text(source)
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
+    assert compiler
+    library = folder / "spin.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", library, folder / "spin.c"], check=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def hand(folder: Path) -> Iterator[Hand]:
+    os.environ["FCLIB_TEST_SPIN"] = str(folder / "spin.so")
+    hand = Hand(1)
+    yield hand
+    hand.end()
+    del os.environ["FCLIB_TEST_SPIN"]
+
+
+def job(folder: Path, solver: str, **changes: Any) -> Job:
+    return Job(
+        problem=problems.look(folder / "problem.hdf5"),
+        solver=bench.SolverChoice(solver, {}),
+        tol=1e-8,
+        limits=bench.Limits(time=LIMIT, wall=changes.pop("wall", 20 * LIMIT), memory=MEMORY),
+        repeat=0,
+        threads=1,
+        modules=(str(folder / "bad.py"),),
+        **changes,
+    )
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_what_no_solver_should_do_has_its_own_status(name: str, folder: Path, hand: Hand) -> None:
+    # only who sleeps is to meet the clock on the wall, on a machine that is shared
+    wall = LIMIT if EXPECTED[name] == "wall_limit" else 20 * LIMIT
+    hand.do(job(folder, "auto"))  # the worker is warm
+    start = time.monotonic()
+    record = hand.do(job(folder, f"bad-{name}", wall=wall))
+    took = time.monotonic() - start
+    assert record.status == EXPECTED[name], record
+    # the clock of the CPU holds on a machine that is shared, that on the wall if that is not busy
+    assert record.total_cpu_s is None or record.total_cpu_s < LIMIT + LATE
+    if os.getloadavg()[0] < (os.cpu_count() or 1):
+        assert took < wall + LATE
+    assert not record.solved
+    # the next one is not touched by it
+    after = hand.do(job(folder, "auto"))
+    assert after.status == "converged"
+    assert after.merits is not None
+    assert after.merits["error"] <= 1e-8
+    assert not left_over()
+
+
+def left_over() -> list[str]:
+    """Processes that a solver has left behind."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            if "12345" in path.read_text().replace("\0", " "):
+                found.append(path.read_text())
+        except OSError:
+            continue
+    return found
+
+
+@pytest.mark.parametrize("command", PROGRAMS)
+def test_programs_too(command: str, folder: Path, hand: Hand) -> None:
+    record = hand.do(job(folder, f"cmd:{command}", wall=20 * LIMIT))
+    assert record.status == PROGRAMS[command], record
+
+
+def test_words_on_the_standard_streams_do_no_harm(folder: Path, hand: Hand) -> None:
+    assert hand.do(job(folder, "bad-chatters")).status == "converged"
+
+
+def test_a_message_says_what_a_crashed_solver_said(folder: Path, hand: Hand) -> None:
+    record = hand.do(job(folder, "bad-segfaults"))
+    assert "SIGSEGV" in record.message
+    assert "about to read from nowhere" in record.message
+
+
+def test_a_file_that_changes_is_no_fault_of_the_solver(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "problem.hdf5"
+    shutil.copy(folder / "problem.hdf5", path)
+    hand = Hand(1)
+    try:
+        given = job(folder, "auto")
+        moved = Job(**{**vars(given), "problem": problems.look(path)})
+        fclib.write(path, planted_local(4, nc=5).problem)
+        record = hand.do(moved)
+        assert (record.status, record.merits) == ("unreadable", None)
+        assert "has changed" in record.message
+        assert str(path) in record.message
+    finally:
+        hand.end()
+
+
+def test_a_keeper_that_is_killed_is_replaced(folder: Path, hand: Hand) -> None:
+    hand.give(job(folder, "auto"))
+    assert hand.process is not None
+    hand.process.kill()
+    while (taken := hand.take()) is None:
+        pass
+    assert taken[1].status == "converged"
+
+
+def test_what_is_measured(folder: Path, hand: Hand) -> None:
+    record = hand.do(job(folder, "nsgs", history=True))
+    assert record.status == "converged"
+    assert record.merits is not None
+    assert set(record.merits) == set(bench.job.MERITS)
+    assert record.cpu_s is not None
+    assert record.total_cpu_s is not None
+    assert 0 < record.cpu_s <= record.total_cpu_s
+    assert record.wall_s is not None
+    assert record.memory is not None
+    assert 10 < record.memory < 1000
+    assert record.machine is not None
+    assert record.machine["fclib"] == fclib.__version__
+    assert record.history
+    errors = [error for _, error, _, _ in record.history]
+    assert np.isfinite(errors).all()
+    assert errors[-1] <= 1e-8 < errors[0]

@@ -42,6 +42,7 @@ KNOWN = {
     "problems",
 }
 KNOWN_OF_PROBLEMS = {"family", "files", "sample", "simulate", "planted", "tolerances", *NUMBERS}
+KNOWN_OF_PROBLEMS |= {"optional", "published_mean"}
 KNOWN_OF_SOLVER = {"name", "options", "label", "optional"}
 MADE = {
     "simulate": {"family", "parameters", "steps", "seed"},
@@ -64,6 +65,7 @@ class Group:
     sample: int | None = None
     simulate: Mapping[str, Any] | None = None
     planted: Mapping[str, Any] | None = None
+    optional: bool = False  # left out where there is no such file
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ class Campaign:
             known = ", ".join(sorted(p.stem for p in PUBLISHED.glob("*.toml")))
             raise CampaignError(f"{file}: {word}; published campaigns: {known}") from None
         try:
-            entries = _toml().loads(text)
+            entries = toml().loads(text)
         except ValueError as error:
             raise CampaignError(f"{file}: {error}") from None
         # what a published campaign names is found from where it is run
@@ -165,7 +167,7 @@ class Campaign:
 
         Args:
             store: what it knows of files is not found out again.
-            tell: is called with the name of each file that is looked at.
+            tell: is called with what is left out, and why.
 
         Raises:
             fclib.Error: a problem cannot be found, made or read.
@@ -173,8 +175,14 @@ class Campaign:
         """
         found: list[tuple[ProblemFacts, Group]] = []
         for group in self.groups:
-            for path in problems.sample(self._paths(group), group.sample):
-                tell(path.name)
+            try:
+                paths = self._paths(group)
+            except fclib.FileError as error:
+                if not group.optional:
+                    raise
+                tell(f"left out: {error}")
+                continue
+            for path in problems.sample(paths, group.sample):
                 facts = store.known(path) if store else None
                 if facts is None:
                     facts = problems.look(path, group.family)
@@ -223,7 +231,8 @@ class Campaign:
         return paths
 
 
-def _toml() -> Any:
+def toml() -> Any:
+    """The reader of TOML: `loads`."""
     return importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
 
 
@@ -287,6 +296,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         sample=_count(row, "sample", 1) if "sample" in row else None,
         simulate=row.get("simulate"),
         planted=row.get("planted"),
+        optional=bool(row.get("optional", False)),
     )
 
 

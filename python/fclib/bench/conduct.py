@@ -62,7 +62,7 @@ def conduct(
         store: an SQLite file, made where there is none.
         jobs: runs at once, on this machine.
         runner: runs the jobs elsewhere instead, as `fclib.bench.cluster.runner` does.
-        tell: is called with the name of each problem that is looked at.
+        tell: is called with what is left out of the campaign, and why.
         show: is called at the start, and after each run.
 
     Raises:

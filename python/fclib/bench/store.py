@@ -345,6 +345,11 @@ class Store:
         query = "SELECT iteration, error, time, stage FROM history WHERE run = ? ORDER BY rowid"
         return list(self.db.execute(query, (run,)))
 
+    def texts(self) -> list[str]:
+        """The campaigns that have written here, as their files have them."""
+        query = "SELECT DISTINCT text FROM campaigns WHERE text IS NOT NULL"
+        return [text for (text,) in self.db.execute(query)]
+
     def status(self) -> list[Status]:
         """The campaigns that have written here, the last one first."""
         found = []

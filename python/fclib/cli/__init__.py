@@ -10,7 +10,18 @@ from __future__ import annotations
 import typer
 
 import fclib
-from fclib.cli import bench, check, collection, convert, demo, info, simulate, solve, solvers
+from fclib.cli import (
+    bench,
+    check,
+    collection,
+    convert,
+    demo,
+    info,
+    profile,
+    simulate,
+    solve,
+    solvers,
+)
 from fclib.cli._output import fail, print_version
 
 app = typer.Typer(
@@ -20,7 +31,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (info, check, solve, convert, solvers, simulate, demo):
+for module in (info, check, solve, convert, solvers, simulate, demo, profile):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.add_typer(collection.app, name="collection")
 app.add_typer(bench.app, name="bench")

@@ -153,8 +153,12 @@ def run(
             )
     except bench.CampaignError as error:
         usage_error(error)
-    for word in () if as_json else chosen.missing:
-        err.print(f"left out: {word}", markup=False, highlight=False)
+
+    def tell(word: str) -> None:
+        err.print(word, markup=False, highlight=False)
+
+    for word in chosen.missing:
+        tell(f"left out: {word}")
 
     path = store or Path(f"{chosen.name}.sqlite")
     with ExitStack() as stack:
@@ -172,7 +176,7 @@ def run(
                 fail(f'{error}; pip install "fclib[bench]"')
         show = stack.enter_context(live(chosen.name, as_json))
         try:
-            progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show)
+            progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show, tell=tell)
         except KeyboardInterrupt:
             fail(f"interrupted; the same command goes on with {path}")
         except ImportError as error:

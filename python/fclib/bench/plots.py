@@ -1,0 +1,162 @@
+"""Profiles as pictures, for the page of a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fclib.bench import profiles
+from fclib.bench.profiles import METRICS, Array, Costs
+
+# told apart by those who see few colours, too: Okabe & Ito (2008), then other strokes
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STROKES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
+MARKERS = "osD^v<>PX*hp"
+STYLE: Any = {
+    "font.family": "sans-serif",
+    "font.size": 8,
+    "axes.titlesize": 8.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "grid.linewidth": 0.3,
+    "grid.color": "#d0d0d0",
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "fclib",
+    "savefig.dpi": 300,
+}
+SIZE = (5.6, 3.2)  # [inch]
+ENDS = 1e4  # the largest ratio that is shown
+
+
+def stroke(number: int) -> dict[str, Any]:
+    """How the curve of a solver is drawn."""
+    colour = COLOURS[number % len(COLOURS)]
+    return {"color": colour, "linestyle": STROKES[number // len(COLOURS) % len(STROKES)]}
+
+
+@contextmanager
+def figure(folder: Path, name: str, formats: Sequence[str]) -> Iterator[Any]:
+    """Axes to draw in; written to the folder in each of the formats, then closed."""
+    import matplotlib
+
+    matplotlib.use("Agg", force=False)
+    import matplotlib.pyplot as plt
+
+    with plt.rc_context(STYLE):
+        drawn, axes = plt.subplots(figsize=SIZE, layout="constrained")
+        try:
+            yield axes
+            folder.mkdir(parents=True, exist_ok=True)
+            for kind in formats:
+                part = folder / f".{name}.part.{kind}"
+                # the same data give the same file
+                stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
+                drawn.savefig(part, metadata=stamp)
+                part.replace(folder / f"{name}.{kind}")
+        finally:
+            plt.close(drawn)
+
+
+def _legend(axes: Any) -> None:
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), handlelength=2.6, labelspacing=0.35)
+
+
+def _order(costs: Costs, heights: Array) -> list[int]:
+    """The solvers, the highest curve first, as the legend has them."""
+    return sorted(range(len(costs.solvers)), key=lambda k: (-heights[k].mean(), k))
+
+
+def performance(costs: Costs, folder: Path, formats: Sequence[str]) -> None:
+    """Dolan & More's profiles, the ratio on a logarithmic axis."""
+    quotients = profiles.ratios(costs.values)
+    finite = quotients[np.isfinite(quotients)]
+    end = min(ENDS, 1.3 * float(finite.max(initial=2.0)))
+    taus = np.unique(np.concatenate([[1.0, end], finite[finite <= end]]))
+    curves = profiles.performance_profile(costs.values, taus)
+    grid = profiles.performance_profile(costs.values, np.geomspace(1, end, 200))
+    with figure(folder, f"performance-{costs.metric}", formats) as axes:
+        for rank, k in enumerate(_order(costs, grid)):
+            axes.step(taus, curves[k], where="post", label=costs.solvers[k], **stroke(rank))
+        axes.set_xscale("log")
+        axes.set_xlim(1.0, end)
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel(rf"$\tau$: {METRICS[costs.metric][0].split(' [')[0]} over that of the best")
+        axes.set_ylabel(r"share of problems solved within $\tau$")
+        _legend(axes)
+
+
+def data(costs: Costs, folder: Path, formats: Sequence[str], per_contact: bool) -> None:
+    """The share of problems solved within a cost, or a cost per contact."""
+    shown = costs.per_contact() if per_contact else costs
+    finite = shown.values[np.isfinite(shown.values)]
+    if not finite.size:
+        return
+    ends = 0.8 * float(finite.min()), 1.2 * float(finite.max())
+    bounds = np.unique(np.concatenate([ends, finite]))
+    curves = profiles.share_within(shown.values, bounds)
+    grid = profiles.share_within(shown.values, np.geomspace(*ends, 200))
+    name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "")
+    with figure(folder, name, formats) as axes:
+        for rank, k in enumerate(_order(shown, grid)):
+            axes.step(bounds, curves[k], where="post", label=costs.solvers[k], **stroke(rank))
+        axes.set_xscale("log")
+        axes.set_xlim(*ends)
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel(METRICS[costs.metric][0] + (" per contact" if per_contact else ""))
+        axes.set_ylabel("share of problems solved")
+        _legend(axes)
+
+
+def work_precision(
+    points: Sequence[Mapping[str, Any]], metric: str, folder: Path, formats: Sequence[str]
+) -> None:
+    """The mean cost at each tolerance; hollow marks where not all problems were solved."""
+    solvers = list(dict.fromkeys(point["solver"] for point in points))
+    least = {s: min(p["mean"] for p in points if p["solver"] == s) for s in solvers}
+    with figure(folder, f"work-precision-{metric}", formats) as axes:
+        for rank, solver in enumerate(sorted(solvers, key=lambda s: least[s])):
+            own = [point for point in points if point["solver"] == solver]
+            style = stroke(rank)
+            marker = MARKERS[rank % len(MARKERS)]
+            x, y = [p["mean"] for p in own], [p["tol"] for p in own]
+            fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
+            axes.plot(x, y, **style, label=solver, marker=marker, markersize=4)
+            axes.scatter(
+                x, y, 16, fills, marker, edgecolors=style["color"], linewidths=0.9, zorder=3
+            )
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        means = np.log10([point["mean"] for point in points])
+        axes.set_xlim(10.0 ** np.floor(means.min()), 10.0 ** np.ceil(means.max()))
+        axes.invert_yaxis()
+        axes.set_xlabel(f"shifted geometric mean of {METRICS[metric][0]}, failures charged")
+        axes.set_ylabel("tolerance on the relative error")
+        _legend(axes)
+
+
+def convergence(
+    curves: Mapping[str, Array], times: Array, folder: Path, formats: Sequence[str]
+) -> None:
+    """The least error that was reached, over time."""
+    ends = {solver: float(curve[-1]) for solver, curve in curves.items()}
+    with figure(folder, "convergence", formats) as axes:
+        for rank, solver in enumerate(sorted(curves, key=lambda s: ends[s])):
+            curve = np.where(np.isfinite(curves[solver]), curves[solver], np.nan)
+            axes.step(times, curve, where="post", label=solver, **stroke(rank))
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("median of the least relative error")
+        _legend(axes)

@@ -1,12 +1,13 @@
 """The main job, end to end: simulate a scene, store its problems, solve them, judge the solutions.
 
 scene -> simulate -> FCLIB files -> read -> solve -> merit -> table, CSV, picture
+the campaign `quick` -> runs in limited processes -> store -> profile
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ CONFIGURATIONS: tuple[tuple[str, dict[str, Any]], ...] = (
     ("auto", {}),
     ("nsgs", {}),
 )
+CAMPAIGN = "quick"
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,15 @@ def solve(path: Path, tol: float) -> list[bench.Run]:
     best = min(runs, key=lambda run: run.error)
     fclib.write_solution(path, best.result.solution)
     return runs
+
+
+def campaign(store: Path, jobs: int, show: Callable[[bench.Progress], None]) -> bench.Progress:
+    """Run the campaign `quick`, or what is left of it.
+
+    Raises:
+        fclib.Error: as `fclib.bench.conduct` does.
+    """
+    return bench.conduct(bench.Campaign.read(CAMPAIGN), store, jobs=jobs, show=show)
 
 
 def write_csv(path: Path, runs: Sequence[bench.Run]) -> None:

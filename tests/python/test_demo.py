@@ -19,6 +19,8 @@ STEPS = 22  # the first box lands in step 14
 
 def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "fclib", "demo", "--out", folder, "--boxes", "2"]
+    if "--campaign" not in arguments:
+        command.append("--no-campaign")
     return subprocess.run(
         [*map(str, command), "--steps", str(STEPS), *arguments], capture_output=True, text=True
     )
@@ -77,3 +79,26 @@ def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
     assert len(done.stderr.splitlines()) == 1
     assert str(tmp_path / "file") in done.stderr
+
+
+def test_the_demo_ends_with_a_campaign_and_its_profile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))
+    # what makes it long is not to be shown here
+    short = "solvers = ['auto', 'nsgs']\n[[problems]]\nplanted = { count = 2, contacts = 5 }\n"
+    code = (
+        "import sys, pathlib, fclib.demo, fclib.bench.campaign as c\n"
+        "c.PUBLISHED = pathlib.Path(sys.argv.pop(1))\n"
+        "import fclib.cli; fclib.cli.main()"
+    )
+    (tmp_path / "quick.toml").write_text(short)
+    command = [sys.executable, "-c", code, tmp_path, "demo", "--boxes", "1", "--steps", "2"]
+    done = subprocess.run(
+        [*map(str, command), "--out", str(tmp_path / "demo")], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    assert "virtual best" in done.stdout
+    assert (tmp_path / "demo" / "quick.sqlite").exists()
+    assert (tmp_path / "demo" / "profile" / "performance-cpu_s.pdf").exists()

@@ -86,7 +86,7 @@ def look(path: Path, family: str = "") -> ProblemFacts:
         matrix = getattr(problem, "M", None)
     return ProblemFacts(
         hash=fclib.digest(problem),
-        name=path.stem,
+        name=f"{path.parent.name}/{path.stem}" if path.stem[0].isdigit() else path.stem,
         family=family or _scene_of(problem.info) or path.parent.name,
         path=str(path),
         kind=problem.kind,

@@ -223,7 +223,7 @@ def share_within(values: Array, bounds: Array) -> Array:
     """The share of instances whose value is at most each bound (solvers, bounds)."""
     count = max(1, values.shape[0])
     found = [np.searchsorted(np.sort(column), bounds, side="right") for column in values.T]
-    return np.array(found).reshape(values.shape[1], len(bounds)) / count
+    return np.asarray(np.array(found).reshape(values.shape[1], len(bounds)) / count)
 
 
 def performance_profile(values: Array, taus: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -18,6 +19,7 @@ from fclib import bench
 from fclib.bench.campaign import parse_solver
 from fclib.bench.store import Status
 from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
+from fclib.collections import library
 
 SILENT = 30.0  # [s] after which a campaign that gives no sign of life is taken for dead
 
@@ -142,6 +144,8 @@ def run(
         if campaign is not None:
             if problems or solver:
                 raise bench.CampaignError("a campaign names its own problems and solvers")
+            # where the published ones look for their problems
+            os.environ.setdefault(library.FOLDER, str(library.default_folder()))
             chosen = bench.Campaign.read(campaign, flags, sample)
         else:
             if not problems or not solver:

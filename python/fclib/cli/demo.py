@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from fclib import bench, demo
+from fclib.cli import profile
 from fclib.cli._output import (
     Json,
     Report,
@@ -19,6 +21,7 @@ from fclib.cli._output import (
     out,
     progress_bar,
 )
+from fclib.cli.bench import live
 
 TABLE_ROWS = 24  # the CSV has them all
 
@@ -41,14 +44,31 @@ def summarize(runs: list[bench.Run]) -> list[dict[str, Any]]:
     return rows
 
 
+def compare(folder: Path, as_json: bool) -> None:
+    """The campaign `quick` and its profile, whose tables are left out with --json."""
+    store = folder / f"{demo.CAMPAIGN}.sqlite"
+    say = err if as_json else out
+    say.print(f"\nThe campaign {demo.CAMPAIGN}: solvers beside each other, within hard limits ...")
+    with live(demo.CAMPAIGN, as_json) as show:
+        demo.campaign(store, min(2, os.cpu_count() or 1), show)
+    try:
+        profile.run(store, folder / "profile", as_json=as_json, quiet=as_json)
+    except ImportError as error:
+        say.print(f"No pictures: {error}")
+    say.print(f"The runs:      {store}  (fclib bench --status {store})", highlight=False)
+
+
 def command(
     out_dir: Annotated[Path, typer.Option("--out", help="Folder of what is made.")] = Path("demo"),
     boxes: Annotated[int, typer.Option(help="Boxes of the stack.", min=1)] = 6,
     steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 50,
     tol: Tolerance = 1e-8,
+    campaign: Annotated[
+        bool, typer.Option(help="End with the campaign `quick` and its profile.")
+    ] = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate a falling stack, store its problems, solve and judge them."""
+    """Simulate a falling stack, store its problems, solve and judge them; compare solvers."""
     try:
         from fclib.simulate import NoRenderer
     except ImportError as error:
@@ -94,4 +114,6 @@ def command(
         out.print(f"The problems:  {out_dir}/stack-*.hdf5  (try: fclib check {paths[-1]})")
         if picture is not None:
             out.print(f"The picture:   {picture}")
+    if campaign:
+        compare(out_dir, as_json)
     raise typer.Exit(int(report.failed))

@@ -12,7 +12,6 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-import fclib
 from fclib.bench import profiles
 from fclib.cli._output import Json, Report, err, fail, make_table, out
 
@@ -76,43 +75,72 @@ def command(
     as_json: Json = False,
 ) -> None:
     """Compare the solvers of a store: profiles, means, ratios, as tables and pictures."""
-    name = metric.value
     try:
-        rows = profiles.load(
+        run(
             store,
+            out_dir,
+            metric=metric.value,
+            solver=solver or (),
+            family=family or (),
+            tol=tol or (),
             campaign=campaign,
-            families=family or (),
-            solvers=solver or (),
-            tolerances=tol or (),
             machine=machine,
+            penalty=penalty,
+            shift=shift,
+            formats=formats.split(","),
+            as_json=as_json,
         )
-        costs = profiles.costs(rows, name)
-        published = profiles.published(store)
-    except fclib.Error as error:
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[bench]"')
+    except ValueError as error:  # a format that Matplotlib does not know, and what fclib raises
         fail(str(error))
+
+
+def run(
+    store: Path,
+    folder: Path | None,
+    *,
+    metric: str = "cpu_s",
+    solver: Sequence[str] = (),
+    family: Sequence[str] = (),
+    tol: Sequence[float] = (),
+    campaign: str | None = None,
+    machine: str | None = None,
+    penalty: float = profiles.PENALTY,
+    shift: float = profiles.SHIFT,
+    formats: Sequence[str] = ("pdf", "svg", "png"),
+    as_json: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Print the tables of a store, and draw its pictures where a folder is given."""
+    rows = profiles.load(
+        store,
+        campaign=campaign,
+        families=family,
+        solvers=solver,
+        tolerances=tol,
+        machine=machine,
+    )
+    costs = profiles.costs(rows, metric)
+    published = profiles.published(store)
     tables: dict[str, list[dict[str, Any]]] = {
         "summary": profiles.summary(costs, penalty, shift),
         "profile": shares_within(costs),
         "statuses": profiles.failures(rows),
         "families": profiles.families(costs, published),
         "pairs": [dataclasses.asdict(pair) for pair in profiles.pairs(costs)],
-        "work-precision": profiles.work_precision(rows, name, penalty, shift),
+        "work-precision": profiles.work_precision(rows, metric, penalty, shift),
     }
-    if as_json:
+    if not quiet and as_json:
         report = Report(True)
         for table, records in tables.items():
             for record in records:
                 report.add({"table": table, **record})
-    else:
+    elif not quiet:
         show(tables, costs, penalty, shift)
-    if out_dir is not None:
-        try:
-            draw(tables, costs, rows, store, out_dir, formats.split(","))
-        except ImportError as error:
-            fail(f'{error}; pip install "fclib[bench]"')
-        except ValueError as error:
-            fail(str(error))
-        err.print(f"Pictures and tables: {out_dir}", highlight=False)
+    if folder is not None:
+        draw(tables, costs, rows, store, folder, formats)
+        err.print(f"Pictures and tables: {folder}", highlight=False)
 
 
 def show(

@@ -43,8 +43,18 @@ def fill(
         for solver, own in times.items():
             for k, time in enumerate(own):
                 problem = ProblemFacts(
-                    *(f"hash{k}", f"problem{k}", "few" if k < 2 else "many", "", "local"),
-                    *("local 3D", 3, 0, 0, CONTACTS[k], 9, ""),
+                    hash=f"hash{k}",
+                    name=f"problem{k}",
+                    family="few" if k < 2 else "many",
+                    path="",
+                    kind="local",
+                    formulation="local 3D",
+                    spacedim=3,
+                    n=0,
+                    p=0,
+                    nc=CONTACTS[k],
+                    nnz=9,
+                    title="",
                 )
                 job = Job(
                     problem,
@@ -131,7 +141,7 @@ def test_pairs_by_hand(store: Path) -> None:
     pair = pairs["A", "B"]
     assert pair.ratio == pytest.approx(1)
     assert (pair.both, pair.only_first, pair.only_second) == (2, 1, 0)
-    assert (pair.low, pair.high) == (pytest.approx(0.5), pytest.approx(2))
+    assert [pair.low, pair.high] == pytest.approx([0.5, 2])
     # B : C is 1/2 and 1/8
     assert pairs["B", "C"].ratio == pytest.approx(0.25)
     assert [pair.first for pair in profiles.pairs(costs, against="B")] == ["A", "C"]

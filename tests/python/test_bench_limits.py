@@ -159,6 +159,26 @@ BAD = """
         subprocess.run([sys.executable, "-c", eats])
 
 
+    helper = None
+
+
+    @bad
+    def has_a_helper(problem, r, monitor):
+        # one process serves all runs, as the interpreter of another package does
+        global helper
+        if helper is None:
+            code = "import time\\nfor _ in open(0):\\n a = time.process_time()\\n"
+            code += " for k in range(10**4): pass\\n print(time.process_time() - a, flush=True)"
+            command = [sys.executable, "-u", "-c", code]
+            helper = subprocess.Popen(command, stdin=-1, stdout=-1)
+        if not monitor.stop(r):
+            helper.stdin.write(b"go\\n")
+            helper.stdin.flush()
+            monitor.cpu_s = float(helper.stdout.readline())
+            r[:] = SOLUTION
+            monitor.stop(r)
+
+
     @fclib.solver("bad-flat", dimensions=(2,))
     def flat(problem, r, monitor):
         pass
@@ -281,6 +301,15 @@ def test_words_on_the_standard_streams_do_no_harm(folder: Path, hand: Hand) -> N
     assert hand.do(job(folder, "bad-chatters")).status == "converged"
 
 
+def test_the_limits_leave_the_clocks_alone(folder: Path, hand: Hand) -> None:
+    # a limit of the kernel makes the clock of a process tick in milliseconds
+    for _ in range(5):
+        record = hand.do(job(folder, "bad-has_a_helper"))
+        assert record.status == "converged", record
+        assert record.cpu_s is not None
+        assert record.cpu_s > 0
+
+
 def test_a_message_says_what_a_crashed_solver_said(folder: Path, hand: Hand) -> None:
     record = hand.do(job(folder, "bad-segfaults"))
     assert "SIGSEGV" in record.message
@@ -322,7 +351,7 @@ def test_what_is_measured(folder: Path, hand: Hand) -> None:
     assert 0 < record.cpu_s <= record.total_cpu_s
     assert record.wall_s is not None
     assert record.memory is not None
-    assert 10 < record.memory < 1000
+    assert 0 <= record.memory < 1000
     assert record.machine is not None
     assert record.machine["fclib"] == fclib.__version__
     assert record.history

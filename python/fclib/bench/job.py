@@ -161,7 +161,7 @@ class Record:
     setup_s: float | None = None  # [s] of conversions and judgement inside the solve
     total_cpu_s: float | None = None  # [s] of all processes of the run, measured by the bench
     wall_s: float | None = None  # [s]
-    memory: float | None = None  # [MB] largest resident size of the run's processes, together
+    memory: float | None = None  # [MB] by which the run's processes grew at most, together
     merits: Mapping[str, float] | None = None  # by MERITS, recomputed by the bench
     stages: str | None = None  # JSON, of a solver that chains others
     history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import resource
 import select
 import signal
 import socket
@@ -27,10 +28,12 @@ import numpy as np
 import fclib
 from fclib.bench import machine, processes
 from fclib.bench.job import MERITS, ORDERLY, Record
-from fclib.bench.worker import GRACE, Problems, of_signal, one_line, send, serve
+from fclib.bench.worker import Problems, of_signal, one_line, send, serve
 
 READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
 LOOKS = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
+GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
+ARMS = 1.0  # [s] of CPU after which the kernel is told the limit, too: see Watch.arm
 LONGEST = 1 << 40  # [bytes] of a message
 
 
@@ -57,6 +60,7 @@ class Watch:
         self.start = time.monotonic()
         self.cpu_before, self.memory_before = processes.usage(pid)
         self.cpu, self.memory = 0.0, self.memory_before
+        self.armed = False
 
     @property
     def wall(self) -> float:
@@ -73,12 +77,26 @@ class Watch:
         self.cpu = max(self.cpu, cpu - self.cpu_before)
         self.memory = max(self.memory, memory)
         most_wall, most_cpu, most_memory = self.limits
+        if self.cpu > ARMS and not self.armed and math.isfinite(most_cpu):
+            self.arm(math.ceil(most_cpu - self.cpu + GRACE) + 1)
         if self.memory - self.memory_before > most_memory:
             raise WorkerEnded("memory", f"killed above {most_memory:g} MB")
         if self.cpu > most_cpu + GRACE:
             raise WorkerEnded("cpu_limit", f"killed after {self.cpu:.1f} s of CPU time")
         if self.wall > most_wall + GRACE:
             raise WorkerEnded("wall_limit", f"killed after {self.wall:.1f} s")
+
+    def arm(self, seconds: int) -> None:
+        """Set RLIMIT_CPU of each process, for the case that this one is held up.
+
+        Not before a run has become a long one, and its worker does not serve another: where there
+        is such a limit, Linux counts the CPU time of a process in ticks of some milliseconds, even
+        after it is lifted, and those who measure short solves by it would read 0.
+        """
+        self.armed = True
+        for pid in processes.tree(self.pid):
+            used = math.ceil(processes.own_cpu(pid))
+            processes.lower(pid, resource.RLIMIT_CPU, used + max(1, seconds))
 
 
 class Keeper:
@@ -91,6 +109,7 @@ class Keeper:
         self.link: socket.socket | None = None  # to the worker
         self.words = -1  # the standard error of the worker
         self.said = b""
+        self.armed = False  # whether the worker has a limit of CPU time
 
     def start(self) -> socket.socket:
         """The link to the worker, which is forked where there is none."""
@@ -128,7 +147,7 @@ class Keeper:
             pass
         self.link.close()
         os.close(self.words)
-        self.link, self.pid = None, 0
+        self.link, self.pid, self.armed = None, 0, False
         return status
 
     def listen(self) -> bool:
@@ -212,7 +231,7 @@ class Keeper:
             return record
         if vectors:
             self.judge(order, record, vectors)
-        if record.status in ORDERLY:
+        if record.status in ORDERLY and not self.armed:
             processes.kill_orphans(but=self.pid)
         else:
             self.stop()
@@ -238,7 +257,8 @@ class Keeper:
                 reply = self.receive(watch)
             finally:
                 record.wall_s, record.total_cpu_s = watch.wall, watch.cpu
-                record.memory = watch.memory
+                record.memory = watch.memory - watch.memory_before
+                self.armed = watch.armed
         said = json.loads(reply)
         said["memory"] = max(said.get("memory", 0.0), record.memory or 0.0) or None
         names = said.pop("vectors", [])

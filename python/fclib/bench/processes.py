@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import resource
 import signal
 import time
 from pathlib import Path
@@ -105,9 +106,32 @@ def peak_memory() -> float:
     return 0.0
 
 
-def address_space() -> int:
-    """[bytes] of this process."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * PAGE
+def address_space(pid: int) -> int:
+    """[bytes] of a process, 0 where it has ended."""
+    fields = _stat(pid)
+    return int(fields[20]) if fields else 0
+
+
+def own_cpu(pid: int) -> float:
+    """[s] of CPU that a process has used itself, in ticks."""
+    fields = _stat(pid)
+    return sum(map(int, fields[11:13])) / TICKS if fields else 0.0
+
+
+def lower(pid: int, kind: int, value: int) -> None:
+    """Set the soft limit of a process, as far as its hard one allows."""
+    with contextlib.suppress(OSError):  # it has ended
+        hard = resource.prlimit(pid, kind)[1]
+        unlimited = resource.RLIM_INFINITY
+        values = [limit for limit in (value, hard) if limit != unlimited]
+        resource.prlimit(pid, kind, (min(values, default=unlimited), hard))
+
+
+def release_memory() -> None:
+    """Give freed memory back to the system, so that the next run is not lent it."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
 
 
 def forget_peak() -> None:

@@ -27,7 +27,6 @@ import numpy.typing as npt
 import fclib
 from fclib.bench import processes
 
-GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
 CACHE = 256e6  # [bytes] of problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
 STAGE = ("name", "calls", "solved", "iterations", "time")
@@ -106,27 +105,22 @@ def receive(link: socket) -> bytes:
 
 
 def limit(order: dict[str, Any]) -> None:
-    """Limits of the kernel, which hold where the keeper's watch should fail.
+    """A limit of the kernel on the address space, at twice the memory that the keeper kills at.
 
-    The keeper kills at the limits of the order; these are beyond.
+    It is that of this process and of what it has left from earlier runs, as the interpreter of
+    another package's solver; what it starts later inherits it.
     """
-    limits = order["limits"]
-    if math.isfinite(limits["time"]):
-        _lower(resource.RLIMIT_CPU, math.ceil(time.process_time() + limits["time"] + GRACE) + 1)
-    if math.isfinite(limits["memory"]):
-        _lower(resource.RLIMIT_AS, processes.address_space() + int(2 * limits["memory"] * 1e6))
-
-
-def _lower(kind: int, value: int) -> None:
-    hard = resource.getrlimit(kind)[1]
-    resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+    memory = order["limits"]["memory"]
+    if math.isfinite(memory):
+        for pid in processes.tree(os.getpid()):
+            size = processes.address_space(pid) + int(2 * memory * 1e6)
+            processes.lower(pid, resource.RLIMIT_AS, size)
 
 
 def unlimit() -> None:
-    """Lift the limits between runs."""
-    for kind in (resource.RLIMIT_CPU, resource.RLIMIT_AS):
-        hard = resource.getrlimit(kind)[1]
-        resource.setrlimit(kind, (hard, hard))
+    """Lift the limit between runs."""
+    for pid in processes.tree(os.getpid()):
+        processes.lower(pid, resource.RLIMIT_AS, resource.RLIM_INFINITY)
 
 
 def serve(keeper: socket, problems: Problems) -> None:
@@ -161,7 +155,9 @@ def answer(
     except fclib.Error as error:
         return {"status": "error", "message": one_line(error)}, []
 
+    processes.release_memory()
     processes.forget_peak()
+    resident = processes.peak_memory()
     me = os.getpid()
     limit(order)
     send(keeper, b"started")
@@ -187,7 +183,7 @@ def answer(
         "message": message,
         "wall_s": wall,
         "total_cpu_s": total_cpu(me) - before,
-        "memory": processes.peak_memory(),
+        "memory": processes.peak_memory() - resident,
     }
     arrays: list[npt.NDArray[np.float64]] = []
     if result is not None:

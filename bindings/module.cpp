@@ -24,6 +24,7 @@
 #include "fields.hpp"
 #include "io/hdf5.hpp"
 #include "merit/merit.hpp"
+#include "merit/merit_1.hpp"
 #include "python_solver.hpp"
 #include "solve/driver.hpp"
 #include "version.hpp"
@@ -416,6 +417,33 @@ void bind_files(nb::module_& m) {
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
       "outside 0..9.");
   m.def(
+      "read_attributes",
+      [](const fs::path& path, const std::string& group) {
+        return read_attributes(path.string(), group);
+      },
+      "path"_a, "group"_a,
+      nb::sig(signature("read_attributes", ", group: typing.Literal['solution', 'info']",
+                        "dict[str, float | str]")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "What a file says of its solution, or of its problem (\"info\"), beside the data: numbers "
+      "and texts by their names. Raises FileError.");
+  m.def(
+      "write_attributes",
+      [](const fs::path& path, const std::string& group, const Attributes& attributes) {
+        write_attributes(path.string(), group, attributes);
+      },
+      "path"_a, "group"_a, "attributes"_a,
+      nb::sig(signature("write_attributes",
+                        ", group: typing.Literal['solution', 'info'], attributes: "
+                        "collections.abc.Mapping[str, float | str]",
+                        "None")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "Gives the solution of a file, or its problem (\"info\"), attributes, in place of those of "
+      "the same names, atomically. They go where the solution, or the problem, is replaced.\n\n"
+      "Raises FileError where there is no solution in the file.");
+  m.def(
       "write_guesses",
       [](const fs::path& path, const std::vector<Solution>& guesses, const std::string& mode,
          int compression) {
@@ -511,6 +539,42 @@ NB_MODULE(_core, m) {
   bind_solvers(m);
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     bind_solve<P>(m);
+    m.def(
+        "merit_1", [](const P& p, const Solution& s) { return merit_1(p, s); }, "problem"_a,
+        "solution"_a, nb::call_guard<Unlocked>(),
+        "What libfclib calls MERIT_1, for comparisons with it.\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
+    m.def(
+        "contact_merits",
+        [](const P& p, const Solution& s) {
+          const ContactMerits merits = [&] {
+            const Unlocked unlocked;
+            return contact_merits(p, s);
+          }();
+          nb::list status;
+          for (const ContactStatus one : merits.status) {
+            status.append(one == ContactStatus::open    ? "open"
+                          : one == ContactStatus::stick ? "stick"
+                                                        : "slide");
+          }
+          const auto array = [](const Vector& values) {
+            return to_python(values, nb::handle()).attr("copy")();
+          };
+          nb::dict result;
+          result["status"] = nb::module_::import_("numpy").attr("array")(status, "dtype"_a = "U5");
+          result["u"] = array(merits.u);
+          result["natural"] = array(merits.natural);
+          result["cone"] = array(merits.cone);
+          result["dual_cone"] = array(merits.dual_cone);
+          return result;
+        },
+        "problem"_a, "solution"_a,
+        nb::sig(("def contact_merits(problem: " + class_name(P::kind) +
+                 ", solution: Solution) -> dict[str, numpy.typing.NDArray[typing.Any]]")
+                    .c_str()),
+        "The merit contact by contact: status (open, stick, slide), u (m,) recomputed, natural "
+        "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,).\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
         "solution"_a, nb::call_guard<Unlocked>(),

@@ -1190,6 +1190,94 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
   });
 }
 
+namespace {
+
+/// The path of a group that has attributes, by its short name.
+std::string group_with_attributes(const Group& root, std::string_view name) {
+  if (name == "solution") return "solution";
+  if (name == "info") return "fclib_" + owner_of(kinds_of(root)) + "/info";
+  throw Error(ErrorKind::option,
+              "there is no group '" + std::string(name) + "'; there are: solution, info", "group");
+}
+
+herr_t add_name(hid_t, const char* name, const H5A_info_t*, void* names) {
+  static_cast<std::vector<std::string>*>(names)->emplace_back(name);
+  return 0;
+}
+
+/// An attribute that is one number or one text of fixed length, or nothing.
+std::optional<std::variant<double, std::string>> read_attribute(hid_t group,
+                                                                const std::string& name) {
+  const Handle attribute(H5Aopen(group, name.c_str(), H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) return std::nullopt;
+  const Handle space(H5Aget_space(attribute.id()), H5Sclose);
+  const Handle type(H5Aget_type(attribute.id()), H5Tclose);
+  if (H5Sget_simple_extent_npoints(space.id()) != 1) return std::nullopt;
+  const H5T_class_t kind = H5Tget_class(type.id());
+  if (kind == H5T_INTEGER || kind == H5T_FLOAT) {
+    double value = 0;
+    if (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0) return std::nullopt;
+    return value;
+  }
+  // attributes lie in the header of their group, which ends at 64 kB
+  constexpr std::size_t longest = std::size_t{1} << 16;
+  const std::size_t size = H5Tget_size(type.id());
+  if (kind != H5T_STRING || H5Tis_variable_str(type.id()) > 0 || size > longest) {
+    return std::nullopt;
+  }
+  std::string text(size, '\0');
+  if (H5Aread(attribute.id(), type.id(), text.data()) < 0) return std::nullopt;
+  return text.substr(0, text.find('\0'));
+}
+
+}  // namespace
+
+Attributes read_attributes(const std::string& path, std::string_view group) {
+  const Session session;
+  return in_file(path, [&] {
+    const Handle file = open_file(path);
+    const Group root{file.id(), "/"};
+    const std::string name = group_with_attributes(root, group);
+    Attributes result;
+    const std::string parent = name.substr(0, name.find('/'));
+    if (!root.has(parent) || !root.has(name)) return result;
+    const Handle handle = open_group(root, name);
+    std::vector<std::string> names;
+    H5Aiterate2(handle.id(), H5_INDEX_NAME, H5_ITER_INC, nullptr, add_name, &names);
+    for (const std::string& key : names) {
+      if (const auto value = read_attribute(handle.id(), key)) result[key] = *value;
+    }
+    return result;
+  });
+}
+
+void write_attributes(const std::string& path, std::string_view group,
+                      const Attributes& attributes) {
+  change_file(path, Start::existing, {}, [&](const Target& root) {
+    const std::string name = group_with_attributes(root, group);
+    const std::string parent = name.substr(0, name.find('/'));
+    const bool there = root.has(parent) && root.has(name);
+    const Handle handle =
+        there || group == "solution" ? open_group(root, name) : create_group(root, name);
+    const Group target{handle.id(), root.child(name)};
+    for (const auto& [key, value] : attributes) {
+      const std::string where = target.path + ", attribute " + key;
+      if (H5Aexists(handle.id(), key.c_str()) > 0)
+        check(H5Adelete(handle.id(), key.c_str()), where);
+      if (const auto* text = std::get_if<std::string>(&value)) {
+        write_text_attribute(target, key.c_str(), *text);
+        continue;
+      }
+      const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+      const Handle attribute(H5Acreate2(handle.id(), key.c_str(), H5T_IEEE_F64LE, space.id(),
+                                        H5P_DEFAULT, H5P_DEFAULT),
+                             H5Aclose);
+      if (!attribute.ok()) fail(where, "cannot be created");
+      check(H5Awrite(attribute.id(), H5T_NATIVE_DOUBLE, &std::get<double>(value)), where);
+    }
+  });
+}
+
 void write_int_attribute(const std::string& path, const std::string& name, Index value,
                          const WriteOptions& options) {
   change_file(path, Start::existing, options, [&](const Target& root) {

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <map>
 #include <memory>
 #include <new>
 #include <optional>
@@ -161,6 +162,20 @@ void write_solution(const std::string& path, const Solution& solution,
 /// those (WriteOptions::append).
 void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
                    const WriteOptions& options = {.replace = true});
+
+/// What is said of a solution or of a problem beside their data: numbers and texts by their names.
+using Attributes = std::map<std::string, std::variant<double, std::string>>;
+
+/// The attributes of a group that are one number or one text; others are left out, and there are
+/// none where the file has no such group. The group is "solution", or "info" of the problem that a
+/// solution belongs to.
+Attributes read_attributes(const std::string& path, std::string_view group);
+
+/// Gives a group attributes, in place of those of the same names. They go with what they are of: a
+/// solution, or a problem, that replaces another has none. Throws Error (file) where the file has
+/// no solution.
+void write_attributes(const std::string& path, std::string_view group,
+                      const Attributes& attributes);
 
 /// Gives the info group of the problem that read_outline() finds, the local one first, an integer
 /// attribute.

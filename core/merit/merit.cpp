@@ -48,24 +48,35 @@ void raise(double& largest, Real value) { largest = std::max(largest, static_cas
 /// The parts that depend on one contact at a time. `scale` is tr(W_aa) / d of each contact.
 template <class Cone>
 void judge_contacts(const Friction& friction, const RealVector& q, const RealVector& u,
-                    const RealVector& r, const RealVector& scale, Merit& result) {
+                    const RealVector& r, const RealVector& scale, Merit& result,
+                    ContactMerits& each) {
   constexpr int D = Cone::dim;
   Real squares = 0;
   Real scaled_squares = 0;
   Real scaled_q = 0;
+  each = {.status = {},
+          .u = u.cast<double>(),
+          .natural = Vector(friction.mu.size()),
+          .cone = Vector(friction.mu.size()),
+          .dual_cone = Vector(friction.mu.size())};
   for (Eigen::Index contact = 0; contact < friction.mu.size(); ++contact) {
     const Cone cone(friction, contact);
     const ContactVector<D, Real> ua = u.segment<D>(D * contact);
     const ContactVector<D, Real> ra = r.segment<D>(D * contact);
     const ContactVector<D, Real> modified = cone.modified(ua);
-    squares += natural_map(cone, ua, ra).squaredNorm();
+    const Real square = natural_map(cone, ua, ra).squaredNorm();
+    squares += square;
     const Real rho = scale[contact] > 0 ? 1 / scale[contact] : Real(1);
     scaled_squares += natural_map(cone, ua, ra, rho).squaredNorm();
     scaled_q += rho * rho * q.segment<D>(D * contact).squaredNorm();
-    raise(result.cone, cone_violation(cone, ra));
-    raise(result.dual_cone, dual_violation(cone, modified));
+    each.natural[contact] = static_cast<double>(std::sqrt(square));
+    each.cone[contact] = static_cast<double>(cone_violation(cone, ra));
+    each.dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
+    raise(result.cone, each.cone[contact]);
+    raise(result.dual_cone, each.dual_cone[contact]);
     raise(result.complementarity, std::abs(ra.dot(modified)));
-    switch (status_of(cone, ua, ra, rho)) {
+    each.status.push_back(status_of(cone, ua, ra, rho));
+    switch (each.status.back()) {
       case ContactStatus::open:
         ++result.open;
         break;
@@ -83,21 +94,22 @@ void judge_contacts(const Friction& friction, const RealVector& q, const RealVec
 
 void judge_contacts(Index spacedim, const Friction& friction, const RealVector& q,
                     const RealVector& u, const RealVector& r, const RealVector& scale,
-                    Merit& result) {
+                    Merit& result, ContactMerits& each) {
   const bool rolling = friction.mu_r.size() > 0;
   if (spacedim == 2) {
-    judge_contacts<Coulomb<2, Real>>(friction, q, u, r, scale, result);
+    judge_contacts<Coulomb<2, Real>>(friction, q, u, r, scale, result, each);
   } else if (spacedim == 5) {
-    judge_contacts<Rolling<5, Real>>(friction, q, u, r, scale, result);
+    judge_contacts<Rolling<5, Real>>(friction, q, u, r, scale, result, each);
   } else if (rolling) {
-    judge_contacts<Rolling<3, Real>>(friction, q, u, r, scale, result);
+    judge_contacts<Rolling<3, Real>>(friction, q, u, r, scale, result, each);
   } else {
-    judge_contacts<Coulomb<3, Real>>(friction, q, u, r, scale, result);
+    judge_contacts<Coulomb<3, Real>>(friction, q, u, r, scale, result, each);
   }
   result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
 }
 
-Merit judge(const LocalProblem& problem, const Friction& friction, const Solution& solution) {
+Merit judge(const LocalProblem& problem, const Friction& friction, const Solution& solution,
+            ContactMerits& each) {
   Merit result;
   const RealVector q = problem.q.cast<Real>();
   const RealVector r = solution.r.cast<Real>();
@@ -123,11 +135,12 @@ Merit judge(const LocalProblem& problem, const Friction& friction, const Solutio
   for_each_entry(problem.W, [&](Index row, Index col, double value) {
     if (row == col) scale[row / problem.spacedim] += Real(value) / problem.spacedim;
   });
-  judge_contacts(problem.spacedim, friction, q, u, r, scale, result);
+  judge_contacts(problem.spacedim, friction, q, u, r, scale, result, each);
   return result;
 }
 
-Merit judge(const GlobalProblem& problem, const Friction& friction, const Solution& solution) {
+Merit judge(const GlobalProblem& problem, const Friction& friction, const Solution& solution,
+            ContactMerits& each) {
   Merit result;
   const Factorization mass(to_eigen(problem.M), "M");
   const RealVector f = problem.f.cast<Real>();
@@ -176,16 +189,29 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
         mass.is_cholesky() ? y.col(col).squaredNorm() : h.col(col).dot(y.col(col));
     scale[col / problem.spacedim] += Real(diagonal) / problem.spacedim;
   }
-  judge_contacts(problem.spacedim, friction, q, u, r, scale, result);
+  judge_contacts(problem.spacedim, friction, q, u, r, scale, result, each);
   return result;
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution) {
+Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
   validate(problem);
   validate(solution, problem);
-  return judge(problem, friction_of(problem), solution);
+  return judge(problem, friction_of(problem), solution, each);
+}
+
+template <class P>
+Merit judge_valid(const P& problem, const Solution& solution) {
+  ContactMerits each;
+  return judge_valid(problem, solution, each);
+}
+
+template <class P>
+ContactMerits judge_each(const P& problem, const Solution& solution) {
+  ContactMerits each;
+  judge_valid(problem, solution, each);
+  return each;
 }
 
 }  // namespace
@@ -201,6 +227,19 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
 }
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
   return judge_valid(problem, solution);
+}
+
+ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {
+  return judge_each(problem, solution);
+}
+ContactMerits contact_merits(const LocalRollingProblem& problem, const Solution& solution) {
+  return judge_each(problem, solution);
+}
+ContactMerits contact_merits(const GlobalProblem& problem, const Solution& solution) {
+  return judge_each(problem, solution);
+}
+ContactMerits contact_merits(const GlobalRollingProblem& problem, const Solution& solution) {
+  return judge_each(problem, solution);
 }
 
 }  // namespace fclib

@@ -11,7 +11,9 @@
 
 #include <string_view>
 #include <tuple>
+#include <vector>
 
+#include "cones/cone.hpp"
 #include "problem.hpp"
 
 namespace fclib {
@@ -81,6 +83,15 @@ struct Merit {
   }
 };
 
+/// The same for each contact.
+struct ContactMerits {
+  std::vector<ContactStatus> status;
+  Vector u;          ///< velocity, recomputed (m) [m/s]
+  Vector natural;    ///< ||r - P_K(r - u^)|| (nc), not relative to anything
+  Vector cone;       ///< distance of r from K (nc) [N s]
+  Vector dual_cone;  ///< distance of u^ from K* (nc) [m/s]
+};
+
 /// The merit of (solution, problem). r is required, and l where there are bilateral constraints;
 /// a missing v follows from them, a missing u is not judged.
 ///
@@ -90,5 +101,11 @@ Merit merit(const LocalProblem& problem, const Solution& solution);
 Merit merit(const LocalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
+
+/// As merit(), and throws as it does.
+ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);
+ContactMerits contact_merits(const LocalRollingProblem& problem, const Solution& solution);
+ContactMerits contact_merits(const GlobalProblem& problem, const Solution& solution);
+ContactMerits contact_merits(const GlobalRollingProblem& problem, const Solution& solution);
 
 }  // namespace fclib

@@ -46,11 +46,22 @@ PYTHON: dict[str, set[str]] = {
     "scenes": set(),
     "simulate": {"api", "scenes"},
     "external": {"api", "_registry"},
+    "analysis": {"api"},
     "bench": {"api", "external", "scenes", "simulate"},
     "collections": {"api", "scenes", "simulate"},
     "report": {"bench"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},
-    "cli": {"api", "collections", "scenes", "simulate", "external", "bench", "report", "demo"},
+    "cli": {
+        "api",
+        "analysis",
+        "collections",
+        "scenes",
+        "simulate",
+        "external",
+        "bench",
+        "report",
+        "demo",
+    },
     "__main__": {"cli"},
 }
 # and what only its functions import, when they are called

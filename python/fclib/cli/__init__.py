@@ -11,6 +11,7 @@ import typer
 
 import fclib
 from fclib.cli import (
+    analyze,
     bench,
     check,
     collection,
@@ -31,7 +32,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (info, check, solve, convert, solvers, simulate, demo, profile):
+for module in (info, check, solve, convert, analyze, solvers, simulate, demo, profile):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.add_typer(collection.app, name="collection")
 app.add_typer(bench.app, name="bench")

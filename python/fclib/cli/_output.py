@@ -148,6 +148,8 @@ def finite(value: Any) -> Any:
     """The value with None for each number that is not finite, which is no JSON."""
     if isinstance(value, dict):
         return {key: finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

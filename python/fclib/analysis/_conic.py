@@ -1,0 +1,113 @@
+"""Conic programs for Clarabel: rows of s = b - A x in zeros, nonnegatives, second-order cones."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fclib.analysis._data import Array, Data
+
+MISSING = 'the analysis needs Clarabel: pip install "fclib[analysis]"'
+
+
+def available() -> bool:
+    """Whether Clarabel is installed."""
+    return importlib.util.find_spec("clarabel") is not None
+
+
+@dataclass
+class Program:
+    """min 1/2 x^T P x + c^T x subject to what is added."""
+
+    size: int
+    zeros: list[tuple[Any, Array]] = field(default_factory=list)
+    nonnegatives: list[tuple[Any, Array]] = field(default_factory=list)
+    cones: list[tuple[Any, Array, int]] = field(default_factory=list)
+
+    def equal(self, B: Any, e: Array) -> None:
+        """B x = e."""
+        self.zeros.append((sp.csr_array(B), e))
+
+    def nonnegative(self, B: Any, c: Array) -> None:
+        """B x + c >= 0."""
+        self.nonnegatives.append((-sp.csr_array(B), c))
+
+    def second_order(self, B: Any, c: Array, size: int) -> None:
+        """B x + c in cones of `size` rows each, the first bounds the norm of the others."""
+        if c.size:
+            self.cones.append((-sp.csr_array(B), c, size))
+
+    def solve(self, c: Array, P: Any = None, tol: float = 1e-10, time_limit: float = 60.0) -> Any:
+        """Clarabel's answer. Raises ImportError, saying what to install."""
+        if not available():
+            raise ImportError(MISSING)
+        clarabel = importlib.import_module("clarabel")
+        settings = clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.max_threads = 1
+        settings.time_limit = time_limit
+        settings.tol_feas = settings.tol_gap_abs = settings.tol_gap_rel = tol
+        cones = [clarabel.ZeroConeT(e.size) for _, e in self.zeros if e.size]
+        cones += [clarabel.NonnegativeConeT(b.size) for _, b in self.nonnegatives if b.size]
+        for _, b, size in self.cones:
+            cones += [clarabel.SecondOrderConeT(size)] * (b.size // size)
+        rows = [*self.zeros, *self.nonnegatives, *((B, b) for B, b, _ in self.cones)]
+        A = sp.csc_array(sp.vstack([B for B, _ in rows]))
+        b = np.concatenate([b for _, b in rows])
+        quadratic = sp.csc_array((self.size, self.size)) if P is None else sp.triu(P, format="csc")
+        return clarabel.DefaultSolver(quadratic, c, A, b, cones, settings).solve()
+
+
+def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -> None:
+    """A x + c in K*, for all contacts: u_N >= mu ||u_T|| (+ mu_r ||u_R||).
+
+    Args:
+        program: takes the constraints.
+        data: the problem.
+        A: (m, size of the program).
+        c: (m,).
+        first: of the unknowns that share u_N between sliding and rolling: nc of them where there is
+            rolling friction, none else.
+    """
+    d, nc = data.d, data.problem.nc
+    A = sp.csr_array(A)
+    share = sp.csr_array((nc, program.size))
+    if len(data.friction) > 1:
+        share = sp.csr_array(
+            (np.ones(nc), (np.arange(nc), first + np.arange(nc))), shape=(nc, program.size)
+        )
+        program.nonnegative(share, np.zeros(nc))
+        program.nonnegative(A[::d] - share, c[::d])
+    for number, (mu, part) in enumerate(data.friction):
+        # with rolling, the first cone is given what the share says and the second one the rest
+        if len(data.friction) == 1:
+            top, constant = A[::d], c[::d]
+        elif number == 0:
+            top, constant = share, np.zeros(nc)
+        else:
+            top, constant = A[::d] - share, c[::d]
+        without = np.flatnonzero(mu == 0)
+        program.nonnegative(top[without], constant[without])
+        contacts = np.flatnonzero(mu > 0)
+        components = list(range(d))[part]
+        size = 1 + len(components)
+        # rows contact by contact: the normal one, then mu times the tangential ones
+        stacked = sp.vstack(
+            [top[contacts]]
+            + [sp.diags_array(mu[contacts]) @ A[d * contacts + k] for k in components]
+        )
+        values = np.concatenate(
+            [constant[contacts], *(mu[contacts] * c[d * contacts + k] for k in components)]
+        )
+        order = np.arange(size * contacts.size).reshape(size, -1).T.ravel()
+        program.second_order(sp.csr_array(stacked)[order], values[order], size)
+
+
+def shares(data: Data) -> int:
+    """The unknowns that add_dual_cones needs."""
+    return data.problem.nc if len(data.friction) > 1 else 0

@@ -1,0 +1,346 @@
+"""Whether a problem has a solution: Slater's condition, a solution at hand, or a proof of none.
+
+Let S be the symmetric part of W, positive semidefinite. Reactions that grow without bound tend
+to a direction d in K with S d = 0 and q . d <= 0; so there is a solution where no such d is, and by
+the theorem of the alternative that is where some u = S x + q is strictly inside K*. For symmetric W
+this is the criterion of Cadoux: a velocity strictly inside the dual cone exists (Acary, Cadoux,
+Lemarechal & Malick 2011, "A formulation of the linear discrete Coulomb friction problem via convex
+optimization"; Klarbring & Pang 1998, "Existence of solutions to discrete semicoercive frictional
+contact problems"). With bilateral constraints x has lambda too, and the constraints hold.
+
+u^ is in K* exactly where u_N >= 0, so what proves that there is no solution is (Farkas) y >= 0 and
+z with
+
+    -(W^T E y + V z) in K*,   V^T E y + R^T z = 0,   y . q_N + z . s < 0.
+
+The lack of a Slater point proves nothing: jammed packings have solutions under prestress.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import lsmr
+
+import fclib
+from fclib.analysis._conic import Program, add_dual_cones, shares
+from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
+
+MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
+ROUNDING = 1e-8  # of terms that cancel in a proof, relative to them
+SAFE = 1e4  # a proof must hold for reactions this many times the usual size ||q|| / mean W_kk
+
+EXISTS_SLATER = "exists by Slater"
+EXISTS_AT_HAND = "exists (a solution is at hand)"
+PROVEN_NOT = "proven not to exist"
+UNDECIDED = "undecided"
+VERDICTS = (EXISTS_SLATER, EXISTS_AT_HAND, PROVEN_NOT, UNDECIDED)
+
+
+@dataclass(frozen=True)
+class Slater:
+    """Slater's condition: a velocity strictly inside K* at every contact.
+
+    Attributes:
+        holds: whether one was found; None where the question was not decided.
+        margin: the least u_N - mu ||u_T|| (- mu_r ||u_R||) of the best velocity found, relative to
+            ||q||, at most 1; nan where none was looked for.
+        velocity: (m,) that velocity, [m/s].
+        method: how it was found.
+        threshold: what the margin must exceed.
+    """
+
+    holds: bool | None
+    margin: float
+    velocity: Array | None = field(repr=False, compare=False)
+    method: str
+    threshold: float = MARGIN
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A proof that there is no solution, of the local form of a problem.
+
+    Attributes:
+        y: (nc,) >= 0, z: (p,) such that -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and
+            y . q_N + z . s < 0. E y has the normal parts y.
+        gain: -(y . q_N + z . s), positive.
+        distance: of the two images from where they belong; what is left of rounding.
+        bound: the proof holds for all reactions (and lambda) of a norm below this.
+        usual: the norm that reactions usually have, ||q|| / mean W_kk.
+    """
+
+    y: Array = field(repr=False)
+    z: Array | None = field(repr=False)
+    gain: float
+    distance: float
+    bound: float
+    usual: float
+
+    @property
+    def contacts(self) -> int:
+        """How many contacts the proof speaks of."""
+        return int(np.count_nonzero(self.y))
+
+
+def farkas(problem: fclib.Problem, y: Array, z: Array | None = None) -> Certificate | None:
+    """The proof that y (and z) are, judged from the data alone; None where they prove nothing.
+
+    Args:
+        problem: any formulation; a global one is condensed.
+        y: (nc,) as in Certificate.
+        z: (p,) likewise, zero where it is left out.
+
+    Raises:
+        fclib.ProblemError: y or z is not of this size.
+    """
+    data = Data.of(problem)
+    local, d, p = data.local, data.d, problem.p
+    y = np.asarray(y, dtype=float)
+    if y.shape != (problem.nc,) or (z is not None and np.shape(z) != (p,)):
+        raise fclib.ProblemError(f"y must have nc = {problem.nc} entries, z p = {p}")
+    if not np.isfinite(y).all() or (y < 0).any():
+        return None
+    normal = np.zeros(problem.m)
+    normal[::d] = y
+    image, size = data.W.T @ normal, abs(data.W.T) @ normal
+    q = local.q[::d]
+    gain, terms = -float(y @ q), float(y @ abs(q))
+    rest = limit = np.zeros(0)
+    if local.V is not None and local.R is not None and local.s is not None:
+        z = np.zeros(p) if z is None else np.asarray(z, dtype=float)
+        V, R = data.matrices["V"], data.matrices["R"]
+        image, size = image + V @ z, size + abs(V) @ abs(z)
+        rest = V.T @ normal + R.T @ z
+        limit = ROUNDING * (abs(V.T) @ normal + abs(R.T) @ abs(z))
+        gain, terms = gain - float(z @ local.s), terms + float(abs(z) @ abs(local.s))
+    distances = np.maximum(0, -data.dual_margin(-image))
+    sizes = size.reshape(-1, d).sum(axis=1)
+    small = (distances <= ROUNDING * sizes).all() and (abs(rest) <= limit).all()
+    if not small or not gain > ROUNDING * terms:
+        return None
+    # the margin bounds the distance from K* from above
+    distance = float(np.hypot(np.linalg.norm(distances), np.linalg.norm(rest)))
+    usual = data.speed / abs(data.stiffness)
+    bound = gain / distance if distance else np.inf
+    if not bound > SAFE * usual:
+        return None
+    return Certificate(y, z, gain, distance, bound, usual)
+
+
+def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
+    """A proof that there is no solution, or None where none was found.
+
+    Raises:
+        ImportError: Clarabel is not installed.
+    """
+    local, d, nc, p = data.local, data.d, data.problem.nc, data.problem.p
+    if nc == 0 or not (local.q[::d] < 0).any():
+        return None
+    own = shares(data)
+    program = Program(nc + p + own)
+    scale = abs(data.stiffness)
+    E = sp.csr_array((np.ones(nc), (d * np.arange(nc), np.arange(nc))), shape=(d * nc, nc))
+    blocks = [-(data.W.T @ E) / scale]
+    c = [local.q[::d] / data.speed]
+    if local.V is not None:
+        V, R = data.matrices["V"], data.matrices["R"]
+        blocks.append(-V / scale)
+        c.append(np.asarray(local.s) / data.speed)
+        program.equal(
+            sp.hstack([V.T @ E / scale, R.T / scale, sp.csr_array((p, own))]), np.zeros(p)
+        )
+    image = sp.hstack([*blocks, sp.csr_array((d * nc, own))])
+    add_dual_cones(program, data, image, np.zeros(d * nc), nc + p)
+    some = sp.csr_array(sp.eye_array(nc, program.size))
+    program.nonnegative(some, np.zeros(nc))
+    program.nonnegative(-sp.csr_array(some.sum(axis=0)[None, :]), np.ones(1))
+    answer = program.solve(np.concatenate([*c, np.zeros(own)]), tol=1e-12, time_limit=time_limit)
+    x = np.array(answer.x)
+    y, z = np.maximum(0, x[:nc]), x[nc : nc + p] if p else None
+    if not np.isfinite(x).all() or not y.any():
+        return None
+    # contacts outside the proof keep small parts, which are left out; the others are brought to
+    # where the image vanishes, which it does for symmetric W
+    for least in (1e-3, 1e-6, 1e-9, 0.0):
+        kept = y > least * y.max()
+        for trial in (_refined(data, E, kept, y, z), (np.where(kept, y, 0), z)):
+            if proof := farkas(data.problem, *trial):
+                return proof
+    return None
+
+
+def _refined(
+    data: Data, E: sp.csr_array, kept: Array, y: Array, z: Array | None
+) -> tuple[Array, Array | None]:
+    """Y and z moved to the nearest ones whose images are zero."""
+    nc, p = data.problem.nc, data.problem.p
+    number = np.flatnonzero(kept)
+    A = (data.W.T @ E)[:, number]
+    x = y[number]
+    if z is not None:
+        V, R = data.matrices["V"], data.matrices["R"]
+        A = sp.vstack([sp.hstack([A, V]), sp.hstack([(V.T @ E)[:, number], R.T])])
+        x = np.concatenate([x, z])
+    A = sp.csr_array(A)
+    for _ in range(2):
+        x = x - lsmr(A, A @ x, atol=1e-15, btol=1e-15, conlim=0, maxiter=20 * sum(A.shape))[0]
+    result = np.zeros(nc)
+    result[number] = np.maximum(0, x[: number.size])
+    return result, x[number.size :] if p else None
+
+
+def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0) -> Slater:
+    """Looks for a velocity strictly inside K*.
+
+    Args:
+        data: the problem.
+        semidefinite: whether the symmetric part of W is positive semidefinite; else the condition
+            says nothing of solutions, and is not looked at.
+        full: whether that part has full rank: each velocity can be reached.
+        time_limit: [s] of the conic solver.
+
+    Raises:
+        ImportError: Clarabel is needed, and not installed.
+    """
+    d, nc, p = data.d, data.problem.nc, data.problem.p
+    if nc == 0:
+        return Slater(True, 1.0, np.zeros(0), "there is no contact")
+    if not semidefinite:
+        return Slater(None, np.nan, None, "W is not positive semidefinite")
+    inside = np.zeros(data.problem.m)
+    inside[::d] = data.speed
+    if full and p == 0:
+        return Slater(True, 1.0, inside, "W has full rank")
+    if p == 0 and data.dual_margin(data.local.q).min() > MARGIN * data.speed:
+        margin = min(1.0, float(data.dual_margin(data.local.q).min() / data.speed))
+        return Slater(True, margin, data.local.q, "the velocity without reactions")
+    A, c, B, e = _reachable(data)
+    # the velocity that leaves every contact at the same speed, where it can be reached
+    if p == 0:
+        x = lsmr(A, inside - c, atol=1e-14, btol=1e-14, maxiter=500)[0]
+        if found := _witness(data, A, c, B, e, x, "least squares"):
+            return found
+    own = shares(data)
+    k = A.shape[1]
+    program = Program(k + 1 + own)  # x, t and what rolling needs
+    top = sp.csr_array((np.full(nc, -1.0), (d * np.arange(nc), np.zeros(nc, int))), (d * nc, 1))
+    row_scale = max(abs(A).max(), 1e-300)
+    map_ = sp.hstack([A / row_scale, top, sp.csr_array((d * nc, own))])
+    add_dual_cones(program, data, map_, c / data.speed, k + 1)
+    if e.size:
+        program.equal(sp.hstack([B / row_scale, sp.csr_array((e.size, 1 + own))]), e / data.speed)
+    t = sp.csr_array(([1.0], ([0], [k])), shape=(1, program.size))
+    program.nonnegative(-t, np.ones(1))
+    goal = np.zeros(program.size)
+    goal[k] = -1
+    answer = program.solve(goal, time_limit=time_limit)
+    x = np.array(answer.x)[:k] * data.speed / row_scale
+    if np.isfinite(x).all() and (found := _witness(data, A, c, B, e, x, "conic program")):
+        return found
+    # t is free below, so that there is a solution: t <= 0 is an answer, if it came to an end
+    reached = float(answer.x[k])
+    solved = "Solved" in str(answer.status) and "Almost" not in str(answer.status)
+    return Slater(False if solved and reached <= MARGIN else None, reached, None, "conic program")
+
+
+def _reachable(data: Data) -> tuple[sp.csr_array, Array, sp.csr_array, Array]:
+    """A, c, B, e: velocities are A x + c for all x with B x = e."""
+    problem, local = data.problem, data.local
+    bodies = isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
+    if bodies and asymmetry(data.matrices["M"]) <= SYMMETRIC:
+        assert isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
+        G, b = data.matrices.get("G"), problem.b
+        if G is None or b is None:
+            return data.matrices["H"].T.tocsr(), problem.w, _nothing(problem.n), np.zeros(0)
+        return data.matrices["H"].T.tocsr(), problem.w, sp.csr_array(G.T), -b
+    if local.V is None or local.s is None:
+        return _symmetric_part(data.W), local.q, _nothing(problem.m), np.zeros(0)
+    V, R = data.matrices["V"], data.matrices["R"]
+    whole = sp.vstack([sp.hstack([data.W, V]), sp.hstack([V.T, R])])
+    S = _symmetric_part(whole)
+    m = problem.m
+    return S[:m], local.q, S[m:], -local.s
+
+
+def _nothing(size: int) -> sp.csr_array:
+    return sp.csr_array((0, size))
+
+
+def _symmetric_part(a: sp.sparray) -> sp.csr_array:
+    return sp.csr_array((a + a.T) / 2)
+
+
+def _witness(
+    data: Data,
+    A: sp.csr_array,
+    c: Array,
+    B: sp.csr_array,
+    e: Array,
+    x: Array,
+    method: str,
+) -> Slater | None:
+    """X as a Slater point, judged from the data; None where it is none."""
+    slack = 0.0
+    if e.size:
+        x = x - lsmr(B, B @ x - e, atol=1e-15, btol=1e-15)[0]
+        # what is left of the equations is put right by an x of this size
+        step = lsmr(B, B @ x - e, atol=1e-15, btol=1e-15)[0]
+        slack = float(np.linalg.norm(A @ step)) * 10
+    u = A @ x + c
+    rounding = 1e-12 * (abs(A) @ abs(x) + abs(c)).reshape(-1, data.d).sum(axis=1)
+    margin = float((data.dual_margin(u) - rounding).min() - slack) / data.speed
+    if not margin > MARGIN:
+        return None
+    return Slater(True, min(1.0, margin), u, method)
+
+
+@dataclass(frozen=True)
+class Existence:
+    """The verdict on existence, one of VERDICTS, with its reason.
+
+    Attributes:
+        verdict: one of four.
+        reason: in words.
+        certificate: the proof where there is no solution.
+        solution: the one at hand, of whatever verdict; error: its merit (nan without one).
+    """
+
+    verdict: str
+    reason: str
+    certificate: Certificate | None = field(default=None, repr=False)
+    solution: fclib.Solution | None = field(default=None, repr=False, compare=False)
+    error: float = float("nan")
+
+
+def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> Existence:
+    """The verdict. Raises ImportError where Clarabel is needed, and not installed."""
+    problem = data.problem
+    solution, error, proof = None, float("nan"), None
+    why = ""
+    try:
+        result = fclib.solve(problem, "auto", tol, time_limit=time_limit)
+    except fclib.UnsuitableError as refused:
+        why = f"no solver takes it: {refused}"
+    else:
+        error = result.error
+        solution = result.solution if result.converged else None
+        why = f"the default solver ended as {result.status}, with an error of {error:.1e}"
+        if result.certificate is not None and problem.p == 0:
+            proof = farkas(problem, result.certificate)
+    if condition.holds:
+        reason = f"Slater's condition holds ({condition.method}), W is positive semidefinite"
+        return Existence(EXISTS_SLATER, reason, None, solution, error)
+    if solution is not None:
+        reason = f"solved, with an error of {error:.1e} (tolerance {tol:.0e})"
+        return Existence(EXISTS_AT_HAND, reason, None, solution, error)
+    proof = proof or prove(data, time_limit)
+    if proof is not None:
+        reason = (
+            f"no reactions of a norm below {proof.bound:.1e} N s (usual: {proof.usual:.1e}) keep "
+            f"{proof.contacts} contacts from closing (Farkas)"
+        )
+        return Existence(PROVEN_NOT, reason, proof, None, error)
+    return Existence(UNDECIDED, f"{why}; no proof was found that there is no solution", None)

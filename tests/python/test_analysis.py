@@ -1,0 +1,736 @@
+"""Ranks, existence with its proofs, uniqueness, reference solutions, contacts and energy."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import hypothesis
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import strategies as st
+
+import fclib
+from fclib import analysis
+from fclib.analysis import _existence, _spectrum
+from fclib.analysis._data import Data
+from helpers import (
+    dense,
+    local_problem,
+    planted_global,
+    planted_local,
+    planted_rolling,
+    project,
+)
+
+some = hypothesis.settings(deadline=None, max_examples=20, derandomize=True)
+
+
+def folder() -> Path:
+    """As the fixture real_data, for what is collected before fixtures run."""
+    default = Path(__file__).parents[3] / "shared" / "data" / "real"
+    return Path(os.environ.get("FCLIB_DATA", default))
+
+
+REAL = [
+    pytest.param(path, id=f"{path.parent.name}/{path.stem}")
+    for path in sorted(folder().glob("*/*.hdf5"))
+]
+needs_data = pytest.mark.skipif(not REAL, reason=f"there are no real problems in {folder()}")
+
+
+def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "fclib", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True)
+
+
+def assert_no_solution(problem: fclib.Problem, proof: analysis.Certificate | None) -> None:
+    """Farkas, from the data: no r in K, with its lambda, keeps all contacts from closing."""
+    assert proof is not None
+    local = problem
+    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+        local = problem.condense()
+    assert isinstance(local, (fclib.LocalProblem, fclib.LocalRollingProblem))
+    y, d = proof.y, local.spacedim
+    assert (y >= 0).all()
+    normal = np.zeros(local.m)
+    normal[::d] = y
+    image = -dense(local.W).T @ normal
+    gain = -y @ local.q[::d]
+    rest = np.zeros(0)
+    if local.V is not None:
+        z = proof.z
+        assert z is not None
+        assert local.s is not None
+        image = image - dense(local.V) @ z
+        rest = dense(local.V).T @ normal + dense(local.R).T @ z
+        gain = gain - z @ local.s
+    assert gain > 0
+    outside = np.linalg.norm(project(-image.reshape(-1, d), local.mu))
+    distance = np.hypot(outside, np.linalg.norm(rest))
+    trace = np.trace(dense(local.W)) / local.m
+    usual = np.linalg.norm(local.q) / abs(trace or 1.0)
+    assert distance == 0 or gain / distance > 1e3 * usual
+
+
+# ---- real problems
+
+
+@needs_data
+@pytest.mark.parametrize("path", REAL)
+def test_ranks_are_those_of_dense_algebra(path: Path) -> None:
+    problem = fclib.read(path)
+    if problem.nc > 300:
+        pytest.skip("more than 300 contacts")
+    found = analysis.analyze(problem)
+    local = problem
+    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+        local = problem.condense()
+        H = dense(problem.H)
+        assert found.spectra["H"].rank == (np.linalg.matrix_rank(H) if H.size else 0)
+    assert isinstance(local, (fclib.LocalProblem, fclib.LocalRollingProblem))
+    W = dense(local.W)
+    size = abs(W).max(initial=0)
+    assert found.asymmetry["W"] == pytest.approx(
+        abs(W - W.T).max() / size if size else 0, rel=1e-12, abs=1e-18
+    )
+    if problem.nc:
+        values = np.linalg.svd(W, compute_uv=False)
+        rank = int(np.linalg.matrix_rank(W))
+        spectrum = found.spectra["W"]
+        assert spectrum.rank == rank
+        # the smallest singular value is known to the rounding of the largest
+        accuracy = 1e-13 * values[0] / values[rank - 1] + 1e-9
+        assert spectrum.conditioning == pytest.approx(values[0] / values[rank - 1], rel=accuracy)
+        assert found.hyperstaticity == problem.m - rank
+    # each of them has been solved: none may be said to have no solution
+    assert found.existence.verdict in (analysis.EXISTS_SLATER, analysis.EXISTS_AT_HAND)
+    assert found.existence.error <= 1e-8
+    json.dumps(found.record, allow_nan=False)
+
+
+@needs_data
+def test_a_real_problem_has_a_reference_solution() -> None:
+    path = folder() / "local3d" / "Capsules-i125-1213.hdf5"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    problem = fclib.read(path)
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.error <= 1e-12
+    assert found.reaction == "minimum norm"
+    assert found.solution is not None
+    other = fclib.solve(problem, tol=1e-12).solution
+    assert np.linalg.norm(found.solution.r) < np.linalg.norm(other.r)
+
+
+# ---- ranks
+
+
+@some
+@hypothesis.given(
+    seed=st.integers(0, 10**6), rank=st.integers(1, 30), extra=st.integers(0, 20), d=st.booleans()
+)
+def test_sparse_and_dense_counts_agree(seed: int, rank: int, extra: int, d: bool) -> None:
+    rng = np.random.default_rng(seed)
+    size = rank + extra
+    factor = rng.standard_normal((size, rank)) * (rng.uniform(size=(size, rank)) < 0.5)
+    right = factor if d else factor + 0.1 * rng.standard_normal(factor.shape) * (factor != 0)
+    a = sp.csc_array(factor @ right.T)
+    a.eliminate_zeros()
+    if a.nnz == 0:
+        return
+    expected = _spectrum.spectrum(a)
+    assert expected.rank == np.linalg.matrix_rank(a.toarray())
+    values = np.linalg.svd(a.toarray(), compute_uv=False)
+    assert expected.largest == pytest.approx(values[0])
+    # what the sparse thresholds cannot tell apart is left out
+    gap = values[values > 1e-14 * values[0]]
+    if gap.min() < 1e-5 * values[0]:
+        return
+    sparse = _spectrum.spectrum(a, limit=1)
+    assert sparse.rank == expected.rank
+    assert "inertia" in sparse.method or min(a.shape) == 1 or "dense" in sparse.method
+    assert sparse.conditioning == pytest.approx(expected.conditioning, rel=0.05)
+
+
+def test_blocks_are_found() -> None:
+    a = sp.block_diag([np.diag([1.0, 2.0]), np.ones((2, 3)), np.zeros((1, 2)), [[4.0]]])
+    found = _spectrum.spectrum(sp.csc_array(a))
+    assert found.rank == 4
+    assert found.largest == 4
+    assert found.smallest == 1
+    low, high, _ = _spectrum.lowest_eigenvalue(sp.csc_array(np.diag([3.0, -1.0, 0.0])))
+    assert (low, high) == (-1, 3)
+    low, _, _ = _spectrum.lowest_eigenvalue(sp.csc_array(np.diag([3.0, 0.0])))
+    assert low == 0
+
+
+@pytest.mark.parametrize("lowest", [0.5, 0.0, -0.5])
+def test_the_sign_of_sparse_matrices(lowest: float) -> None:
+    rng = np.random.default_rng(1)
+    q, _ = np.linalg.qr(rng.standard_normal((12, 12)))
+    a = q @ np.diag([lowest, *rng.uniform(1, 2, 11)]) @ q.T
+    low, _, method = _spectrum.lowest_eigenvalue(sp.csc_array((a + a.T) / 2), limit=3)
+    assert "inertia" in method
+    assert np.sign(round(low, 9)) == np.sign(lowest) or abs(low) < 1e-9
+
+
+# ---- problems without a solution
+
+
+def squeezed(d: int, mu: float, others: int, seed: int = 0) -> fclib.GlobalProblem:
+    """A body between walls that close on it, other bodies touch it and each other."""
+    rng = np.random.default_rng(seed)
+    n = d * (others + 1)
+    H = np.zeros((n, d * (others + 2)))
+    H[:d, :d] = np.eye(d)
+    H[:d, d : 2 * d] = -np.eye(d)
+    for k in range(others):
+        frame, _ = np.linalg.qr(rng.standard_normal((d, d)))
+        own = slice(d * (k + 1), d * (k + 2))
+        column = slice(d * (k + 2), d * (k + 3))
+        H[own, column] = frame
+        H[:d, column] = -frame
+    w = np.zeros(H.shape[1])
+    w[[0, d]] = [-1.0, -0.5]
+    f = rng.standard_normal(n)
+    return fclib.GlobalProblem(spacedim=d, M=np.eye(n), H=H, f=f, w=w, mu=np.full(others + 2, mu))
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("mu", [0.0, 0.4, 3.0])
+@pytest.mark.parametrize("others", [0, 5])
+def test_a_body_between_closing_walls(d: int, mu: float, others: int) -> None:
+    problem = squeezed(d, mu, others)
+    found = analysis.analyze(problem, time_limit=3)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert found.slater.holds is not True
+    assert_no_solution(problem, found.certificate)
+    assert found.record["certificate_contacts"] == [0, 1]
+    # of the local form alone, and without the solver's own proof
+    data = Data.of(problem.condense())
+    assert_no_solution(problem, _existence.prove(data))
+
+
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_a_ring_of_walls_that_pushes_a_body_out_of_itself(count: int) -> None:
+    # normals that hold each other: no motion leaves all walls that come nearer
+    angles = 2 * np.pi * np.arange(count) / count + 0.1
+    frames = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
+    H = np.hstack(frames)
+    w = np.zeros(2 * count)
+    w[::2] = -1
+    problem = fclib.GlobalProblem(
+        spacedim=2, M=np.eye(2), H=H, f=[0.3, -0.2], w=w, mu=np.full(count, 0.5)
+    )
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert_no_solution(problem, found.certificate)
+    # where they go away there is a solution, strictly inside K*
+    apart = analysis.analyze(problem.replace(w=-w))
+    assert apart.existence.verdict == analysis.EXISTS_SLATER
+
+
+@pytest.mark.parametrize("mu", [1.5, 2.0, 4.0])
+def test_the_rod_of_painleve(mu: float) -> None:
+    # a sliding rod at 45 degrees (m = l / 2 = 1): the normal acceleration is A r + b with
+    # A = 1 + 3 cos a (cos a - mu sin a), negative from mu = 5/3 on, and b < 0
+    push = 1 + 1.5 * (1 - mu)
+    problem = fclib.LocalProblem(
+        spacedim=2, W=np.array([[push, 0.0], [0.0, 1.0]]), q=[-1.0, 0.3], mu=[0.2]
+    )
+    found = analysis.analyze(problem)
+    if push < 0:
+        assert found.definiteness.word == "indefinite"
+        assert found.existence.verdict == analysis.PROVEN_NOT
+        assert_no_solution(problem, found.certificate)
+    else:
+        assert found.existence.verdict == analysis.EXISTS_SLATER
+
+
+def test_friction_and_an_asymmetric_w_leave_no_way_out() -> None:
+    # with Painleve's coupling in W itself: u_N = (a r_N + b r_T) - 1 with |b| mu < -a
+    W = np.array([[-1.0, 0.5], [0.0, 1.0]])
+    for mu, none in ((1.0, True), (3.0, False)):
+        problem = fclib.LocalProblem(spacedim=2, W=W, q=[-1.0, 0.0], mu=[mu])
+        found = analysis.analyze(problem)
+        assert (found.existence.verdict == analysis.PROVEN_NOT) == none
+        if none:
+            assert_no_solution(problem, found.certificate)
+
+
+def test_a_bilateral_constraint_holds_what_is_pushed() -> None:
+    # the body cannot leave along x, and a wall comes from there
+    problem = fclib.GlobalProblem(
+        M=np.eye(3),
+        H=np.eye(3),
+        G=np.eye(3)[:, :1],
+        f=np.zeros(3),
+        w=[-1.0, 0, 0],
+        b=[0.0],
+        mu=[0.5],
+    )
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert_no_solution(problem, found.certificate)
+    assert analysis.analyze(problem.replace(b=[-2.0])).existence.verdict == analysis.EXISTS_SLATER
+
+
+def test_a_rolling_body_between_closing_walls() -> None:
+    W = np.zeros((10, 10))
+    block = np.diag([1.0, 1.0, 1.0, 2.0, 2.0])
+    sign = np.diag([-1.0, 1.0, 1.0, 1.0, 1.0])
+    W[:5, :5], W[:5, 5:], W[5:, :5], W[5:, 5:] = block, block @ sign, sign @ block, block
+    q = np.zeros(10)
+    q[[0, 5]] = -1
+    problem = fclib.LocalRollingProblem(spacedim=5, W=W, q=q, mu=[0.3, 0.3], mu_r=[0.1, 0.1])
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    proof = found.certificate
+    assert proof is not None
+    normal = np.zeros(10)
+    normal[::5] = proof.y
+    np.testing.assert_allclose(W @ normal, 0, atol=1e-9)
+    assert proof.y @ q[::5] < 0
+
+
+def test_what_proves_nothing_is_no_proof() -> None:
+    problem = squeezed(3, 0.4, 2).condense()
+    assert isinstance(problem, fclib.LocalProblem)
+    assert analysis.farkas(problem, np.array([1.0, 1, 0, 0])) is not None
+    assert analysis.farkas(problem, np.array([1.0, 0, 0, 0])) is None
+    assert analysis.farkas(problem, np.array([1.0, 1, 1e-3, 0])) is None
+    assert analysis.farkas(problem, np.array([-1.0, -1, 0, 0])) is None
+    assert analysis.farkas(problem, np.zeros(4)) is None
+    with pytest.raises(fclib.ProblemError, match="nc = 4"):
+        analysis.farkas(problem, np.ones(3))
+
+
+# ---- problems with a solution
+
+
+@some
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1),
+    nc=st.integers(1, 8),
+    d=st.sampled_from([2, 3]),
+    p=st.sampled_from([0, 2]),
+    mu=st.sampled_from([0.0, 0.3, 2.0]),
+)
+def test_planted_problems_are_never_called_infeasible(
+    seed: int, nc: int, d: int, p: int, mu: float
+) -> None:
+    for case in (planted_local(seed, d, nc, p, mu), planted_global(seed, d, nc, p, mu)):
+        found = analysis.analyze(case.problem)
+        assert found.existence.verdict == analysis.EXISTS_SLATER
+        assert _existence.prove(Data.of(case.problem)) is None
+
+
+@some
+@hypothesis.given(
+    seed=st.integers(0, 2**32 - 1),
+    nc=st.integers(2, 8),
+    duplicated=st.integers(0, 2),
+    mu=st.sampled_from([0.0, 0.3, 2.0]),
+)
+def test_hyperstatic_problems_are_never_called_infeasible(
+    seed: int, nc: int, duplicated: int, mu: float
+) -> None:
+    # fewer bodies than contacts hold, and a planted solution
+    rng = np.random.default_rng(seed)
+    case = planted_local(seed, nc=nc, mu=mu)
+    u, r = case.solution.u, case.solution.r
+    assert u is not None
+    n = max(3, 3 * nc // 2)
+    H = rng.standard_normal((n, 3 * nc))
+    H = np.hstack([H, H[:, : 3 * duplicated]])
+    u, r = np.append(u, u[: 3 * duplicated]), np.append(r, r[: 3 * duplicated])
+    v = rng.standard_normal(n)
+    problem = fclib.GlobalProblem(
+        M=np.eye(n), H=H, f=v - H @ r, w=u - H.T @ v, mu=np.full(nc + duplicated, mu)
+    )
+    for form in (problem, problem.condense()):
+        found = analysis.analyze(form, time_limit=2)
+        assert found.existence.verdict != analysis.PROVEN_NOT
+        assert found.hyperstaticity == 3 * (nc + duplicated) - np.linalg.matrix_rank(H)
+        assert _existence.prove(Data.of(form)) is None
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_a_jammed_body_has_a_solution_and_no_slater_point(local: bool) -> None:
+    # between walls that stand still: whatever the prestress, u = 0
+    H = np.hstack([np.eye(3), np.diag([-1.0, 1.0, 1.0])])
+    whole = fclib.GlobalProblem(M=np.eye(3), H=H, f=[0.5, -0.1, 0], w=np.zeros(6), mu=[0.5, 0.5])
+    found = analysis.analyze(whole.condense() if local else whole)
+    assert found.slater.holds is False
+    assert found.slater.margin <= 1e-7
+    assert found.existence.verdict == analysis.EXISTS_AT_HAND
+    assert found.certificate is None
+    assert found.hyperstaticity == 3
+
+
+def test_a_slater_point_is_strictly_inside() -> None:
+    case = planted_global(3, d=3, nc=5, p=2)
+    problem = case.problem
+    assert isinstance(problem, fclib.GlobalProblem)
+    # more contacts than the bodies can move apart freely
+    H = np.hstack([dense(problem.H), dense(problem.H)])
+    problem = problem.replace(H=H, w=np.tile(problem.w, 2), mu=np.tile(problem.mu, 2))
+    found = analysis.analyze(problem).slater
+    assert found.holds
+    u = found.velocity
+    assert u is not None
+    parts = u.reshape(-1, 3)
+    assert (parts[:, 0] > problem.mu * np.linalg.norm(parts[:, 1:], axis=1)).all()
+    # it is a velocity that the bodies can have, the constraints kept
+    G, b = dense(problem.G), problem.b
+    assert b is not None
+    rows, right = np.vstack([H.T, G.T]), np.concatenate([u - problem.w, -b])
+    v, *_ = np.linalg.lstsq(rows, right, rcond=None)
+    np.testing.assert_allclose(rows @ v, right, atol=1e-8)
+
+
+def test_contradictory_constraints_have_no_slater_point() -> None:
+    # redundant and contradictory bilateral constraints: no solver, no Slater point, no claim
+    problem = fclib.GlobalProblem(
+        M=np.eye(3),
+        H=np.eye(3),
+        G=np.array([[0.0, 0], [1, 1], [0, 0]]),
+        f=[-1.0, 0, 0],
+        w=np.zeros(3),
+        b=[0.0, 1.0],
+        mu=[0.5],
+    )
+    found = analysis.analyze(problem)
+    assert found.slater.holds is not True
+    assert found.existence.verdict in (analysis.UNDECIDED, analysis.PROVEN_NOT)
+    consistent = analysis.analyze(problem.replace(b=[0.0, 0.0]))
+    assert consistent.existence.verdict == analysis.EXISTS_SLATER
+
+
+# ---- uniqueness, units, words
+
+
+def test_a_contraction_makes_the_velocity_unique() -> None:
+    for mu, unique in ((0.3, True), (1.5, False)):
+        problem = local_problem(np.eye(6), [-1, 1, 0, -1, 0, 2], [mu, mu])
+        found = analysis.analyze(problem).uniqueness
+        assert found.contraction == pytest.approx(mu)
+        assert (found.verdict == "unique") == unique
+        assert found.reactions
+
+
+@hypothesis.settings(some, max_examples=5)
+@hypothesis.given(seed=st.integers(0, 10**6), mu=st.floats(0.01, 0.5))
+def test_the_contraction_bounds_the_fixed_point(seed: int, mu: float) -> None:
+    problem = planted_local(seed, nc=4, mu=mu).problem
+    assert isinstance(problem, fclib.LocalProblem)
+    constant = analysis.analyze(problem).uniqueness.contraction
+    W, q = dense(problem.W), problem.q
+    rng = np.random.default_rng(seed)
+    images = []
+    shifts = rng.uniform(0, 1, (2, 4))
+    for s in shifts:
+        r = np.zeros(12)
+        for _ in range(1000):
+            u = W @ r + q
+            u[::3] += s
+            step = r - u / np.linalg.norm(W, 2)
+            r = project(step.reshape(-1, 3), problem.mu).ravel()
+        u = (W @ r + q).reshape(-1, 3)
+        images.append(mu * np.linalg.norm(u[:, 1:], axis=1))
+    moved = np.linalg.norm(images[0] - images[1])
+    assert moved <= constant * np.linalg.norm(shifts[0] - shifts[1]) + 1e-9
+
+
+def test_without_friction_the_velocity_is_unique() -> None:
+    H = np.hstack([np.eye(3), np.eye(3)])
+    problem = fclib.GlobalProblem(M=np.eye(3), H=H, f=[-1, 0, 0], w=np.zeros(6), mu=[0, 0])
+    found = analysis.analyze(problem).uniqueness
+    assert (found.verdict, found.reactions) == ("unique", False)
+
+
+def test_units_far_from_one_are_said() -> None:
+    problem = planted_local(1).problem
+    assert analysis.analyze(problem).units.trouble == ()
+    heavy = analysis.analyze(problem.scaled(impulse=1e7))
+    assert any("scaled(impulse=" in line for line in heavy.units.trouble)
+    assert heavy.units.mass == pytest.approx(1e7 * analysis.analyze(problem).units.mass)
+    stuck = local_problem(np.diag([1.0, 1, 1, 0, 0, 0]), [-1, 0, 0, 1, 0, 0], [0.3, 0.3])
+    assert "nothing can move" in analysis.analyze(stuck).units.trouble[0]
+
+
+def test_nothing_in_contact() -> None:
+    found = analysis.analyze(planted_global(1, nc=0).problem)
+    assert found.existence.verdict == analysis.EXISTS_SLATER
+    assert found.islands == found.largest_island == 0
+    json.dumps(found.record, allow_nan=False)
+
+
+def test_every_key_is_documented(root: Path) -> None:
+    text = (root / "docs" / "analysis.md").read_text()
+    problem = squeezed(3, 0.4, 1)
+    rolling, _ = planted_rolling(5, 1)
+    mixed = planted_global(1, nc=2, p=2).problem
+    for one in (problem, rolling, mixed):
+        for key in analysis.analyze(one, time_limit=2).record:
+            name, _, matrix = key.partition("_")
+            general = f"{name}_A" if matrix[:1] in "MHGWVR" and matrix else key
+            assert f"`{key}`" in text or f"`{general}`" in text, key
+    for key in analysis.reference(mixed).record:
+        assert f"`{key}`" in text, key
+
+
+# ---- reference solutions
+
+
+@some
+@hypothesis.given(seed=st.integers(0, 10**6), p=st.sampled_from([0, 2]))
+def test_references_of_planted_problems(seed: int, p: int) -> None:
+    for case in (planted_local(seed, nc=4, p=p, mu=0.3), planted_global(seed, nc=4, p=p, mu=0.3)):
+        found = analysis.reference(case.problem)
+        assert found.certified, found.reason
+        assert found.error <= 1e-12
+        assert found.solution is not None
+        first, second = found.runs[0], found.second
+        assert second is not None
+        assert not set(first.families) & set(second.families)
+        assert found.reaction == "unique"
+        np.testing.assert_allclose(found.solution.r, case.solution.r, atol=1e-8)
+
+
+def table(mu: float, push: float = 0.0) -> fclib.GlobalProblem:
+    """A square table of 1 kg on four legs, at rest or pushed along x [N s]."""
+    corners = np.array([[1.0, 1], [1, -1], [-1, -1], [-1, 1]])
+    H = np.zeros((6, 12))
+    for k, (x, y) in enumerate(corners):
+        for column, force in enumerate(np.roll(np.eye(3), 1, axis=0)):
+            H[:3, 3 * k + column] = force
+            H[3:, 3 * k + column] = np.cross([x, y, 0], force)
+    f = np.array([push, 0, -1.0, 0, 0, 0])
+    return fclib.GlobalProblem(M=np.eye(6), H=H, f=f, w=np.zeros(12), mu=np.full(4, mu))
+
+
+@pytest.mark.parametrize("push", [0.0, 0.1])
+@pytest.mark.parametrize("local", [False, True])
+def test_the_least_reactions_of_a_table_are_equal(push: float, local: bool) -> None:
+    problem = table(0.5, push)
+    found = analysis.reference(problem.condense() if local else problem)
+    assert found.certified, found.reason
+    assert found.reaction == "minimum norm"
+    assert found.freedom == 6
+    assert found.solution is not None
+    r = found.solution.r.reshape(4, 3)
+    np.testing.assert_allclose(r[:, 0], 0.25, atol=1e-7)
+    np.testing.assert_allclose(r[:, 1], -push / 4, atol=1e-7)
+
+
+def test_sliding_reactions_keep_their_direction() -> None:
+    problem = table(0.2, push=2.0)
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.solution is not None
+    r = found.solution.r.reshape(4, 3)
+    np.testing.assert_allclose(r[:, 1], -0.2 * r[:, 0], atol=1e-12)
+    assert found.merit is not None
+    assert found.merit.slide == 4
+    # one freedom is left: the legs along the diagonals
+    assert (found.reaction, found.freedom) == ("minimum norm", 1)
+    turned = np.array([1.0, -1, 1, -1])
+    assert abs(turned @ r[:, 0]) < 1e-7
+
+
+def test_friction_at_its_limit_bounds_the_least_reactions() -> None:
+    # legs whose own least reactions would leave the cone: pushed to the limit of friction
+    problem = table(0.2, push=0.19)
+    found = analysis.reference(problem)
+    assert found.certified, found.reason
+    assert found.solution is not None
+    r = found.solution.r.reshape(4, 3)
+    assert (np.hypot(r[:, 1], r[:, 2]) <= 0.2 * r[:, 0] * (1 + 1e-12)).all()
+    np.testing.assert_allclose(r[:, 0].sum(), 1, atol=1e-10)
+
+
+def test_references_of_rolling_problems() -> None:
+    for d in (3, 5):
+        problem, r = planted_rolling(d, 4)
+        found = analysis.reference(problem)
+        assert found.certified, found.reason
+        assert found.solution is not None
+        np.testing.assert_allclose(found.solution.r, r, atol=1e-9)
+
+
+def test_no_reference_where_there_is_no_solution() -> None:
+    found = analysis.reference(squeezed(3, 0.4, 1), time_limit=1)
+    assert not found.certified
+    assert found.solution is None
+    assert "no algorithm came nearer" in found.reason
+    json.dumps(found.record, allow_nan=False)
+    with pytest.raises(fclib.ProblemError, match="no solution"):
+        _ = found.attributes
+
+
+# ---- contacts and energy
+
+
+@pytest.mark.parametrize("make", [planted_local, planted_global])
+@pytest.mark.parametrize("p", [0, 2])
+def test_contacts_are_those_of_the_merit(make: Any, p: int) -> None:
+    case = make(5, nc=7, p=p)
+    rows = analysis.contacts(case.problem, case.solution)
+    assert rows.shape == (7,)
+    counts = tuple(int((rows["status"] == s).sum()) for s in ("open", "stick", "slide"))
+    merit = fclib.merit(case.problem, case.solution)
+    assert counts == (merit.open, merit.stick, merit.slide) == case.statuses
+    assert rows["cone"].max() == pytest.approx(merit.cone, abs=1e-15)
+    r, u = case.solution.r.reshape(7, 3), case.solution.u.reshape(7, 3)
+    np.testing.assert_allclose(rows["r_n"], r[:, 0])
+    np.testing.assert_allclose(rows["u_t"], np.linalg.norm(u[:, 1:], axis=1), atol=1e-11)
+    slides = rows["status"] == "slide"
+    np.testing.assert_allclose(rows["used"][slides], 1)
+    assert np.isnan(rows["used"][rows["status"] == "open"]).all()
+    np.testing.assert_allclose(
+        rows["dissipated"][slides], (rows["mu"] * rows["r_n"] * rows["u_t"])[slides], rtol=1e-9
+    )
+
+
+def test_contacts_of_a_rolling_problem() -> None:
+    problem, r = planted_rolling(5, 3)
+    rows = analysis.contacts(problem, fclib.Solution(r=r))
+    assert {"mu_r", "r_r", "u_r"} <= set(rows.dtype.names or ())
+    np.testing.assert_allclose(rows["r_r"], np.linalg.norm(r.reshape(-1, 5)[:, 3:], axis=1))
+
+
+@pytest.mark.parametrize("p", [0, 2])
+def test_the_energy_balances(p: int) -> None:
+    case = planted_global(6, nc=6, p=p)
+    found = analysis.energy(case.problem, case.solution)
+    assert found.residual < 1e-12
+    u = case.solution.u
+    assert u is not None
+    assert found.dissipated == pytest.approx(-case.solution.r @ u)
+    # reactions of another problem do not balance with this v
+    wrong = analysis.energy(case.problem, case.solution.replace(r=1.1 * case.solution.r))
+    assert wrong.residual > 1e-4
+    local = planted_local(6, p=p)
+    assert analysis.energy(local.problem, local.solution).residual < 1e-12
+    assert local.solution.u is not None
+    other = local.solution.replace(u=local.solution.u + 0.1)
+    assert analysis.energy(local.problem, other).residual > 1e-4
+
+
+def test_pushing_down_on_the_ground_costs_the_energy_it_had() -> None:
+    ball = fclib.GlobalProblem(
+        M=2 * np.eye(3), H=np.eye(3), f=[-6.0, 0, 0], w=np.zeros(3), mu=[0.3]
+    )
+    found = analysis.energy(ball, fclib.solve(ball).solution)
+    assert (found.free, found.work) == pytest.approx((9, -9))
+    assert found.kinetic == pytest.approx(0, abs=1e-15)
+
+
+# ---- files and the command line
+
+
+def test_attributes_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.hdf5"
+    case = planted_global(1, nc=2)
+    fclib.write(path, case.problem)
+    assert fclib.read_attributes(path, "solution") == {}
+    with pytest.raises(fclib.FileError, match="/solution"):
+        fclib.write_attributes(path, "solution", {"a": 1.0})
+    fclib.write_solution(path, case.solution)
+    fclib.write_attributes(path, "solution", {"merit": 1e-13, "by": "hand, é"})
+    fclib.write_attributes(path, "solution", {"merit": 2e-13})
+    fclib.write_attributes(path, "info", {"rank": 3})
+    assert fclib.read_attributes(path, "solution") == {"merit": 2e-13, "by": "hand, é"}
+    assert fclib.read_attributes(path, "info") == {"rank": 3.0}
+    with h5py.File(path, "a") as file:
+        assert file["solution"].attrs["merit"] == 2e-13
+        file["solution"].attrs["many"] = [1.0, 2.0]
+        file["solution"].attrs["long"] = "x"  # of variable length
+        file["solution"].attrs["whole"] = 3
+    assert fclib.read_attributes(path, "solution") == {
+        "merit": 2e-13,
+        "by": "hand, é",
+        "whole": 3.0,
+    }
+    # what is said of a solution goes with it
+    fclib.write_solution(path, case.solution)
+    assert fclib.read_attributes(path, "solution") == {}
+    assert fclib.read_attributes(path, "info") == {"rank": 3.0}
+    with pytest.raises(fclib.OptionError, match="solution, info"):
+        fclib.read_attributes(path, "guesses")  # type: ignore[arg-type]
+
+
+def test_the_command_analyses_stores_and_checks(tmp_path: Path) -> None:
+    path = tmp_path / "table.hdf5"
+    guess = fclib.Solution(r=np.zeros(12))
+    problem = table(0.5, 0.1).replace(info=fclib.ProblemInfo(title="a table"))
+    fclib.write(path, problem, guesses=[guess])
+    done = run("analyze", "--write", "--reference", "--json", path)
+    assert done.returncode == 0, done.stderr
+    record = json.loads(done.stdout)
+    assert record["existence"] == analysis.EXISTS_SLATER
+    assert record["rank_W"] == 6
+    assert record["reference_certified"] is True
+    stored = fclib.read(path)
+    assert fclib.digest(stored) == fclib.digest(problem) == record["digest"]
+    assert stored.info.title == "a table"
+    assert "exists by Slater" in stored.info.math_info
+    assert stored.matrix_info["H"].rank == 6
+    assert stored.matrix_info["M"].conditioning == 1
+    assert len(fclib.read_guesses(path)) == 1
+    assert fclib.read_attributes(path, "info")["hyperstaticity"] == 6
+    told = fclib.read_attributes(path, "solution")
+    assert told["reaction"] == "minimum norm"
+    assert told["certified"] == "yes"
+    assert isinstance(told["merit_error"], float)
+    assert told["merit_error"] <= 1e-12
+    assert "fclib " in str(told["versions"])
+
+    # what is there is judged again, and the words are kept through another analysis
+    checked = run("check", "--tol", "1e-12", "--contacts", "--json", path)
+    assert checked.returncode == 0, checked.stdout
+    judged = json.loads(checked.stdout)
+    assert (judged["stick"], judged["open"], judged["slide"]) == (4, 0, 0)
+    assert judged["says"]["certified"] == "yes"
+    assert [row["status"] for row in judged["contacts"]] == ["stick"] * 4
+    assert run("analyze", "--write", path).returncode == 0
+    assert fclib.read_attributes(path, "solution") == told
+    shown = run("check", "--contacts", path)
+    assert shown.stdout.count("stick") >= 4
+
+
+def test_the_command_names_what_is_infeasible(tmp_path: Path) -> None:
+    path = tmp_path / "squeezed.hdf5"
+    fclib.write(path, squeezed(3, 0.4, 1))
+    done = run("analyze", path)
+    assert done.returncode == 0
+    assert analysis.PROVEN_NOT in done.stdout
+    assert "Farkas" in done.stderr
+    missing = run("analyze", tmp_path / "none.hdf5")
+    assert missing.returncode == 1
+    assert "none.hdf5" in missing.stderr
+
+
+def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    H = np.hstack([np.eye(3), np.diag([-1.0, 1.0, 1.0])])
+    jammed = fclib.GlobalProblem(M=np.eye(3), H=H, f=[1, 0, 0], w=np.zeros(6), mu=[0.5, 0.5])
+    monkeypatch.setattr("fclib.analysis._conic.available", lambda: False)
+    with pytest.raises(ImportError, match=r"fclib\[analysis\]"):
+        analysis.analyze(jammed)
+
+
+def test_importing_fclib_loads_none_of_it() -> None:
+    code = (
+        "import sys, fclib; print([m for m in ('clarabel', 'fclib.analysis') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]"

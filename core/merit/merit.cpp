@@ -166,10 +166,9 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
   const RealVector free = mass.solve(problem.f).cast<Real>();
   if (is_mixed(problem)) {
     const RealVector b = problem.b.cast<Real>();
-    result.bilateral =
-        relative((product_transposed(problem.G, v) + b).norm(),
-                 {size_of_product(problem.G, v, true), size_of_product(problem.G, free, true),
-                  b.norm()});
+    result.bilateral = relative(
+        (product_transposed(problem.G, v) + b).norm(),
+        {size_of_product(problem.G, v, true), size_of_product(problem.G, free, true), b.norm()});
   }
 
   // u = H^T v + w

@@ -1,0 +1,143 @@
+"""Pinocchio: the ADMM and the PGS that it solves contacts by, a wheel of PyPI (``pin``).
+
+Carpentier, Le Lidec & Montaut, "From compliant to rigid contact simulation: a unified and efficient
+approach" (2024).
+
+It takes spatial contacts, their normal component last. The numbers are scaled: the mean of the
+diagonal of W and ||q|| become 1. It knows no time limit: it runs in slices of iterations that take
+about a tenth of a second, each from the last one's impulses. Its tolerances are on feasibility and
+complementarity; where they are met before the error is, they are tightened.
+
+W is passed dense. Pinocchio copies it to the stack, and ends the process where that is too small:
+larger problems are refused. A sparse W only ADMM would take, at seconds an iteration.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import importlib.util
+import math
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib._registry import make_solver
+
+PREFIX = "pinocchio:"
+SOLVERS = "pinocchio:admm, pinocchio:pgs"
+SLICE = 0.1  # [s] aimed at
+LONGEST = 1000  # iterations of a slice
+STACK = 0.75 * 2**23  # bytes that W may take, of the 8 MiB that are usual
+MOST = math.isqrt(int(STACK / 8)) // 3  # contacts
+LEAST = 1e-16  # tolerance
+
+
+def missing() -> str:
+    """What is to be installed."""
+    if importlib.util.find_spec("pinocchio") is None:
+        return "pip install pin"
+    if not hasattr(importlib.import_module("pinocchio"), "ADMMConstraintSolver"):
+        return "pip install 'pin>=4.1': the one that is there has no such solvers"
+    return ""
+
+
+@functools.cache
+def solvers() -> Sequence[fclib.SolverInfo]:
+    """The entries."""
+    return (
+        _entry("ADMM", "optimisation", "ADMM with a spectral penalty"),
+        _entry("PGS", "splitting", "Projected Gauss-Seidel"),
+    )
+
+
+def find(name: str) -> fclib.SolverInfo | None:
+    """The entry of a name."""
+    return next((info for info in solvers() if info.name == name), None)
+
+
+def _entry(which: str, family: str, title: str) -> fclib.SolverInfo:
+    def function(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+        return _solve(which, problem, r, monitor)
+
+    return make_solver(
+        function,
+        name=PREFIX + which.lower(),
+        family=family,
+        title=title,
+        citation="Carpentier, Le Lidec & Montaut 2024",
+        origin="pinocchio",
+        dimensions=(3,),
+        rolling_dimensions=(),
+        max_iterations=1_000_000,
+    )
+
+
+def _solve(which: str, problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+    """Slice by slice; the best iterate is returned."""
+    if monitor.stop(r):
+        return r
+    import scipy.sparse as sp
+
+    pin = importlib.import_module("pinocchio")
+    m = problem.m
+    if m**2 * 8 > STACK:
+        raise fclib.UnsuitableError(f"Pinocchio takes up to {MOST} contacts, not {problem.nc}")
+    order = np.arange(m).reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    W = sp.csc_matrix(sp.csr_array(problem.W)[order][:, order])
+    if which == "ADMM" and abs(W - W.T).max() > 1e-10 * abs(W).max():
+        raise fclib.UnsuitableError("ADMM of Pinocchio takes no asymmetric W")
+    stiffness = float(W.diagonal().mean()) or 1.0
+    speed = float(np.linalg.norm(problem.q)) or 1.0
+    W, q = W / stiffness, problem.q[order] / speed
+    delassus = pin.DelassusOperatorDense(np.asfortranarray(W.toarray()))
+    models, datas = _contacts(pin, problem.mu)
+    settings = getattr(pin, f"{which}SolverSettings")()
+    settings.relative_feasibility_tol = settings.relative_complementarity_tol = 0.0
+    settings.solve_ncp = True
+    result = getattr(pin, f"{which}SolverResult")()
+    solver = getattr(pin, f"{which}ConstraintSolver")(m)
+    tolerance = max(monitor.tolerance, LEAST)
+    best, least, iterations = r, monitor.error(r), 0
+    count = 10
+    while True:
+        settings.absolute_feasibility_tol = settings.absolute_complementarity_tol = tolerance
+        settings.max_iterations = max(1, min(count, monitor.max_iterations - iterations))
+        if r.any():
+            result.setConstraintImpulseGuess(r[order] * (stiffness / speed))
+        start = time.perf_counter()
+        content = solver.solve(delassus, q, models, datas, settings, result)
+        took = time.perf_counter() - start
+        iterations += min(max(1, result.iterations), settings.max_iterations)
+        r = np.zeros(m)
+        r[order] = np.array(result.retrieveConstraintImpulses()) * (speed / stiffness)
+        stop = monitor.stop(r, iterations)
+        error = monitor.error(r)
+        if error < least:
+            best, least = r, error
+        if stop:
+            return best
+        if content:
+            if tolerance <= LEAST:
+                monitor.status = "stalled"
+                return best
+            tolerance = max(0.1 * tolerance, LEAST)
+        count = min(2 * count, LONGEST) if took < SLICE / 2 else max(1, count // 2)
+
+
+def _contacts(pin: Any, mu: Any) -> tuple[Any, Any]:
+    """Contacts with these coefficients, of a model that has no other meaning."""
+    model = pin.Model()
+    placement = pin.SE3.Identity()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), placement, "body")
+    models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+    for coefficient in mu:
+        contact = pin.PointContactConstraintModel(model, 0, placement, joint, placement)
+        contact.setFriction(float(coefficient))
+        entry = pin.ConstraintModel(contact)
+        models.append(entry)
+        datas.append(entry.createData())
+    return models, datas

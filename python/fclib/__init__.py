@@ -6,7 +6,7 @@
 >>> fclib.merit(problem, result.solution).error
 """
 
-from typing import TYPE_CHECKING
+import typing
 
 from fclib._core import (
     Error,
@@ -49,7 +49,7 @@ from fclib._digest import digest
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
-if TYPE_CHECKING:
+if typing.TYPE_CHECKING:
     from pathlib import Path
 
     from fclib.collections import Collection

@@ -1,6 +1,8 @@
 // What holds for every formulation: the union of them, their names and their validation.
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <cmath>
 #include <concepts>
 #include <limits>
@@ -92,6 +94,12 @@ inline void require_size(Index actual, Index expected, Dim dim, const std::strin
   }
 }
 
+/// A number with as few digits as tell it from all others.
+inline std::string shortest(double value) {
+  std::array<char, 32> digits{};
+  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
+}
+
 template <class Struct>
 void validate_vector(const Vector& values, Index expected, const Field<Struct, Vector>& field,
                      const std::string& where) {
@@ -102,8 +110,8 @@ void validate_vector(const Vector& values, Index expected, const Field<Struct, V
       throw Error(ErrorKind::problem, "the value is not a finite number", entry);
     }
     if (field.range == Range::nonnegative && values[k] < 0) {
-      throw Error(ErrorKind::problem,
-                  "is " + std::to_string(values[k]) + ", but must not be negative", entry);
+      throw Error(ErrorKind::problem, "is " + shortest(values[k]) + ", but must not be negative",
+                  entry);
     }
   }
 }

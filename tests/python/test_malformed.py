@@ -223,6 +223,7 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
     },
     "nan in s": (change(f"{ROOT}/vectors/s", 1, np.nan), f"{ROOT}/vectors/s[1]"),
     "negative mu": (change(f"{ROOT}/vectors/mu", 2, -0.1), f"{ROOT}/vectors/mu[2]"),
+    "very negative mu": (change(f"{ROOT}/vectors/mu", 2, -1e300), "is -1e+300, but"),
     "index out of range": (change(f"{ROOT}/W/i", 5, 18), f"{ROOT}/W/i[5]"),
     "huge index": (change(f"{ROOT}/W/i", 5, 2**31 - 1), f"{ROOT}/W/i[5]"),
     "negative index": (change(f"{ROOT}/W/i", 0, -1), f"{ROOT}/W/i[0]"),

@@ -11,6 +11,7 @@ SOURCES := CMakeLists.txt pyproject.toml README.md \
            $(wildcard campaigns/*.toml) \
            $(shell find core bindings cmake python include -type f \
              \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.map' -o -name '*.py' \
+                -o -name '*.js' -o -name '*.css' -o -name '*.html' \
                 -o -name py.typed \))
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
@@ -68,7 +69,7 @@ $(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
 	@echo "== building and installing fclib into $(VENV) (two minutes the first time)"
 	@$(BIN)/pip install --no-build-isolation \
 	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
-	  '.[analysis,collection,bench,solvers]'
+	  '.[analysis,collection,bench,report,solvers]'
 	@touch $@
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml

@@ -49,7 +49,7 @@ PYTHON: dict[str, set[str]] = {
     "analysis": {"api"},
     "bench": {"api", "external", "scenes", "simulate"},
     "collections": {"api", "scenes", "simulate"},
-    "report": {"bench"},
+    "report": {"api", "bench", "collections", "scenes"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},
     "cli": {
         "api",

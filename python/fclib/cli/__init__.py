@@ -19,9 +19,11 @@ from fclib.cli import (
     demo,
     info,
     profile,
+    report,
     simulate,
     solve,
     solvers,
+    view,
 )
 from fclib.cli._output import fail, print_version
 
@@ -32,7 +34,19 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (info, check, solve, convert, analyze, solvers, simulate, demo, profile):
+for module in (
+    info,
+    check,
+    solve,
+    convert,
+    analyze,
+    solvers,
+    simulate,
+    demo,
+    profile,
+    report,
+    view,
+):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.add_typer(collection.app, name="collection")
 app.add_typer(bench.app, name="bench")

@@ -1,0 +1,83 @@
+"""``fclib report``: a site to browse from stores and a catalogue, or the figures of a paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+import fclib
+from fclib.cli._output import err, fail, out
+
+
+@contextmanager
+def bars() -> Iterator[Callable[[str, int, int], None]]:
+    """A bar for each part of the work on the standard error, where that is a terminal."""
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as shown:
+        tasks = {}
+
+        def show(what: str, done: int, total: int) -> None:
+            if what not in tasks:
+                tasks[what] = shown.add_task(what, total=total)
+            shown.update(tasks[what], completed=done)
+
+        yield show
+
+
+def command(
+    stores: Annotated[
+        list[Path] | None, typer.Argument(help="Stores of `fclib bench`.", show_default=False)
+    ] = None,
+    catalogue: Annotated[
+        Path | None, typer.Option("--catalog", help="Folder of a collection.")
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option("--out", help="Folder of the site, or of the figures.")
+    ] = (Path("site")),
+    pdf: Annotated[
+        bool, typer.Option("--pdf", help="Figures (PDF) and tables (LaTeX) for a paper instead.")
+    ] = False,
+    machine: Annotated[str | None, typer.Option(help="Only the runs of this node.")] = None,
+    campaign: Annotated[str | None, typer.Option(help="Only the runs of this campaign.")] = None,
+    views: Annotated[
+        int, typer.Option(help="Problems that get a 3D view, those with runs first.", min=0)
+    ] = 60,
+    title: Annotated[str, typer.Option(help="Of the site.")] = "",
+) -> None:
+    """Make a site from stores and a catalogue; open its index.html, no server is needed."""
+    try:
+        from fclib import report
+        from fclib.collections import CatalogError
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[report]"')
+    if not stores and (pdf or catalogue is None):
+        raise typer.BadParameter("name stores, a catalogue by --catalog, or both")
+    try:
+        with ExitStack() as stack:
+            campaigns = None
+            if stores:
+                campaigns = stack.enter_context(report.Campaigns(stores, machine, campaign))
+            if pdf:
+                assert campaigns is not None
+                for path in report.write_paper(campaigns, folder):
+                    out.print(str(path), markup=False, highlight=False)
+                return
+            show = stack.enter_context(bars())
+            counts = report.build_site(
+                campaigns, folder, catalogue, views=views, title=title, progress=show
+            )
+    except (fclib.Error, CatalogError) as error:
+        fail(str(error))
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[report]"')
+    out.print(
+        f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
+        f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
+        markup=False,
+        highlight=False,
+    )

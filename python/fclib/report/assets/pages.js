@@ -1,0 +1,401 @@
+// the pages
+"use strict";
+(() => {
+  const { h, number, load, link, to } = Fclib;
+  const site = () => Fclib.values.site;
+
+  // ---- the catalogue: columns as they are stored, rows when they are asked for
+  const catalogue = async () => {
+    const stored = await load("catalogue");
+    if (stored.rows) return stored;
+    const at = (column) => column.words ? (k) => column.values[k] < 0 ? null : column.words[column.values[k]] : (k) => column.values[k];
+    const read = Object.fromEntries(stored.columns.map((column) => [column.key, at(column)]));
+    class Row { constructor(k) { this.k = k; } }
+    for (const [key, value] of Object.entries(read)) Object.defineProperty(Row.prototype, key, { get() { return value(this.k); } });
+    stored.rows = Array.from({ length: stored.size }, (_, k) => new Row(k));
+    stored.places = new Map(stored.rows.map((row) => [row.id, row.k]));
+    stored.read = read;
+    return stored;
+  };
+  const problemHref = (id) => to("problem", id.split("/"));
+  const familyHref = (set, name) => to("family", set ? [set, name] : [name]);
+  const solverLink = (label) => label ? link("solver", [label], {}, label) : "–";
+
+  // ---- controls
+  const select = (label, options, value, onchange) => h("label", {}, label, h("select", { onchange: (e) => onchange(e.target.value) },
+    options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text))));
+  const tolerances = () => site().tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]);
+  const lastTolerance = () => site().tolerances.length - 1;
+  const search = (label, value, oninput, hint) => h("label", {}, label, h("input", { type: "search", value: value || "", placeholder: hint, oninput: (e) => oninput(e.target.value) }));
+  const copyable = (text) => {
+    const button = h("button", { type: "button", onclick: async () => {
+      try { await navigator.clipboard.writeText(text); button.textContent = "copied"; } catch { getSelection().selectAllChildren(code); button.textContent = "selected"; }
+      setTimeout(() => { button.textContent = "copy"; }, 1500);
+    } }, "copy");
+    const code = h("code", {}, text);
+    return h("div", { class: "copy" }, h("pre", { tabindex: 0 }, code), button);
+  };
+  const facts = (pairs) => h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [h("dt", {}, name), h("dd", {}, v)]));
+  const status = (name) => h("span", { class: name === "converged" ? "good" : "bad" }, name);
+
+  const summaryColumns = (order) => [
+    { key: "solver", label: "solver", head: true, cell: (r) => r.solver === "virtual best" ? h("em", {}, r.solver) : [order && Fclib.swatch(order.indexOf(r.solver)), " ", solverLink(r.solver)] },
+    { key: "method", label: "method", value: (r) => (site().solvers.find((s) => s.label === r.solver) || {}).family || "" },
+    { key: "solved", label: "solved", title: "instances whose recomputed error meets the tolerance" },
+    { key: "of", label: "of" },
+    { key: "share", label: "share", type: "number", value: (r) => r.solved / r.of, format: Fclib.percent },
+    { key: "fastest", label: "fastest", title: "instances on which no other is faster" },
+    { key: "mean", label: "mean [s]", type: "number", title: `shifted geometric mean of the CPU time, shift ${site().charges.shift} s; a failure counts ${site().charges.penalty} times the limit` },
+    { key: "to best", label: "to best", type: "number", title: "the mean over that of the virtual best solver" },
+    { key: "median ratio", label: "median ratio", type: "number", title: "of the time over that of the best solver, where solved" },
+    { key: "worst ratio", label: "worst ratio", type: "number" },
+  ];
+
+  // ---- overview
+  Fclib.pages.overview = async (page, rest, params, keep) => {
+    const s = site(), o = s.overview;
+    page.append(h("h1", {}, s.title));
+    if (!o) {
+      page.append(h("p", {}, `${s.problems} problems in ${s.families.length} families. No runs were given to this report.`));
+    } else {
+      page.append(h("p", {}, `${s.solvers.length} solvers on ${o.problems} problems${s.problems > o.problems ? ` of ${s.problems} in the catalogue` : ""}. Every error is recomputed from the problem and the returned solution: `,
+        h("em", {}, "solved"), " means that the relative natural-map error meets the tolerance within the limits."),
+      h("ul", { class: "figures" }, [[s.problems, "problems"], [s.families.length, "families"], [s.solvers.length, "solvers"], [o.runs, "runs"], [Fclib.percent(o.solved / o.runs), "of them solved"]].map(([value, name]) =>
+        h("li", {}, h("b", {}, value.toLocaleString("en").replaceAll(",", " ")), h("span", {}, name)))));
+      page.append(h("h2", {}, "Performance profiles"), h("p", {}, "How many of the instances a solver has solved within a multiple τ of the CPU time of the best solver on each. At the left: how often it is the fastest. At the right: how often it succeeds at all."));
+      const charts = h("div", { class: "two" });
+      s.headlines.forEach((head, t) => {
+        if (!head) return;
+        const mean = head.curves.map((curve) => curve.reduce((a, b) => a + b, 0));
+        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: s.solvers.findIndex((v) => v.label === name), mean: mean[k] })).sort((a, b) => b.mean - a.mean);
+        charts.append(h("section", {}, h("h3", {}, `Tolerance ${Fclib.tolerance(s.tolerances[t])}`),
+          Fclib.lines({
+            name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), step: true, xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
+            ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
+            note: `${head.instances} instances${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
+          }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
+      });
+      page.append(charts, h("h2", {}, "Solvers"));
+      const labels = s.solvers.map((v) => v.label);
+      const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "", q: params.get("q") || "" };
+      const rows = () => {
+        const head = s.headlines[state.tol];
+        return ((head && head.tables[state.family]) || []).filter((r) => `${r.solver} ${(s.solvers.find((v) => v.label === r.solver) || {}).family || ""}`.toLowerCase().includes(state.q.toLowerCase()));
+      };
+      const [sort, down] = (params.get("sort") || "").split(":");
+      const table = Fclib.table({
+        caption: "CPU times of the solvers, over the instances that all of them have run", columns: summaryColumns(labels), rows: rows(), page: 60, sort: sort ? { key: sort, down: down === "down" } : null,
+        onstate: ({ sort: by }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}` }),
+      });
+      const change = (key) => (value) => { state[key] = key === "tol" ? Number(value) : value; keep({ [key]: value }); table.update(rows()); };
+      page.append(h("div", { class: "controls" }, select("tolerance", tolerances(), state.tol, change("tol")),
+        select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family")), search("solver or method", state.q, change("q"))), table);
+      page.append(h("h2", {}, "How the runs ended"), Fclib.table({
+        caption: "Statuses of all runs", rows: Object.entries(o.statuses).map(([name, v]) => ({ name, ...v })),
+        columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", value: (r) => r.count / o.runs, format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],
+      }), h("h2", {}, "Where and what"), facts([["machine", `${o.node || "?"}, ${o.cpu || "?"}`], ["campaigns", o.campaigns.map((c) => `${c.name}: ${c.done} of ${c.planned} runs${c.ended ? "" : ", not ended"}`).join("; ")]]));
+    }
+    page.append(h("h2", {}, "Families"), familyCards());
+  };
+
+  const familyCards = () => h("div", { class: "cards" }, site().families.map((f) => h("article", { class: "panel" },
+    f.scene && h("img", { src: f.scene, alt: f.description || f.name, loading: "lazy" }),
+    h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
+    h("p", { class: "small" }, f.description || ""),
+    h("p", { class: "small soft" }, `${f.problems} problems, ${f.ranges.nc ? f.ranges.nc.join(" to ") : "?"} contacts, ${f.formulations.join(", ")}`))));
+
+  Fclib.pages.families = async (page) => {
+    page.append(h("h1", {}, "Families"), h("p", {}, `${site().problems} problems.`), familyCards());
+  };
+
+  // ---- profiles
+  Fclib.pages.profiles = async (page, rest, params, keep) => {
+    const s = site(), cat = await catalogue();
+    const labels = s.solvers.map((v) => v.label);
+    const fair = (t) => ((s.headlines[t] || {}).solvers || labels).map((name) => labels.indexOf(name));
+    const t0 = Math.min(lastTolerance(), Number(params.get("tol") ?? lastTolerance()));
+    const state = {
+      tol: t0, metric: params.get("metric") || "cpu_s", kind: params.get("kind") || "performance", family: params.get("family") || "", axis: params.get("axis") || "log",
+      solvers: params.get("solvers") ? params.get("solvers").split("~").map((name) => labels.indexOf(name)).filter((k) => k >= 0) : null,
+      a: params.get("a"), b: params.get("b"),
+    };
+    let chosen = new Set(state.solvers || fair(state.tol));
+    const box = h("div", {}), pair = h("div", {}), statuses = h("div", {});
+    const change = (key) => (value) => {
+      state[key] = key === "tol" ? Number(value) : value;
+      keep({ [key]: value });
+      return draw();
+    };
+    const chips = h("div", { class: "choices", role: "group", "aria-label": "Solvers" });
+    const fill = () => chips.replaceChildren(...labels.map((name, k) => h("label", {}, h("input", { type: "checkbox", checked: chosen.has(k), onchange: (e) => { if (e.target.checked) chosen.add(k); else chosen.delete(k); kept(); } }), Fclib.swatch(k), name)));
+    const kept = () => { keep({ solvers: labels.filter((_, k) => chosen.has(k)).join("~") }); return draw(); };
+    const choose = (text, which) => h("button", { type: "button", onclick: () => { chosen = new Set(which()); fill(); kept(); } }, text);
+    fill();
+    page.append(h("h1", {}, "Profiles"), h("div", { class: "controls" },
+      select("profile", [["performance", "performance: ratio to the best"], ["data", "data: cost"], ["contact", "data: cost per contact"]], state.kind, change("kind")),
+      select("measure", Object.entries(s.metrics), state.metric, change("metric")), select("tolerance", tolerances(), state.tol, change("tol")),
+      select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family")),
+      select("axis", [["log", "logarithmic"], ["linear", "linear"]], state.axis, change("axis"))),
+    chips, h("div", { class: "tools" }, choose("those with enough runs", () => fair(state.tol)), choose("all", () => labels.map((_, k) => k)), choose("none", () => [])),
+    box, h("h2", {}, "How they ended"), statuses, h("h2", {}, "Two solvers, problem by problem"), pair);
+
+    const draw = async () => {
+      const [bench, costs] = await Promise.all([load(`t${state.tol}`), load(`t${state.tol}-${state.metric}`)]);
+      const keepProblem = state.family ? (k) => cat.read.family(k) === state.family : () => true;
+      const order = [...chosen].sort((a, b) => a - b);
+      const { instances, values } = Fclib.compared(bench, costs, order, keepProblem);
+      drawProfile(order, instances, values, bench);
+      drawStatuses(order, bench, keepProblem);
+      drawPair(bench, costs, keepProblem);
+    };
+    const drawProfile = (order, instances, values, bench) => {
+      if (!order.length || !instances.length) { box.replaceChildren(h("p", { class: "panel" }, order.length ? "There is no instance that all of these solvers have run." : "Choose some solvers.")); return; }
+      const performance = state.kind === "performance";
+      const shown = performance ? Fclib.ratios(values) : state.kind === "contact" ? values.map((own) => own.map((v, i) => { const nc = cat.read.nc(bench.problems[instances[i]]); return v === null || !nc ? null : v / nc; })) : values;
+      const finite = shown.flatMap((own) => own.filter((v) => v !== null));
+      let low = Infinity, high = -Infinity;
+      for (const v of finite) { if (v < low) low = v; if (v > high) high = v; }
+      if (!finite.length) { box.replaceChildren(h("p", { class: "panel" }, "None of these solvers solves any of these instances.")); return; }
+      if (performance) { low = 1; high = Math.max(2, Math.min(1e4, high)); if (state.axis === "linear") high = Math.min(high, 20); }
+      if (high <= low) high = low * 2;
+      const series = order.map((k, i) => ({ name: labels[k], style: k, ...Fclib.shares(shown[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
+      series.forEach((one) => { one.mean = one.y[one.y.length - 1]; });
+      const metric = s.metrics[state.metric];
+      box.replaceChildren(Fclib.lines({
+        name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, step: true, xlog: state.axis === "log",
+        xrange: performance ? [1, high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
+        xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
+        note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run${state.family ? `, family ${state.family}` : ""}.`,
+      }));
+      box.dataset.instances = instances.length;
+      box.series = series;
+    };
+    const drawStatuses = (order, bench, keepProblem) => {
+      const rows = order.map((k) => {
+        const counts = {}; let total = 0;
+        bench.problems.forEach((problem, i) => { const code = bench.statuses[k][i]; if (code !== "." && keepProblem(problem)) { counts[code] = (counts[code] || 0) + 1; total++; } });
+        return { solver: labels[k], total, counts };
+      });
+      const there = s.statuses.filter(([code]) => rows.some((row) => row.counts[code]));
+      statuses.replaceChildren(Fclib.table({
+        caption: "Instances, by the status of the run; over all that each solver has run", rows, page: 60, largest: true,
+        columns: [{ key: "solver", label: "solver", head: true, cell: (r) => solverLink(r.solver) }, { key: "total", label: "runs" },
+          ...there.map(([code, name, meaning]) => ({ key: code, label: name, title: meaning, type: "number", value: (r) => r.counts[code] || 0 }))],
+      }));
+    };
+    const drawPair = (bench, costs, keepProblem) => {
+      const names = labels.map((name) => [name, name]);
+      const two = [...chosen];
+      const a = Math.max(0, labels.indexOf(state.a ?? labels[two[0] ?? 0])), b = Math.max(0, labels.indexOf(state.b ?? labels[two[1] ?? 1] ?? labels[0]));
+      const families = [...new Set(bench.problems.map((k) => cat.read.family(k)))].sort();
+      const points = [];
+      let first = 0, second = 0, low = Infinity, high = 0;
+      bench.problems.forEach((k, i) => {
+        const x = costs[a][i], y = costs[b][i];
+        if (!keepProblem(k) || bench.statuses[a][i] === "." || bench.statuses[b][i] === "." || (x === null && y === null)) return;
+        for (const v of [x, y]) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); }
+        if (y === null || (x !== null && x < y)) first++; else if (x === null || y < x) second++;
+        const id = cat.read.id(k);
+        points.push({ x, y, problem: id, href: problemHref(id), group: families.indexOf(cat.read.family(k)), label: `${id}: ${labels[a]} ${x === null ? "failed" : number(x)}, ${labels[b]} ${y === null ? "failed" : number(y)}` });
+      });
+      const metric = s.metrics[state.metric];
+      pair.replaceChildren(h("div", { class: "controls" }, select("across", names, labels[a], change("a")), select("up", names, labels[b], change("b"))),
+        points.length ? Fclib.scatter({
+          name: `${labels[a]}-${labels[b]}`, title: `${labels[a]} against ${labels[b]}, ${metric}`, points, groups: families, range: [low * 0.8, high * 1.25], xlabel: `${labels[a]}: ${metric}`, ylabel: `${labels[b]}: ${metric}`, xname: labels[a], yname: labels[b],
+          note: `${points.length} instances that at least one of the two solves; ${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point leads to its problem.`,
+        }) : h("p", { class: "panel" }, "No instance that both have run and one solves."));
+    };
+    await draw();
+  };
+
+  // ---- catalogue
+  const OPERATORS = /^([\p{L}\w]+)(<=|>=|=|<|>)(.+)$/u;
+  /* "nc>100 mu_max<0.5 family=Chain stack": all must hold; a word without an operator is looked for in name and title */
+  const parseFilter = (text, read) => {
+    const tests = [], wrong = [];
+    for (const word of text.split(/\s+/).filter(Boolean)) {
+      const found = OPERATORS.exec(word);
+      if (!found) { const part = word.toLowerCase(); tests.push((k) => `${read.id(k)} ${read.title ? read.title(k) || "" : ""}`.toLowerCase().includes(part)); continue; }
+      const [, key, operator, wanted] = found, column = read[key];
+      if (!column) { wrong.push(`no column ${key}`); continue; }
+      if (operator === "=") tests.push((k) => String(column(k)).toLowerCase() === wanted.toLowerCase() || (wanted !== "" && column(k) === Number(wanted)));
+      else {
+        const bound = Number(wanted);
+        if (Number.isNaN(bound)) { wrong.push(`${wanted} is no number`); continue; }
+        const compare = { "<": (v) => v < bound, ">": (v) => v > bound, "<=": (v) => v <= bound, ">=": (v) => v >= bound }[operator];
+        tests.push((k) => column(k) !== null && column(k) !== undefined && compare(column(k)));
+      }
+    }
+    return { test: (k) => tests.every((one) => one(k)), wrong };
+  };
+  Fclib.pages.catalogue = async (page, rest, params, keep) => {
+    const s = site(), cat = await catalogue(), { read } = cat;
+    const state = Object.fromEntries(["q", "family", "formulation", "min", "max", "runs", "view"].map((key) => [key, params.get(key) || ""]));
+    const says = h("p", { class: "small soft", role: "status" });
+    const rows = () => {
+      const { test, wrong } = parseFilter(state.q, read);
+      const found = cat.rows.filter(({ k }) => (!state.family || read.family(k) === state.family) && (!state.formulation || read.formulation(k) === state.formulation) &&
+        (!state.min || read.nc(k) >= Number(state.min)) && (!state.max || read.nc(k) <= Number(state.max)) && (!state.runs || read.runs(k)) && (!state.view || read.view(k)) && test(k));
+      says.textContent = `${found.length} of ${cat.size} problems${wrong.length ? `; not understood: ${wrong.join(", ")}` : ""}`;
+      return found;
+    };
+    const format = { view: (v) => v ? "yes" : "", best_tol: (v) => v ? Fclib.tolerance(v) : "–" };
+    const columns = cat.columns.filter((c) => !c.hidden).map((c) => ({
+      key: c.key, label: c.label, title: c.doc, head: c.key === "id", format: format[c.key],
+      type: c.words || ["id", "family", "formulation", "status", "best_solver", "view"].includes(c.key) ? "text" : "number",
+      cell: c.key === "id" ? (row) => h("a", { href: problemHref(row.id) }, row.id)
+        : c.key === "family" ? (row) => h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family)
+          : c.key === "best_solver" ? (row) => solverLink(row.best_solver) : c.key === "status" ? (row) => row.status ? status(row.status) : "–" : undefined,
+    }));
+    const [sort, down] = (params.get("sort") || "").split(":");
+    const table = Fclib.table({
+      caption: "Problems", columns, rows: rows(), page: 50, sort: sort ? { key: sort, down: down === "down" } : null, at: Number(params.get("page") || 1) - 1,
+      onstate: ({ sort: by, at }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}`, page: at ? at + 1 : "" }),
+    });
+    let waiting = 0;
+    const change = (key) => (value) => {
+      state[key] = value === true ? "1" : value || "";
+      clearTimeout(waiting);
+      waiting = setTimeout(() => { keep({ [key]: state[key], page: "" }); table.update(rows()); }, 80);
+    };
+    const values = (key) => [["", "all"], ...[...new Set(cat.rows.map((row) => row[key]))].sort().map((v) => [v, v])];
+    const amount = (label, key) => h("label", {}, label, h("input", { type: "number", min: 0, value: state[key], oninput: (e) => change(key)(e.target.value) }));
+    const check = (label, key, there) => there && h("label", { class: "check" }, h("input", { type: "checkbox", checked: Boolean(state[key]), onchange: (e) => change(key)(e.target.checked) }), label);
+    const names = columns.map((c) => c.key).join(" ");
+    page.append(h("h1", {}, "Catalogue"),
+      h("div", { class: "controls" }, search("filter", state.q, change("q"), "mu_max<0.5 best_solver=nsgs"), select("family", values("family"), state.family, change("family")), select("form", values("formulation"), state.formulation, change("formulation")),
+        amount("contacts from", "min"), amount("to", "max"), check("with runs", "runs", read.runs), check("with 3D view", "view", read.view)),
+      h("details", {}, h("summary", {}, "What the filter knows"), h("p", { class: "small" }, "Words are looked for in names and titles; conditions have one of = < > <= >= between a column and a value, without blanks, and all must hold. The columns are: ", h("code", {}, names), ". The address of this page keeps the filter.")),
+      says, table, h("div", { class: "tools" }, h("button", { type: "button", onclick: () => Fclib.saveText("catalogue.csv", Fclib.csv(columns.map((c) => c.key), table.rows().map((row) => columns.map((c) => row[c.key]))), "text/csv") }, "↓ CSV of these problems")));
+  };
+
+  // ---- a family
+  Fclib.pages.family = async (page, rest, params) => {
+    const s = site(), name = rest[rest.length - 1], set = rest.length > 1 ? rest[0] : "";
+    const f = s.families.find((one) => one.name === name && (one.set || "") === set) || s.families.find((one) => one.name === name);
+    if (!f) throw new Fclib.NotHere(`There is no family ${rest.join("/")}.`);
+    page.append(h("h1", {}, f.title || f.name),
+      h("div", { class: "two" }, f.scene ? h("figure", {}, h("img", { src: f.scene, alt: f.description || f.name })) : null,
+        h("div", {}, h("p", {}, f.description || ""), (f.text || []).map((text) => h("p", { class: "small" }, text)),
+          facts([["name", f.set ? `${f.set}/${f.name}` : f.name], ["problems", link("catalogue", [], { family: f.name }, String(f.problems))], ["application", f.application], ["friction", f.friction], ["original by", f.authors], ["formulations", f.formulations.join(", ")],
+            ...Object.entries(f.ranges).map(([key, [a, b]]) => [{ nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key], a === b ? number(a) : `${number(a)} to ${number(b)}`])]))));
+    if (f.distribution) page.append(h("h2", {}, "Distribution"), h("figure", {}, h("img", { src: f.distribution, alt: `Histograms of contacts, degrees of freedom and density: ${f.problems} problems` }), h("figcaption", {}, "The numbers are in the ", link("catalogue", [], { family: f.name }, "catalogue"), ".")));
+    if (s.headlines.some((head) => head && head.tables[f.name])) {
+      const t = Number(params.get("tol") ?? lastTolerance()), head = s.headlines[t];
+      page.append(h("h2", {}, "Solvers on this family"), h("p", {}, s.tolerances.map((tol, k) => [k ? " · " : "", k === t ? h("b", {}, `tolerance ${Fclib.tolerance(tol)}`) : link("family", rest, { tol: k }, `tolerance ${Fclib.tolerance(tol)}`)]), " · ", link("profiles", [], { family: f.name, tol: t }, "profiles")));
+      if (head && head.tables[f.name]) page.append(Fclib.table({ caption: `CPU times on ${f.name}`, columns: summaryColumns(), rows: head.tables[f.name], page: 60 }));
+    }
+    if (f.parameters) page.append(h("h2", {}, "Parameters of the scene"), Fclib.table({
+      caption: "As in the collection", rows: f.parameters, page: 60,
+      columns: [{ key: 0, label: "parameter", head: true }, { key: 1, label: "default", type: "text" }, { key: 2, label: "unit" }, { key: 3, label: "meaning", wrap: true }],
+    }), h("h2", {}, "Get it"), copyable(`fclib collection build ${f.name} --out collection`));
+  };
+
+  // ---- a problem
+  const C_KINDS = { true: "global", false: "local" };
+  const recipes = (row, cat) => {
+    const { read } = cat, id = row.id, file = (read.global_file && row.global_file) || (read.local_file && row.local_file);
+    const global = /^G/.test(row.formulation), rolling = /R/.test(row.formulation.replace(/^GM?|^M/, "")) ? "_rolling" : "";
+    const kind = `${C_KINDS[global]}${rolling}`, path = file ? `collection/${file}` : `${id.split("/").pop()}.hdf5`;
+    const built = Boolean(site().families.find((f) => f.name === row.family && f.parameters) && file);
+    const cli = [...built ? [`fclib collection build ${row.family} --out collection`] : [], `fclib solve --tol 1e-8 ${path}`, `fclib view ${path}`].join("\n");
+    const python = ["import fclib", "", built ? `problem = fclib.load("${id}")` : `problem = fclib.read("${path}")`, "result = fclib.solve(problem, tol=1e-8)", "print(result.status, fclib.merit(problem, result.solution).error)"].join("\n");
+    const size = global ? "problem->H->n" : "problem->W->m";
+    const c = ["#include <fclib.h>", "#include <stdlib.h>", "",
+      `struct fclib_${kind}* problem = fclib_read_${kind}("${path}");`,
+      ...global ? ["double* v = calloc(problem->M->n, sizeof *v);"] : [],
+      `double* u = calloc(${size}, sizeof *u);`, `double* r = calloc(${size}, sizeof *r);`,
+      ...row.p ? [`double* l = calloc(${global ? "problem->G->n" : "problem->R->m"}, sizeof *l);`] : [],
+      `struct fclib_solution solution = {${global ? "v" : "NULL"}, u, r, ${row.p ? "l" : "NULL"}};`,
+      "struct fclib_solve_options options = {0};", "options.tolerance = 1e-8;", "struct fclib_solve_result result;",
+      `fclib_solve_${kind}(problem, "auto", &options, &solution, &result);`].join("\n");
+    return h("div", {}, h("h3", {}, "Command line"), copyable(cli), h("h3", {}, "Python"), copyable(python), h("h3", {}, "C"), copyable(c));
+  };
+  Fclib.pages.problem = async (page, rest, params, keep) => {
+    const s = site(), cat = await catalogue(), id = rest.join("/"), k = cat.places.get(id);
+    if (k === undefined) throw new Fclib.NotHere(`There is no problem ${id} in this catalogue.`);
+    const row = cat.rows[k], { read } = cat;
+    const [runs, view] = await Promise.all([read.runs && row.runs ? load(`problems/${k}`) : null, read.view && row.view ? load(`views/${k}`) : null]);
+    const neighbour = (j, text) => j >= 0 && j < cat.size && read.family(j) === row.family ? h("a", { href: problemHref(read.id(j)) }, text) : null;
+    page.append(h("h1", {}, id), h("p", { class: "small" }, [neighbour(k - 1, "← previous"), h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family), neighbour(k + 1, "next →")].filter(Boolean).map((a, i) => [i ? " · " : "", a])),
+      read.title && row.title && row.title !== id && h("p", {}, row.title));
+    const labelled = cat.columns.filter((c) => !c.hidden && !["id", "family", "view"].includes(c.key)).map((c) => [c.label, row[c.key] === null || row[c.key] === undefined ? null : c.key === "best_solver" ? solverLink(row.best_solver) : c.key === "status" ? status(row.status) : c.key === "best_tol" ? Fclib.tolerance(row.best_tol) : number(row[c.key])]);
+    const half = Math.ceil(labelled.length / 2);
+    page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
+    if (view) {
+      if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view));
+      page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns));
+      if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({ caption: "Recomputed from the file", rows: Object.entries(view.merit), columns: [{ key: 0, label: "part", head: true }, { key: 1, label: "value", type: "number" }] }));
+    } else page.append(h("p", { class: "soft" }, "This site has no picture of this problem: ", h("code", {}, "fclib view FILE"), " draws it."));
+    if (runs) {
+      const several = new Set(runs.map((r) => r.form)).size > 1;
+      page.append(h("h2", {}, "Runs"), Fclib.table({
+        caption: `${runs.length} runs`, rows: runs, page: 50, sort: { key: "cpu_s", down: false },
+        columns: [{ key: "solver", label: "solver", head: true, cell: (r) => solverLink(r.solver) }, { key: "tol", label: "tolerance", format: Fclib.tolerance }, ...several ? [{ key: "form", label: "form" }] : [], { key: "status", label: "status", cell: (r) => status(r.status) },
+          { key: "error", label: "error", type: "number" }, { key: "cpu_s", label: "CPU [s]", type: "number" }, { key: "wall_s", label: "wall [s]", type: "number" }, { key: "iterations", label: "iterations", type: "number" }, { key: "memory_mb", label: "memory [MB]", type: "number" }, { key: "message", label: "message", wrap: runs.some((r) => r.message), format: (v) => v || "" }],
+      }));
+      const curves = runs.filter((r) => r.history && r.history.length > 1);
+      if (curves.length) {
+        const box = h("div", {}), tols = [...new Set(curves.map((r) => r.tol))].sort((a, b) => a - b);
+        const state = { over: params.get("over") || "time", tol: Number(params.get("tol") || tols[0]) };
+        const draw = () => {
+          const seen = new Set();
+          const own = curves.filter((r) => r.tol === state.tol && !seen.has(r.solver) && seen.add(r.solver));
+          const at = state.over === "time" ? 2 : 0;
+          const series = own.map((r) => {
+            let least = Infinity;
+            const points = r.history.filter((p) => p[1] > 0 && p[at] > 0).map((p) => [p[at], least = Math.min(least, p[1])]);
+            return { name: r.solver, style: s.solvers.findIndex((v) => v.label === r.solver), x: points.map((p) => p[0]), y: points.map((p) => p[1]) };
+          }).filter((one) => one.x.length);
+          const xs = series.flatMap((one) => one.x), ys = series.flatMap((one) => one.y);
+          if (!xs.length) { box.replaceChildren(); return; }
+          let [low, high] = [Math.min(...xs), Math.max(...xs)];
+          if (low === high) high = 2 * low;
+          box.replaceChildren(Fclib.lines({
+            name: `convergence-${id.replaceAll("/", "-")}`, title: `Convergence on ${id}, tolerance ${state.tol}`, series, step: true, xlog: true, ylog: true, xrange: [low, high], yrange: [Math.min(...ys) / 2, Math.max(...ys) * 2],
+            xname: at ? "time [s]" : "iteration", xlabel: at ? "time [s]" : "iteration", ylabel: "least error so far", note: "The error that the solver sees, of the reduced problem; a solver that reports once has no curve.",
+          }));
+        };
+        draw();
+        page.append(h("h2", {}, "Convergence"), h("div", { class: "controls" }, select("over", [["time", "time"], ["iteration", "iterations"]], state.over, (v) => { state.over = v; keep({ over: v }); draw(); }), select("tolerance", tols.map((v) => [v, Fclib.tolerance(v)]), state.tol, (v) => { state.tol = Number(v); keep({ tol: v }); draw(); })), box);
+      }
+    } else if (s.overview) page.append(h("p", { class: "soft" }, "No run of it in the stores of this report."));
+    page.append(h("h2", {}, "Get it and solve it"), recipes(row, cat));
+  };
+
+  // ---- solvers
+  Fclib.pages.solvers = async (page) => {
+    const s = site();
+    page.append(h("h1", {}, "Solvers"), Fclib.table({
+      caption: `${s.solvers.length} solvers${s.overview ? " that were run" : ""}`, rows: s.solvers, page: 100,
+      columns: [{ key: "label", label: "solver", head: true, cell: (r) => solverLink(r.label) }, { key: "family", label: "method", format: (v) => v || "" }, { key: "origin", label: "from", format: (v) => v || "" }, { key: "title", label: "what it is", format: (v) => v || "", wrap: true }, { key: "version", label: "version", format: (v) => v || "" }],
+    }));
+  };
+  Fclib.pages.solver = async (page, rest) => {
+    const s = site(), label = rest.join("/"), solver = s.solvers.find((one) => one.label === label) || s.solvers.find((one) => one.name === label);
+    if (!solver) throw new Fclib.NotHere(`There is no solver ${label} in this report.`);
+    const cat = await catalogue();
+    const set = solver.options && solver.options !== "{}" ? solver.options : null;
+    page.append(h("h1", {}, solver.label), solver.title && h("p", {}, solver.title), facts([["name", solver.name], ["options set", set && h("code", {}, set)], ["method", solver.family], ["from", [solver.origin, solver.version].filter(Boolean).join(" ")], ["citation", solver.citation],
+      ["takes", solver.dimensions && [...solver.dimensions.map((d) => `${d}D`), ...(solver.rolling || []).map((d) => `${d === 3 ? "planar" : "spatial"} rolling`)].join(", ")]]));
+    s.headlines.forEach((head, t) => {
+      if (!head || !head.tables[""].some((r) => r.solver === solver.label)) return;
+      const rows = Object.entries(head.tables).map(([family, table]) => ({ family, ...table.find((r) => r.solver === solver.label) }));
+      const columns = summaryColumns().filter((c) => !["solver", "method"].includes(c.key));
+      page.append(h("h2", {}, `At tolerance ${Fclib.tolerance(s.tolerances[t])}`), Fclib.table({ caption: "By family", rows, columns: [{ key: "family", label: "family", head: true, cell: (r) => r.family ? link("profiles", [], { tol: t, family: r.family }, r.family) : "all" }, ...columns] }));
+      const { best, worst } = head.extremes[solver.label];
+      const list = (caption, entries) => Fclib.table({
+        caption, rows: entries, columns: [
+          { key: 0, label: "problem", head: true, cell: (e) => h("a", { href: problemHref(cat.read.id(e[0])) }, cat.read.id(e[0])) },
+          { key: 1, label: "CPU [s]", type: "number", format: (v) => v === null ? h("span", { class: "bad" }, "failed") : number(v) },
+          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", cell: (e) => solverLink(e[3]) }],
+      });
+      page.append(h("div", { class: "two" }, best.length ? list("Where it is best", best) : h("p", {}, "It is nowhere the fastest."), worst.length ? list("Where it is worst", worst) : h("p", {}, "It is the fastest everywhere.")));
+    });
+    if (solver.known) page.append(h("h2", {}, "Options"), solver.known.length ? Fclib.table({
+      caption: "Set by name=value", rows: solver.known, page: 60,
+      columns: [{ key: 0, label: "option", head: true }, { key: 1, label: "type", wrap: true }, { key: 2, label: "default", type: "text" }, { key: 3, label: "unit" }, { key: 4, label: "meaning", wrap: true }],
+    }) : h("p", {}, "It has none."));
+    page.append(h("h2", {}, "Use it"), copyable(`fclib solve --solver ${solver.name} FILE`), copyable(`result = fclib.solve(problem, solver="${solver.name}", tol=1e-8)`));
+  };
+})();

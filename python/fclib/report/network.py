@@ -1,0 +1,345 @@
+"""The network of contacts of a problem: bodies, contact points, normals, where they are in space.
+
+FCLIB files hold no positions. Where bodies are free and rigid, H holds more than it seems to: its
+block of a contact and a body is
+
+    H_v = T            (3 x 3), the contact's frame, columns N, T1, T2, in space
+    H_w = Q^T [l]x T   (3 x 3), l from the body's centre to the contact point, Q the body's rotation
+
+so that A = H_w T^T = Q^T [l]x gives l l^T = (tr(A^T A) / 2) I - A^T A, hence l up to its sign;
+A_j^T A_k = (l_j . l_k) I - l_k l_j^T ties the signs of all contacts of a body to each other, and
+the last sign is the one for which Q is a rotation (or, with one contact, the one for which the body
+lies on the side it is pushed to, as a convex body does). Two bodies in contact share its point,
+x_a + l_a = x_b + l_b, which gives the positions of all bodies that hang together, by least squares.
+Groups without a contact between them are set down beside each other, at their heights over
+the ground, and the network is said to be `placed`. Otherwise it is laid out as a graph.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+import scipy.sparse.csgraph
+import scipy.sparse.linalg
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int64]
+
+FRAME = 1e-6  # what the columns of a frame may lack of orthonormality
+MISFIT = 0.05  # what contact points may be apart, of the size of the levers, to be believed
+EDGES = 20_000  # of a graph that pull while it is laid out
+GROUND = 1e-2  # weight of a plane ground against that of shared points
+
+
+@dataclass
+class Network:
+    """Bodies and contacts in space; the ground is body -1."""
+
+    placed: bool  # by the geometry in H; else laid out as a graph
+    bodies: Array  # (bodies, 3) [m] where placed
+    points: Array  # (contacts, 3)
+    pairs: Indices  # (contacts, 2) bodies of each contact
+    frames: Array | None  # (contacts, 3, 3) columns N, T1, T2, pushing the first body
+    radii: Array  # (bodies) of balls, 0 for another shape
+    note: str = ""
+
+
+@dataclass
+class _Body:
+    first: int
+    size: int
+    free: bool
+    levers: dict[int, Array] = field(default_factory=dict)  # contact -> (3)
+
+
+def network_of(problem: Any) -> Network:
+    """The network of a problem in any formulation; nc is at least 1."""
+    if getattr(problem, "H", None) is None:
+        return _of_local(problem)
+    H = sp.csc_array(problem.H)
+    d = problem.spacedim
+    bodies = _bodies_of(problem, H)
+    owner = np.full(problem.n, -1)
+    for number, body in enumerate(bodies):
+        owner[body.first : body.first + body.size] = number
+    pairs = np.full((problem.nc, 2), -1)
+    for contact in range(problem.nc):
+        rows = H.indices[H.indptr[d * contact] : H.indptr[d * (contact + 1)]]
+        touched = np.unique(owner[rows])
+        # a row of H beyond the first two bodies would be a joint, which lies in G
+        pairs[contact, : min(2, touched.size)] = touched[:2]
+    if d >= 3:
+        found = _place(problem.nc, d, H, bodies, pairs)
+        if found is not None:
+            return found
+    return _lay_out(len(bodies), pairs, "as a graph: H is not that of free rigid bodies in space")
+
+
+# ---- bodies
+
+
+def _bodies_of(problem: Any, H: Any) -> list[_Body]:
+    """Blocks of degrees of freedom: what M or G couples, and free rigid bodies six at a time."""
+    coupled = abs(sp.csr_array(problem.M))
+    G = getattr(problem, "G", None)
+    if G is not None and problem.p:
+        G = abs(sp.csr_array(G))
+        coupled = coupled + G @ G.T
+    _, label = scipy.sparse.csgraph.connected_components(coupled, directed=False)
+    # the last degree of freedom of each component, so that blocks can be cut between them
+    last = np.zeros(problem.n, int)
+    np.maximum.at(last, label, np.arange(problem.n))
+    ends = np.maximum.accumulate(last[label])
+    cut = np.flatnonzero(ends == np.arange(problem.n))
+    size = problem.spacedim
+    rows = sp.csr_array(H)
+    bodies = []
+    start = 0
+    while start < problem.n:
+        end = int(cut[np.searchsorted(cut, start)]) + 1
+        six = start + 6
+        free = False
+        if size >= 3 and six <= problem.n and (end >= six or six - 1 in cut):
+            free = _is_free(rows, size, start)
+            if free:
+                end = max(end, six)
+        bodies.append(_Body(start, end - start, free))
+        start = end
+    return bodies
+
+
+def _is_free(H: Any, d: int, first: int) -> bool:
+    """Whether six degrees of freedom are the velocity of a body's point and its rotation."""
+    block = H[first : first + 6]
+    contacts = np.unique(block.indices // d)
+    if not contacts.size:
+        return False
+    # (3, contacts, 3): the columns of the frames, if they are such
+    T = block[:3].toarray().reshape(3, -1, d)[:, contacts, :3]
+    return bool(np.abs(np.einsum("ikp,ikq->kpq", T, T) - np.eye(3)).max() < FRAME)
+
+
+# ---- positions
+
+
+def _place(nc: int, d: int, H: Any, bodies: list[_Body], pairs: Indices) -> Network | None:
+    rows = sp.csr_array(H)
+    frames = np.zeros((nc, 3, 3))
+    known = np.zeros(nc, bool)
+    for number, body in enumerate(bodies):
+        if not body.free:
+            continue
+        own = np.flatnonzero((pairs == number).any(axis=1))
+        part = rows[body.first : body.first + 6].toarray()
+        moments, T = {}, {}
+        for contact in own.tolist():
+            block = part[:, d * contact : d * contact + 3]
+            T[contact] = block[:3]
+            moments[contact] = block[3:] @ block[:3].T
+        body.levers = _levers(moments, T)
+        for contact in own.tolist():
+            if not known[contact] or pairs[contact, 0] == number:
+                frames[contact] = T[contact]
+                if pairs[contact, 0] != number:
+                    frames[contact] *= -1.0  # the first body is pushed the other way
+                known[contact] = True
+    if not known.all():
+        return None
+    sizes = [np.linalg.norm(lever) for body in bodies for lever in body.levers.values()]
+    scale = float(np.sqrt(np.mean(np.square(sizes)))) or 1.0
+    centres, misfit = _solve(bodies, pairs, frames, scale)
+    if misfit > MISFIT:
+        return None
+    points = np.zeros((nc, 3))
+    for contact in range(nc):
+        sides = [int(b) for b in pairs[contact] if b >= 0 and bodies[b].free]
+        ends = [centres[b] + bodies[b].levers[contact] for b in sides]
+        points[contact] = np.mean(ends, axis=0)
+    groups = _set_down(bodies, pairs, centres, points)
+    radii = np.zeros(len(bodies))
+    for number, body in enumerate(bodies):
+        own = np.flatnonzero((pairs == number).any(axis=1))
+        if not body.free:
+            centres[number] = points[own].mean(axis=0)
+        elif body.size == 6:
+            radii[number] = _ball(body, own, frames)
+    note = "positions recovered from H"
+    if groups > 1:
+        note += f"; its {groups} groups that do not touch stand beside each other as it fits"
+    return Network(True, centres, points, pairs, frames, radii, note)
+
+
+def _levers(moments: dict[Any, Array], frames: dict[Any, Array]) -> dict[int, Array]:
+    """The levers of a body's contacts, from A = Q^T [l]x of each."""
+    levers: dict[int, Array] = {}
+    for contact, A in moments.items():
+        S = A.T @ A
+        _, vectors = np.linalg.eigh(0.5 * np.trace(S) * np.eye(3) - S)
+        levers[contact] = vectors[:, -1] * np.sqrt(max(0.0, 0.5 * np.trace(S)))
+    order = sorted(levers, key=lambda c: -float(np.linalg.norm(levers[c])))
+    # each sign by the one, of those that are settled, that tells most
+    for k, contact in enumerate(order[1:], start=1):
+        dots = [0.5 * float(np.sum(moments[contact] * moments[other])) for other in order[:k]]
+        best = int(np.argmax(np.abs(dots)))
+        if dots[best] * float(levers[contact] @ levers[order[best]]) < 0:
+            levers[contact] = -levers[contact]
+    # A = Q^T [l]x, and for -l it would be that of -Q
+    total = sum(moments[c] @ _cross(levers[c]).T for c in order)
+    values = np.linalg.svd(total, compute_uv=False)
+    if values[-1] > 1e-9 * max(1e-300, values[0]):
+        wrong = np.linalg.det(total) < 0
+    else:
+        wrong = sum(float(levers[c] @ frames[c][:, 0]) for c in order) > 0
+    return {c: -lever if wrong else lever for c, lever in levers.items()}
+
+
+def _cross(x: Array) -> Array:
+    return np.array([[0.0, -x[2], x[1]], [x[2], 0.0, -x[0]], [-x[1], x[0], 0.0]])
+
+
+def _solve(bodies: list[_Body], pairs: Indices, frames: Array, scale: float) -> tuple[Array, float]:
+    """Centres (bodies, 3) by least squares, and how far shared points are apart, over the scale."""
+    i: list[int] = []
+    j: list[int] = []
+    x: list[float] = []
+    right: list[float] = []
+    planes: dict[tuple[int, ...], int] = {}
+    first_plane = 3 * len(bodies)
+    shared = 0
+    for contact in range(len(pairs)):
+        a, b = int(pairs[contact, 0]), int(pairs[contact, 1])
+        levers = [(n, bodies[n].levers[contact]) for n in (a, b) if n >= 0 and bodies[n].free]
+        if len(levers) == 2:
+            (one, la), (other, lb) = levers
+            for k in range(3):
+                row = len(right)
+                i += [row, row]
+                j += [3 * one + k, 3 * other + k]
+                x += [1.0, -1.0]
+                right.append(float(lb[k] - la[k]))
+                shared += 1
+        elif b < 0:
+            normal = frames[contact][:, 0]
+            key = tuple(np.round(normal * 100).astype(int))
+            plane = planes.setdefault(key, first_plane + len(planes))
+            row = len(right)
+            i += [row] * 4
+            j += [3 * a, 3 * a + 1, 3 * a + 2, plane]
+            x += [*(GROUND * normal).tolist(), -GROUND]
+            right.append(-GROUND * float(normal @ levers[0][1]))
+    shape = (len(right), first_plane + len(planes))
+    A = sp.csr_array((x, (i, j)), shape=shape)
+    distances = np.array(right)
+    solved = scipy.sparse.linalg.lsqr(
+        A, distances, atol=1e-12, btol=1e-12, iter_lim=20 * max(shape)
+    )[0]
+    gaps = (A @ solved - distances)[np.bincount(i, minlength=len(right)) == 2]
+    misfit = float(np.sqrt(np.mean(gaps**2)) / scale) if gaps.size else 0.0
+    return solved[:first_plane].reshape(-1, 3).copy(), misfit
+
+
+def _set_down(bodies: list[_Body], pairs: Indices, centres: Array, points: Array) -> int:
+    """Move groups that do not touch beside each other, in place; how many they are."""
+    joined = pairs[(pairs >= 0).all(axis=1)]
+    count = len(bodies)
+    ones = np.ones(len(joined))
+    graph = sp.csr_array((ones, (joined[:, 0], joined[:, 1])), shape=(count, count))
+    groups, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    if groups == 1:
+        return 1
+    at = label[pairs[:, 0]]
+    boxes = []
+    for group in range(groups):
+        # a body's other end is as far as its contact is
+        own = points[at == group, :2]
+        middle = centres[label == group, :2].mean(axis=0)
+        half = np.abs(np.vstack([own, centres[label == group, :2]]) - middle).max(axis=0)
+        boxes.append((middle, half))
+    widths = np.array([2.2 * half.max() for _, half in boxes])
+    widths = np.maximum(
+        widths, 0.5 * np.median(widths[widths > 0], axis=None) if widths.any() else 1
+    )
+    row_end = 1.1 * float(np.sqrt((widths**2).sum()))
+    x = y = height = 0.0
+    for group in np.argsort(-widths, kind="stable"):
+        if x > 0 and x + widths[group] > row_end:
+            x, y, height = 0.0, y + height, 0.0
+        shift = np.array([x + widths[group] / 2, y + widths[group] / 2]) - boxes[group][0]
+        centres[label == group, :2] += shift
+        points[at == group, :2] += shift
+        x += widths[group]
+        height = max(height, widths[group])
+    return int(groups)
+
+
+def _ball(body: _Body, own: Indices, frames: Array) -> float:
+    """The radius of a body whose levers are normals of one length; 0 for another."""
+    levers = np.array([body.levers[c] for c in own])
+    sizes = np.linalg.norm(levers, axis=1)
+    along = np.abs(np.einsum("kj,kj->k", levers, frames[own][:, :, 0]))
+    # a contact in a gap lies beyond the surface
+    same = np.ptp(sizes) < 0.1 * sizes.max() and bool((along > 0.999 * sizes).all())
+    return float(sizes.min()) if same else 0.0
+
+
+# ---- graphs
+
+
+def _of_local(problem: Any) -> Network:
+    """A local problem knows contacts and what couples them, and no bodies."""
+    d = problem.spacedim
+    W = problem.W
+    entries = sp.coo_array(W if sp.issparse(W) else np.asarray(W))
+    keep = entries.data != 0
+    a, b = entries.row[keep] // d, entries.col[keep] // d
+    edges = np.unique(np.column_stack([a, b])[a < b], axis=0)
+    points = _spread(problem.nc, edges)
+    pairs = np.full((problem.nc, 2), -1)
+    note = "as a graph: points that W couples are near; a local problem does not know its bodies"
+    return Network(False, np.zeros((0, 3)), points, pairs, None, np.zeros(0), note)
+
+
+def _lay_out(count: int, pairs: Indices, note: str) -> Network:
+    """Bodies and contacts as the nodes of one graph."""
+    contacts = np.arange(len(pairs)) + count
+    edges = np.vstack(
+        [np.column_stack([side, contacts])[side >= 0] for side in (pairs[:, 0], pairs[:, 1])]
+    )
+    nodes = _spread(count + len(pairs), edges)
+    return Network(False, nodes[:count], nodes[count:], pairs, None, np.zeros(count), note)
+
+
+def _spread(count: int, edges: Indices, rounds: int = 60) -> Array:
+    """Positions (count, 3) of the nodes of a graph, by Fruchterman & Reingold (1991)."""
+    random = np.random.Generator(np.random.PCG64(0))
+    side = max(1.0, count ** (1 / 3))
+    x = random.uniform(-side, side, (count, 3))
+    # beyond this many, each node is pushed by a sample of the others
+    sample = min(count, 400)
+    if len(edges) > EDGES:
+        edges = edges[np.sort(random.choice(len(edges), EDGES, replace=False))]
+    ends = np.arange(len(edges))
+    towards = sp.csr_array(
+        (
+            np.repeat([1.0, -1.0], len(edges)),
+            (np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([ends, ends])),
+        ),
+        shape=(count, len(edges)),
+    )
+    for k in range(rounds):
+        others = random.choice(count, sample, replace=False) if sample < count else np.arange(count)
+        away = x[:, None] - x[None, others]
+        far = np.maximum((away**2).sum(axis=2), 1e-2)
+        step = (away / far[:, :, None]).sum(axis=1) * (count / sample)
+        if len(edges):
+            along = x[edges[:, 1]] - x[edges[:, 0]]
+            pull = along * np.linalg.norm(along, axis=1, keepdims=True)
+            step += towards @ pull
+        step -= 0.05 * x * side  # keeps groups that do not touch in sight
+        length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
+        x += step / length * np.minimum(length, 0.4 * side * (1 - k / rounds) + 1e-3)
+    return np.asarray(x - x.mean(axis=0))

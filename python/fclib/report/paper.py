@@ -1,0 +1,89 @@
+"""Figures and tables for a paper: vector graphics by Matplotlib, tables for LaTeX."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from fclib.bench import plots, profiles
+from fclib.report.runs import Campaigns
+
+FORMATS = ("pdf",)
+HEADS = {
+    "solver": "solver",
+    "solved": "solved",
+    "of": "of",
+    "fastest": "fastest",
+    "mean": "mean [s]",
+    "to best": "to best",
+    "median ratio": "median",
+    "worst ratio": "worst",
+}
+
+
+def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> list[Path]:
+    """Write profiles as PDF and the tables as LaTeX, in a folder for each tolerance.
+
+    Raises:
+        ImportError: Matplotlib is not there.
+        ProfileError: there is no such metric.
+    """
+    written: set[Path] = set()
+    for tol in campaigns.tolerances:
+        costs = campaigns.fair(tol, metric)
+        if costs is None:
+            continue
+        own = folder / f"tol-{tol:g}"
+        own.mkdir(parents=True, exist_ok=True)
+        plots.performance(costs, own, FORMATS)
+        plots.data(costs, own, FORMATS, per_contact=False)
+        plots.data(costs, own, FORMATS, per_contact=True)
+        _write(own / "summary.tex", latex(profiles.summary(costs)))
+        _write(own / "families.tex", latex(profiles.families(costs)))
+        _write(own / "statuses.tex", latex(profiles.failures(campaigns.at(tol))))
+        written |= set(own.iterdir())
+    if len(campaigns.tolerances) > 1:
+        points = profiles.work_precision(campaigns.rows, metric)
+        if points:
+            plots.work_precision(points, metric, folder, FORMATS)
+            written.add(folder / f"work-precision-{metric}.pdf")
+    return sorted(written)
+
+
+def latex(rows: Sequence[Mapping[str, Any]]) -> str:
+    """A tabular of booktabs, a column a key."""
+    keys = list(rows[0])
+    numeric = [isinstance(rows[0][key], (int, float)) for key in keys]
+    lines = [
+        rf"\begin{{tabular}}{{{''.join('r' if right else 'l' for right in numeric)}}}",
+        r"\toprule",
+        " & ".join(_escaped(HEADS.get(key, key)) for key in keys) + r" \\",
+        r"\midrule",
+        *(" & ".join(_cell(row[key]) for key in keys) + r" \\" for row in rows),
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "--"
+    if isinstance(value, float):
+        text = f"{value:.3g}"
+        mantissa, e, exponent = text.partition("e")
+        return rf"${mantissa}\cdot 10^{{{int(exponent)}}}$" if e else text
+    return _escaped(str(value))
+
+
+def _escaped(text: str) -> str:
+    for character in "&%$#_{}":
+        text = text.replace(character, f"\\{character}")
+    return text
+
+
+def _write(path: Path, text: str) -> None:
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(text, encoding="utf-8")
+    part.replace(path)

@@ -1,0 +1,288 @@
+"""The runs of stores, as the pages of the site need them; all sums are by `bench.profiles`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib.bench import STATUSES as STATUSES
+from fclib.bench import Store, profiles
+from fclib.bench.profiles import METRICS, Costs, Instance, ProfileError
+from fclib.report.view import rounded
+
+DIGITS = 6  # of costs on the site
+LEFT_OUT = 0.1  # share of instances that may be left out for solvers that have not run them
+EXTREMES = 8  # problems on which a solver is best, and worst
+REPORTS = 80  # points of a convergence curve
+TAUS = 160  # points of a headline's curve
+CODES = "0123456789abcdefghijklmnopqrstuvwxyz"  # of statuses; "." where nothing was run
+NOT_RUN = "."
+
+
+class ReportError(fclib.Error, ValueError):
+    """There is nothing to report, or nowhere to put it."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What was run at one tolerance: a row an instance, a column a solver."""
+
+    tol: float
+    instances: tuple[Instance, ...]
+    costs: Mapping[str, list[list[float | None]]]  # metric -> solver -> instance; None: failed
+    statuses: tuple[str, ...]  # for each solver a code for each instance
+
+
+class Campaigns:
+    """The runs of one or several stores on one machine; ``with Campaigns(paths) as campaigns``."""
+
+    def __init__(
+        self, stores: Sequence[str | Path], machine: str | None = None, campaign: str | None = None
+    ) -> None:
+        """Read them.
+
+        Args:
+            stores: files of `fclib bench`.
+            machine: only the runs of this node.
+            campaign: only the runs of this campaign.
+
+        Raises:
+            StoreError: a file is no store.
+            ProfileError: no run is left, or they are of several machines.
+        """
+        self._folder = tempfile.TemporaryDirectory(prefix="fclib-report-")
+        try:
+            self.store = self._merged(stores)
+            self.rows = profiles.load(self.store, machine=machine, campaign=campaign)
+        except BaseException:
+            self._folder.cleanup()
+            raise
+        self.rows = [row for row in self.rows if row["status"] != "unreadable"]
+        if not self.rows:
+            self._folder.cleanup()
+            raise ReportError("no problem of these runs could be read")
+        # the most run first, then by name
+        counts = Counter(row["solver"] for row in self.rows)
+        self.solvers = sorted(counts, key=lambda name: (-counts[name], name))
+        self.tolerances = sorted({row["tol"] for row in self.rows}, reverse=True)
+        self.families = sorted({row["family"] for row in self.rows})
+
+    def _merged(self, stores: Sequence[str | Path]) -> Path:
+        if len(stores) == 1:
+            return Path(stores[0])
+        path = Path(self._folder.name) / "merged.sqlite"
+        with Store(path) as merged:
+            merged.merge(stores)
+        return path
+
+    def __enter__(self) -> Campaigns:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._folder.cleanup()
+
+    def at(self, tol: float) -> list[dict[str, Any]]:
+        """The runs at a tolerance."""
+        return [row for row in self.rows if row["tol"] == tol]
+
+    def problems(self) -> dict[str, dict[str, Any]]:
+        """What the stores know of each problem that was run, by its hash."""
+        with Store(self.store, create=False) as store:
+            paths = dict(store.db.execute("SELECT hash, path FROM problems"))
+        found: dict[str, dict[str, Any]] = {}
+        for row in self.rows:
+            if row["hash"] not in found:
+                keys = ("problem", "family", "formulation", "spacedim", "n", "p", "nc", "nnz")
+                facts = {key: row[key] for key in keys}
+                found[row["hash"]] = facts | {"title": row["title"], "path": paths[row["hash"]]}
+        return found
+
+    def overview(self) -> dict[str, Any]:
+        """What was run, where, and by whom it was asked for."""
+        with Store(self.store, create=False) as store:
+            campaigns = [
+                {"name": s.name, "planned": s.planned, "done": s.done, "ended": s.ended is not None}
+                for s in store.status()
+            ]
+        first = self.rows[0]
+        return {
+            "runs": len(self.rows),
+            "solved": sum(bool(row["solved"]) for row in self.rows),
+            "problems": len({row["hash"] for row in self.rows}),
+            "node": first["node"],
+            "cpu": first["cpu"],
+            "campaigns": campaigns,
+            "statuses": {
+                name: {"count": count, "meaning": STATUSES.get(name, "")}
+                for name, count in Counter(row["status"] for row in self.rows).most_common()
+            },
+        }
+
+    # ---- one tolerance
+
+    def bench(self, tol: float) -> Bench:
+        """All costs at a tolerance, those of `profiles.costs` for each solver on its own."""
+        rows = self.at(tol)
+        by_solver = defaultdict(list)
+        for row in rows:
+            by_solver[row["solver"]].append(row)
+        costs: dict[str, list[list[float | None]]] = {}
+        instances: dict[Instance, int] = {}
+        for name in self.solvers:
+            if name in by_solver:
+                for instance in profiles.costs(by_solver[name]).instances:
+                    instances.setdefault(instance, len(instances))
+        order = sorted(instances, key=lambda i: (i.family, i.problem, i.limit))
+        instances = {instance: k for k, instance in enumerate(order)}
+        for metric in METRICS:
+            columns = []
+            for name in self.solvers:
+                column: list[float | None] = [None] * len(order)
+                if name in by_solver:
+                    own = profiles.costs(by_solver[name], metric)
+                    for instance, value in zip(own.instances, own.values[:, 0], strict=True):
+                        column[instances[instance]] = rounded(float(value), DIGITS)
+                columns.append(column)
+            costs[metric] = columns
+        return Bench(tol, tuple(order), costs, self._statuses(by_solver, instances))
+
+    def _statuses(
+        self, by_solver: Mapping[str, list[dict[str, Any]]], instances: Mapping[Instance, int]
+    ) -> tuple[str, ...]:
+        place = {(i.hash, i.limit): k for i, k in instances.items()}
+        code = dict(zip(STATUSES, CODES, strict=False))
+        found = []
+        for name in self.solvers:
+            seen: dict[int, list[str]] = defaultdict(list)
+            for row in by_solver.get(name, ()):
+                seen[place[row["hash"], row["time_limit"]]].append(row["status"])
+            found.append(
+                "".join(
+                    code[Counter(seen[k]).most_common(1)[0][0]] if k in seen else NOT_RUN
+                    for k in range(len(instances))
+                )
+            )
+        return tuple(found)
+
+    def fair(self, tol: float, metric: str = "cpu_s") -> Costs | None:
+        """The costs of solvers that have run nearly the same instances; None where there are none.
+
+        Solvers that have run the fewest are left out, until at most `LEFT_OUT` of the instances
+        are left out for the others.
+        """
+        rows = self.at(tol)
+        counts = Counter(name for name, _ in {(row["solver"], row["hash"]) for row in rows})
+        names = [name for name in self.solvers if name in counts]
+        names.sort(key=lambda name: -counts[name])
+        while names:
+            try:
+                found = profiles.costs([row for row in rows if row["solver"] in names], metric)
+                if found.left_out <= LEFT_OUT * (found.left_out + len(found.instances)):
+                    return found
+            except ProfileError:
+                pass
+            names.pop()
+        return None
+
+    def headline(self, tol: float, places: Mapping[str, int]) -> dict[str, Any] | None:
+        """Curves, tables and extremes at a tolerance.
+
+        Args:
+            tol: the tolerance.
+            places: the number of each problem on the site, by its hash.
+        """
+        costs = self.fair(tol)
+        if costs is None:
+            return None
+        quotients = profiles.ratios(costs.values)
+        finite = quotients[np.isfinite(quotients)]
+        end = min(1e4, 1.2 * float(finite.max(initial=2.0)))
+        taus = np.geomspace(1.0, end, TAUS)
+        groups: dict[str, list[int]] = defaultdict(list)
+        for k, instance in enumerate(costs.instances):
+            groups[instance.family].append(k)
+        tables = {"": profiles.summary(costs)}
+        tables |= {family: profiles.summary(costs.of(own)) for family, own in groups.items()}
+        return {
+            "instances": len(costs.instances),
+            "left_out": costs.left_out,
+            "solvers": list(costs.solvers),
+            "taus": rounded(taus, DIGITS),
+            "curves": rounded(profiles.performance_profile(costs.values, taus), DIGITS),
+            "tables": rounded(tables, DIGITS),
+            "extremes": _extremes(costs, places),
+        }
+
+    # ---- one problem
+
+    def by_problem(self) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+        """The runs of each problem, its hash first, with their convergence where it was stored."""
+        groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
+        for row in self.rows:
+            groups[row["hash"]].append(row)
+        with Store(self.store, create=False) as store:
+            reported = {run for (run,) in store.db.execute("SELECT DISTINCT run FROM history")}
+            for digest, rows in groups.items():
+                yield digest, [self._run(row, store, reported) for row in rows]
+
+    def _run(self, row: Mapping[str, Any], store: Store, reported: set[int]) -> dict[str, Any]:
+        keys = ("solver", "tol", "status", "message", "iterations", "error")
+        found = {key: row[key] for key in (*keys, "cpu_s", "wall_s", "memory_mb", "time_limit")}
+        found["form"] = row["formulation"]
+        if row["run"] in reported:
+            found["history"] = _thinned(store.history(row["run"]))
+        return dict(rounded(found, DIGITS))
+
+
+def _thinned(history: Sequence[tuple[int, float, float, str]]) -> list[list[float]]:
+    """Iteration, error and time [s] of some reports, evenly on a logarithmic axis, the last too."""
+    count = len(history)
+    chosen = list(range(count))
+    if count > REPORTS:
+        spread = np.geomspace(1, count, REPORTS).round().astype(int) - 1
+        chosen = sorted({*spread.tolist(), count - 1})
+    return [[history[k][0], history[k][1], history[k][2]] for k in chosen]
+
+
+def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
+    """For each solver the problems that it is best and worst on, beside the best of the others."""
+    found = {}
+    count = len(costs.solvers)
+    for k, name in enumerate(costs.solvers):
+        own = costs.values[:, k]
+        if count > 1:
+            others = costs.values[:, [j for j in range(count) if j != k]]
+            rival, best = others.argmin(axis=1), others.min(axis=1)
+        else:
+            rival, best = np.zeros(len(own), int), np.full(len(own), np.inf)
+        with np.errstate(invalid="ignore"):
+            ratio = np.where(np.isinf(own), np.where(np.isinf(best), np.nan, np.inf), own / best)
+        names = [other for other in costs.solvers if other != name]
+
+        def entry(
+            i: int, own: Any = own, best: Any = best, rival: Any = rival, names: Any = names
+        ) -> list[Any]:
+            # problem, own cost, that of the best of the others, which that is
+            other = names[rival[i]] if names and np.isfinite(best[i]) else None
+            return [places[costs.instances[i].hash], own[i], best[i], other]
+
+        known = np.flatnonzero(~np.isnan(ratio))
+        order = known[np.argsort(ratio[known], kind="stable")]
+        won = [i for i in order if ratio[i] <= 1][:EXTREMES]
+        # failures first, those that were the easiest for another before
+        lost = sorted((i for i in order if ratio[i] > 1), key=lambda i: (-ratio[i], best[i]))
+        found[name] = rounded(
+            {
+                "best": [entry(i) for i in won],
+                "worst": [entry(i) for i in lost[:EXTREMES]],
+            },
+            DIGITS,
+        )
+    return found

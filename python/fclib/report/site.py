@@ -1,0 +1,428 @@
+"""The site: pages that need no server, and data in files that they load when they are asked for.
+
+    index.html  assets/           the pages, the same for every site
+    data/site.js                  what the first page shows, the solvers, the families
+    data/catalogue.js             a column each of what is known of the problems
+    data/t0.js  data/t0-cpu_s.js  statuses, and costs by a metric, at the first tolerance
+    data/problems/12.js           the runs of the problem in row 12 of the catalogue
+    data/views/12.js              its patterns, and its network of contacts
+    pictures/SET/FAMILY/          of the catalogue
+
+A data file calls `Fclib.put(name, value)`: a script loads from a folder of files, JSON does not.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import math
+import shutil
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import fclib
+from fclib import scenes
+from fclib.bench.profiles import METRICS, PENALTY, SHIFT
+from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns, ReportError
+from fclib.report.view import ASSETS, as_json, rounded, view_of
+
+MARK = "data/site.js"  # by which a folder is known to be a site
+VIEWS = 60  # problems whose network is drawn, where nothing else is said
+PICTURES = ("scene.png", "distribution.svg")
+PAGES = (
+    *("index.html", "style.css", "core.js", "table.js", "chart.js"),
+    *("pattern.js", "scene.js", "profiles.js", "pages.js", "site.js"),
+)
+# column of the catalogue, label, meaning; others of a catalogue follow with their own names
+COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("id", "problem", "its name"),
+    ("collection", "set", "the set of families"),
+    ("family", "family", "the scene that it is from"),
+    ("formulation", "form", "in the abbreviations of RT-0444"),
+    ("spacedim", "d", "components of a contact"),
+    ("nc", "contacts", "number of contacts"),
+    ("n", "dof", "degrees of freedom of the bodies that contacts move"),
+    ("p", "bilateral", "bilateral constraints"),
+    ("bodies", "bodies", "bodies, or trees of bodies, among which the contacts are"),
+    ("density", "density", "contact components for a degree of freedom"),
+    ("mu_min", "μ min", "smallest coefficient of friction"),
+    ("mu_max", "μ max", "largest coefficient of friction"),
+    ("nnz_W", "nnz W", "entries of W"),
+    ("open", "open", "contacts without reaction in the reference solution"),
+    ("stick", "stick", "sticking contacts in the reference solution"),
+    ("slide", "slide", "sliding contacts in the reference solution"),
+    ("status", "reference", "status of the reference solution"),
+    ("error", "error", "relative natural-map error of the reference solution"),
+    ("nsgs_sweeps", "NSGS sweeps", "that Gauss-Seidel takes to 1e-6"),
+    (
+        "best_solver",
+        "best solver",
+        "the fastest one at the smallest tolerance at which one solves it",
+    ),
+    ("best_s", "best [s]", "its CPU time"),
+    ("best_tol", "at", "that tolerance"),
+    ("runs", "runs", "in the stores"),
+    ("solved", "solved", "runs whose recomputed error met the tolerance"),
+    ("view", "3D", "whether the site has its contact network"),
+)
+# of a catalogue, and of no use on a page
+HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
+HIDDEN |= {"nnz_H", "solver", "tol"}
+
+
+def _no_progress(what: str, done: int, total: int) -> None:
+    pass
+
+
+def build_site(
+    campaigns: Campaigns | None,
+    out: Path,
+    catalogue: Path | None = None,
+    *,
+    views: int = VIEWS,
+    title: str = "",
+    progress: Callable[[str, int, int], None] = _no_progress,
+) -> dict[str, int]:
+    """Write the site, whole, in the place of an older one.
+
+    Args:
+        campaigns: the runs; None for a catalogue alone.
+        out: the folder of the site.
+        catalogue: a collection's folder.
+        views: so many problems get their picture, those with runs first, spread over families.
+        title: of the site.
+        progress: is told what is done, how far, of how many.
+
+    Returns:
+        How many problems, runs, views and bytes the site holds.
+
+    Raises:
+        ReportError: there is nothing to show, or `out` holds something else.
+        fclib.collections.CatalogError: the catalogue cannot be read.
+    """
+    if campaigns is None and catalogue is None:
+        raise ReportError("a report needs a store, a catalogue, or both")
+    if out.exists() and not (out / MARK).is_file() and (not out.is_dir() or any(out.iterdir())):
+        raise ReportError(f"{out}: is there, and is no site that fclib report has made")
+    problems = Problems(campaigns, catalogue)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
+    try:
+        counts = _Writer(part, campaigns, problems, views, title, progress).write()
+        part.chmod(0o755)
+        if out.exists():
+            old = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
+            out.rename(old / "site")
+            part.rename(out)
+            shutil.rmtree(old)
+        else:
+            part.rename(out)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return counts
+
+
+# ---- problems
+
+
+class Problems:
+    """The problems of the catalogue and those of the stores, a row each."""
+
+    def __init__(self, campaigns: Campaigns | None, catalogue: Path | None) -> None:
+        """CatalogError where the catalogue cannot be read."""
+        self.rows: list[dict[str, Any]] = []
+        self.files: list[Path | None] = []  # where a problem may be read
+        self.places: dict[str, int] = {}  # by the hash of a store
+        self.folder = None
+        if catalogue is not None:
+            from fclib.collections import read_catalog
+
+            self.folder = catalogue if catalogue.is_dir() else catalogue.parent
+            self.rows = read_catalog(catalogue).to_pylist()
+            for row in self.rows:
+                self.files.append(self.folder / (row["global_file"] or row["local_file"]))
+        if campaigns is not None:
+            self._add_runs(campaigns)
+
+    def _add_runs(self, campaigns: Campaigns) -> None:
+        digests = {row["digest"]: k for k, row in enumerate(self.rows)}
+        names = {
+            row[key]: k
+            for k, row in enumerate(self.rows)
+            for key in ("global_file", "local_file")
+            if row[key]
+        }
+        taken = {row["id"] for row in self.rows}
+        for digest, facts in campaigns.problems().items():
+            path = Path(facts["path"] or "")
+            # by its file: a local form has no digest there, and at rest two steps may be equal
+            place = names.get("/".join(path.parts[-3:]), digests.get(digest))
+            if place is None:
+                name = f"{facts['family']}/{facts['problem'].rpartition('/')[2]}"
+                if name in taken:
+                    name = f"{name}-{digest[:8]}"
+                taken.add(name)
+                place = len(self.rows)
+                self.rows.append({**facts, "id": name, "nnz_W": facts["nnz"]})
+                self.files.append(path)
+            self.places[digest] = place
+
+    def columns(self) -> list[dict[str, Any]]:
+        """Those that hold something, with the values of all rows."""
+        known = {name for name, *_ in COLUMNS}
+        more = sorted({key for row in self.rows for key in row} - known - HIDDEN)
+        more = [
+            key
+            for key in more
+            if key not in ("problem", "path", "nnz", "step", "time", "seed", "title")
+        ]
+        found = []
+        for name, label, doc in (*COLUMNS, *((key, key.replace("_", " "), "") for key in more)):
+            values = [row.get(name) for row in self.rows]
+            if any(value not in (None, "", False) for value in values):
+                found.append({"key": name, "label": label, "doc": doc, **_packed(values)})
+        for name in ("title", "step", "time", "seed", "tol", "solver", "global_file", "local_file"):
+            values = [row.get(name) for row in self.rows]
+            if any(value is not None for value in values):
+                found.append({"key": name, "hidden": True, **_packed(values)})
+        return found
+
+
+def _packed(values: Sequence[Any]) -> dict[str, Any]:
+    """A column; words that come again are stored once."""
+    if any(isinstance(value, str) for value in values):
+        words = list(dict.fromkeys(value for value in values if value is not None))
+        if len(words) < len(values) / 2:
+            number = {word: k for k, word in enumerate(words)}
+            return {"words": words, "values": [number.get(value, -1) for value in values]}
+    return {"values": rounded(list(values), DIGITS)}
+
+
+# ---- pages
+
+
+class _Writer:
+    """Writes the files of a site into an empty folder."""
+
+    def __init__(
+        self,
+        folder: Path,
+        campaigns: Campaigns | None,
+        problems: Problems,
+        views: int,
+        title: str,
+        progress: Callable[[str, int, int], None],
+    ) -> None:
+        self.folder = folder
+        self.campaigns = campaigns
+        self.problems = problems
+        self.views = views
+        self.title = title
+        self.progress = progress
+        self.bytes = 0
+
+    def put(self, name: str, value: Any) -> None:
+        path = self.folder / "data" / f"{name}.js"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        text = f"Fclib.put({as_json(name)},{as_json(value)});\n"
+        path.write_text(text, encoding="utf-8")
+        self.bytes += len(text)
+
+    def write(self) -> dict[str, int]:
+        (self.folder / "assets").mkdir()
+        for name in PAGES:
+            target = self.folder if name == "index.html" else self.folder / "assets"
+            shutil.copyfile(ASSETS / name, target / name)
+        site: dict[str, Any] = {
+            "title": self.title or "Frictional contact problems",
+            "version": fclib.__version__,
+            "metrics": {name: label for name, (label, _) in METRICS.items()},
+            "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
+            "charges": {"penalty": PENALTY, "shift": SHIFT},
+            "tolerances": [],
+            "headlines": [],
+            "solvers": [],
+        }
+        if self.campaigns is not None:
+            site |= self._runs(self.campaigns)
+        else:
+            site["solvers"] = [_solver(info.name, info.name, {}) for info in fclib.solvers()]
+        drawn = self._views()
+        site["families"] = self._families()
+        site["views"] = drawn
+        site["problems"] = len(self.problems.rows)
+        self.put("catalogue", {"size": len(self.problems.rows), "columns": self.problems.columns()})
+        self.put("site", site)
+        return {
+            "problems": len(self.problems.rows),
+            "runs": len(self.campaigns.rows) if self.campaigns is not None else 0,
+            "views": drawn,
+            "bytes": self.bytes,
+        }
+
+    def _runs(self, campaigns: Campaigns) -> dict[str, Any]:
+        total = len(campaigns.tolerances)
+        best: dict[int, tuple[str, float, float]] = {}
+        headlines = []
+        for t, tol in enumerate(campaigns.tolerances):
+            self.progress("tolerances", t, total)
+            bench = campaigns.bench(tol)
+            self._put_bench(t, bench)
+            headlines.append(campaigns.headline(tol, self.problems.places))
+            # tolerances fall: what a smaller one tells takes the place
+            best |= self._best(bench, campaigns.solvers)
+        self.progress("tolerances", total, total)
+        for place, (solver, seconds, tol) in best.items():
+            self.problems.rows[place] |= {"best_solver": solver, "best_s": seconds, "best_tol": tol}
+        by_place: dict[int, list[dict[str, Any]]] = defaultdict(list)
+        for digest, runs in campaigns.by_problem():
+            by_place[self.problems.places[digest]] += runs
+        for done, (place, runs) in enumerate(by_place.items()):
+            self.progress("problems", done, len(by_place))
+            self.put(f"problems/{place}", runs)
+            solved = sum(run["status"] == "converged" for run in runs)
+            self.problems.rows[place] |= {"runs": len(runs), "solved": solved}
+        self.progress("problems", len(by_place), len(by_place))
+        first = {row["solver"]: row for row in campaigns.rows}
+        return {
+            "overview": campaigns.overview(),
+            "tolerances": campaigns.tolerances,
+            "headlines": headlines,
+            "solvers": [
+                _solver(label, first[label]["solver_name"], first[label])
+                for label in campaigns.solvers
+            ],
+        }
+
+    def _put_bench(self, t: int, bench: Bench) -> None:
+        places = [self.problems.places[instance.hash] for instance in bench.instances]
+        limits = [rounded(instance.limit) for instance in bench.instances]
+        statuses = list(bench.statuses)
+        self.put(f"t{t}", {"problems": places, "limits": limits, "statuses": statuses})
+        for metric, columns in bench.costs.items():
+            self.put(f"t{t}-{metric}", columns)
+
+    def _best(self, bench: Bench, solvers: Sequence[str]) -> dict[int, tuple[str, float, float]]:
+        found: dict[int, tuple[str, float, float]] = {}
+        for i, instance in enumerate(bench.instances):
+            costs = [(column[i], k) for k, column in enumerate(bench.costs["cpu_s"])]
+            solved = [(value, k) for value, k in costs if value is not None]
+            if solved:
+                value, k = min(solved)
+                place = self.problems.places[instance.hash]
+                if place not in found or value < found[place][1]:
+                    found[place] = (solvers[k], value, bench.tol)
+        return found
+
+    def _views(self) -> int:
+        rows, files = self.problems.rows, self.problems.files
+        there = [k for k, file in enumerate(files) if file is not None and file.is_file()]
+        chosen = _spread(there, rows, self.views)
+        drawn = 0
+        for done, place in enumerate(chosen):
+            self.progress("networks", done, len(chosen))
+            file = files[place]
+            assert file is not None
+            try:
+                problem: Any = fclib.read(file)
+                solution = fclib.read_solution(file) if "solution" in fclib.contents(file) else None
+                self.put(f"views/{place}", view_of(problem, solution))
+            except fclib.Error:
+                continue  # a file that went away or was damaged has no picture; its runs stay
+            rows[place]["view"] = True
+            drawn += 1
+        self.progress("networks", len(chosen), len(chosen))
+        return drawn
+
+    def _families(self) -> list[dict[str, Any]]:
+        known = scenes.families()
+        groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
+        for row in self.problems.rows:
+            groups[row.get("collection") or "", row["family"]].append(row)
+        found = []
+        for (collection, name), rows in sorted(groups.items()):
+            record: dict[str, Any] = {"name": name, "set": collection, "problems": len(rows)}
+            record["ranges"] = {
+                key: [min(values), max(values)]
+                for key in ("nc", "n", "density", "mu_max")
+                if (values := [row[key] for row in rows if row.get(key) is not None])
+            }
+            record["ranges"] = rounded(record["ranges"])
+            record["formulations"] = sorted({row["formulation"] for row in rows})
+            if name in known:
+                record |= _family(known[name])
+            source = self.problems.folder / collection / name if self.problems.folder else None
+            for picture in PICTURES:
+                if source and (source / picture).is_file():
+                    target = self.folder / "pictures" / collection / name
+                    target.mkdir(parents=True, exist_ok=True)
+                    shutil.copyfile(source / picture, target / picture)
+                    record[picture.partition(".")[0]] = f"pictures/{collection}/{name}/{picture}"
+            found.append(record)
+        return found
+
+
+def _spread(there: Sequence[int], rows: Sequence[Mapping[str, Any]], count: int) -> list[int]:
+    """So many of the rows, those with runs first, evenly over their families and within each."""
+    chosen: list[int] = []
+    for wanted in (True, False):
+        families: dict[str, list[int]] = defaultdict(list)
+        for k in there:
+            if bool(rows[k].get("runs")) == wanted:
+                families[rows[k]["family"]].append(k)
+        left = count - len(chosen)
+        waiting = sorted(families.values(), key=len)
+        for k, own in enumerate(waiting):
+            share = min(len(own), math.ceil(left / (len(waiting) - k)))
+            chosen += [own[(2 * i + 1) * len(own) // (2 * share)] for i in range(share)]
+            left -= share
+    return sorted(chosen)
+
+
+def _family(family: Any) -> dict[str, Any]:
+    """What a family of scenes says of itself."""
+    return {
+        "title": family.title,
+        "description": family.description,
+        "text": (inspect.getdoc(family) or "").split("\n\n")[1:],
+        "application": family.application,
+        "friction": family.friction,
+        "authors": family.authors,
+        "parameters": [
+            [item.name, str(item.default), item.metadata["unit"], item.metadata["doc"]]
+            for item in dataclasses.fields(family)
+        ],
+    }
+
+
+def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of a solver: here, or where it was run."""
+    found: dict[str, Any] = {"label": label, "name": name}
+    if row:
+        found |= {key: row[key] for key in ("options", "version", "origin")}
+        found["family"] = row["solver_family"]
+    try:
+        info = fclib.find_solver(name)
+    except fclib.Error:
+        return found  # of another machine, or a program of the user's
+    return found | {
+        "title": info.title,
+        "citation": info.citation,
+        "family": info.family,
+        "origin": info.origin,
+        "dimensions": list(info.dimensions),
+        "rolling": list(info.rolling_dimensions),
+        "known": [
+            [
+                option.name,
+                " | ".join(option.choices) or option.type,
+                str(option.default),
+                option.unit,
+                option.doc,
+            ]
+            for option in info.options
+        ],
+    }

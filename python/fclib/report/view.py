@@ -1,0 +1,157 @@
+"""One problem as pictures: its network of contacts with the reactions, and its pattern."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+import fclib
+from fclib.report.network import Network, network_of
+
+ASSETS = Path(__file__).with_name("assets")
+DIGITS = 5  # of positions and reactions in a picture
+CELLS = 128  # of a pattern, along its longer side
+SCRIPTS = ("core.js", "table.js", "scene.js", "pattern.js", "view.js")
+STATUS = ("open", "stick", "slide")
+
+
+def rounded(values: Any, digits: int = DIGITS) -> Any:
+    """Nested lists of numbers with so many significant digits; what is not finite is None."""
+    if isinstance(values, np.ndarray):
+        values = values.tolist()
+    if isinstance(values, (list, tuple)):
+        return [rounded(value, digits) for value in values]
+    if isinstance(values, Mapping):
+        return {key: rounded(value, digits) for key, value in values.items()}
+    if isinstance(values, float):
+        if not math.isfinite(values):
+            return None
+        short = float(f"{values:.{digits}g}")
+        return int(short) if short.is_integer() and abs(short) < 1e15 else short
+    return values
+
+
+def as_json(value: Any) -> str:
+    """Compact JSON that may stand in a script: no `<`, and no number that JSON does not know."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
+    """What the picture of a problem is drawn from, in JSON's types.
+
+    Args:
+        problem: in any formulation.
+        solution: of it; without one there are no reactions.
+    """
+    record: dict[str, Any] = {
+        "title": problem.info.title,
+        "formulation": problem.formulation,
+        "spacedim": problem.spacedim,
+        "n": problem.n,
+        "nc": problem.nc,
+        "p": problem.p,
+        "mu": rounded(np.asarray(problem.mu)),
+        "patterns": patterns_of(problem),
+    }
+    if not problem.nc:
+        return record
+    network = network_of(problem)
+    size = float(np.abs(network.points - network.points.mean(axis=0)).max()) or 1.0
+    record["network"] = {
+        "placed": network.placed,
+        "note": network.note,
+        "size": rounded(size),
+        "bodies": rounded(network.bodies),
+        "points": rounded(network.points),
+        "pairs": network.pairs.tolist(),
+        "radii": rounded(network.radii),
+    }
+    if network.frames is not None:
+        record["network"]["normals"] = rounded(network.frames[:, :, 0])
+    if solution is not None:
+        record.update(_solved(problem, solution, network))
+    return record
+
+
+def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
+    d, nc = problem.spacedim, problem.nc
+    r = np.asarray(solution.r).reshape(nc, d)
+    # the first components are those of a force, also where friction rolls
+    tangential = 1 if d == 2 or (d == 3 and hasattr(problem, "mu_r")) else 2
+    force = r[:, : 1 + tangential]
+    each = fclib.contact_merits(problem, solution)
+    found: dict[str, Any] = {
+        "reactions": rounded(force),
+        "status": "".join(str(STATUS.index(name)) for name in each["status"]),
+    }
+    if network.frames is not None:
+        inside = network.frames[:, :, : 1 + tangential]
+        found["forces"] = rounded(np.einsum("kij,kj->ki", inside, force))
+    merit = fclib.merit(problem, solution)
+    names = [name for name in dir(merit) if not name.startswith("_")]
+    found["merit"] = rounded({name: float(getattr(merit, name)) for name in names}, 6)
+    return found
+
+
+# ---- patterns
+
+
+def patterns_of(problem: Any) -> list[dict[str, Any]]:
+    """Of each matrix its shape, its entries, and how many lie in each cell of a coarse grid."""
+    found = []
+    for name in ("W", "M", "H", "G", "V", "R"):
+        matrix = getattr(problem, name, None)
+        if matrix is None or 0 in matrix.shape:
+            continue
+        entries = sp.coo_array(matrix if sp.issparse(matrix) else np.asarray(matrix))
+        keep = entries.data != 0
+        cell = max(1, math.ceil(max(matrix.shape) / CELLS))
+        cells, counts = np.unique(
+            np.column_stack([entries.row[keep] // cell, entries.col[keep] // cell]),
+            axis=0,
+            return_counts=True,
+        )
+        info = problem.matrix_info.get(name)
+        known = {key: getattr(info, key, None) for key in ("rank", "conditioning", "determinant")}
+        found.append(
+            {
+                **{key: rounded(value) for key, value in known.items() if value},
+                "name": name,
+                "shape": list(matrix.shape),
+                "nnz": int(keep.sum()),
+                "cell": cell,
+                "rows": cells[:, 0].tolist(),
+                "columns": cells[:, 1].tolist(),
+                "counts": counts.tolist(),
+            }
+        )
+    return found
+
+
+# ---- one page
+
+
+def asset(name: str) -> str:
+    """The text of a file of the site."""
+    return (ASSETS / name).read_text(encoding="utf-8")
+
+
+def write_view(record: Mapping[str, Any], path: Path, title: str = "") -> None:
+    """Write a page that holds all it needs; it is whole, or the old one."""
+    scripts = "\n".join(asset(name) for name in SCRIPTS)
+    page = asset("view.html")
+    for mark, text in {
+        "/*STYLE*/": asset("style.css"),
+        "/*SCRIPTS*/": f"{scripts}\nFclib.view({as_json(dict(record, file=title))});",
+    }.items():
+        page = page.replace(mark, text)
+    part = path.with_name(f".{path.name}.part")
+    part.write_text(page, encoding="utf-8")
+    part.replace(path)

@@ -1,0 +1,109 @@
+"""What the tests of the report are about: a small collection and a store of made-up runs."""
+
+import hashlib
+import json
+import random
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib.bench import Job, Limits, ProblemFacts, Record, SolverChoice, Store
+from fclib.bench.problems import look
+
+LABELS = ["auto", "nsgs", "under_score", "rare"]
+NAMES = {"auto": "auto", "under_score": "nsn-ac"}
+TOLERANCES = (1e-4, 1e-8)
+
+
+def make_collection(folder: Path) -> Path:
+    """A stack of three cubes that lands: a dozen problems in both forms."""
+    from fclib import collections, scenes
+    from fclib.collections.plan import Plan
+
+    scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
+    collections.build([Plan(scene=scene, collection="small", problems=12)], folder, pictures=False)
+    # a picture as a build would draw it
+    part = next(folder.rglob("*-global.hdf5")).parent
+    (part / "distribution.svg").write_text(
+        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 3"><path d="M0 0H5V3z"/></svg>'
+    )
+    return folder
+
+
+def make_store(
+    path: Path, collection: Path, labels: Sequence[str] = tuple(LABELS), files: int = 6
+) -> Path:
+    """Runs of some problems, with failures and histories; the solver `rare` has run two of them."""
+    alone = path.parent / "alone.hdf5"
+    problem = fclib.LocalProblem(spacedim=3, W=np.eye(6), q=-np.ones(6), mu=np.full(2, 0.3))
+    fclib.write(alone, problem)
+    found = sorted(collection.rglob("*-global.hdf5"))[-files + 1 :]
+    local = Path(str(found[0]).replace("-global", "-local"))
+    # one problem by its local form, which the catalogue knows by its file alone
+    facts = [look(file) for file in (local, *found[1:])] + [look(alone, "Alone")]
+    add_runs(path, facts, labels)
+    return path
+
+
+def add_runs(
+    path: Path, facts: Sequence[ProblemFacts], labels: Sequence[str], history: bool = True
+) -> None:
+    """Runs whose costs and statuses are drawn by lot, the same every time."""
+    draw = random.Random(5)
+    limits = Limits(time=10.0, wall=20.0, memory=1000.0)
+    with Store(path) as store:
+        number = store.begin("made", 'title = "Made"\n', len(facts) * len(labels) * 2, 0, "here")
+        for p, fact in enumerate(facts):
+            for label in labels:
+                for tol in TOLERANCES:
+                    if label == "rare" and p > 1:
+                        continue
+                    solved = draw.random() < 0.8
+                    seconds = 10 ** draw.uniform(-4, 0)
+                    reports = [(k, 10.0 ** (-k / 20), seconds * k / 200, "") for k in range(200)]
+                    record = Record(
+                        status="converged" if solved else draw.choice(["stalled", "cpu_limit"]),
+                        iterations=draw.randrange(1, 1000),
+                        cpu_s=seconds,
+                        total_cpu_s=seconds * 1.5,
+                        wall_s=seconds * 2,
+                        memory=draw.uniform(10, 100),
+                        merits={"error": tol / 2 if solved else 1.0},
+                        history=reports if history and solved else None,
+                        machine={"node": "here", "cpu": "Abacus"},
+                    )
+                    name = NAMES.get(label, "nsgs")
+                    choice = SolverChoice(name, {}, f"of {label}", "splitting", "fclib", label)
+                    store.add(Job(fact, choice, tol, limits, 0, 1), record, number)
+
+
+def made_facts(count: int) -> list[ProblemFacts]:
+    """Problems that are nowhere but in a store."""
+    return [
+        ProblemFacts(
+            hash=hashlib.sha256(str(k).encode()).hexdigest(),
+            name=f"{k:05d}",
+            family=f"Family{k % 7}",
+            path=f"/none/{k:05d}.hdf5",
+            kind="local",
+            formulation="3DFC",
+            spacedim=3,
+            n=0,
+            p=0,
+            nc=1 + k % 500,
+            nnz=9 * (1 + k % 500),
+            title=f"Problem {k}",
+        )
+        for k in range(count)
+    ]
+
+
+def read_data(site: Path, name: str) -> Any:
+    """What a data file of a site holds."""
+    text = (site / "data" / f"{name}.js").read_text()
+    start = f'Fclib.put("{name}",'
+    assert text.startswith(start)
+    return json.loads(text[len(start) : text.rindex(");")])

@@ -1,0 +1,319 @@
+"""The report: its numbers are the store's, the network's positions are the scene's."""
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fclib
+from fclib.bench import Store, profiles
+from fclib.cli import app
+from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
+from fclib.report.network import network_of
+from helpers_report import LABELS, TOLERANCES, make_collection, make_store, read_data
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pyarrow")
+# what they give is of one kind here
+read: Any = fclib.read
+read_solution: Any = fclib.read_solution
+
+
+@pytest.fixture(scope="module")
+def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_collection(tmp_path_factory.mktemp("collection"))
+
+
+@pytest.fixture(scope="module")
+def store(collection: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_store(tmp_path_factory.mktemp("store") / "runs.sqlite", collection)
+
+
+@pytest.fixture(scope="module")
+def site(collection: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("built") / "site"
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, folder, collection, views=4)
+    return folder
+
+
+def column(site: Path, key: str) -> list[Any]:
+    """A column of the site's catalogue, its words unpacked."""
+    found = next(c for c in read_data(site, "catalogue")["columns"] if c["key"] == key)
+    if "words" in found:
+        return [found["words"][k] if k >= 0 else None for k in found["values"]]
+    return list(found["values"])
+
+
+# ---- numbers
+
+
+def test_costs_and_statuses_are_those_of_the_store(site: Path, store: Path) -> None:
+    with Store(store, create=False) as opened:
+        rows = opened.results()
+    ids = column(site, "id")
+    known = read_data(site, "site")
+    labels = [solver["label"] for solver in known["solvers"]]
+    names = {code: name for code, name, _ in known["statuses"]}
+    assert sorted(labels) == sorted(LABELS)
+    seen = 0
+    for t, tol in enumerate(known["tolerances"]):
+        bench = read_data(site, f"t{t}")
+        for metric in profiles.METRICS:
+            costs = read_data(site, f"t{t}-{metric}")
+            for s, label in enumerate(labels):
+                for i, place in enumerate(bench["problems"]):
+                    name = ids[place].rpartition("/")[2]
+                    own = [
+                        row
+                        for row in rows
+                        if (row["solver"], row["tol"]) == (label, tol)
+                        and row["problem"].rpartition("/")[2].startswith(name)
+                    ]
+                    if not own:
+                        assert bench["statuses"][s][i] == "."
+                        assert costs[s][i] is None
+                        continue
+                    (row,) = own
+                    assert names[bench["statuses"][s][i]] == row["status"]
+                    if row["solved"]:
+                        floor = profiles.METRICS[metric][1]
+                        assert costs[s][i] == pytest.approx(max(row[metric], floor), rel=1e-5)
+                    else:
+                        assert costs[s][i] is None
+                    seen += 1
+    assert seen == len(rows) * len(profiles.METRICS)
+
+
+def test_headlines_are_those_of_the_profiles(site: Path, store: Path) -> None:
+    known = read_data(site, "site")
+    for t, tol in enumerate(known["tolerances"]):
+        rows = profiles.load(store, tolerances=[tol])
+        head = known["headlines"][t]
+        # the solver that has run one problem alone is left out
+        assert set(head["solvers"]) == set(LABELS) - {"rare"}
+        costs = profiles.costs([row for row in rows if row["solver"] != "rare"])
+        assert head["instances"] == len(costs.instances)
+        curves = profiles.performance_profile(costs.values, np.array(head["taus"]))
+        order = [costs.solvers.index(name) for name in head["solvers"]]
+        np.testing.assert_allclose(head["curves"], curves[order], atol=1e-5)
+        own = {row["solver"]: row for row in profiles.summary(costs)}
+        for row in head["tables"][""]:
+            for key, value in row.items():
+                assert value == (
+                    pytest.approx(own[row["solver"]][key], rel=1e-5)
+                    if isinstance(value, float)
+                    else own[row["solver"]][key]
+                )
+
+
+def test_extremes_are_ordered_and_true(site: Path, store: Path) -> None:
+    known = read_data(site, "site")
+    ids = column(site, "id")
+    for t, tol in enumerate(known["tolerances"]):
+        with Store(store, create=False) as opened:
+            rows = opened.results("tol = ? AND solver <> 'rare'", [tol])
+        for label, lists in known["headlines"][t]["extremes"].items():
+            for kind in ("best", "worst"):
+                for place, own, best, which in lists[kind]:
+                    name = ids[place].rpartition("/")[2]
+                    costs = {
+                        row["solver"]: row["cpu_s"] if row["solved"] else math.inf
+                        for row in rows
+                        if row["problem"].rpartition("/")[2].startswith(name)
+                    }
+                    mine = costs.pop(label)
+                    assert (own if own is not None else math.inf) == pytest.approx(mine, rel=1e-5)
+                    assert (best if best is not None else math.inf) == pytest.approx(
+                        min(costs.values()), rel=1e-5
+                    )
+                    assert which is None or costs[which] == min(costs.values())
+                    assert (mine <= min(costs.values())) == (kind == "best")
+
+
+def test_the_catalogue_knows_all_problems_and_their_best_solver(
+    site: Path, store: Path, collection: Path
+) -> None:
+    from fclib.collections import read_catalog
+
+    catalogue = read_catalog(collection).to_pylist()
+    ids = column(site, "id")
+    # the last one is of the store alone
+    assert ids[:-1] == [row["id"] for row in catalogue]
+    assert ids[-1] == "Alone/alone"
+    assert column(site, "nc")[:-1] == [row["nc"] for row in catalogue]
+    with Store(store, create=False) as opened:
+        rows = opened.results("solved")
+    assert sum(x or 0 for x in column(site, "solved")) == len(rows)
+    for k, best in enumerate(column(site, "best_solver")):
+        name = ids[k].rpartition("/")[2]
+        own = [row for row in rows if row["problem"].rpartition("/")[2].startswith(name)]
+        tol = min((row["tol"] for row in own), default=None)
+        fastest = min(
+            (row for row in own if row["tol"] == tol), key=lambda r: r["cpu_s"], default=None
+        )
+        assert best == (fastest["solver"] if fastest else None)
+
+
+def test_runs_and_histories_of_a_problem(site: Path, store: Path) -> None:
+    with Store(store, create=False) as opened:
+        rows = opened.results()
+        histories = {row["run"]: opened.history(row["run"]) for row in rows}
+    written = sorted((site / "data" / "problems").iterdir())
+    runs = [run for path in written for run in read_data(site, f"problems/{path.stem}")]
+    assert len(runs) == len(rows)
+    long = [run for run in runs if len(run.get("history", ())) > 1]
+    assert long
+    assert all(len(run["history"]) <= 81 for run in long)
+    ends = {round(math.log10(history[-1][1]), 3) for history in histories.values() if history}
+    assert {round(math.log10(run["history"][-1][1]), 3) for run in long} <= ends
+
+
+def test_several_stores_are_one(store: Path, collection: Path, tmp_path: Path, site: Path) -> None:
+    other = make_store(tmp_path / "other.sqlite", collection, labels=["later"])
+    with Campaigns([store, other]) as campaigns:
+        assert set(campaigns.solvers) == {*LABELS, "later"}
+        build_site(campaigns, tmp_path / "site", views=0)
+    assert read_data(tmp_path / "site", "site")["problems"] < len(column(site, "id"))
+
+
+def test_nothing_is_lost_and_nothing_foreign_replaced(
+    store: Path, collection: Path, tmp_path: Path
+) -> None:
+    foreign = tmp_path / "mine"
+    foreign.mkdir()
+    (foreign / "thesis.tex").write_text("years of work")
+    with pytest.raises(ReportError, match="is no site"):
+        build_site(None, foreign, collection)
+    assert (foreign / "thesis.tex").is_file()
+    with pytest.raises(ReportError, match="needs a store"):
+        build_site(None, tmp_path / "new")
+    # a site takes the place of the older one, and leaves nothing beside it
+    for _ in range(2):
+        build_site(None, tmp_path / "site", collection, views=1)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "site"]
+
+
+def test_no_path_of_this_machine_is_on_the_site(site: Path, collection: Path) -> None:
+    for path in (site / "data").rglob("*.js"):
+        assert str(collection) not in path.read_text(), path
+
+
+# ---- networks
+
+
+def test_positions_are_recovered(collection: Path) -> None:
+    """Cubes of side 2, one upon another: their centres are 2 apart, and 1 above the ground."""
+    file = sorted(collection.rglob("*-global.hdf5"))[-1]
+    problem = read(file)
+    network = network_of(problem)
+    assert network.placed
+    assert len(network.bodies) == 3
+    heights = np.sort(network.bodies[:, 2]) - network.points[:, 2].min()
+    np.testing.assert_allclose(heights, [1.0, 3.0, 5.0], atol=0.05)
+    assert network.frames is not None
+    np.testing.assert_allclose(np.abs(network.frames[:, 2, 0]), 1.0, atol=1e-2)
+
+
+def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
+    """The rotation of a body turns its part of H and its inertia, and moves nothing."""
+    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    before = network_of(problem)
+    H = problem.H.toarray()
+    M = problem.M.toarray()
+    random = np.random.default_rng(3)
+    for body in range(problem.n // 6):
+        Q, _ = np.linalg.qr(random.standard_normal((3, 3)))
+        Q *= np.sign(np.linalg.det(Q))
+        own = slice(6 * body + 3, 6 * body + 6)
+        H[own] = Q.T @ H[own]
+        M[own, own] = Q.T @ M[own, own] @ Q
+    import scipy.sparse as sp
+
+    after = network_of(problem.replace(H=sp.csc_array(H), M=sp.csc_array(M)))
+    assert after.placed
+    np.testing.assert_allclose(after.points, before.points, atol=1e-6)
+    np.testing.assert_allclose(after.bodies, before.bodies, atol=1e-6)
+
+
+def test_a_matrix_that_is_not_of_rigid_bodies_gives_a_graph(collection: Path) -> None:
+    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    network = network_of(problem.replace(H=problem.H * 2.0))
+    assert not network.placed
+    assert "graph" in network.note
+    assert np.isfinite(network.points).all()
+    assert np.isfinite(network.bodies).all()
+
+
+def test_a_view_counts_as_the_merit_does(collection: Path) -> None:
+    for file in sorted(collection.rglob("*.hdf5"))[-4:]:
+        problem, solution = read(file), read_solution(file)
+        view = view_of(problem, solution)
+        merit = fclib.merit(problem, solution)
+        counts = [view["status"].count(str(k)) for k in range(3)]
+        assert counts == [merit.open, merit.stick, merit.slide]
+        assert view["merit"]["error"] == pytest.approx(merit.error, rel=1e-4)
+        r = np.asarray(solution.r).reshape(problem.nc, -1)
+        np.testing.assert_allclose(view["reactions"], r, rtol=1e-4, atol=1e-300)
+        assert json.dumps(view, allow_nan=False)
+        for pattern in view["patterns"]:
+            assert sum(pattern["counts"]) == pattern["nnz"]
+
+
+@pytest.mark.parametrize("kind", ["without contact", "planar", "without solution"])
+def test_views_of_any_problem(kind: str, tmp_path: Path) -> None:
+    nc = 0 if kind == "without contact" else 3
+    d = 2 if kind == "planar" else 3
+    W = np.eye(d * nc) + 0.1
+    problem = fclib.LocalProblem(spacedim=d, W=W, q=-np.ones(d * nc), mu=np.full(nc, 0.5))
+    solution = None if kind == "without solution" else fclib.solve(problem).solution
+    record = view_of(problem, solution)
+    assert ("network" in record) == (nc > 0)
+    write_view(record, tmp_path / "page.html", title="</script><b>")
+    page = (tmp_path / "page.html").read_text()
+    assert "</script><b>" not in page
+    assert not re.search(r"""(src|href)=["']https?:""", page)
+
+
+# ---- the command line
+
+
+def run(*words: object) -> Any:
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_report_by_the_command_line(store: Path, collection: Path, tmp_path: Path) -> None:
+    done = run("report", store, "--catalog", collection, "--out", tmp_path / "s", "--views", 1)
+    assert done.exit_code == 0, done.output
+    assert "1 views" in done.output
+    assert (tmp_path / "s" / "index.html").is_file()
+    assert run("report").exit_code == 2
+    assert run("report", "--pdf", "--catalog", collection).exit_code == 2
+    missing = run("report", tmp_path / "none.sqlite")
+    assert missing.exit_code == 1
+    assert run("report", "--catalog", tmp_path).exit_code == 1
+
+
+def test_view_by_the_command_line(collection: Path, tmp_path: Path) -> None:
+    file = sorted(collection.rglob("*-local.hdf5"))[-1]
+    done = run("view", file, "--out", tmp_path / "v.html")
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "v.html").stat().st_size > 10_000
+    assert run("view", tmp_path / "none.hdf5").exit_code == 1
+
+
+def test_figures_for_a_paper(store: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    done = run("report", store, "--pdf", "--out", tmp_path / "paper")
+    assert done.exit_code == 0, done.output
+    for tol in TOLERANCES:
+        folder = tmp_path / "paper" / f"tol-{tol:g}"
+        assert (folder / "performance-cpu_s.pdf").read_bytes().startswith(b"%PDF")
+        table = (folder / "summary.tex").read_text()
+        assert table.count(r"\\") == len(LABELS) - 1 + 2  # without the rare one; best, and heads
+        assert "under\\_score" in table

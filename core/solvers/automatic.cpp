@@ -5,10 +5,11 @@
 //   1  Gauss-Seidel sweeps on the whole, then on each island (contacts linked through W) left over
 //   2  conjugate gradients on W r = -q, before the sweeps of an island: all may stick and rest
 //   3  proximal Newton ("polish"), where the error is small already
-//   4  interior point with the shift in the Newton system, polished as it comes near
+//   4  interior point with the shift in the Newton system, polished as it comes near; where its
+//      path folds, again with shorter steps
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  a proof that there is no solution (kernels/no_solution.hpp)
-//   7  interior point again, residual and gap held together: passes folds of the first one's path
+//   7  interior point thrice again, residual and gap held together: paths that fold elsewhere
 //   8  proximal point with an accurate inner solution, the last resort
 //
 // Every stage starts from, and returns to, the best iterate so far; each island is held to its
@@ -241,14 +242,26 @@ class Island {
     start_ = best_;
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       if (!done()) stage("interior point", [&] { interior_point({}); });
+      // where its path folds, another way along it may pass
+      if (!done()) {
+        stage("interior point, shorter steps",
+              [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
+      }
       if (!done()) stage("associated", [&] { associated(); });
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      // R and tau go down together, slowly: passes where the path of the first one folds
-      if (!done()) {
-        stage("interior point, patient",
-              [&] { interior_point({.balance = 10, .max_iterations = 300, .patience = 60}); });
+      // R and tau go down together, slowly
+      for (const InteriorPointRules& rules :
+           {InteriorPointRules{.delta = 1e-2,
+                               .delta_follows = false,
+                               .balance = 30,
+                               .max_iterations = 200,
+                               .patience = 40},
+            InteriorPointRules{
+                .step_cap = 0.8, .balance = 30, .max_iterations = 200, .patience = 40},
+            InteriorPointRules{.balance = 10, .max_iterations = 300, .patience = 60}}) {
+        if (!done()) stage("interior point, patient", [&] { interior_point(rules); });
       }
     }
     // from the associated solution, then from the best iterate, which is another

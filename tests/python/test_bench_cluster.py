@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import signal
 import time
@@ -122,7 +123,9 @@ def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_script_for_slurm() -> None:
-    pytest.importorskip("dask_jobqueue")
+    if importlib.util.find_spec("dask_jobqueue") is None:
+        pytest.skip("dask_jobqueue is not installed")
+    before = signal.getsignal(signal.SIGINT)
     made, workers = cluster.slurm_cluster(
         {
             "workers": "8",
@@ -138,6 +141,7 @@ def test_the_script_for_slurm() -> None:
         script = made.job_script()
     finally:
         made.close()
+    assert signal.getsignal(signal.SIGINT) is before
     assert workers == 8
     for line in (
         "#SBATCH -p short",

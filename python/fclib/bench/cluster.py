@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import os
+import signal
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
@@ -153,7 +154,10 @@ def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
     Raises:
         fclib.OptionError: a number is none.
     """
+    # its import takes Ctrl-C for itself, and would end the campaign without a word
+    handler = signal.getsignal(signal.SIGINT)
     SLURMCluster = importlib.import_module("dask_jobqueue").SLURMCluster
+    signal.signal(signal.SIGINT, handler)
 
     given = dict(options)
     try:

@@ -52,6 +52,8 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
     """
     record: dict[str, Any] = {
         "title": problem.info.title,
+        "description": problem.info.description,
+        "math_info": problem.info.math_info,
         "formulation": problem.formulation,
         "spacedim": problem.spacedim,
         "n": problem.n,

@@ -324,7 +324,7 @@
     page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
     if (view) {
       if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view));
-      page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns));
+      page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), Fclib.texts(view) || "");
       if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({ caption: "Recomputed from the file", rows: Object.entries(view.merit), columns: [{ key: 0, label: "part", head: true }, { key: 1, label: "value", type: "number" }] }));
     } else page.append(h("p", { class: "soft" }, "This site has no picture of this problem: ", h("code", {}, "fclib view FILE"), " draws it."));
     if (runs) {

@@ -23,6 +23,9 @@
       pattern.rank && `, rank ${pattern.rank}`, pattern.conditioning && `, condition number ${number(pattern.conditioning)}`,
       pattern.cell > 1 && `; a pixel is ${pattern.cell} × ${pattern.cell}`));
   };
+  /* what the file says of itself */
+  Fclib.texts = (view) => (view.description || view.math_info) && h("details", {}, h("summary", {}, "What the file says of itself"),
+    [view.description, view.math_info].filter(Boolean).map((text) => h("p", { class: "small words" }, text)));
   Fclib.patterns = (list) => h("div", {}, h("div", { class: "patterns" }, list.map(one)),
     h("details", {}, h("summary", {}, "As a table"), Fclib.table({
       caption: "Matrices", rows: list,

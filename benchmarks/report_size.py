@@ -1,0 +1,128 @@
+"""What a report of a large campaign costs: to build, to keep, and to open in a browser.
+
+    python benchmarks/report_size.py [--problems 5000] [--solvers 40] [--out FOLDER]
+
+The runs are made up. The times to open need Playwright and a Chromium: from the call to the moment
+that the page shows what it is about, the files in the system's cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import random
+import resource
+import shutil
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from fclib.bench import Store
+from fclib.report import Campaigns, build_site
+
+
+def fill(path: Path, problems: int, solvers: int) -> None:
+    """A store of problems x solvers runs at one tolerance, its rows written in one go."""
+    draw = random.Random(1)
+    with Store(path) as store, store.transaction():
+        db = store.db
+        db.execute("INSERT INTO machines (id, hash, node, cpu) VALUES (1, 'm', 'made', 'up')")
+        db.executemany(
+            "INSERT INTO problems (id, hash, name, family, path, kind, formulation, spacedim, n, p,"
+            " nc, nnz, title) VALUES (?, ?, ?, ?, ?, 'local', '3DFC', 3, 0, 0, ?, ?, ?)",
+            (
+                (k, digest(k), f"{k:05d}", f"Family{k % 9}", "", 1 + k % 997, 9 * k, f"Problem {k}")
+                for k in range(1, problems + 1)
+            ),
+        )
+        db.executemany(
+            "INSERT INTO solvers (id, hash, label, name, options, version, family, origin)"
+            " VALUES (?, ?, ?, 'nsgs', '{}', '1', 'splitting', 'fclib')",
+            ((k, f"s{k}", f"solver-{k:02d}") for k in range(1, solvers + 1)),
+        )
+        db.executemany(
+            "INSERT INTO runs (key, problem, solver, machine, tol, time_limit, wall_limit,"
+            " memory_limit, threads, repeat, status, message, solved, iterations, cpu_s, setup_s,"
+            " total_cpu_s, wall_s, memory_mb, error)"
+            " VALUES (?, ?, ?, 1, 1e-6, 10, 20, 1000, 1, 0, ?, '', ?, ?, ?, 0, ?, ?, ?, ?)",
+            (run(draw, p, s) for p in range(1, problems + 1) for s in range(1, solvers + 1)),
+        )
+
+
+def digest(number: int) -> str:
+    """A hash as those of problems look."""
+    return hashlib.sha256(str(number).encode()).hexdigest()
+
+
+def run(draw: random.Random, problem: int, solver: int) -> tuple[Any, ...]:
+    """The columns of a run, drawn by lot."""
+    solved = draw.random() < 0.95 - solver / 100
+    seconds = 10 ** draw.gauss(-3 + solver / 40, 0.7)
+    status = "converged" if solved else "time_limit"
+    key = f"{problem}-{solver}"
+    error = 5e-7 if solved else 1e-2
+    return (
+        *(key, problem, solver, status, int(solved), draw.randrange(1, 9999), seconds),
+        *(1.1 * seconds, 1.2 * seconds, draw.uniform(20, 90), error),
+    )
+
+
+def open_pages(site: Path) -> dict[str, float]:
+    """Seconds until each page shows what it is about, the median of five."""
+    from playwright.sync_api import sync_playwright
+
+    marks = {
+        "overview": ("#/overview", "main table tbody tr"),
+        "profiles": ("#/profiles", "main .chart svg path[data-name]"),
+        "catalogue": ("#/catalogue", "main table tbody tr"),
+        "problem": ("#/problem/Family1/00001", "main table tbody tr"),
+    }
+    found: dict[str, float] = {}
+    with sync_playwright() as playwright:
+        chromium = shutil.which("chromium")
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        for name, (address, mark) in marks.items():
+            times = []
+            for _ in range(5):
+                page = browser.new_page()
+                start = time.perf_counter()
+                page.goto(f"{(site / 'index.html').as_uri()}{address}")
+                page.wait_for_selector(mark, state="attached")
+                times.append(time.perf_counter() - start)
+                page.close()
+            found[name] = sorted(times)[2]
+        browser.close()
+    return found
+
+
+def main() -> None:
+    """Measure, and print a line for each figure."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--problems", type=int, default=5000)
+    parser.add_argument("--solvers", type=int, default=40)
+    parser.add_argument("--out", type=Path, help="keep the site here")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        store = Path(folder) / "runs.sqlite"
+        fill(store, options.problems, options.solvers)
+        site = options.out or Path(folder) / "site"
+        start = time.perf_counter()
+        with Campaigns([store]) as campaigns:
+            counts = build_site(campaigns, site, views=0)
+        print(f"built       {time.perf_counter() - start:.1f} s, {counts['runs']} runs")
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        print(f"memory      {memory:.0f} MB")
+        files = list((site / "data").rglob("*.js"))
+        print(f"data        {counts['bytes'] / 1e6:.1f} MB in {len(files)} files")
+        for name in ("site", "catalogue", "t0", "t0-cpu_s"):
+            print(f"  {name:10}{(site / 'data' / f'{name}.js').stat().st_size / 1e6:.2f} MB")
+        try:
+            for name, seconds in open_pages(site).items():
+                print(f"open {name:10}{seconds:.2f} s")
+        except ImportError:
+            print("the times to open need Playwright")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,403 @@
+"""The site in a real browser, from the file system: no error, no request, no server."""
+
+import csv
+import io
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from fclib.bench import profiles
+from fclib.report import Campaigns, build_site, view_of, write_view
+from helpers_report import LABELS, add_runs, made_facts, make_collection, make_store, read_data
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pyarrow")
+api = pytest.importorskip("playwright.sync_api")
+# what they give is of one kind here
+read: Any = fclib.read
+read_solution: Any = fclib.read_solution
+PHONE = {"width": 390, "height": 800}
+PAGES = {
+    "overview": "#/overview",
+    "profiles": "#/profiles",
+    "catalogue": "#/catalogue",
+    "families": "#/families",
+    "family": "#/family/small/BoxesStack",
+    "problem": "#/problem/small/BoxesStack/0011",
+    "problem of a store": "#/problem/Alone/alone",
+    "problem without runs": "#/problem/small/BoxesStack/0000",
+    "solvers": "#/solvers",
+    "solver": "#/solver/under_score",
+}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with api.sync_playwright() as playwright:
+        found = [None, *filter(None, map(shutil.which, ("chromium", "chromium-browser")))]
+        for path in found:
+            try:
+                opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+            except api.Error:
+                continue
+            yield opened
+            opened.close()
+            return
+        pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")
+
+
+@pytest.fixture(scope="module")
+def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_collection(tmp_path_factory.mktemp("collection"))
+
+
+@pytest.fixture(scope="module")
+def store(collection: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_store(tmp_path_factory.mktemp("store") / "runs.sqlite", collection)
+
+
+@pytest.fixture(scope="module")
+def site(collection: Path, store: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    # a folder whose name must be escaped in an address
+    folder = tmp_path_factory.mktemp("built") / "a site #1"
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, folder, collection, views=4)
+    return folder
+
+
+class Opener:
+    """Opens pages, and notes what a page must not do."""
+
+    def __init__(self, browser: Any, site: Path) -> None:
+        self.browser = browser
+        self.site = site
+        self.contexts: list[Any] = []
+        self.wrong: list[str] = []
+
+    def __call__(self, address: str, **settings: Any) -> Any:
+        """A page, when it shows what it is about."""
+        context = self.browser.new_context(
+            **{"viewport": {"width": 1200, "height": 900}, **settings}
+        )
+        self.contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda m: self.wrong.append(f"{address}: {m.type} {m.text}"))
+        page.on("pageerror", lambda error: self.wrong.append(f"{address}: {error}"))
+        page.on("request", self.judge)
+        file = self.site if self.site.suffix == ".html" else self.site / "index.html"
+        page.goto(file.as_uri() + address)
+        page.wait_for_selector("main h1")
+        return page
+
+    def judge(self, request: Any) -> None:
+        if not request.url.startswith(("file:", "data:", "blob:")):
+            self.wrong.append(f"asks for {request.url}")
+
+
+@pytest.fixture
+def go(browser: Any, site: Path) -> Iterator[Opener]:
+    opener = Opener(browser, site)
+    yield opener
+    for context in opener.contexts:
+        context.close()
+    assert not opener.wrong
+
+
+def cells(page: Any, row: int = 0, table: str = "main table >> nth=0") -> list[str]:
+    """The texts of a row of a table."""
+    found = page.locator(table).locator("tbody tr").nth(row).locator("th, td").all_inner_texts()
+    return [str(text).strip() for text in found]
+
+
+def column(page: Any, number: int, table: str = "main table >> nth=0") -> list[str]:
+    """The texts of a column of a table."""
+    found = page.locator(table).locator(f"tbody tr > :nth-child({number + 1})").all_inner_texts()
+    return [str(text).strip() for text in found]
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_page_opens(name: str, go: Opener) -> None:
+    page = go(PAGES[name])
+    assert page.inner_text("main h1") != "Not here"
+    assert page.locator("nav a[aria-current=page]").count() == 1
+    for image in page.locator("main img").all():
+        image.scroll_into_view_if_needed()
+        page.wait_for_function("i => i.complete && i.naturalWidth > 0", arg=image.element_handle())
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_page_fits_a_phone(name: str, go: Opener) -> None:
+    page = go(PAGES[name], viewport=PHONE, color_scheme="dark")
+    assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+
+def test_addresses_that_lead_nowhere_say_so(go: Opener) -> None:
+    for address in ("#/nowhere", "#/problem/none/such/0001", "#/solver/none", "#/family/none"):
+        page = go(address)
+        assert page.inner_text("main h1") == "Not here"
+        page.click("text=To the overview")
+        page.wait_for_selector("main[data-page=overview]")
+
+
+def test_the_solver_table_sorts_filters_and_keeps_its_state(go: Opener) -> None:
+    page = go("#/overview")
+    assert cells(page)[0] == "virtual best"
+    solved = page.get_by_role("button", name="solved", exact=True)
+    solved.click()
+    first = [int(text) for text in column(page, 2)]
+    assert first == sorted(first)
+    solved.click()
+    assert [int(text) for text in column(page, 2)] == sorted(first, reverse=True)
+    assert page.locator("th[aria-sort=descending]").inner_text().startswith("solved")
+    page.get_by_label("solver or method").fill("under")
+    assert column(page, 0) == ["under_score"]
+    # the address alone gives the same view
+    again = go(page.evaluate("location.hash"))
+    assert column(again, 0) == ["under_score"]
+    assert again.locator("th[aria-sort=descending]").count() == 1
+
+
+def test_the_catalogue_filters_sorts_and_keeps_its_state(go: Opener, site: Path) -> None:
+    page = go("#/catalogue")
+    total = read_data(site, "catalogue")["size"]
+    said = page.get_by_role("status")
+    assert said.inner_text() == f"{total} of {total} problems"
+    page.get_by_label("filter").fill("nc>4 family=BoxesStack")
+    page.wait_for_function("document.querySelector('[role=status]').textContent.startsWith('10 ')")
+    page.get_by_role("button", name="contacts", exact=True).click()
+    heads = page.locator("thead th").all_inner_texts()
+    contacts = next(k for k, text in enumerate(heads) if text.startswith("contacts"))
+    counts = [int(text) for text in column(page, contacts)]
+    assert counts == sorted(counts)
+    assert min(counts) > 4
+    again = go(page.evaluate("location.hash"))
+    assert again.get_by_role("status").inner_text() == f"10 of {total} problems"
+    assert [int(text) for text in column(again, contacts)] == counts
+    again.get_by_label("filter").fill("colour=red")
+    again.wait_for_function(
+        "document.querySelector('[role=status]').textContent.includes('no column colour')"
+    )
+    with again.expect_download() as saved:
+        again.get_by_role("button", name="CSV of these").click()
+    text = Path(saved.value.path()).read_text()
+    assert len(text.splitlines()) == total + 1
+    again.click("main tbody a >> nth=0")
+    again.wait_for_selector("main[data-page=problem]")
+
+
+def test_profiles_are_those_of_the_bench(go: Opener, store: Path, site: Path) -> None:
+    labels = [solver["label"] for solver in read_data(site, "site")["solvers"]]
+    chosen = [name for name in labels if name != "rare"]
+    rows = [row for row in profiles.load(store, tolerances=[1e-8]) if row["solver"] != "rare"]
+    for kind in ("performance", "data", "contact"):
+        page = go(f"#/profiles?tol=1&kind={kind}")
+        page.wait_for_selector("main .chart path[data-name]")
+        with page.expect_download() as saved:
+            page.locator("main figure").first.get_by_role("button", name="CSV").click()
+        table = list(csv.reader(io.StringIO(Path(saved.value.path()).read_text())))
+        assert table[0][1:] == chosen
+        numbers = np.array([[float(x) for x in line] for line in table[1:]])
+        costs = profiles.costs(rows)
+        shown = costs.per_contact() if kind == "contact" else costs
+        values = profiles.ratios(shown.values) if kind == "performance" else shown.values
+        # between the steps, where six digits do not matter
+        bounds = numbers[:, 0]
+        inside = np.sqrt(bounds[:-1] * bounds[1:])
+        wide = bounds[1:] > bounds[:-1] * (1 + 1e-4)
+        expected = profiles.share_within(values, inside[wide])
+        order = [costs.solvers.index(name) for name in chosen]
+        np.testing.assert_allclose(numbers[:-1, 1:][wide].T, expected[order], atol=1e-9)
+
+
+def test_profiles_follow_what_is_chosen(go: Opener) -> None:
+    page = go("#/profiles")
+    paths = page.locator("main .chart >> nth=0 >> path[data-name]")
+    paths.first.wait_for(state="attached")
+    assert paths.count() == len(LABELS) - 1
+    page.get_by_role("group", name="Solvers").get_by_label("nsgs").uncheck()
+    page.wait_for_function("document.querySelectorAll('.chart path[data-name]').length === 2")
+    page.get_by_label("axis").select_option("linear")
+    page.get_by_label("family").select_option("Alone")
+    page.wait_for_function("document.body.textContent.includes('1 instances of 6')")
+    again = go(page.evaluate("location.hash"))
+    again.wait_for_function("document.body.textContent.includes('1 instances of 6')")
+    assert again.locator(".chart >> nth=0 >> path[data-name]").count() == 2
+    again.get_by_role("button", name="none").click()
+    again.wait_for_selector("text=Choose some solvers")
+
+
+def test_charts_are_read_by_pointer_and_keys_and_saved(go: Opener) -> None:
+    page = go("#/profiles")
+    chart = page.locator("main .chart >> nth=0")
+    picture = chart.locator("svg[role=img]")
+    tip = chart.locator(".tip")
+    assert not tip.is_visible()
+    picture.hover()
+    assert "τ =" in tip.inner_text()
+    picture.focus()
+    page.keyboard.press("ArrowRight")
+    before = tip.inner_text()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    assert tip.inner_text() != before
+    page.keyboard.press("Escape")
+    assert not tip.is_visible()
+    for kind, start in (("SVG", b"<svg"), ("PNG", b"\x89PNG")):
+        with page.expect_download() as saved:
+            page.locator("main figure").first.get_by_role("button", name=kind).click()
+        data = Path(saved.value.path()).read_bytes()
+        assert data.startswith(start)
+        assert b"var(--" not in data
+    page.locator("main figure details summary").first.click()
+    page.locator("main figure table tbody tr").first.wait_for()
+    assert page.locator("main figure table tbody tr").count() > 3
+
+
+def test_a_point_of_two_solvers_leads_to_its_problem(go: Opener) -> None:
+    page = go("#/profiles?a=auto&b=nsgs")
+    point = page.locator("main svg a circle").first
+    point.wait_for(state="attached")
+    point.hover(force=True)
+    assert "auto" in page.locator(".chart >> nth=1 >> .tip").inner_text()
+    page.locator("main svg a").first.dispatch_event("click")
+    page.wait_for_selector("main[data-page=problem]")
+
+
+def test_a_problem_shows_its_runs(go: Opener, site: Path) -> None:
+    page = go("#/problem/small/BoxesStack/0011")
+    runs = page.get_by_role("region", name="runs")
+    assert runs.locator("tbody tr").count() == 6
+    assert 'fclib.load("small/BoxesStack/0011")' in page.inner_text("main")
+    assert page.locator("h2", has_text="Convergence").count() == 1
+    page.get_by_role("link", name="← previous").click()
+    page.wait_for_function("document.querySelector('h1').textContent.endsWith('0010')")
+
+
+def test_the_network_turns_zooms_and_answers(go: Opener) -> None:
+    page = go("#/problem/small/BoxesStack/0011")
+    canvas = page.locator(".scene canvas")
+    canvas.scroll_into_view_if_needed()
+    eye = "(({ turn, tilt, zoom }) => [turn, tilt, zoom])(document.querySelector('.scene').eye)"
+    ink = """(() => { const c = document.querySelector('.scene canvas');
+        const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        let sum = 0; for (let i = 3; i < d.length; i += 4) sum += d[i] > 0; return sum; })()"""
+    page.wait_for_function(f"{ink} > 500")
+    start = page.evaluate(eye)
+    canvas.focus()
+    for key in ("ArrowLeft", "ArrowUp", "+"):
+        page.keyboard.press(key)
+    assert all(a != b for a, b in zip(page.evaluate(eye), start, strict=True))
+    page.keyboard.press("0")
+    assert page.evaluate(eye) == start
+    box = canvas.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 80, y + 20)
+    page.mouse.up()
+    page.mouse.wheel(0, -200)
+    assert all(a != b for a, b in zip(page.evaluate(eye), start, strict=True))
+    page.locator(".scene").get_by_role("checkbox", name="bodies").uncheck()
+    page.locator(".scene summary").click()
+    page.locator(".scene table tbody tr").first.wait_for()
+    assert cells(page, 0, ".scene table")[0] == "0"
+    assert page.locator(".scene table tbody tr").count() == 12
+
+
+def test_all_can_be_done_by_keys(go: Opener) -> None:
+    page = go("#/catalogue")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.className") == "skip"
+    seen = set()
+    for _ in range(40):
+        page.keyboard.press("Tab")
+        seen.add(page.evaluate("document.activeElement.tagName"))
+    assert {"A", "BUTTON", "INPUT", "SELECT"} <= seen
+    page.get_by_role("button", name="contacts", exact=True).focus()
+    page.keyboard.press("Enter")
+    assert page.locator("th[aria-sort=ascending]").inner_text().startswith("contacts")
+
+
+def luminance(colour: str) -> float:
+    """Of "rgb(1, 2, 3)", by WCAG."""
+    parts = [int(x) / 255 for x in colour[4:-1].split(",")]
+    linear = [x / 12.92 if x <= 0.04045 else ((x + 0.055) / 1.055) ** 2.4 for x in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+def test_light_and_dark_can_be_read(go: Opener) -> None:
+    colours = {}
+    style = "getComputedStyle(document.querySelector('{}')).{}"
+    for scheme in ("light", "dark"):
+        page = go("#/overview", color_scheme=scheme)
+        colours[scheme] = page.evaluate(style.format("body", "backgroundColor"))
+        back = luminance(colours[scheme])
+        for what in ("body", "main a", "caption", "main .good", "main .bad"):
+            text = luminance(page.evaluate(style.format(what, "color")))
+            assert (max(text, back) + 0.05) / (min(text, back) + 0.05) >= 4.5, (scheme, what)
+    assert luminance(colours["light"]) > luminance(colours["dark"])
+    # the button turns it round, and the choice stays
+    page.click("#theme")
+    assert page.evaluate(style.format("body", "backgroundColor")) == colours["light"]
+    page.reload()
+    page.wait_for_selector("main h1")
+    assert page.evaluate(style.format("body", "backgroundColor")) == colours["light"]
+
+
+def test_a_site_without_runs(
+    browser: Any, collection: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    build_site(None, tmp_path / "site", collection, views=1)
+    go = Opener(browser, tmp_path / "site")
+    for name in ("overview", "catalogue", "family", "problem without runs", "solvers"):
+        assert go(PAGES[name]).inner_text("main h1") != "Not here"
+    assert go("#/overview").locator("nav a").all_inner_texts() == [
+        *("Overview", "Catalogue", "Families", "Solvers")
+    ]
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
+def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -> None:
+    for form in ("global", "local"):
+        file = sorted(collection.rglob(f"*-{form}.hdf5"))[-1]
+        target = tmp_path / f"{form}.html"
+        write_view(view_of(read(file), read_solution(file)), target, title=file.name)
+        go = Opener(browser, target)
+        page = go("")
+        assert file.name in page.inner_text("main")
+        assert ("To scale" in page.inner_text("main")) == (form == "global")
+        page.click("#theme")
+        page.locator(".scene summary").click()
+        page.locator(".scene table tbody tr").first.wait_for()
+        assert page.locator(".scene table tbody tr").count() == 12
+        for context in go.contexts:
+            context.close()
+        assert not go.wrong
+
+
+def test_a_large_campaign_is_paged(browser: Any, tmp_path: Path) -> None:
+    """Few solvers here; benchmarks/report_size.py has 200,000 runs and the times."""
+    store = tmp_path / "large.sqlite"
+    add_runs(store, made_facts(1500), ["auto", "nsgs"], history=False)
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, tmp_path / "site", views=0)
+    go = Opener(browser, tmp_path / "site")
+    page = go("#/catalogue?sort=nc:down&page=3")
+    assert page.locator("main tbody tr").count() == 50
+    assert "101–150 of 1500" in page.inner_text("main")
+    page.get_by_role("button", name="Next page").click()
+    assert "151–200 of 1500" in page.inner_text("main")
+    assert "page=4" in page.evaluate("location.hash")
+    page = go("#/profiles")
+    page.wait_for_selector("main svg a circle", state="attached")
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong

@@ -261,6 +261,13 @@ def test_a_view_counts_as_the_merit_does(collection: Path) -> None:
         r = np.asarray(solution.r).reshape(problem.nc, -1)
         np.testing.assert_allclose(view["reactions"], r, rtol=1e-4, atol=1e-300)
         assert json.dumps(view, allow_nan=False)
+        W = problem.W if problem.kind == "local" else problem.condense().W
+        values = np.linalg.svd(W.toarray(), compute_uv=False)
+        assert view["spectrum"]["rank"] == np.linalg.matrix_rank(W.toarray())
+        np.testing.assert_allclose(
+            view["spectrum"]["values"], values[: view["spectrum"]["rank"]], rtol=1e-3
+        )
+        assert view["patterns"][0]["name"] == "W"
         for pattern in view["patterns"]:
             assert sum(pattern["counts"]) == pattern["nnz"]
 

@@ -63,7 +63,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
         "the fastest one at the smallest tolerance at which one solves it",
     ),
     ("best_s", "best [s]", "its CPU time"),
-    ("best_tol", "at", "that tolerance"),
+    ("best_tol", "best at", "that tolerance"),
     ("runs", "runs", "in the stores"),
     ("solved", "solved", "runs whose recomputed error met the tolerance"),
     ("view", "3D", "whether the site has its contact network"),

@@ -17,7 +17,8 @@ from fclib.report.network import Network, network_of
 ASSETS = Path(__file__).with_name("assets")
 DIGITS = 5  # of positions and reactions in a picture
 CELLS = 128  # of a pattern, along its longer side
-SCRIPTS = ("core.js", "table.js", "scene.js", "pattern.js", "view.js")
+SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
+SCRIPTS = ("core.js", "table.js", "chart.js", "scene.js", "pattern.js", "view.js")
 STATUS = ("open", "stick", "slide")
 
 
@@ -60,10 +61,12 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
         "nc": problem.nc,
         "p": problem.p,
         "mu": rounded(np.asarray(problem.mu)),
-        "patterns": patterns_of(problem),
     }
     if not problem.nc:
-        return record
+        return record | {"patterns": patterns_of(problem, None)}
+    W = problem.condense().W if hasattr(problem, "H") else problem.W
+    record["patterns"] = patterns_of(problem, W)
+    record |= spectrum_of(W)
     network = network_of(problem)
     size = float(np.abs(network.points - network.points.mean(axis=0)).max()) or 1.0
     record["network"] = {
@@ -105,11 +108,37 @@ def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
 # ---- patterns
 
 
-def patterns_of(problem: Any) -> list[dict[str, Any]]:
-    """Of each matrix its shape, its entries, and how many lie in each cell of a coarse grid."""
+def spectrum_of(W: Any) -> dict[str, Any]:
+    """The eigenvalues of W, the largest first, those that are rounding left out.
+
+    What counts as rounding is what NumPy's matrix_rank takes for it, max(shape) eps sigma_1.
+    """
+    size = W.shape[0]
+    if size > SPECTRUM:
+        return {}
+    values = np.linalg.eigvalsh(W.toarray() if sp.issparse(W) else np.asarray(W))[::-1]
+    threshold = size * np.finfo(float).eps * np.abs(values).max()
+    kept = values[values > threshold]
+    return {
+        "spectrum": {
+            "values": rounded(kept, 4),
+            "size": size,
+            "rank": int(kept.size),
+            "conditioning": rounded(float(kept[0] / kept[-1])) if kept.size else None,
+        }
+    }
+
+
+def patterns_of(problem: Any, W: Any) -> list[dict[str, Any]]:
+    """Of each matrix its shape, its entries, and how many lie in each cell of a coarse grid.
+
+    Args:
+        problem: in any formulation.
+        W: of the problem itself, or of its condensed form; None is left out.
+    """
     found = []
     for name in ("W", "M", "H", "G", "V", "R"):
-        matrix = getattr(problem, name, None)
+        matrix = W if name == "W" else getattr(problem, name, None)
         if matrix is None or 0 in matrix.shape:
             continue
         entries = sp.coo_array(matrix if sp.issparse(matrix) else np.asarray(matrix))

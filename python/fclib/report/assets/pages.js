@@ -324,6 +324,7 @@
     page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
     if (view) {
       if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view));
+      if (view.spectrum && view.spectrum.rank > 1) page.append(h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, id));
       page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), Fclib.texts(view) || "");
       if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({ caption: "Recomputed from the file", rows: Object.entries(view.merit), columns: [{ key: 0, label: "part", head: true }, { key: 1, label: "value", type: "number" }] }));
     } else page.append(h("p", { class: "soft" }, "This site has no picture of this problem: ", h("code", {}, "fclib view FILE"), " draws it."));
@@ -386,7 +387,7 @@
       const { best, worst } = head.extremes[solver.label];
       const list = (caption, entries) => Fclib.table({
         caption, rows: entries, columns: [
-          { key: 0, label: "problem", head: true, cell: (e) => h("a", { href: problemHref(cat.read.id(e[0])) }, cat.read.id(e[0])) },
+          { key: 0, label: "problem", type: "text", head: true, cell: (e) => h("a", { href: problemHref(cat.read.id(e[0])) }, cat.read.id(e[0])) },
           { key: 1, label: "CPU [s]", type: "number", format: (v) => v === null ? h("span", { class: "bad" }, "failed") : number(v) },
           { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", cell: (e) => solverLink(e[3]) }],
       });

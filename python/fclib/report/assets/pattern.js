@@ -23,6 +23,12 @@
       pattern.rank && `, rank ${pattern.rank}`, pattern.conditioning && `, condition number ${number(pattern.conditioning)}`,
       pattern.cell > 1 && `; a pixel is ${pattern.cell} × ${pattern.cell}`));
   };
+  /* the eigenvalues of W, the largest first */
+  Fclib.spectrum = ({ values, size, rank, conditioning }, name) => values.length < 2 ? null : Fclib.lines({
+    name: `spectrum-${name.replaceAll("/", "-")}`, title: `Eigenvalues of W of ${name}`, series: [{ name: "eigenvalues of W", x: values.map((_, k) => k + 1), y: values, style: 0 }],
+    ylog: true, xrange: [0, Math.max(size, 2)], yrange: [values[values.length - 1] / 2, values[0] * 2], xname: "number", xlabel: "number, the largest first", ylabel: "eigenvalue",
+    note: `Rank ${rank} of ${size}${rank < size ? `: ${size - rank} eigenvalues are rounding` : ""}; the largest over the smallest of the others is ${number(conditioning)}.`,
+  });
   /* what the file says of itself */
   Fclib.texts = (view) => (view.description || view.math_info) && h("details", {}, h("summary", {}, "What the file says of itself"),
     [view.description, view.math_info].filter(Boolean).map((text) => h("p", { class: "small words" }, text)));

@@ -66,6 +66,8 @@ class SemismoothNewton {
     spectral_norm_.resize(problem.nc());
   }
 
+  [[nodiscard]] std::int64_t factorisations() const { return system_.factorisations(); }
+
   /// Improves r. `report(error)` is told of each iterate, and ends it by returning true. r ends as
   /// the iterate with the least error.
   template <class Report>

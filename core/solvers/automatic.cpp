@@ -8,9 +8,10 @@
 //   4  interior point with the shift in the Newton system, polished as it comes near; where its
 //      path folds, again with shorter steps
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
-//   6  a proof that there is no solution (kernels/no_solution.hpp)
-//   7  interior point thrice again, residual and gap held together: paths that fold elsewhere
-//   8  proximal point with an accurate inner solution, the last resort
+//   6  semismooth Newton on the natural map
+//   7  a proof that there is no solution (kernels/no_solution.hpp)
+//   8  interior point thrice again, residual and gap held together: paths that fold elsewhere
+//   9  proximal point with an accurate inner solution, the last resort
 //
 // Every stage starts from, and returns to, the best iterate so far; each island is held to its
 // share of the tolerance. What a stage may cost is counted in operations, not in time: the same
@@ -29,6 +30,7 @@
 #include "kernels/natural_error.hpp"
 #include "kernels/no_solution.hpp"
 #include "kernels/proximal_point.hpp"
+#include "kernels/semismooth_newton.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::automatic {
@@ -71,6 +73,9 @@ struct Options {
 
 /// Up to here the error is evaluated often: a few sweeps may do, and cost no more than it.
 constexpr Index few_contacts = 10;
+
+/// Of the semismooth Newton method: what it solves, it nearly always solves within these.
+constexpr std::int64_t newton_iterations = 200;
 
 /// A proof that there is no solution must hold for reactions this many times the usual size.
 constexpr double safe_bound = 1e4;
@@ -248,6 +253,8 @@ class Island {
               [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
       }
       if (!done()) stage("associated", [&] { associated(); });
+      // slower than the proximal point on rolling contacts
+      if (!done()) semismooth_newton();
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
@@ -363,6 +370,23 @@ class Island {
         next_polish = error / 30;
       }
       return done();
+    });
+  }
+
+  /// On the natural map, started anew by sweeps where it stands still. From nothing: where it
+  /// converges, it does from there as well as from an iterate that another method is stuck at.
+  void semismooth_newton() {
+    tracker_.stage("semismooth newton", [&] {
+      SemismoothNewton<NaturalMap<Cone>> newton(problem_);
+      Vector r = Vector::Zero(problem_.m());
+      std::int64_t left = newton_iterations;
+      double least = std::numeric_limits<double>::infinity();
+      newton.solve({}, r, [&](double error) {
+        least = std::min(least, error);
+        return tracker_.report(1, error) || error <= tolerance_ || --left == 0;
+      });
+      take(0, least, r);
+      return std::pair(newton.factorisations(), done());
     });
   }
 

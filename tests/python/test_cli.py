@@ -128,6 +128,16 @@ def test_solve_and_check_take_the_problem_that_a_solution_belongs_to(both: Path)
     assert fclib.contents(both) == ["global", "local", "solution", "guesses"]
 
 
+def test_solve_takes_the_problem_that_is_asked_for(both: Path) -> None:
+    for kind, formulation in (("local", "3DFC"), ("global", "G3DFC")):
+        (record,) = records(run("solve", "--kind", kind, both, "--json"))
+        assert record["formulation"] == formulation
+    missing = run("solve", "--kind", "global_rolling", both)
+    assert missing.returncode == 1
+    assert missing.stderr.count("\n") == 1
+    assert run("solve", "--kind", "local", "--write", both).returncode == 2
+
+
 def test_info_of_a_problem_without_contacts_is_json(tmp_path: Path) -> None:
     path = tmp_path / "empty.hdf5"
     fclib.write(path, planted_global(1, nc=0).problem)

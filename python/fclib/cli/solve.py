@@ -53,6 +53,10 @@ def command(
     time_limit: Annotated[
         float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.0)
     ] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(help="Which of several problems in a file: local, global, ...; not to --write."),
+    ] = None,
     write: Annotated[
         bool, typer.Option("--write", help="Store solutions that converged in their files.")
     ] = False,
@@ -65,6 +69,9 @@ def command(
     as_json: Json = False,
 ) -> None:
     """Solve problems, and judge the solutions; of several in a file the global one."""
+    if kind is not None and write:
+        # the one solution of a file is that of its global problem
+        raise typer.BadParameter("--write stores the solution of the main problem, not of a --kind")
     options = parse_options(option or [])
     try:
         fclib.find_solver(solver).check_options(options)
@@ -74,7 +81,8 @@ def command(
     for path in each_file(files, "solving"):
         try:
             trace = Trace(path.name) if verbose else None
-            run = bench.run(str(path), read_owner(path), solver, tol, time_limit, options, trace)
+            problem = fclib.read(path, kind) if kind else read_owner(path)
+            run = bench.run(str(path), problem, solver, tol, time_limit, options, trace)
             stages = [{key: getattr(stage, key) for key in STAGE} for stage in run.result.stages]
             if trace is not None:
                 trace.finish(stages)

@@ -241,6 +241,23 @@ def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
     np.testing.assert_allclose(after.bodies, before.bodies, atol=1e-6)
 
 
+def test_bodies_without_contact_and_rounding_move_nothing(collection: Path) -> None:
+    import scipy.sparse as sp
+
+    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    before = network_of(problem)
+    # a body that touches nothing comes first, and rounding ties it to all contacts
+    n, m = problem.n, problem.m
+    H = np.full((n + 6, m), 1e-17)
+    H[6:] = problem.H.toarray()
+    M = sp.block_diag([sp.diags_array([2.0, 2.0, 2.0, 0.1, 0.2, 0.3]), problem.M])
+    f = np.concatenate([np.zeros(6), problem.f])
+    after = network_of(problem.replace(H=sp.csc_array(H), M=sp.csc_array(M), f=f))
+    assert after.placed
+    np.testing.assert_array_equal(after.pairs, before.pairs)
+    np.testing.assert_allclose(after.points, before.points, atol=1e-6)
+
+
 def test_a_matrix_that_is_not_of_rigid_bodies_gives_a_graph(collection: Path) -> None:
     problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
     network = network_of(problem.replace(H=problem.H * 2.0))

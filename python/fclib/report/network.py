@@ -32,12 +32,13 @@ Indices = npt.NDArray[np.int64]
 FRAME = 1e-6  # what the columns of a frame may lack of orthonormality
 MISFIT = 0.05  # what contact points may be apart, of the size of the levers, to be believed
 EDGES = 20_000  # of a graph that pull while it is laid out
+ROUNDING = 1e-12  # what an entry of H may be, of the largest, and stand for nought
 GROUND = 1e-2  # weight of a plane ground against that of shared points
 
 
 @dataclass
 class Network:
-    """Bodies and contacts in space; the ground is body -1."""
+    """Bodies that have a contact, and contacts, in space; the ground is body -1."""
 
     placed: bool  # by the geometry in H; else laid out as a graph
     bodies: Array  # (bodies, 3) [m] where placed
@@ -60,7 +61,10 @@ def network_of(problem: Any) -> Network:
     """The network of a problem in any formulation; nc is at least 1."""
     if getattr(problem, "H", None) is None:
         return _of_local(problem)
-    H = sp.csc_array(problem.H)
+    H = sp.csc_array(problem.H, copy=True)
+    # what is rounding in H ties no body to a contact
+    H.data[np.abs(H.data) <= ROUNDING * np.abs(H.data).max(initial=0.0)] = 0.0
+    H.eliminate_zeros()
     d = problem.spacedim
     bodies = _bodies_of(problem, H)
     owner = np.full(problem.n, -1)
@@ -72,6 +76,10 @@ def network_of(problem: Any) -> Network:
         touched = np.unique(owner[rows])
         # a row of H beyond the first two bodies would be a joint, which lies in G
         pairs[contact, : min(2, touched.size)] = touched[:2]
+    touched, numbers = np.unique(pairs, return_inverse=True)
+    kept = touched[touched >= 0]
+    pairs = numbers.reshape(pairs.shape) - (touched.size - kept.size)
+    bodies = [bodies[number] for number in kept]
     if d >= 3:
         found = _place(problem.nc, d, H, bodies, pairs)
         if found is not None:
@@ -97,6 +105,7 @@ def _bodies_of(problem: Any, H: Any) -> list[_Body]:
     cut = np.flatnonzero(ends == np.arange(problem.n))
     size = problem.spacedim
     rows = sp.csr_array(H)
+    masses = np.asarray(sp.csr_array(problem.M).diagonal())
     bodies = []
     start = 0
     while start < problem.n:
@@ -104,7 +113,7 @@ def _bodies_of(problem: Any, H: Any) -> list[_Body]:
         six = start + 6
         free = False
         if size >= 3 and six <= problem.n and (end >= six or six - 1 in cut):
-            free = _is_free(rows, size, start)
+            free = _is_free(rows, masses, size, start)
             if free:
                 end = max(end, six)
         bodies.append(_Body(start, end - start, free))
@@ -112,12 +121,16 @@ def _bodies_of(problem: Any, H: Any) -> list[_Body]:
     return bodies
 
 
-def _is_free(H: Any, d: int, first: int) -> bool:
-    """Whether six degrees of freedom are the velocity of a body's point and its rotation."""
+def _is_free(H: Any, masses: Array, d: int, first: int) -> bool:
+    """Whether six degrees of freedom are the velocity of a body's point and its rotation.
+
+    Of a body without contact the equal masses of its first three decide.
+    """
     block = H[first : first + 6]
     contacts = np.unique(block.indices // d)
     if not contacts.size:
-        return False
+        own = masses[first : first + 3]
+        return bool(np.ptp(own) <= FRAME * own.max())
     # (3, contacts, 3): the columns of the frames, if they are such
     T = block[:3].toarray().reshape(3, -1, d)[:, contacts, :3]
     return bool(np.abs(np.einsum("ikp,ikq->kpq", T, T) - np.eye(3)).max() < FRAME)

@@ -220,6 +220,25 @@ def test_positions_are_recovered(collection: Path) -> None:
     np.testing.assert_allclose(np.abs(network.frames[:, 2, 0]), 1.0, atol=1e-2)
 
 
+def test_positions_are_those_of_the_simulation() -> None:
+    """Capsules that fall into a box: two that touch are apart as they are there."""
+    from fclib import scenes, simulate
+
+    scene = scenes.get("Capsules")(capsules=40).scene(seed=0)
+    step = next(s for s in simulate.simulate(scene, 600) if s.problem.nc > 20)
+    network = network_of(step.problem)
+    assert network.placed
+    bodies = np.asarray(step.dofs)[::6] // 6
+    true = step.model.position.reshape(-1, 7)[bodies, :3]
+    pairs = network.pairs[(network.pairs >= 0).all(axis=1)]
+    assert len(pairs) > 3
+    apart = network.bodies[pairs[:, 0]] - network.bodies[pairs[:, 1]]
+    expected = true[pairs[:, 0]] - true[pairs[:, 1]]
+    # the state is that after the step, of 2.5 ms
+    np.testing.assert_allclose(apart, expected, atol=5e-2)
+    assert np.median(np.abs(apart - expected)) < 1e-3
+
+
 def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
     """The rotation of a body turns its part of H and its inertia, and moves nothing."""
     problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])

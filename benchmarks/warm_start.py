@@ -1,10 +1,10 @@
 """What a guess from the step before is worth, on the sequences of the families.
 
-    .venv/bin/python benchmarks/warm_start.py [--steps 300] [--solver auto] [FAMILY...]
+    .venv/bin/python benchmarks/warm_start.py [--steps 300] [--every 1] [FAMILY...]
 
-Each step of a scene is solved twice, from the impulses that the same pairs of bodies had in the step
-before and from nothing; the simulation goes on with the first. The CPU times are those of the solver
-alone, in one run. Steps without contact do not count.
+Each step of a scene is solved twice, from the impulses that the same pairs of bodies had in the
+step before and from nothing; the simulation goes on with the first. The CPU times are those of the
+solver alone, in one run. Steps without contact do not count.
 """
 
 from __future__ import annotations
@@ -29,9 +29,12 @@ def main() -> None:
     known = scenes.families()
     families = arguments.families or [n for n, f in known.items() if f.collection == "rt444"]
 
-    print(f"{'family':16}{'steps':>6}{'warm s':>9}{'cold s':>9}{'ratio':>7}{'median':>8}{'both':>6}")
+    heads = ("steps", "warm s", "cold s", "ratio", "median", "solved")
+    print(f"{'family':16}" + "".join(f"{head:>9}" for head in heads))
     for name in families:
-        warm, cold, both = [], [], 0
+        warm: list[float] = []
+        cold: list[float] = []
+        both = 0
         for step in simulate(
             scenes.get(name)().scene(seed=0), 100_000, solver=arguments.solver, tol=arguments.tol
         ):
@@ -47,8 +50,8 @@ def main() -> None:
             both += step.result.converged and again.converged
         ratios = np.array(warm) / np.array(cold)
         print(
-            f"{name:16}{len(warm):6d}{sum(warm):9.3f}{sum(cold):9.3f}{sum(warm) / sum(cold):7.2f}"
-            f"{np.median(ratios):8.2f}{both:6d}"
+            f"{name:16}{len(warm):9d}{sum(warm):9.3f}{sum(cold):9.3f}"
+            f"{sum(warm) / sum(cold):9.2f}{np.median(ratios):9.2f}{both:9d}"
         )
 
 

@@ -11,7 +11,8 @@
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)
 //   8  interior point thrice again, residual and gap held together: paths that fold elsewhere
-//   9  proximal point with an accurate inner solution, the last resort
+//   9  proximal point with an accurate inner solution, the last resort; then semismooth Newton on
+//      two other functions, and the proximal point from nothing
 //
 // Every stage starts from, and returns to, the best iterate so far; each island is held to its
 // share of the tolerance. What a stage may cost is counted in operations, not in time: the same
@@ -76,6 +77,9 @@ constexpr Index few_contacts = 10;
 
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
+
+/// Of the proximal point method from nothing, tried last of all.
+constexpr std::int64_t last_factorisations = 400;
 
 /// A proof that there is no solution must hold for reactions this many times the usual size.
 constexpr double safe_bound = 1e4;
@@ -254,7 +258,7 @@ class Island {
       }
       if (!done()) stage("associated", [&] { associated(); });
       // slower than the proximal point on rolling contacts
-      if (!done()) semismooth_newton();
+      if (!done()) semismooth_newton<NaturalMap<Cone>>();
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
@@ -279,6 +283,17 @@ class Island {
             [&] { proximal({.kappa = 10, .max_factorisations = limit}, start_); });
       left -= limit;
       start_ = best_;
+    }
+    // what is left is near a solution of some, and which method passes there differs
+    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
+      if (!done()) semismooth_newton<FischerBurmeister<Cone>>();
+      if (!done()) semismooth_newton<JeanMoreau<Cone>>();
+    }
+    if (!done()) {
+      stage("proximal point", [&] {
+        proximal({.kappa = 10, .max_factorisations = last_factorisations},
+                 Vector::Zero(problem_.m()));
+      });
     }
   }
 
@@ -373,11 +388,12 @@ class Island {
     });
   }
 
-  /// On the natural map, started anew by sweeps where it stands still. From nothing: where it
-  /// converges, it does from there as well as from an iterate that another method is stuck at.
+  /// Started anew by sweeps where it stands still. From nothing: where it converges, it does from
+  /// there as well as from an iterate that another method is stuck at.
+  template <class Function>
   void semismooth_newton() {
     tracker_.stage("semismooth newton", [&] {
-      SemismoothNewton<NaturalMap<Cone>> newton(problem_);
+      SemismoothNewton<Function> newton(problem_);
       Vector r = Vector::Zero(problem_.m());
       std::int64_t left = newton_iterations;
       double least = std::numeric_limits<double>::infinity();

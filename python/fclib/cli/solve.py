@@ -55,7 +55,7 @@ def command(
     ] = None,
     kind: Annotated[
         str | None,
-        typer.Option(help="Which of several problems in a file: local, global, ...; not to --write."),
+        typer.Option(help="Which of several problems in a file: local, global, ..."),
     ] = None,
     write: Annotated[
         bool, typer.Option("--write", help="Store solutions that converged in their files.")

@@ -342,12 +342,26 @@ def test_report_by_the_command_line(store: Path, collection: Path, tmp_path: Pat
     assert run("report", "--catalog", tmp_path).exit_code == 1
 
 
-def test_view_by_the_command_line(collection: Path, tmp_path: Path) -> None:
+def test_view_by_the_command_line(
+    collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     file = sorted(collection.rglob("*-local.hdf5"))[-1]
     done = run("view", file, "--out", tmp_path / "v.html")
     assert done.exit_code == 0, done.output
     assert (tmp_path / "v.html").stat().st_size > 10_000
     assert run("view", tmp_path / "none.hdf5").exit_code == 1
+    opened: list[str] = []
+
+    def open_page(address: str) -> bool:
+        opened.append(address)
+        return True
+
+    monkeypatch.setattr("webbrowser.open", open_page)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert run("view", file).exit_code == 0
+    (address,) = opened
+    assert address.startswith("file:")
+    assert address.endswith(f"{file.stem}.html")
 
 
 def test_figures_for_a_paper(store: Path, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ setup: $(VENV)/.installed
 demo: setup
 	$(BIN)/fclib demo
 
-test: setup $(VENV)/.test-tools
+test: setup $(VENV)/.test-tools $(VENV)/.test-system
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
 	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest
@@ -57,6 +57,10 @@ clean:
 $(VENV)/.system: scripts/system-packages.sh
 	@PYTHON=$(PYTHON) sh scripts/system-packages.sh
 	@test -x $(BIN)/python || { echo "== making $(VENV)"; $(PYTHON) -m venv $(VENV); }
+	@touch $@
+
+$(VENV)/.test-system: scripts/system-packages.sh
+	@PYTHON=$(PYTHON) sh scripts/system-packages.sh test
 	@touch $@
 
 $(VENV)/.build-tools: $(VENV)/.system pyproject.toml

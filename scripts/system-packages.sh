@@ -1,5 +1,6 @@
 #!/bin/sh
 # Installs the system packages that building needs: by apt where there is one, else it says which.
+# With the argument `test` also those that the tests use where they are there.
 set -eu
 PYTHON=${PYTHON:-python3}
 
@@ -24,6 +25,10 @@ need libgtest-dev sh -c 'pkg-config --exists gtest || ls /usr/include/gtest/gtes
 
 # draws the picture of the demo, which goes without where it is not
 if ! { ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional=" libosmesa6"; fi
+# shows the report's pages to the tests
+if [ "${1-}" = test ] && ! { command -v chromium || command -v chromium-browser; } >/dev/null 2>&1; then
+  optional="$optional chromium"
+fi
 
 if [ -z "$missing$optional" ]; then
   echo "== system packages: all there"

@@ -48,7 +48,7 @@ PYTHON: dict[str, set[str]] = {
     "external": {"api", "_registry"},
     "analysis": {"api"},
     "bench": {"api", "external", "scenes", "simulate"},
-    "collections": {"api", "scenes", "simulate"},
+    "collections": {"api", "analysis", "scenes", "simulate"},
     "report": {"api", "bench", "collections", "scenes"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},
     "cli": {

@@ -222,6 +222,19 @@ def test_names() -> None:
         collections.family_names(["rt44"])
 
 
+def test_analysis_is_in_the_catalogue_where_it_was_asked_for(built: Path, tmp_path: Path) -> None:
+    pytest.importorskip("clarabel")
+    table = collections.build([plan(problems=2, analyze=True)], tmp_path, pictures=False)
+    for row in table.to_pylist():
+        assert row["rank_W"] == np.linalg.matrix_rank(
+            read(tmp_path / row["local_file"]).W.toarray()
+        )
+        assert row["slater"]
+        assert row["existence"] == "exists by Slater"
+    assert set(catalog.ANALYSIS) <= set(table.column_names)
+    assert not set(catalog.ANALYSIS) & set(collections.read_catalog(built).column_names)
+
+
 # ---- verifying
 
 

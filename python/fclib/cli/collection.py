@@ -48,6 +48,9 @@ FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
 SelectOption = Annotated[
     Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
 ]
+Analyze = Annotated[
+    bool, typer.Option("--analyze", help="Also ranks, conditioning, existence; slow.")
+]
 Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
 
 
@@ -182,6 +185,7 @@ def build(
     count: Count = None,
     select: SelectOption = Select.EVERY,
     form: FormOption = Form.BOTH,
+    analyze: Analyze = False,
     jobs: Jobs = None,
     seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
     pictures: Pictures = True,
@@ -195,7 +199,9 @@ def build(
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     plans = [
-        collections.Plan.of_family(family, seed, form=form.value, count=count, select=select.value)
+        collections.Plan.of_family(
+            family, seed, form=form.value, count=count, select=select.value, analyze=analyze
+        )
         for family in families
     ]
     run(plans, folder, jobs, pictures, as_json)

@@ -9,7 +9,16 @@ import typer
 
 from fclib import collections, scenes
 from fclib.cli._output import Json, err, fail
-from fclib.cli.collection import Count, Form, FormOption, Pictures, Select, SelectOption, run
+from fclib.cli.collection import (
+    Analyze,
+    Count,
+    Form,
+    FormOption,
+    Pictures,
+    Select,
+    SelectOption,
+    run,
+)
 
 
 def command(
@@ -34,6 +43,7 @@ def command(
     form: FormOption = Form.BOTH,
     count: Count = None,
     select: SelectOption = Select.EVERY,
+    analyze: Analyze = False,
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
@@ -65,6 +75,7 @@ def command(
             form=form.value,
             count=count,
             select=select.value,
+            analyze=analyze,
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")

@@ -226,7 +226,11 @@ def store(plan: Plan, kept: Kept, step: Step, out: Path) -> None:
         trial = fclib.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
         sweeps = trial.iterations
     row = describe(plan, kept.looked, step) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
-    written = []
+    if plan.analyze:
+        from fclib.analysis import analyze
+
+        record = analyze(step.problem, tol=plan.tol).record
+        row |= {name: record.get(name) for name in catalog.ANALYSIS}
     for form in plan.forms:
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = step.problem if form == "global" else local
@@ -235,7 +239,6 @@ def store(plan: Plan, kept: Kept, step: Step, out: Path) -> None:
             solution = fclib.Solution(r=solution.r, u=solution.u, l=solution.l)
         fclib.write(out / path, problem, solution)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
-        written.append(path)
     for gone in kept.add(row):
         for form in plan.forms:
             (out / gone[f"{form}_file"]).unlink(missing_ok=True)

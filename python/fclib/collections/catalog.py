@@ -54,6 +54,24 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("local_sha256", "string", "of that file"),
 )
 
+# further columns where a build was asked to analyze; docs/analysis.md has their meaning
+ANALYSIS: tuple[str, ...] = (
+    "islands",
+    "largest_island",
+    "asymmetry_W",
+    "definiteness",
+    "rank_H",
+    "conditioning_H",
+    "rank_W",
+    "conditioning_W",
+    "hyperstaticity",
+    "mass_ratio",
+    "prestress",
+    "slater",
+    "existence",
+    "uniqueness",
+)
+
 
 class CatalogError(Exception):
     """A catalogue that is not there, or is not one."""

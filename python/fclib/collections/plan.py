@@ -63,6 +63,7 @@ class Plan:
     form: Form = "both"
     count: int | None = None  # problems kept; None: all
     select: Selection = "every"
+    analyze: bool = False  # also figures of `fclib.analysis.analyze`; a second a problem, or more
     solver: str = "auto"
     tol: float = 1e-8
     options: dict[str, Any] = field(default_factory=dict)  # of `fclib.simulate.simulate`
@@ -122,6 +123,7 @@ class Plan:
                 "form": self.form,
                 "count": self.count,
                 "select": self.select,
+                "analyze": self.analyze,
                 "solver": self.solver,
                 "tol": self.tol,
                 "options": self.options,

@@ -36,11 +36,11 @@ class RollingSpheres:
     spread: float = parameter(0.3, "1", "the smallest radius is smaller by this share, in [0, 1)")
     density: float = parameter(2500.0, "kg/m^3", "mass density")
     mu: float = parameter(0.5, "1", "coefficient of friction")
-    mu_r: float = parameter(5e-3, "m", "coefficient of rolling friction")
+    mu_r: float = parameter(0.015, "m", "coefficient of rolling friction")
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
     per_layer: int = parameter(9, "1", "spheres of a layer of the column, a square number")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
-    time_step: float = parameter(2e-3, "s", "time step h")
+    time_step: float = parameter(4e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
         _mjcf.check(
@@ -61,12 +61,13 @@ class RollingSpheres:
         draws = random.uniform(size=(self.spheres, 3))
         radii = self.radius * (1 - self.spread * draws[:, 0])
         side = math.isqrt(self.per_layer)
-        pitch = 2.1 * self.radius
+        # offsets of a fifth of the radius leave no overlap
+        pitch = 2.4 * self.radius
         bodies = []
         for i, radius in enumerate(radii.tolist()):
             layer, cell = divmod(i, self.per_layer)
             place = np.array([cell % side, cell // side]) - 0.5 * (side - 1)
-            x, y = pitch * place + 0.05 * self.radius * (2 * draws[i, 1:] - 1)
+            x, y = pitch * place + 0.2 * self.radius * (2 * draws[i, 1:] - 1)
             z = self.radius + layer * pitch
             bodies.append(
                 f'<body name="sphere{i}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'

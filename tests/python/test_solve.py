@@ -70,7 +70,7 @@ def test_the_tolerance_is_kept(tol: float) -> None:
         assert_solved(case.problem, fclib.solve(case.problem, tol=tol), tol)
 
 
-@pytest.mark.parametrize(("d", "kind"), itertools.product([2, 3], ["local", "global"]))
+@pytest.mark.parametrize(("d", "kind"), list(itertools.product([2, 3], ["local", "global"])))
 def test_bilateral_constraints_hold(d: int, kind: str) -> None:
     make = planted_local if kind == "local" else planted_global
     problem = make(7, d=d, nc=5, p=4).problem

@@ -134,7 +134,14 @@ def work_precision(
             fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
             axes.plot(x, y, **style, label=solver, marker=marker, markersize=4)
             axes.scatter(
-                x, y, 16, fills, marker, edgecolors=style["color"], linewidths=0.9, zorder=3
+                x,
+                y,
+                s=16,
+                c=fills,
+                marker=marker,
+                edgecolors=style["color"],
+                linewidths=0.9,
+                zorder=3,
             )
         axes.set_xscale("log")
         axes.set_yscale("log")

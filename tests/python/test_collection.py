@@ -1,6 +1,7 @@
 """Collections: built the same twice and after a kill, verified, published and fetched."""
 
 import contextlib
+import dataclasses
 import functools
 import http.server
 import signal
@@ -323,21 +324,26 @@ class Server(http.server.SimpleHTTPRequestHandler):
         pass
 
 
-@pytest.fixture
-def site(built: Path, tmp_path: Path) -> Iterator[tuple[str, Path, type[Server]]]:
-    # under the name of a family, as `get` knows only those
-    folder = tmp_path / "site"
-    collections.publish(built, folder)
+@contextlib.contextmanager
+def serving(folder: Path) -> Iterator[tuple[str, type[Server]]]:
+    """A server of a folder, and its handler."""
 
     class Handler(Server):
         requests: list[tuple[str, str | None]] = []  # noqa: RUF012
 
     handler = functools.partial(Handler, directory=str(folder))
     with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        thread = threading.Thread(target=server.serve_forever, daemon=True)
-        thread.start()
-        yield f"http://127.0.0.1:{server.server_port}", folder, Handler
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}", Handler
         server.shutdown()
+
+
+@pytest.fixture
+def site(built: Path, tmp_path: Path) -> Iterator[tuple[str, Path, type[Server]]]:
+    folder = tmp_path / "site"
+    collections.publish(built, folder)
+    with serving(folder) as (url, handler):
+        yield url, folder, handler
 
 
 def test_published_twice_is_equal(built: Path, tmp_path: Path) -> None:
@@ -361,6 +367,16 @@ def test_get_fetches_what_was_published(
     assert collections.get(["BoxesStack"], url, tmp_path / "copy") == ["BoxesStack"]
     copied = {k: v for k, v in files(tmp_path / "copy").items() if not k.startswith(".archives")}
     assert copied == files(built)
+
+
+def test_get_knows_published_scenes(tmp_path: Path) -> None:
+    scene = dataclasses.replace(plan().scene, name="two-legs")
+    scenes_plan = Plan(scene=scene, collection="scenes", problems=1)
+    collections.build([scenes_plan], tmp_path / "built", pictures=False)
+    collections.publish(tmp_path / "built", tmp_path / "site")
+    with serving(tmp_path / "site") as (url, _):
+        assert collections.get(["two-legs"], url, tmp_path / "copy") == ["two-legs"]
+    assert all(verdict.ok for verdict in collections.verify(tmp_path / "copy"))
 
 
 @pytest.mark.parametrize("ranges", [True, False])

@@ -102,7 +102,7 @@ def get(
     A download that broke off is gone on with, where the server lets one ask for the rest.
 
     Args:
-        names: sets or families.
+        names: sets, families, or scenes that are published there.
         url: where `registry.txt` lies.
         folder: the collection's folder; the archives are kept in its `.archives`.
         progress: called with the archive's name, the bytes there are, and how many there will be.
@@ -130,7 +130,14 @@ def get(
         raise FetchError(f"{base}{REGISTRY}: is no registry: {error}") from error
 
     published = {name: family for name in fetcher.registry for family in [family_of(name)]}
-    families = family_names(list(names))
+    # an MJCF scene is no family of ours, and known by its archive alone
+    families = list(
+        dict.fromkeys(
+            family
+            for name in names
+            for family in ([name] if name in published.values() else family_names([name]))
+        )
+    )
     for family in families:
         found = [name for name, own in published.items() if own == family]
         if not found:
@@ -158,7 +165,8 @@ def family_of(archive: str) -> str | None:
     """The family of an archive's name, None for another file."""
     if not archive.endswith(".zip"):
         return None
-    return archive.removesuffix(".zip").rpartition("-")[2]
+    # the name of a set has no hyphen, that of a scene may
+    return archive.removesuffix(".zip").partition("-")[2]
 
 
 def download(url: str, target: Path, progress: Callable[[int, int], None] | None = None) -> None:

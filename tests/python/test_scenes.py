@@ -173,6 +173,54 @@ def test_rolling_spheres_come_to_rest_as_a_heap() -> None:
     assert last.contacts.gap.min() > -0.1 * family.radius
 
 
+def flat(step: Step) -> Any:
+    """x, z and angle of the bodies of a planar scene, from where they began (nb x 3)."""
+    return step.position.reshape(-1, 3)
+
+
+def test_discs_pile_up_before_the_wall() -> None:
+    family: Any = scenes.get("DiscFlow")(discs=12, per_row=3)
+    scene = family.scene(seed=0)
+    model = MujocoModel(scene)
+    starts = model.model.body_pos[1:, [0, 2]]
+    last = last_of(scene, 250)
+    assert (last.problem.spacedim, last.problem.n) == (2, 3 * 12)
+    x, z = (starts + flat(last)[:, :2]).T
+    # the wall stands half a row's width behind the end of the ramp
+    wall = 0.5 * 3 * 2.4 * family.radius
+    assert x.max() < wall - (1 - family.spread) * family.radius + 0.01
+    assert x.mean() > starts[:, 0].mean() + 0.5 * wall
+    assert z.min() > (1 - family.spread) * family.radius - 0.01
+    assert np.abs(last.velocity).max() < 0.5
+
+
+def test_planar_wall_stands_until_it_is_struck() -> None:
+    family: Any = scenes.get("PlanarBlocks")(courses=4, blocks=3, disc_radius=0.0)
+    last = last_of(family.scene(seed=0), 100)
+    # two points for each pair of edges: on the floor, and between the courses
+    lying = np.abs(last.contacts.frame[:, 0, 2]) > 0.9
+    pairs, points = np.unique(last.contacts.pair[lying], axis=0, return_counts=True)
+    assert len(pairs) == 3 + 3 * 5
+    assert points.max() == 2
+    assert points.sum() >= 2 * len(pairs) - 2
+    fallen = -flat(last)[:, 1]
+    courses = np.repeat(np.arange(1, 5), 3)
+    # each course has fallen by the gaps below it, and no further than a penetration a course
+    assert (np.abs(fallen - family.gap * courses) < 2e-4 * courses).all()
+    assert np.abs(last.velocity).max() < 1e-3
+    struck = last_of(scenes.get("PlanarBlocks")(courses=4, blocks=3).scene(seed=0), 150)
+    assert np.abs(flat(struck)[:-1, 0]).max() > 0.02
+
+
+def test_rolling_discs_come_to_rest_as_a_heap() -> None:
+    family: Any = scenes.get("RollingDiscs")(discs=9, per_row=3)
+    last = last_of(family.scene(seed=0), 250)
+    assert last.problem.spacedim == 3
+    assert last.problem.kind == "global_rolling"
+    assert np.abs(last.velocity).max() < 0.5
+    assert last.contacts.gap.min() > -0.1 * family.radius
+
+
 @pytest.mark.parametrize(
     ("name", "smaller"),
     [
@@ -181,6 +229,9 @@ def test_rolling_spheres_come_to_rest_as_a_heap() -> None:
         ("KaplasTower", {"levels": 2}),
         ("BoxesStack", {"boxes": 5}),
         ("RollingSpheres", {"spheres": 12, "per_layer": 4}),
+        ("DiscFlow", {"discs": 12, "per_row": 4}),
+        ("PlanarBlocks", {"courses": 3, "blocks": 3, "delay": 0.05}),
+        ("RollingDiscs", {"discs": 9, "per_row": 3}),
     ],
 )
 def test_energy_does_not_grow(name: str, smaller: dict[str, Any]) -> None:

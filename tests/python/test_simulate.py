@@ -668,3 +668,107 @@ def test_no_renderer_says_so_in_a_line(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(NoRenderer, match=r"^no picture: [^\n]*install libosmesa6$"):
         render(MujocoModel(Scene(name="test", xml=mjcf(SPHERE))), tmp_path / "none.png")
     module.backend.cache_clear()
+
+
+# ---- the plane
+
+IN_PLANE = (
+    '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>'
+)
+BAR = (
+    '<body name="bar" pos="0 0 0.1">' + IN_PLANE + '<geom type="mesh" mesh="slab" mass="2"'
+    ' friction="{mu}" {more}/></body>'
+)
+BALL = (
+    '<body pos="{x} 0 0.1">' + IN_PLANE + '<geom size="0.1" mass="2" friction="{mu} 0 {mu_r}"'
+    " {more}/></body>"
+)
+
+
+def planar(xml: str, steps: int, **options: Any) -> list[Any]:
+    scene = Scene(name="test", xml=xml, planar=True, restitution=options.pop("restitution", 0.0))
+    return list(simulate(scene, steps, **{"tol": 1e-10, **options}))
+
+
+def test_bar_slides_in_the_plane_as_in_space() -> None:
+    mu, v0 = 0.3, 2.0
+    steps = planar(mjcf(BAR, mu=mu, rest=start("0 0 0", f"{v0} 0 0")), 160)
+    first = steps[0].problem
+    # an edge of the slab touches in two points of the plane, not in four of space
+    assert (first.spacedim, first.n, first.nc) == (2, 3, 2)
+    assert first.M.nnz == 3
+    k = np.arange(1, 161)
+    np.testing.assert_allclose(
+        velocities(steps)[:, 0], np.maximum(v0 - mu * G * H * k, 0), atol=1e-6
+    )
+    weight = steps[-1].result.solution.r.reshape(-1, 2)[:, 0].sum() / H
+    np.testing.assert_allclose(weight, 2 * G, rtol=1e-7)
+
+
+def test_planar_columns_are_those_of_space() -> None:
+    """H^T v is what the contact in space has along N and T; the third direction is at rest."""
+    xml = mjcf(BAR + BAR.replace("0 0 0.1", "0.3 0 0.3").replace("bar", "other"), mu=0.4)
+    steps = [run(xml, 1)[0], planar(xml, 1)[0]]
+    models = [step.model for step in steps]
+    v = np.random.Generator(np.random.PCG64(1)).normal(size=6)
+    space, plane = (model.assemble(H, shared_speed=True) for model in models)
+    u = (space.H.T @ v).reshape(-1, 3)
+    world = np.einsum("cij,ci->cj", space.contacts.frame, u)
+    np.testing.assert_allclose(world[:, 1], 0, atol=1e-12)
+    flat = (plane.H.T @ v).reshape(-1, 2)
+    assert 2 * len(flat) == len(u) == 8
+    np.testing.assert_allclose(np.linalg.det(plane.contacts.frame), 1, rtol=1e-12)
+    np.testing.assert_array_equal(plane.contacts.frame[:, 2], np.tile([0, 1.0, 0], (4, 1)))
+    for contact, velocity in zip(plane.contacts.point, flat, strict=True):
+        # both ends of the line across the plane
+        near = np.linalg.norm(space.contacts.point[:, [0, 2]] - contact[[0, 2]], axis=1) < 1e-9
+        same = near & np.isclose(u[:, 0], velocity[0], atol=1e-12)
+        assert same.sum() == 2
+        frame = plane.contacts.frame[np.flatnonzero(plane.contacts.point[:, 0] == contact[0])[0]]
+        np.testing.assert_allclose(world[same] @ frame[1], velocity[1], atol=1e-12)
+
+
+def test_rolling_resistance_in_the_plane_stops_a_ball() -> None:
+    """The speed falls by g mu_r / R / (1 + I / m R^2) a second; I = 2/5 m R^2."""
+    R, mu_r, v0 = 0.1, 0.01, 1.0
+    rolls = {"mu": 0.5, "mu_r": mu_r, "x": 0, "more": 'condim="6"'}
+    floor = FLOOR.replace("/>", ' condim="6"/>')
+    xml = mjcf(floor + BALL, floor=False, rest=start("0 0 0", f"{v0} 0 {v0 / R}"), **rolls)
+    steps = planar(xml, 100)
+    problem = steps[0].problem
+    assert (problem.spacedim, problem.n, problem.nc) == (3, 3, 1)
+    assert problem.formulation == "GR2DFC" or problem.kind == "global_rolling"
+    v = velocities(steps)
+    slowing = G * mu_r / R / 1.4
+    expected = np.maximum(v0 - slowing * H * np.arange(1, 101), 0)
+    np.testing.assert_allclose(v[:, 0], expected, atol=1e-7)
+    np.testing.assert_allclose(R * v[:, 2], expected, atol=1e-7)
+
+
+def test_warm_start_in_the_plane_knows_the_reactions() -> None:
+    steps = planar(mjcf(BAR), 3)
+    second = steps[1]
+    again = fclib.solve(second.problem, "nsgs", tol=1e-8, guess=steps[0].result.solution)
+    assert again.iterations <= 1
+    np.testing.assert_allclose(
+        steps[0].contacts.forces(steps[0].result.solution.r).sum(axis=0),
+        [0, 0, 2 * G * H],
+        atol=1e-8,
+    )
+
+
+@pytest.mark.parametrize(
+    ("bodies", "message"),
+    [
+        (SPHERE, "joint 0 .* leaves the plane"),
+        (BALL.replace("1 0 0", "1 1 0"), "joint 0 .* leaves the plane"),
+        (
+            BALL.replace("<geom ", '<geom pos="0 0.02 0" ')
+            + BALL.replace("{x} 0 0.1", "0.01 0 0.26"),
+            "out of the plane",
+        ),
+    ],
+)
+def test_planar_scene_refuses_what_leaves_the_plane(bodies: str, message: str) -> None:
+    with pytest.raises(UnsupportedSceneError, match=message):
+        planar(mjcf(bodies, x=0, mu_r=0), 1)

@@ -36,6 +36,10 @@ def command(
     law: Annotated[
         str, typer.Option(help='Unilateral law: "velocity" (impacts) or "gap" (no penetration).')
     ] = "velocity",
+    planar: Annotated[
+        bool,
+        typer.Option("--planar", help="The scene moves in the plane x, z: contacts of N and T."),
+    ] = False,
     ignore: Annotated[
         list[str] | None,
         typer.Option(help="Leave out a feature that no problem can hold; can be repeated."),
@@ -64,6 +68,7 @@ def command(
             time_step=time_step,
             restitution=restitution,
             law=law,  # type: ignore[arg-type]
+            planar=planar,
             ignore=tuple(ignore or ()),
         )
         MujocoModel(loaded)

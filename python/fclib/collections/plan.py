@@ -118,6 +118,7 @@ class Plan:
                 "law": self.scene.law,
                 "time_step": self.scene.time_step,
                 "ignore": list(self.scene.ignore),
+                "planar": self.scene.planar,
                 "problems": self.problems,
                 "steps": self.steps,
                 "form": self.form,

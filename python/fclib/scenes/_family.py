@@ -35,6 +35,7 @@ class Scene:
     friction: str = ""  # the law of friction, in words
     # what a picture shows: centre and radius [m]; None: all that moves
     focus: tuple[float, float, float, float] | None = None
+    planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
 
@@ -64,6 +65,7 @@ class Scene:
         time_step: float | None = None,
         restitution: float = 0.0,
         law: Law = "velocity",
+        planar: bool = False,
         ignore: tuple[str, ...] = (),
     ) -> Scene:
         """The scene of an MJCF file. OSError where it cannot be read.
@@ -79,6 +81,7 @@ class Scene:
             time_step=time_step,
             restitution=restitution,
             law=law,
+            planar=planar,
             parameters={"file": path.name, "sha256": digest},
             title=path.stem,
             description=f"Problems of the scene {path.name}.",

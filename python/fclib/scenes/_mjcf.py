@@ -141,6 +141,54 @@ def walls(reach: float, height: float, mu: float, condim: int = 3) -> list[str]:
     return elements
 
 
+# of a body that moves in the plane x, z: n = 3, M diagonal
+IN_PLANE = (
+    '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0"/>'
+)
+
+
+def disc(name: str, place: tuple[float, float], radius: float, density: float, look: str) -> str:
+    """A disc in the plane x, z: mass density pi r^2, inertia m r^2 / 2. It collides as a sphere.
+
+    place: x, z [m]; density in kg/m^2; look: further attributes of its geometry, as its friction.
+    """
+    mass = density * math.pi * radius**2
+    inertia = 0.5 * mass * radius**2
+    return (
+        f'<body name="{name}" pos="{numbers(place[0], 0, place[1])}">{IN_PLANE}'
+        f'<inertial pos="0 0 0" mass="{mass!r}" diaginertia="{numbers(*[inertia] * 3)}"/>'
+        f'<geom type="sphere" size="{radius!r}" material="solid" {look}/></body>'
+    )
+
+
+def block(name: str, place: tuple[float, float], mesh: str, mass: float, look: str) -> str:
+    """A block in the plane x, z, in the shape of a mesh (`block_mesh`); as `disc`."""
+    return (
+        f'<body name="{name}" pos="{numbers(place[0], 0, place[1])}">{IN_PLANE}'
+        f'<geom type="mesh" mesh="{mesh}" mass="{mass!r}" material="solid" {look}/></body>'
+    )
+
+
+def lines(walls: Iterable[tuple[tuple[float, float], tuple[float, float]]], look: str) -> list[str]:
+    """Straight walls without end in the plane x, z, each drawn as a bar between two points [m].
+
+    Bodies are to the left of the way from the first point to the second. A plane hides what is
+    behind it, so it is not drawn itself.
+    """
+    elements = []
+    for i, ((x, z), (x2, z2)) in enumerate(walls):
+        length = math.hypot(x2 - x, z2 - z)
+        elements.append(
+            f'<geom name="line{i}" type="plane" size="0 0 1" pos="{numbers(x, 0, z)}"'
+            f' zaxis="{numbers(z - z2, 0, x2 - x)}" rgba="0 0 0 0" {look}/>'
+        )
+        elements.append(
+            f'<geom type="capsule" size="{0.01 * length!r}" contype="0" conaffinity="0" mass="0"'
+            f' fromto="{numbers(x, 0, z, x2, 0, z2)}" rgba="0.45 0.47 0.5 1"/>'
+        )
+    return elements
+
+
 def check(
     family: object,
     *,

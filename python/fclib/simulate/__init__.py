@@ -9,6 +9,7 @@
 
 moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
+plane.py          contacts of bodies that move in a plane
 simulation.py     the loop, warm starts, and what each problem says of its origin
 render.py         a picture of a state with its reactions
 

@@ -29,6 +29,9 @@ A bilateral constraint with violation c is corrected by the same share: b = stab
 With rolling friction a contact has five components, N, T1, T2, R1, R2: the last two are the
 relative angular velocity about T1 and T2 [rad/s], and the rolling moment, ||r_R|| <= mu_r r_N.
 
+In the plane a contact has two, N and T, and with rolling friction a third, R, about the normal of
+the plane.
+
 A problem holds what the contacts move: bodies that no chain of contacts, bilateral constraints and
 inertia links to a contact go their own way, M v' = M v + h F + G lambda.
 
@@ -63,10 +66,11 @@ class Contacts:
     # (nc x 2) the two geometries, N points from the first to the other; or a limit: < 0, see source
     pair: npt.NDArray[np.int64]
     point: Vector  # (nc x 3) in the world [m], midway between the two
-    frame: Vector  # (nc x 3 x 3) rows N, T1, T2 in the world; 0 for a limit
+    frame: Vector  # (nc x 3 x 3) rows N, T1, T2, in the plane N, T, y, in the world; 0 for a limit
     gap: Vector  # (nc) signed distance [m]; of a joint's limit, also [rad]
     mu: Vector  # (nc) coefficient of friction
     mu_r: Vector | None = None  # (nc) coefficient of rolling friction [m]; None: no rolling
+    planar: bool = False  # d = 2, 3 with rolling
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -79,12 +83,37 @@ class Contacts:
             self.gap[which],
             self.mu[which],
             None if self.mu_r is None else self.mu_r[which],
+            self.planar,
         )
 
     @property
     def dimension(self) -> int:
-        """Components of a contact: 5 with rolling friction, otherwise 3."""
-        return 3 if self.mu_r is None else 5
+        """Components of a contact d: 3, in the plane 2; with rolling friction 5, in the plane 3."""
+        return components(self.planar, rolling=self.mu_r is not None)
+
+    @property
+    def parts(self) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+        """Force and moment: their components of a contact, and the rows of the frame they go by."""
+        force, d = 2 if self.planar else 3, self.dimension
+        axis = 2 if self.planar else 1
+        return (
+            (slice(0, force), slice(0, force)),
+            (slice(force, d), slice(axis, axis + d - force)),
+        )
+
+    def forces(self, r: Vector) -> Vector:
+        """The forces of reactions r (d nc), in the world (nc x 3)."""
+        which, axes = self.parts[0]
+        local = np.reshape(r, (-1, self.dimension))[:, which]
+        world: Vector = np.einsum("cij,ci->cj", self.frame[:, axes], local)
+        return world
+
+
+def components(planar: bool, *, rolling: bool) -> int:
+    """Components of a contact d."""
+    if planar:
+        return 3 if rolling else 2
+    return 5 if rolling else 3
 
 
 @dataclass(frozen=True)
@@ -95,7 +124,7 @@ class System:
     force: Vector  # (n) F(q, v): all but the reactions, gyroscopic terms included
     C: Sparse  # (n x n) damping, -dF/dv of the dampers
     K: Sparse  # (n x n) stiffness, -dF/dq of the springs
-    H: Sparse  # (n x d nc) contact directions, d = 3 or 5
+    H: Sparse  # (n x d nc) contact directions, d = 2, 3 or 5
     contacts: Contacts  # nc
     G: Sparse  # (n x p) gradients of the bilateral constraints, d violation / dt = G^T v
     violation: Vector  # (p) of the bilateral constraints

@@ -8,6 +8,8 @@ velocity of the second relative to the first. A row of an equality is the rate o
 A limit of a joint or a tendon is a contact without friction: its row is N, its tangents are zero,
 and its pair is (-1 - kind, index). Contacts of condim 6 make rolling problems; their spin
 friction, which FCLIB's law does not have, is left out.
+
+A planar scene moves in a plane y = const: slides along x and z, hinges about y (`plane.py`).
 """
 
 from __future__ import annotations
@@ -21,10 +23,12 @@ import scipy.sparse as sp
 
 from fclib.scenes import Scene
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
+from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector, components
+from fclib.simulate.plane import NORMAL, in_plane
 
 MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
+FLAT: Final = 1e-9  # sine of the angle of a joint's axis to the plane
 ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
 
 # features that a scene may leave out knowingly, and the flag of MuJoCo that does so, if any
@@ -50,6 +54,8 @@ class MujocoModel:
         self.model: Any = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
         refuse_unsupported(scene, self.model)
+        if scene.planar:
+            refuse_out_of_plane(scene, self.model, self.data)
 
         m = self.model
         self._margin = m.geom_margin.copy()
@@ -111,6 +117,12 @@ class MujocoModel:
 
         rows = jacobian(m, d)
         H, contacts = contact_columns(self, rows)
+        if self.scene.planar:
+            sizes = m.geom_rbound[np.maximum(contacts.pair, 0)].max(axis=1)
+            try:
+                H, contacts = in_plane(H, contacts, sizes)
+            except ValueError as error:
+                raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
         G, violation = equality_columns(d, rows)
         force = self._force()
         C, K = linear_forces(m, d)
@@ -251,6 +263,20 @@ def refuse_unsupported(scene: Scene, m: Any) -> None:
         raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
 
 
+def refuse_out_of_plane(scene: Scene, m: Any, d: Any) -> None:
+    """UnsupportedSceneError where a joint of a planar scene leaves the plane x, z."""
+    mujoco.mj_kinematics(m, d)
+    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
+    along = np.abs(d.xaxis @ NORMAL)
+    kept = ((m.jnt_type == slide) & (along < FLAT)) | ((m.jnt_type == hinge) & (along > 1 - FLAT))
+    for joint in np.flatnonzero(~kept):
+        body = m.body(m.jnt_bodyid[joint]).name
+        raise UnsupportedSceneError(
+            f"{scene.name}: joint {joint} (body {body!r}) leaves the plane x, z of a planar scene;"
+            " its joints are slides along x and z and hinges about y"
+        )
+
+
 def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
     """Damping and stiffness (n x n) of joints and of actuators that feed back their own state.
 
@@ -355,7 +381,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
         (kind == int(types.mjCNSTR_LIMIT_JOINT)) | (kind == int(types.mjCNSTR_LIMIT_TENDON))
     )
     nc = len(which) + len(limits)
-    d = 5 if source.rolling else 3
+    d = components(planar=False, rolling=source.rolling)
     # where a component has no row, this one of zeros
     nothing = rows.shape[0]
     source_row = np.full((nc, d), nothing)

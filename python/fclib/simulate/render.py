@@ -34,8 +34,8 @@ BACKENDS: Final = ("egl", "osmesa")
 PROBE_LIMIT: Final = 60.0  # longest wait for a backend's answer [s]
 SUPERSAMPLING: Final = 2  # pixels drawn for one kept, along each axis
 FIELD_OF_VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
-AZIMUTH: Final = 125.0  # [deg]
-ELEVATION: Final = -14.0  # [deg]
+VIEW: Final = (125.0, -14.0)  # azimuth and elevation [deg]
+VIEW_OF_PLANE: Final = (90.0, -2.0)  # x to the right
 FILL: Final = 0.86  # share of the picture that the scene takes
 OPACITY: Final = 0.35  # of bodies where forces are drawn inside them
 ARROW: Final = np.array([0.82, 0.12, 0.10, 1.0], dtype=np.float32)
@@ -69,7 +69,7 @@ def render(
 
     source     a step is drawn as it was at its start, with the reactions of its solution;
                a model is drawn as it is, without
-    reactions  (3 nc) impulses of a step to draw instead [N s]
+    reactions  (d nc) impulses of a step to draw instead [N s]
     size       width and height in pixels
 
     NoRenderer, in one line, where no OpenGL works; OSError where the file cannot be written.
@@ -82,9 +82,8 @@ def render(
     else:
         model, position, contacts = source.model, source.position, source.contacts
         r = source.result.solution.r if reactions is None else reactions
-        # rows of a frame are N, T1, T2 in the world; an impulse over a step is a mean force
-        local = np.reshape(r, (-1, contacts.dimension))[:, :3] / model.time_step
-        forces = np.einsum("cij,ci->cj", contacts.frame, local)
+        # an impulse over a step is a mean force
+        forces = contacts.forces(r) / model.time_step
 
     # a copy, since the looks of the bodies change with what is drawn
     m = copy.copy(model.model)
@@ -113,7 +112,8 @@ def render(
         )
     light_up(m, d, points)
     scene = mujoco.MjvScene(m, maxgeom=m.ngeom + m.nsite + m.ntendon * 100 + len(forces) + 1000)
-    camera = framing_camera(points, width / height)
+    view = VIEW_OF_PLANE if model.scene.planar else VIEW
+    camera = framing_camera(points, width / height, view)
     mujoco.mjv_updateScene(
         m, d, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene
     )
@@ -198,9 +198,9 @@ def light_up(m: Any, d: Any, points: Vector) -> None:
     d.light_xpos[directional] = middle - 2.0 * radius * d.light_xdir[directional]
 
 
-def framing_camera(points: Vector, aspect: float) -> Any:
-    """A free camera that sees all the points (k x 3), at the least distance."""
-    azimuth, elevation = np.deg2rad((AZIMUTH, ELEVATION))
+def framing_camera(points: Vector, aspect: float, view: tuple[float, float]) -> Any:
+    """A free camera that sees all the points (k x 3) at the least distance; view in degrees."""
+    azimuth, elevation = np.deg2rad(view)
     forward = np.array(
         [
             np.cos(elevation) * np.cos(azimuth),
@@ -225,7 +225,7 @@ def framing_camera(points: Vector, aspect: float) -> Any:
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.lookat[:] = middle
     camera.distance = max(float(distance.max()), 1e-3)
-    camera.azimuth, camera.elevation = AZIMUTH, ELEVATION
+    camera.azimuth, camera.elevation = view
     return camera
 
 

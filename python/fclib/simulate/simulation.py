@@ -140,7 +140,6 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
 
     They are carried over in the world and turned into the new frames, forces and moments alike.
     """
-    d = contacts.dimension
     known: dict[tuple[int, int], list[int]] = {}
     for i, (first, second) in enumerate(state.pair.tolist()):
         known.setdefault((first, second), []).append(i)
@@ -150,10 +149,10 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
         candidates = known.get((first, second))
         if candidates:
             source[i] = candidates.pop(0)
-    r = np.zeros((len(contacts), d))
+    r = np.zeros((len(contacts), contacts.dimension))
     found = source >= 0
     old, new, local = state.frame[source[found]], contacts.frame[found], state.r[source[found]]
-    for part, axes in ((slice(0, 3), slice(0, 3)), (slice(3, d), slice(1, d - 2))):
+    for part, axes in contacts.parts:
         world = np.einsum("cij,ci->cj", old[:, axes], local[:, part])
         r[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
     # the frame of a limit is zero, its only component goes as it is
@@ -177,6 +176,7 @@ def describe(
         "parameters": dict(scene.parameters),
         "seed": scene.seed,
         "ignore": list(scene.ignore),
+        "planar": scene.planar,
         "time_step": scheme.h,
         "restitution": scheme.restitution,
         "law": scheme.law,
@@ -196,13 +196,16 @@ def describe(
         if text
     ]
     law = f"Newton impact e = {scheme.restitution:g}" if scheme.law == "velocity" else "gap law"
+    words_of_components = (
+        "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
+    )
     return fclib.ProblemInfo(
         title=f"{scene.title or scene.name}, step {index}",
         description="\n".join([*words, json.dumps(origin, default=str)]).lstrip(),
         math_info=(
             f"Moreau-Jean step, theta = 1, h = {scheme.h:g} s; {law}; Coulomb friction;"
             " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
-            " v in m/s and rad/s, r in N s, components N, T1, T2 (and R1, R2 of rolling,"
+            f" v in m/s and rad/s, r in N s, components {words_of_components},"
             " r_R in N m s, mu_r in m)"
         ),
     )

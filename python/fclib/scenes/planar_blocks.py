@@ -28,7 +28,7 @@ class PlanarBlocks:
     problems: ClassVar[int] = 400
 
     courses: int = parameter(10, "1", "number of courses, at least 1")
-    blocks: int = parameter(5, "1", "blocks of a course, at least 1")
+    blocks: int = parameter(5, "1", "blocks of a course, at least 1; a half more in every second")
     length: float = parameter(0.4, "m", "length of a block")
     height: float = parameter(0.2, "m", "height of a block")
     density: float = parameter(400.0, "kg/m^2", "mass of a square metre of block")
@@ -55,20 +55,25 @@ class PlanarBlocks:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the offsets."""
         random = np.random.Generator(np.random.PCG64(seed))
-        draws = random.uniform(-self.offset, self.offset, size=(self.courses, self.blocks))
+        draws = random.uniform(-self.offset, self.offset, size=(self.courses, self.blocks + 1))
         pitch = self.length + self.gap
+        half = 0.5 * (self.length - self.gap)
         look = f'friction="{self.mu!r}" condim="3"'
         bodies = []
         for course in range(self.courses):
             z = (course + 0.5) * self.height + (course + 1) * self.gap
-            for i in range(self.blocks):
-                x = (i - 0.5 * (self.blocks - 1) + 0.5 * (course % 2)) * pitch + draws[course, i]
+            bonded = course % 2
+            for i in range(self.blocks + bonded):
+                x = (i - 0.5 * (self.blocks - 1 + bonded)) * pitch + draws[course, i]
+                # every second course ends in half blocks
+                first, last = bonded and i == 0, bonded and i == self.blocks
+                x += 0.25 * pitch * (first - last)
                 bodies.append(
                     _mjcf.block(
                         f"block{course}.{i}",
                         (x, z),
-                        "block",
-                        self.density * self.length * self.height,
+                        "half" if first or last else "block",
+                        self.density * (half if first or last else self.length) * self.height,
                         f'{look} rgba="{_mjcf.shade(2 * course + i % 2, 2 * self.courses)}"',
                     )
                 )
@@ -94,7 +99,10 @@ class PlanarBlocks:
             _mjcf.document(
                 "PlanarBlocks",
                 bodies=bodies,
-                assets=[_mjcf.block_mesh("block", self.length, self.height, self.height)],
+                assets=[
+                    _mjcf.block_mesh("block", self.length, self.height, self.height),
+                    _mjcf.block_mesh("half", half, self.height, self.height),
+                ],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,

@@ -74,7 +74,8 @@ def open_pages(site: Path) -> dict[str, float]:
 
     marks = {
         "overview": ("#/overview", "main table tbody tr"),
-        "profiles": ("#/profiles", "main .chart svg path[data-name]"),
+        "its profile": ("#/overview", "main .plot[data-drawn]"),
+        "profiles": ("#/profiles", "main .plot[data-drawn]"),
         "catalogue": ("#/catalogue", "main table tbody tr"),
         "problem": ("#/problem/Family1/00001", "main table tbody tr"),
     }
@@ -119,7 +120,7 @@ def main() -> None:
             print(f"  {name:10}{(site / 'data' / f'{name}.js').stat().st_size / 1e6:.2f} MB")
         try:
             for name, seconds in open_pages(site).items():
-                print(f"open {name:10}{seconds:.2f} s")
+                print(f"open {name:12}{seconds:.2f} s")
         except ImportError:
             print("the times to open need Playwright")
 

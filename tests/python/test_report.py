@@ -1,24 +1,33 @@
 """The report: its numbers are the store's, the network's positions are the scene's."""
 
+import dataclasses
+import itertools
 import json
 import math
 import re
+from collections import Counter
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from typer.testing import CliRunner
 
 import fclib
 from fclib.bench import Store, profiles
 from fclib.cli import app
 from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
+from fclib.report.libraries import as_script
 from fclib.report.network import network_of
+from fclib.report.view import hulls_of
 from helpers_report import LABELS, TOLERANCES, make_collection, make_store, read_data
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
+pytest.importorskip("plotly")
+pytest.importorskip("itables")
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution
@@ -204,6 +213,58 @@ def test_no_path_of_this_machine_is_on_the_site(site: Path, collection: Path) ->
         assert str(collection) not in path.read_text(), path
 
 
+# ---- libraries
+
+
+def test_the_libraries_are_copied_with_their_licences(site: Path) -> None:
+    known = read_data(site, "site")["libraries"]
+    assert [one["name"] for one in known] == ["plotly.js", "DataTables"]
+    for one in known:
+        assert re.fullmatch(r"\d+\.\d+\.\d+", one["version"])
+        text = (site / one["text"]).read_text()
+        assert "Permission is hereby granted" in text
+        assert "Bundled license information" in text
+    assert "jQuery JavaScript Library" in (site / known[1]["text"]).read_text()
+    page = (site / "index.html").read_text()
+    for name in ("plotly.js", "tables.js", "tables.css"):
+        assert (site / "assets" / name).stat().st_size > 100_000
+    # the large one waits until a page draws
+    assert "assets/tables.js" in page
+    assert "assets/plotly.js" not in page
+
+
+def test_without_the_packages_it_is_said_what_to_install(
+    collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build_site(None, tmp_path / "site", collection, views=0)
+
+    def missing(name: str) -> metadata.Distribution:
+        raise metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.distribution", missing)
+    with pytest.raises(ReportError, match=r'package plotly: pip install "fclib\[report\]"'):
+        build_site(None, tmp_path / "site", collection, views=0)
+    # the older site is there
+    assert (tmp_path / "site" / "assets" / "plotly.js").is_file()
+    assert [path.name for path in tmp_path.iterdir()] == ["site"]
+    file = sorted(collection.rglob("*-local.hdf5"))[-1]
+    done = run("view", file, "--out", tmp_path / "v.html")
+    assert done.exit_code == 1
+    assert not (tmp_path / "v.html").exists()
+
+
+def test_a_module_becomes_a_script() -> None:
+    module = "var a=1,b=2;/* c */export{a as default,b};\n/*! Bundled */\n"
+    script = as_script(module, "default", "A")
+    assert "export" not in script
+    assert script.count("window.A = a;") == 1
+    assert script.endswith("/*! Bundled */\n")
+    assert "window.B = b;" in as_script(module, "b", "B")
+    for wrong in ("var a=1;", module + module, "export{b};"):
+        with pytest.raises(ReportError, match="another version of itables"):
+            as_script(wrong, "default", "A")
+
+
 # ---- networks
 
 
@@ -277,6 +338,30 @@ def test_bodies_without_contact_and_rounding_move_nothing(collection: Path) -> N
     np.testing.assert_allclose(after.points, before.points, atol=1e-6)
 
 
+def test_hulls_are_those_of_each_body(collection: Path) -> None:
+    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    network = network_of(problem)
+    for body in range(len(network.bodies)):
+        own = np.flatnonzero((network.pairs == body).any(axis=1))
+        alone = dataclasses.replace(
+            network,
+            bodies=network.bodies[[body]],
+            radii=network.radii[[body]],
+            points=network.points[own],
+            pairs=np.tile([0, -1], (own.size, 1)),
+        )
+        faces = hulls_of(alone)
+        # a closed surface: each edge is of two triangles
+        edges = Counter(frozenset(pair) for f in faces for pair in itertools.combinations(f, 2))
+        assert set(edges.values()) == {2}
+        # of the volume that SciPy finds
+        corners = np.concatenate([alone.bodies, alone.points])
+        a, b, c = corners[np.array(faces)].transpose(1, 0, 2) - corners.mean(axis=0)
+        volume = np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum() / 6
+        assert volume == pytest.approx(ConvexHull(corners).volume, rel=1e-6)
+    assert not hulls_of(network_of(problem.condense()))
+
+
 def test_a_matrix_that_is_not_of_rigid_bodies_gives_a_graph(collection: Path) -> None:
     problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
     network = network_of(problem.replace(H=problem.H * 2.0))
@@ -320,7 +405,7 @@ def test_views_of_any_problem(kind: str, tmp_path: Path) -> None:
     write_view(record, tmp_path / "page.html", title="</script><b>")
     page = (tmp_path / "page.html").read_text()
     assert "</script><b>" not in page
-    assert not re.search(r"""(src|href)=["']https?:""", page)
+    assert not re.search(r"""<(script|link|img)[^>]*=["']?https?:""", page)
 
 
 # ---- the command line

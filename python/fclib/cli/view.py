@@ -33,12 +33,12 @@ def command(
         # a stored solution is of one of the file's problems
         own = contents.solution and kind == contents.owner
         record = view.view_of(problem, fclib.read_solution(file) if own else None)
+        path = target
+        if path is None:
+            path = Path(tempfile.mkdtemp(prefix="fclib-view-")) / f"{file.stem}.html"
+        view.write_view(record, path, title=file.name)
     except fclib.Error as error:
         fail(str(error))
-    path = target
-    if path is None:
-        path = Path(tempfile.mkdtemp(prefix="fclib-view-")) / f"{file.stem}.html"
-    view.write_view(record, path, title=file.name)
     out.print(str(path), markup=False, highlight=False)
     if target is None and not webbrowser.open(path.resolve().as_uri()):
         err.print("There is no browser here; open the page in one.", highlight=False)

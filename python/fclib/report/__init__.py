@@ -7,8 +7,9 @@ All numbers come from the stores of `fclib.bench` and from the catalogue of `fcl
 Files of problems are read for their pictures alone: the pattern and the network of contacts.
 """
 
+from fclib.report.error import ReportError
 from fclib.report.paper import write_paper
-from fclib.report.runs import Campaigns, ReportError
+from fclib.report.runs import Campaigns
 from fclib.report.site import build_site
 from fclib.report.view import view_of, write_view
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-import fclib
 from fclib.bench import STATUSES as STATUSES
 from fclib.bench import Store, profiles
 from fclib.bench.profiles import METRICS, Costs, Instance, ProfileError
+from fclib.report.error import ReportError
 from fclib.report.view import rounded
 
 DIGITS = 6  # of costs on the site
@@ -24,10 +24,6 @@ REPORTS = 80  # points of a convergence curve
 TAUS = 160  # points of a headline's curve
 CODES = "0123456789abcdefghijklmnopqrstuvwxyz"  # of statuses; "." where nothing was run
 NOT_RUN = "."
-
-
-class ReportError(fclib.Error, ValueError):
-    """There is nothing to report, or nowhere to put it."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The site: pages that need no server, and data in files that they load when they are asked for.
 
-    index.html  assets/           the pages, the same for every site
+    index.html  assets/           the pages and the libraries, the same for every site
     data/site.js                  what the first page shows, the solvers, the families
     data/catalogue.js             a column each of what is known of the problems
     data/t0.js  data/t0-cpu_s.js  statuses, and costs by a metric, at the first tolerance
@@ -26,15 +26,17 @@ from typing import Any
 import fclib
 from fclib import scenes
 from fclib.bench.profiles import METRICS, PENALTY, SHIFT
-from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns, ReportError
+from fclib.report.error import ReportError
+from fclib.report.libraries import libraries
+from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns
 from fclib.report.view import ASSETS, as_json, rounded, view_of
 
 MARK = "data/site.js"  # by which a folder is known to be a site
 VIEWS = 60  # problems whose network is drawn, where nothing else is said
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
-    *("index.html", "style.css", "core.js", "table.js", "chart.js"),
-    *("pattern.js", "scene.js", "profiles.js", "pages.js", "site.js"),
+    *("index.html", "style.css", "core.js", "table.js", "plot.js"),
+    *("scene.js", "profiles.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
 COLUMNS: tuple[tuple[str, str, str], ...] = (
@@ -100,7 +102,8 @@ def build_site(
         How many problems, runs, views and bytes the site holds.
 
     Raises:
-        ReportError: there is nothing to show, or `out` holds something else.
+        ReportError: there is nothing to show, `out` holds something else, or a library is not
+            installed.
         fclib.collections.CatalogError: the catalogue cannot be read.
     """
     if campaigns is None and catalogue is None:
@@ -245,6 +248,7 @@ class _Writer:
             "tolerances": [],
             "headlines": [],
             "solvers": [],
+            "libraries": self._libraries(),
         }
         if self.campaigns is not None:
             site |= self._runs(self.campaigns)
@@ -262,6 +266,17 @@ class _Writer:
             "views": drawn,
             "bytes": self.bytes,
         }
+
+    def _libraries(self) -> list[dict[str, str]]:
+        found = []
+        for library in libraries():
+            for name, text in library.files.items():
+                (self.folder / "assets" / name).write_text(text, encoding="utf-8")
+            licence = self.folder / library.licence_file
+            licence.parent.mkdir(exist_ok=True)
+            licence.write_text(library.notices, encoding="utf-8")
+            found.append(library.record)
+        return found
 
     def _runs(self, campaigns: Campaigns) -> dict[str, Any]:
         total = len(campaigns.tolerances)

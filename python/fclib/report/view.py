@@ -4,22 +4,26 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import ConvexHull, QhullError
 
 import fclib
+from fclib.report.libraries import libraries
 from fclib.report.network import Network, network_of
 
 ASSETS = Path(__file__).with_name("assets")
 DIGITS = 5  # of positions and reactions in a picture
 CELLS = 128  # of a pattern, along its longer side
 SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
-SCRIPTS = ("core.js", "table.js", "chart.js", "scene.js", "pattern.js", "view.js")
+SCRIPTS = ("table.js", "plot.js", "scene.js", "profiles.js", "view.js")
 STATUS = ("open", "stick", "slide")
+END = re.compile("</script", re.IGNORECASE)
 
 
 def rounded(values: Any, digits: int = DIGITS) -> Any:
@@ -77,12 +81,38 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
         "points": rounded(network.points),
         "pairs": network.pairs.tolist(),
         "radii": rounded(network.radii),
+        "faces": hulls_of(network),
     }
     if network.frames is not None:
         record["network"]["normals"] = rounded(network.frames[:, :, 0])
     if solution is not None:
         record.update(_solved(problem, solution, network))
     return record
+
+
+def hulls_of(network: Network) -> list[list[int]]:
+    """Triangles of the hulls of each body's centre and contact points, but for balls.
+
+    Returns:
+        (triangles, 3) numbers of corners: first the bodies' centres, then the contact points.
+    """
+    count = len(network.bodies)
+    corners = np.concatenate([network.bodies, network.points])
+    found: list[list[int]] = []
+    for body in np.flatnonzero(network.radii == 0) if network.placed else ():
+        own = np.flatnonzero((network.pairs == body).any(axis=1)) + count
+        chosen = np.concatenate([[body], own])
+        if chosen.size == 3:
+            found.append(chosen.tolist())
+        if chosen.size < 4:
+            continue
+        try:
+            # joggled, since contact points are often in one plane
+            hull = ConvexHull(corners[chosen], qhull_options="QJ Pp")
+        except QhullError:
+            continue  # in one place: the lines from the centre show them
+        found += chosen[hull.simplices].tolist()
+    return found
 
 
 def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
@@ -175,12 +205,26 @@ def asset(name: str) -> str:
 
 
 def write_view(record: Mapping[str, Any], path: Path, title: str = "") -> None:
-    """Write a page that holds all it needs; it is whole, or the old one."""
-    scripts = "\n".join(asset(name) for name in SCRIPTS)
+    """Write a page that holds all it needs; it is whole, or the old one.
+
+    Raises:
+        ReportError: a library is not installed.
+    """
+    styles: list[str] = []
+    scripts = [asset("core.js")]
+    known = []
+    for library in libraries():
+        known.append(library.record | {"text": library.notices})
+        for name, text in library.files.items():
+            (scripts if name.endswith(".js") else styles).append(text)
+    scripts += [asset(name) for name in SCRIPTS]
+    scripts.append(f"Fclib.view({as_json(dict(record, file=title, libraries=known))});")
+    # an end of a script in a string of it would be one of the element
+    elements = ["<script>\n" + END.sub(r"<\\/script", text) + "\n</script>" for text in scripts]
     page = asset("view.html")
     for mark, text in {
-        "/*STYLE*/": asset("style.css"),
-        "/*SCRIPTS*/": f"{scripts}\nFclib.view({as_json(dict(record, file=title))});",
+        "/*STYLE*/": "\n".join([*styles, asset("style.css")]),
+        "/*SCRIPTS*/": "\n".join(elements),
     }.items():
         page = page.replace(mark, text)
     part = path.with_name(f".{path.name}.part")

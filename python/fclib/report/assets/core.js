@@ -8,18 +8,24 @@ Fclib.NotHere = class extends Error {};
 
 // ---- data: a file calls put(), load() gives a promise of what it put
 Fclib.put = (name, value) => { Fclib.values[name] = value; };
-Fclib.load = (name) => {
-  if (name in Fclib.values) return Promise.resolve(Fclib.values[name]);
-  if (!(name in Fclib.waiting)) {
-    Fclib.waiting[name] = new Promise((resolve, reject) => {
-      const script = document.createElement("script");
-      script.src = `data/${name}.js`;
-      script.onload = () => resolve(Fclib.values[name]);
-      script.onerror = () => { delete Fclib.waiting[name]; reject(new Error(`${script.src} is not there`)); };
-      document.head.append(script);
-    });
-  }
-  return Fclib.waiting[name];
+Fclib.script = (src) => {
+  Fclib.waiting[src] ||= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = src;
+    script.onload = resolve;
+    script.onerror = () => { delete Fclib.waiting[src]; reject(new Error(`${script.src} is not there`)); };
+    document.head.append(script);
+  });
+  return Fclib.waiting[src];
+};
+Fclib.load = async (name) => {
+  if (!(name in Fclib.values)) await Fclib.script(`data/${name}.js`);
+  return Fclib.values[name];
+};
+// the library that draws is large: pages without pictures do not wait for it
+Fclib.plotly = async () => {
+  if (!window.Plotly) await Fclib.script("assets/plotly.js");
+  return window.Plotly;
 };
 
 // ---- elements; text is never taken for HTML
@@ -27,12 +33,6 @@ Fclib.h = (tag, attributes, ...children) => {
   const element = document.createElement(tag);
   Fclib.set(element, attributes || {});
   element.append(...children.flat(3).filter((child) => child !== null && child !== undefined && child !== false));
-  return element;
-};
-Fclib.svg = (tag, attributes, ...children) => {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
-  Fclib.set(element, attributes || {});
-  element.append(...children.flat(3).filter((child) => child !== null && child !== undefined));
   return element;
 };
 Fclib.set = (element, attributes) => {
@@ -65,44 +65,26 @@ Fclib.number = (value, digits = 3) => {
 Fclib.percent = (share) => `${Math.round(1000 * share) / 10} %`;
 Fclib.tolerance = (tol) => tol.toExponential().replace("e+", "e");
 
-// ---- what a person keeps
-Fclib.saveText = (name, text, type) => {
-  const url = URL.createObjectURL(new Blob([text], { type }));
-  const link = Fclib.h("a", { href: url, download: name });
-  document.body.append(link);
-  link.click();
-  link.remove();
-  setTimeout(() => URL.revokeObjectURL(url), 1000);
-};
-Fclib.csv = (columns, rows) => {
-  const cell = (value) => {
-    const text = value === null || value === undefined ? "" : String(value);
-    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  };
-  return [columns, ...rows].map((row) => row.map(cell).join(",")).join("\n") + "\n";
-};
-
 // ---- light and dark: the system's choice until a person makes another
 Fclib.theme = {
   key: "fclib-theme",
-  stored() { try { return localStorage.getItem(this.key); } catch { return null; } },
-  apply(name) {
-    if (name) document.documentElement.dataset.theme = name;
-    else delete document.documentElement.dataset.theme;
-  },
-  isDark() {
-    const name = document.documentElement.dataset.theme;
-    return name ? name === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  },
-  toggle() {
-    const name = this.isDark() ? "light" : "dark";
-    this.apply(name);
-    try { localStorage.setItem(this.key, name); } catch { /* this page only */ }
+  system: matchMedia("(prefers-color-scheme: dark)"),
+  chosen: null,
+  apply() {
+    const name = this.chosen || (this.system.matches ? "dark" : "light");
+    document.documentElement.dataset.theme = name;
+    document.documentElement.classList.toggle("dark", name === "dark");
     document.dispatchEvent(new Event("fclib-theme"));
   },
+  toggle() {
+    this.chosen = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    try { localStorage.setItem(this.key, this.chosen); } catch { /* this page only */ }
+    this.apply();
+  },
 };
-Fclib.theme.apply(Fclib.theme.stored());
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => document.dispatchEvent(new Event("fclib-theme")));
+try { Fclib.theme.chosen = localStorage.getItem(Fclib.theme.key); } catch { /* no storage here */ }
+Fclib.theme.apply();
+Fclib.theme.system.addEventListener("change", () => Fclib.theme.apply());
 Fclib.themeButton = () => Fclib.h("button", {
   type: "button", class: "quiet", id: "theme", "aria-label": "Light or dark", title: "Light or dark",
   onclick: () => Fclib.theme.toggle(),

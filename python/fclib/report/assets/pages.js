@@ -27,6 +27,14 @@
   const tolerances = () => site().tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]);
   const lastTolerance = () => site().tolerances.length - 1;
   const search = (label, value, oninput, hint) => h("label", {}, label, h("input", { type: "search", value: value || "", placeholder: hint, oninput: (e) => oninput(e.target.value) }));
+  /* the state of a table, in the address */
+  const remembered = (params, keep) => {
+    const [sort, down] = (params.get("sort") || "").split(":");
+    return {
+      sort: sort ? { key: sort, down: down === "down" } : null, at: Number(params.get("page") || 1) - 1, q: params.get("look") || "",
+      onstate: ({ sort: by, at, q }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}`, page: at ? at + 1 : "", look: q }),
+    };
+  };
   const copyable = (text) => {
     const button = h("button", { type: "button", onclick: async () => {
       try { await navigator.clipboard.writeText(text); button.textContent = "copied"; } catch { getSelection().selectAllChildren(code); button.textContent = "selected"; }
@@ -77,19 +85,12 @@
       });
       page.append(charts, h("h2", {}, "Solvers"));
       const labels = s.solvers.map((v) => v.label);
-      const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "", q: params.get("q") || "" };
-      const rows = () => {
-        const head = s.headlines[state.tol];
-        return ((head && head.tables[state.family]) || []).filter((r) => `${r.solver} ${(s.solvers.find((v) => v.label === r.solver) || {}).family || ""}`.toLowerCase().includes(state.q.toLowerCase()));
-      };
-      const [sort, down] = (params.get("sort") || "").split(":");
-      const table = Fclib.table({
-        caption: "CPU times of the solvers, over the instances that all of them have run", columns: summaryColumns(labels), rows: rows(), page: 60, sort: sort ? { key: sort, down: down === "down" } : null,
-        onstate: ({ sort: by }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}` }),
-      });
+      const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "" };
+      const rows = () => ((s.headlines[state.tol] || { tables: {} }).tables[state.family]) || [];
+      const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run", columns: summaryColumns(labels), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
       const change = (key) => (value) => { state[key] = key === "tol" ? Number(value) : value; keep({ [key]: value }); table.update(rows()); };
       page.append(h("div", { class: "controls" }, select("tolerance", tolerances(), state.tol, change("tol")),
-        select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family")), search("solver or method", state.q, change("q"))), table);
+        select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family"))), table);
       page.append(h("h2", {}, "How the runs ended"), Fclib.table({
         caption: "Statuses of all runs", rows: Object.entries(o.statuses).map(([name, v]) => ({ name, ...v })),
         columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", value: (r) => r.count / o.runs, format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],
@@ -163,12 +164,10 @@
       const metric = s.metrics[state.metric];
       box.replaceChildren(Fclib.lines({
         name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, step: true, xlog: state.axis === "log",
-        xrange: performance ? [1, high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
+        xrange: performance ? [1, state.axis === "log" ? high * 1.1 : high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
         xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
         note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run${state.family ? `, family ${state.family}` : ""}.`,
       }));
-      box.dataset.instances = instances.length;
-      box.series = series;
     };
     const drawStatuses = (order, bench, keepProblem) => {
       const rows = order.map((k) => {
@@ -196,12 +195,12 @@
         for (const v of [x, y]) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); }
         if (y === null || (x !== null && x < y)) first++; else if (x === null || y < x) second++;
         const id = cat.read.id(k);
-        points.push({ x, y, problem: id, href: problemHref(id), group: families.indexOf(cat.read.family(k)), label: `${id}: ${labels[a]} ${x === null ? "failed" : number(x)}, ${labels[b]} ${y === null ? "failed" : number(y)}` });
+        points.push({ x, y, problem: id, group: families.indexOf(cat.read.family(k)) });
       });
       const metric = s.metrics[state.metric];
       pair.replaceChildren(h("div", { class: "controls" }, select("across", names, labels[a], change("a")), select("up", names, labels[b], change("b"))),
         points.length ? Fclib.scatter({
-          name: `${labels[a]}-${labels[b]}`, title: `${labels[a]} against ${labels[b]}, ${metric}`, points, groups: families, range: [low * 0.8, high * 1.25], xlabel: `${labels[a]}: ${metric}`, ylabel: `${labels[b]}: ${metric}`, xname: labels[a], yname: labels[b],
+          name: `${labels[a]}-${labels[b]}`, title: `${labels[a]} against ${labels[b]}, ${metric}`, points, groups: families, range: [low * 0.8, high * 1.25], xlabel: `${labels[a]}: ${metric}`, ylabel: `${labels[b]}: ${metric}`, xname: labels[a], yname: labels[b], to: problemHref,
           note: `${points.length} instances that at least one of the two solves; ${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point leads to its problem.`,
         }) : h("p", { class: "panel" }, "No instance that both have run and one solves."));
     };
@@ -247,11 +246,7 @@
         : c.key === "family" ? (row) => h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family)
           : c.key === "best_solver" ? (row) => solverLink(row.best_solver) : c.key === "status" ? (row) => row.status ? status(row.status) : "–" : undefined,
     }));
-    const [sort, down] = (params.get("sort") || "").split(":");
-    const table = Fclib.table({
-      caption: "Problems", columns, rows: rows(), page: 50, sort: sort ? { key: sort, down: down === "down" } : null, at: Number(params.get("page") || 1) - 1,
-      onstate: ({ sort: by, at }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}`, page: at ? at + 1 : "" }),
-    });
+    const table = Fclib.table({ caption: "Problems", name: "catalogue", columns, rows: rows(), page: 50, search: false, ...remembered(params, keep) });
     let waiting = 0;
     const change = (key) => (value) => {
       state[key] = value === true ? "1" : value || "";
@@ -266,7 +261,7 @@
       h("div", { class: "controls" }, search("filter", state.q, change("q"), "mu_max<0.5 best_solver=nsgs"), select("family", values("family"), state.family, change("family")), select("form", values("formulation"), state.formulation, change("formulation")),
         amount("contacts from", "min"), amount("to", "max"), check("with runs", "runs", read.runs), check("with 3D view", "view", read.view)),
       h("details", {}, h("summary", {}, "What the filter knows"), h("p", { class: "small" }, "Words are looked for in names and titles; conditions have one of = < > <= >= between a column and a value, without blanks, and all must hold. The columns are: ", h("code", {}, names), ". The address of this page keeps the filter.")),
-      says, table, h("div", { class: "tools" }, h("button", { type: "button", onclick: () => Fclib.saveText("catalogue.csv", Fclib.csv(columns.map((c) => c.key), table.rows().map((row) => columns.map((c) => row[c.key]))), "text/csv") }, "↓ CSV of these problems")));
+      says, table);
   };
 
   // ---- a family
@@ -323,7 +318,7 @@
     const half = Math.ceil(labelled.length / 2);
     page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
     if (view) {
-      if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view));
+      if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view, id));
       if (view.spectrum && view.spectrum.rank > 1) page.append(h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, id));
       page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), Fclib.texts(view) || "");
       if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({ caption: "Recomputed from the file", rows: Object.entries(view.merit), columns: [{ key: 0, label: "part", head: true }, { key: 1, label: "value", type: "number" }] }));
@@ -398,5 +393,10 @@
       columns: [{ key: 0, label: "option", head: true }, { key: 1, label: "type", wrap: true }, { key: 2, label: "default", type: "text" }, { key: 3, label: "unit" }, { key: 4, label: "meaning", wrap: true }],
     }) : h("p", {}, "It has none."));
     page.append(h("h2", {}, "Use it"), copyable(`fclib solve --solver ${solver.name} FILE`), copyable(`result = fclib.solve(problem, solver="${solver.name}", tol=1e-8)`));
+  };
+
+  // ---- what the site is made with
+  Fclib.pages.about = async (page) => {
+    page.append(h("h1", {}, "About this site"), h("p", {}, `Made by fclib report, FCLIB ${site().version}, Apache-2.0. It asks no other host for anything.`), h("h2", {}, "Libraries"), Fclib.libraries(site().libraries));
   };
 })();

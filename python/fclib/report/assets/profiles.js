@@ -24,4 +24,10 @@
     });
     return { x, y };
   };
+  /* the value at x of steps: that of the last of them at or before x */
+  Fclib.at = (steps, x) => {
+    let low = 0, high = steps.x.length;
+    while (low < high) { const mid = (low + high) >> 1; if (steps.x[mid] <= x) low = mid + 1; else high = mid; }
+    return low ? steps.y[low - 1] : null;
+  };
 })();

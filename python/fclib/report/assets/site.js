@@ -34,6 +34,8 @@
       target.replaceChildren(h("h1", {}, "Not here"), h("p", {}, error.message), h("p", {}, Fclib.link("overview", [], {}, "To the overview")));
     }
     if (own !== turn) return;
+    // a browser keeps few contexts of WebGL
+    main.querySelectorAll(".js-plotly-plot").forEach((plot) => Plotly.purge(plot));
     main.replaceChildren(target);
     const head = target.querySelector("h1");
     document.title = head ? `${head.textContent} – FCLIB` : "FCLIB";
@@ -46,7 +48,7 @@
     const there = NAVIGATION.filter(([page]) => site.tolerances.length || page !== "profiles");
     nav.append(...there.map(([page, name]) => h("a", { href: Fclib.to(page), "data-page": page }, name)));
     nav.after(Fclib.themeButton());
-    document.querySelector("footer").append(`Made by fclib report, FCLIB ${site.version}. Costs have six digits.`);
+    document.querySelector("footer").append(`Made by fclib report, FCLIB ${site.version}. Costs have six digits. `, Fclib.link("about", [], {}, "About this site"));
     addEventListener("hashchange", show);
     show();
   };

@@ -1,65 +1,66 @@
-// tables that sort by their heads and show one page of rows at a time
+// tables by DataTables: sorted by their heads, searched, a page of rows at a time, saved as CSV
 "use strict";
 (() => {
   const { h, number } = Fclib;
-  const compare = (a, b) => {
-    const none = (v) => v === null || v === undefined || v === "";
-    if (none(a) || none(b)) return none(a) - none(b) || 0;
-    return typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), undefined, { numeric: true });
-  };
+  const none = (v) => v === null || v === undefined || v === "";
+  const words = new Intl.Collator(undefined, { numeric: true }).compare;
+  const compare = (a, b) => typeof a === "number" && typeof b === "number" ? a - b : words(String(a), String(b));
+  // what is not there stays last, up and down
+  const order = (sign) => (a, b) => none(a) || none(b) ? none(a) - none(b) : sign * compare(a, b);
+  DataTable.type("value", { order: { asc: order(1), desc: order(-1) } });
+  DataTable.ext.errMode = "throw";
+  DataTable.Buttons.defaults.dom.button.className = "";
+
   /* options: columns [{key, label, type, title, head, wrap, value(row), cell(row), format(value)}], rows, caption,
-     page: rows a page, sort: {key, down}, at: page, onstate({sort, at}) */
-  Fclib.table = (options) => {
-    const state = { sort: options.sort || null, at: options.at || 0 };
-    const size = options.page || 50;
+     page: rows a page, sort: {key, down}, at: page, q: words to look for, search: whether it has a field for them,
+     onstate({sort, at, q}), name: of the CSV, largest: numbers fall at the first click */
+  Fclib.table = ({ columns, rows, caption = "Table", page = 50, sort, at = 0, q = "", search = rows.length > 15, onstate, name, largest }) => {
     const value = (column, row) => column.value ? column.value(row) : row[column.key];
-    const box = h("div", { class: options.columns.length < 4 && !options.columns.some((c) => c.wrap) && "narrow" }), body = h("tbody", {}), pager = h("div", { class: "pager" });
-    let order = options.rows;
-    const numeric = options.columns.map((c) => c.type === "number" || (c.type === undefined && typeof value(c, options.rows[0] || {}) === "number"));
-    const heads = options.columns.map((column, k) => h("th", { scope: "col", class: numeric[k] && "right", title: column.title },
-      h("button", { type: "button", onclick: () => {
-        const down = state.sort && state.sort.key === column.key ? !state.sort.down : numeric[k] && Boolean(options.largest);
-        state.sort = { key: column.key, down };
-        state.at = 0;
-        sort(); fill(); tell();
-      } }, column.label)));
-    const tell = () => options.onstate && options.onstate(state);
-    const sort = () => {
-      const column = state.sort && options.columns.find((c) => String(c.key) === String(state.sort.key));
-      if (!column) { order = options.rows; return; }
-      const sign = state.sort.down ? -1 : 1;
-      // what is not there stays last
-      order = options.rows.map((row, k) => [value(column, row), k, row]).sort((a, b) => {
-        const missing = (v) => v === null || v === undefined;
-        if (missing(a[0]) || missing(b[0])) return missing(a[0]) - missing(b[0]) || a[1] - b[1];
-        return sign * compare(a[0], b[0]) || a[1] - b[1];
-      }).map((entry) => entry[2]);
-    };
-    const fill = () => {
-      const pages = Math.max(1, Math.ceil(order.length / size));
-      state.at = Math.min(Math.max(0, state.at), pages - 1);
-      options.columns.forEach((column, k) => {
-        const own = state.sort && String(state.sort.key) === String(column.key);
-        heads[k].setAttribute("aria-sort", own ? state.sort.down ? "descending" : "ascending" : "none");
-      });
-      body.replaceChildren(...order.slice(state.at * size, (state.at + 1) * size).map((row) => h("tr", {}, options.columns.map((column, k) => {
-        const content = column.cell ? column.cell(row) : (column.format || number)(value(column, row));
-        return h(column.head ? "th" : "td", { scope: column.head && "row", class: [numeric[k] && "right", column.wrap && "wrap"].filter(Boolean).join(" ") || null }, content);
-      }))));
-      pager.replaceChildren();
-      if (pages > 1) {
-        const go = (to) => { state.at = to; fill(); tell(); };
-        const button = (text, to, name) => h("button", { type: "button", disabled: to < 0 || to >= pages || to === state.at, "aria-label": name, onclick: () => go(to) }, text);
-        pager.append(button("«", 0, "First page"), button("‹", state.at - 1, "Previous page"),
-          h("span", { "aria-live": "polite" }, `${state.at * size + 1}–${Math.min(order.length, (state.at + 1) * size)} of ${order.length}`),
-          button("›", state.at + 1, "Next page"), button("»", pages - 1, "Last page"));
-      }
-    };
-    box.append(h("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": options.caption || "Table" },
-      h("table", {}, options.caption && h("caption", {}, options.caption), h("thead", {}, h("tr", {}, heads)), body)), pager);
-    sort(); fill();
-    box.update = (rows) => { options.rows = rows; state.at = 0; sort(); fill(); };
-    box.rows = () => order;
+    const numeric = columns.map((c) => c.type === "number" || (c.type === undefined && typeof value(c, rows[0] || {}) === "number"));
+    const table = h("table", { class: "compact hover" }, h("caption", {}, caption),
+      h("thead", {}, h("tr", {}, columns.map((c) => h("th", { title: c.title }, c.label)))));
+    const box = h("div", { class: columns.length < 4 && !columns.some((c) => c.wrap) && "narrow" }, table);
+    const many = rows.length > page;
+    const csv = { extend: "csvHtml5", text: "↓ CSV", filename: name || caption, title: null, bom: false, footer: false, fieldBoundary: '"',
+      exportOptions: { orthogonal: "raw", stripHtml: false, decodeEntities: false, format: { header: (text, k) => typeof columns[k].key === "string" ? columns[k].key : columns[k].label } } };
+    const buttons = [csv, ...columns.length > 12 ? [{ extend: "colvis", text: "columns" }] : []];
+    const api = new DataTable(table, {
+      data: rows, autoWidth: false, deferRender: true, caption: null, pageLength: page, displayStart: at * page,
+      search: { search: q }, order: columns.flatMap((c, k) => sort && String(c.key) === String(sort.key) ? [[k, sort.down ? "desc" : "asc"]] : []),
+      columns: columns.map((c, k) => ({
+        name: String(c.key), type: "value", searchable: !numeric[k], cellType: c.head ? "th" : "td",
+        className: `${numeric[k] ? "right" : "left"}${c.wrap ? " wrap" : ""}`,
+        orderSequence: numeric[k] && largest ? ["desc", "asc"] : ["asc", "desc"],
+        createdCell: (cell) => c.head && cell.setAttribute("scope", "row"),
+        // what is shown is a node, so that no text is taken for HTML
+        data: (row, kind) => {
+          const own = value(c, row) ?? null;
+          if (kind === "display") return h("span", {}, c.cell ? c.cell(row) : (c.format || number)(own));
+          return kind === "raw" || kind === "filter" ? none(own) ? "" : String(own) : own;
+        },
+      })),
+      language: { info: "_START_–_END_ of _TOTAL_", infoEmpty: "none", infoFiltered: "(of _MAX_)", emptyTable: "none", zeroRecords: "none", thousands: "", search: "search",
+        aria: { paginate: { first: "First page", previous: "Previous page", next: "Next page", last: "Last page", number: "Page " } } },
+      layout: {
+        topStart: null, topEnd: search ? "search" : null,
+        bottomStart: name || rows.length > 7 ? { buttons } : null, bottomEnd: many ? { info: {}, paging: { buttons: 5 } } : null,
+      },
+    });
+    const scroll = table.closest(".dt-layout-table");
+    Fclib.set(scroll, { tabindex: 0, role: "region", "aria-label": caption });
+    if (onstate) api.on("order.dt page.dt search.dt", () => {
+      const [first] = api.order();
+      onstate({ sort: first && { key: columns[first[0]].key, down: first[1] === "desc" }, at: api.page(), q: api.search() });
+    });
+    box.api = api;
+    box.update = (found) => { api.clear().rows.add(found).draw(); };
     return box;
   };
+
+  /* the libraries that a page carries, with their licences */
+  Fclib.libraries = (list) => Fclib.table({
+    caption: "Shipped with this site, each under its own licence", rows: list,
+    columns: [{ key: "name", label: "library", head: true }, { key: "version", label: "version" }, { key: "purpose", label: "for" }, { key: "package", label: "from the Python package" },
+      { key: "licence", label: "licence", cell: (one) => one.text.startsWith("assets/") ? h("a", { href: one.text }, one.licence) : h("details", {}, h("summary", {}, one.licence), h("pre", {}, one.text)) }],
+  });
 })();

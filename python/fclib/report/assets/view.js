@@ -8,9 +8,10 @@ Fclib.view = (view) => {
   document.querySelector("main").append(
     h("h1", {}, view.title || view.file),
     h("dl", { class: "facts" }, Object.entries(facts).filter(([, v]) => v !== null && v !== "").map(([name, v]) => [h("dt", {}, name), h("dd", {}, String(v))])),
-    ...view.network ? [Fclib.scene(view)] : [h("p", {}, "No contact in this problem.")],
+    ...view.network ? [Fclib.scene(view, view.file)] : [h("p", {}, "No contact in this problem.")],
     ...view.network && !view.reactions ? [h("p", { class: "soft" }, "The file holds no solution; fclib solve --write stores one.")] : [],
     ...view.spectrum && view.spectrum.rank > 1 ? [h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, view.file)] : [],
     h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), ...[Fclib.texts(view)].filter(Boolean));
+  document.querySelector("footer").append(h("details", {}, h("summary", {}, "Libraries in this page"), Fclib.libraries(view.libraries)));
   document.querySelector("header.top > div").append(Fclib.themeButton());
 };

@@ -1,0 +1,149 @@
+"""The libraries that the pages draw with, taken from the Python packages that ship them.
+
+    plotly   plotly.min.js: charts, patterns, the network of contacts in space
+    itables  DataTables with jQuery: tables
+
+Nothing of theirs lies in this repository: their files are copied into a site as it is written, each
+with its licence.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+from fclib.report.error import ReportError
+
+# a module of exports at its end: a browser loads none from a folder of files, but scripts
+EXPORTS = re.compile(r"export\s*\{([^{}]*)\};?\s*(?=/\*|\Z)")
+# of the parts that a file is bundled from
+NOTICES = re.compile(r"^/\*!? *Bundled license information:.*?^\*/", re.DOTALL | re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library as a site carries it."""
+
+    name: str
+    version: str
+    licence: str  # its name
+    package: str  # that ships it, with its version
+    purpose: str
+    files: Mapping[str, str]  # name in the site -> text
+    notices: str  # the text of the licence, and what the file says of its parts
+
+    @property
+    def record(self) -> dict[str, str]:
+        """What the page about the site says of it."""
+        keys = ("name", "version", "licence", "package", "purpose")
+        return {key: getattr(self, key) for key in keys} | {"text": self.licence_file}
+
+    @property
+    def licence_file(self) -> str:
+        """Where the site has its licence."""
+        return f"assets/licences/{self.name.lower().replace('.', '-')}.txt"
+
+
+def libraries() -> tuple[Library, ...]:
+    """Those of a site.
+
+    Raises:
+        ReportError: a package is not installed, or holds something else than expected.
+    """
+    return plotly(), datatables()
+
+
+def plotly() -> Library:
+    """Plotly's JavaScript, of the package plotly."""
+    distribution = _package("plotly")
+    script = _text(distribution, "plotly/package_data/plotly.min.js")
+    return Library(
+        name="plotly.js",
+        version=_version(distribution, r"plotly\.js v([\d.]+)", script),
+        licence="MIT, parts BSD-3-Clause",
+        package=f"plotly {distribution.version}",
+        purpose="charts, patterns, contact networks",
+        files={"plotly.js": script},
+        notices=_notices(distribution, script),
+    )
+
+
+def datatables() -> Library:
+    """DataTables with its extensions and jQuery, of the package itables."""
+    distribution = _package("itables")
+    module = _text(distribution, "itables/html/dt_bundle.js")
+    return Library(
+        name="DataTables",
+        version=_version(distribution, r"DataTables ([\d.]+)\n", module),
+        licence="MIT",
+        package=f"itables {distribution.version}",
+        purpose="tables",
+        files={
+            "tables.js": as_script(module, "default", "DataTable"),
+            "tables.css": _text(distribution, "itables/html/dt_bundle.css"),
+        },
+        notices=_notices(distribution, module),
+    )
+
+
+def as_script(module: str, export: str, name: str) -> str:
+    """A module as a classic script that leaves one of its exports in a global variable.
+
+    Raises:
+        ReportError: the text does not end in one list of exports, with this one among them.
+    """
+    found = EXPORTS.findall(module)
+    names = {}
+    if len(found) == 1:
+        for part in found[0].split(","):
+            own, _, given = part.strip().partition(" as ")
+            names[given or own] = own
+    if export not in names:
+        raise ReportError(
+            f"itables' dt_bundle.js does not export {export} as expected; install another"
+            " version of itables"
+        )
+    end = f"window.{name} = {names[export]};\n}})();\n"
+    return "(() => {\n" + EXPORTS.sub(lambda _: end, module)
+
+
+def _package(name: str) -> metadata.Distribution:
+    try:
+        return metadata.distribution(name)
+    except metadata.PackageNotFoundError:
+        raise ReportError(
+            f'the pages draw by a file of the package {name}: pip install "fclib[report]"'
+        ) from None
+
+
+def _text(distribution: metadata.Distribution, path: str) -> str:
+    file = Path(str(distribution.locate_file(path)))
+    try:
+        return file.read_text(encoding="utf-8")
+    except OSError:
+        raise ReportError(
+            f"{distribution.metadata['Name']} {distribution.version} ships no {path};"
+            f" pip install --upgrade {distribution.metadata['Name']}"
+        ) from None
+
+
+def _version(distribution: metadata.Distribution, pattern: str, text: str) -> str:
+    found = re.search(pattern, text)
+    return found[1] if found else f"of {distribution.metadata['Name']} {distribution.version}"
+
+
+def _notices(distribution: metadata.Distribution, text: str) -> str:
+    """The licence in the package, then what the file says of the parts it is bundled from."""
+    own = [
+        file.read_text(encoding="utf-8")
+        for file in distribution.files or ()
+        if file.name.upper().startswith("LICENSE") and ".dist-info" in str(file)
+    ]
+    if not own:
+        raise ReportError(
+            f"{distribution.metadata['Name']} {distribution.version} has no text of its licence"
+        )
+    return "\n\n".join(part.strip() for part in [*own, *NOTICES.findall(text)]) + "\n"

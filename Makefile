@@ -11,7 +11,7 @@ SOURCES := CMakeLists.txt pyproject.toml README.md \
            $(wildcard campaigns/*.toml) \
            $(shell find core bindings cmake python include -type f \
              \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.map' -o -name '*.py' \
-                -o -name '*.js' -o -name '*.css' -o -name '*.html' \
+                -o -name '*.js' -o -name '*.css' -o -name '*.html' -o -name '*.json' -o -name '*.hdf5' \
                 -o -name py.typed \))
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 

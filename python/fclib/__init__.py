@@ -70,15 +70,15 @@ def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Coll
     return Collection(name, folder)
 
 
-def load(name: str, form: str = "global", folder: "str | Path | None" = None) -> Problem:
+def load(name: str, form: str | None = None, folder: "str | Path | None" = None) -> Problem:
     """One problem of the collection, as ``fclib.load("rt444/KaplasTower/0100")``.
 
     It is read from the user's folder; a family that is not there is built, in a minute or so, or
-    fetched from FCLIB_COLLECTION_URL.
+    fetched from FCLIB_COLLECTION_URL. Those of the set ``tiny`` come with the package.
 
     Args:
         name: SET/FAMILY/NUMBER.
-        form: "global" or "local".
+        form: "global" or "local"; by default the global one of a problem that has both.
         folder: as ``collection`` has it.
 
     Raises:

@@ -43,7 +43,7 @@ PYTHON: dict[str, set[str]] = {
     "_solve": {"_core", "_registry"},
     "_digest": set(),
     "__init__": {"_core", "_digest", "_registry", "_solve"},
-    "scenes": set(),
+    "scenes": {"api"},
     "simulate": {"api", "scenes"},
     "external": {"api", "_registry"},
     "analysis": {"api"},

@@ -28,19 +28,22 @@ from fclib.collections import archives, catalog
 from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
 
-FAMILIES = scenes.families()
-
+FAMILIES = collections.families()
 
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution
 
 
+def stack(boxes: int = 3) -> scenes.Scene:
+    """Boxes that land within a few steps."""
+    return scenes.get("BoxesStack")(boxes=boxes, gap=2e-3, time_step=5e-3).scene(seed=1)
+
+
 def plan(boxes: int = 3, **settings: Any) -> Plan:
-    """A small stack that lands within a few steps."""
-    scene = scenes.get("BoxesStack")(boxes=boxes, gap=2e-3, time_step=5e-3).scene(seed=1)
+    """What is built of a small stack."""
     settings = {"problems": 12} | settings
-    return Plan(scene=scene, collection="small", **settings)
+    return Plan(scene=stack(boxes), collection="small", **settings)
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -100,7 +103,7 @@ def test_two_builds_are_equal_byte_for_byte(built: Path, tmp_path: Path) -> None
 def test_processes_give_the_same_as_one(tmp_path: Path) -> None:
     plans = [plan(problems=4), plan(boxes=2, problems=4, form="local")]
     # two plans need two names
-    other = scenes.Scene.of(scenes.get("BoxesStack")(boxes=2), 0, plans[1].scene.xml)
+    other = scenes.Scene.of(scenes.get("BoxesStack")(boxes=2), 0, stack(2).xml)
     plans[1] = Plan(scene=other, collection="others", problems=4, form="local", count=2)
     seen: set[str] = set()
     for jobs in (1, 2):
@@ -218,9 +221,10 @@ def test_nonsense_plans(settings: dict[str, Any], message: str) -> None:
 
 
 def test_names() -> None:
-    assert collections.family_names(["rt444", "Chain"]) == sorted(collections.sets()["rt444"])
+    assert collections.folders(["rt444", "Chain"]) == sorted(collections.sets()["rt444"])
+    assert collections.folders(["Chain", "rt444/Chain"]) == ["rt444/Chain"]
     with pytest.raises(KeyError, match=r"'rt44'; sets: .*rt444"):
-        collections.family_names(["rt44"])
+        collections.folders(["rt44"])
 
 
 def test_analysis_is_in_the_catalogue_where_it_was_asked_for(built: Path, tmp_path: Path) -> None:
@@ -364,18 +368,18 @@ def test_get_fetches_what_was_published(
     site: tuple[str, Path, type[Server]], built: Path, tmp_path: Path
 ) -> None:
     url, _, _ = site
-    assert collections.get(["BoxesStack"], url, tmp_path / "copy") == ["BoxesStack"]
+    assert collections.get(["BoxesStack"], url, tmp_path / "copy") == ["small/BoxesStack"]
     copied = {k: v for k, v in files(tmp_path / "copy").items() if not k.startswith(".archives")}
     assert copied == files(built)
 
 
 def test_get_knows_published_scenes(tmp_path: Path) -> None:
-    scene = dataclasses.replace(plan().scene, name="two-legs")
+    scene = dataclasses.replace(stack(), name="two-legs")
     scenes_plan = Plan(scene=scene, collection="scenes", problems=1)
     collections.build([scenes_plan], tmp_path / "built", pictures=False)
     collections.publish(tmp_path / "built", tmp_path / "site")
     with serving(tmp_path / "site") as (url, _):
-        assert collections.get(["two-legs"], url, tmp_path / "copy") == ["two-legs"]
+        assert collections.get(["two-legs"], url, tmp_path / "copy") == ["scenes/two-legs"]
     assert all(verdict.ok for verdict in collections.verify(tmp_path / "copy"))
 
 
@@ -419,7 +423,7 @@ def test_get_of_what_is_not_there(site: tuple[str, Path, type[Server]], tmp_path
 
 def test_collection_is_a_lazy_sequence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path))
-    monkeypatch.setattr(Plan, "of_family", lambda name: plan(boxes=2, problems=3))
+    monkeypatch.setattr(Plan, "of_family", lambda name, seed, **_: plan(boxes=2, problems=3))
     family = scenes.get("BoxesStack")
     monkeypatch.setattr(family, "collection", "small")
     problems = fclib.collection("BoxesStack")
@@ -445,12 +449,7 @@ def test_collection_is_a_lazy_sequence(tmp_path: Path, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize("name", FAMILIES)
 def test_family_is_built_from_its_default_scene(name: str, tmp_path: Path) -> None:
-    few = Plan.of_family(name)
-    table = collections.build(
-        [Plan(scene=few.scene, collection=few.collection, problems=3, form="global")],
-        tmp_path,
-        pictures=False,
-    )
+    table = collections.build([Plan.of_family(name, problems=3)], tmp_path, pictures=False)
     assert table["number"].to_pylist() == [0, 1, 2]
     assert table["status"].to_pylist() == ["converged"] * 3
     assert all(verdict.ok for verdict in collections.verify(tmp_path))
@@ -522,7 +521,7 @@ def test_list_and_show() -> None:
         assert name in listed.output
         shown = invoke("collection", "show", name)
         assert shown.exit_code == 0
-        assert "time_step" in shown.output
+        assert ("time_step" in shown.output) == (name in scenes.families())
     assert invoke("collection", "show", "Boxes").exit_code == 2
 
 

@@ -731,7 +731,7 @@ def test_planar_columns_are_those_of_space() -> None:
 def test_rolling_resistance_in_the_plane_stops_a_ball() -> None:
     """The speed falls by g mu_r / R / (1 + I / m R^2) a second; I = 2/5 m R^2."""
     R, mu_r, v0 = 0.1, 0.01, 1.0
-    rolls = {"mu": 0.5, "mu_r": mu_r, "x": 0, "more": 'condim="6"'}
+    rolls: dict[str, Any] = {"mu": 0.5, "mu_r": mu_r, "x": 0, "more": 'condim="6"'}
     floor = FLOOR.replace("/>", ' condim="6"/>')
     xml = mjcf(floor + BALL, floor=False, rest=start("0 0 0", f"{v0} 0 {v0 / R}"), **rolls)
     steps = planar(xml, 100)

@@ -13,10 +13,11 @@ from typing import Annotated, Any
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from fclib import collections, scenes
+from fclib import collections
 from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
 from fclib.collections.archives import FetchError
 from fclib.collections.build import BuildError
+from fclib.collections.sets import KNOWN, choices, differing
 
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
@@ -75,10 +76,30 @@ def many_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 
 @app.command("list")
-def list_families(as_json: Json = False) -> None:
-    """The families, with their sets and numbers of problems."""
+def list_families(
+    of_sets: Annotated[bool, typer.Option("--sets", help="The sets instead.")] = False,
+    as_json: Json = False,
+) -> None:
+    """The families, with their sets and numbers of problems; or the sets, with their versions."""
     report = Report(as_json)
-    for name, family in scenes.families().items():
+    if of_sets:
+        for name, folders in collections.sets().items():
+            chosen = len(choices(name))
+            known = collections.families()
+            total = sum(known[folder.partition("/")[2]].problems for folder in folders)
+            report.add(
+                {
+                    "set": name,
+                    "version": collections.version(name),
+                    "families": len(folders),
+                    "problems": chosen or total,
+                    "what": KNOWN[name][1] if name in KNOWN else "",
+                }
+            )
+        if not as_json:
+            out.print(make_table(report.records))
+        return
+    for name, family in collections.families().items():
         report.add(
             {
                 "family": name,
@@ -94,17 +115,22 @@ def list_families(as_json: Json = False) -> None:
 
 @app.command()
 def show(
-    name: Annotated[str, typer.Argument(help="A family.")],
+    name: Annotated[str, typer.Argument(help="A family, or a set.")],
     folder: Annotated[
         Path | None, typer.Option("--in", help="A folder where it was built, for its ranges.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """A family: what it is, its parameters, and what a build gave."""
-    try:
-        family = scenes.get(name)
-    except KeyError as error:
-        usage_error(ValueError(error.args[0]))
+    """A family: what it is, its parameters, and what a build gave; or what a set has."""
+    if name in collections.sets():
+        show_set(name, as_json)
+        return
+    if name not in collections.families():
+        try:
+            collections.folders([name])
+        except KeyError as error:
+            usage_error(ValueError(error.args[0]))
+    family = collections.families()[name.rpartition("/")[2]]
     record: dict[str, Any] = {
         "family": name,
         "set": family.collection,
@@ -147,20 +173,41 @@ def show(
         out.print(make_table(ranges))
 
 
+def show_set(name: str, as_json: bool) -> None:
+    """The version of a set and its families; of a list, its problems."""
+    report = Report(as_json)
+    chosen = choices(name)
+    for folder in collections.sets()[name]:
+        family = folder.partition("/")[2]
+        numbers = sorted(choice.number for choice in chosen if choice.family == family)
+        count = len(numbers) if chosen else collections.families()[family].problems
+        record: dict[str, Any] = {
+            "folder": folder,
+            "version": collections.version(name),
+            "problems": count,
+        }
+        if chosen:
+            record["numbers"] = ", ".join(map(str, numbers))
+        report.add(record)
+    if not as_json:
+        out.print(make_table(report.records))
+
+
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """A row for each family of a catalogue: how many problems, and from where to where."""
     found = []
-    for family in dict.fromkeys(row["family"] for row in rows):
-        own = [row for row in rows if row["family"] == family]
+    for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
+        own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
 
         def span(key: str, own: list[dict[str, Any]] = own) -> str:
-            values = [row[key] for row in own]
-            return f"{min(values):.4g} to {max(values):.4g}"
+            values = [row[key] for row in own if row[key] is not None]
+            return f"{min(values):.4g} to {max(values):.4g}" if values else ""
 
         found.append(
             {
                 "family": family,
-                "set": own[0]["collection"],
+                "set": name,
+                "version": own[0]["version"] or "",
                 "problems": len(own),
                 "solved": sum(row["status"] == "converged" for row in own),
                 "dof": span("n"),
@@ -195,15 +242,18 @@ def build(
     if every == bool(names):
         raise typer.BadParameter("name sets or families, or say --all")
     try:
-        families = collections.family_names(names or ["rt444"])
+        folders = collections.folders(names or ["rt444"])
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
-    plans = [
-        collections.Plan.of_family(
-            family, seed, form=form.value, count=count, select=select.value, analyze=analyze
-        )
-        for family in families
-    ]
+    try:
+        plans = [
+            collections.plan_of(
+                own, seed, form=form.value, count=count, select=select.value, analyze=analyze
+            )
+            for own in folders
+        ]
+    except ValueError as error:
+        usage_error(error)
     run(plans, folder, jobs, pictures, as_json)
 
 
@@ -238,6 +288,15 @@ def run(
             out.print(
                 f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
                 f" {worst['id']}, error {worst['error']:.1e}. The simulation went on from there."
+            )
+        for name in dict.fromkeys(plan.collection for plan in plans if plan.chosen):
+            own = [row for row in rows if row["collection"] == name]
+            built = {row["family"] for row in own}
+            other = [id for id in differing(name, own) if id.split("/")[1] in built]
+            out.print(
+                f"{len(own) - len(other)} of {len(own)} problems of the set {name} have the data"
+                " that its list says"
+                + (f"; not {', '.join(other[:3])}: another machine?" if other else "")
             )
         out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
     raise typer.Exit(int(report.failed))
@@ -305,10 +364,11 @@ def get(
     """Fetch published families, check them and unpack them; goes on where it broke off."""
     try:
         with many_bars() as bars:
-            families = collections.get(names, url, folder, bars)
+            fetched = collections.get(names, url, folder, bars)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     except (FetchError, collections.CatalogError, ImportError) as error:
         fail(str(error))
     rows = collections.read_catalog(folder).to_pylist()
-    out.print(make_table([row for row in ranges_of(rows) if row["family"] in families]))
+    own = [row for row in rows if f"{row['collection']}/{row['family']}" in fetched]
+    out.print(make_table(ranges_of(own)))

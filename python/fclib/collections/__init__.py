@@ -1,17 +1,19 @@
 """The collection: families of problems, built from scenes, with a catalogue.
 
     fclib.collection("rt444")[100]      a problem, from the user's folder; built if it is not there
+    fclib.load("tiny/BoxesStack/0030")  one that comes with the package
     collections.build(...)              scenes ──> problems, solutions, files ──> catalogue
     collections.verify(...)             files again as the catalogue says, solutions judged anew
     collections.publish(...), get(...)  archives with their SHA-256 for any static web server
 
 A problem is named SET/FAMILY/NUMBER, as rt444/KaplasTower/0100; its number counts the steps of
-the family's scene that have a contact.
+the family's scene that have a contact, or the problems of a family assembled directly.
 
-plan.py       which families, which of their problems
-build.py      the simulation of a family into files, gone on with after a kill
+plan.py       what is built of a family, and which of its problems are kept
+sets.py       the sets, their versions and their families; lists of chosen problems in data/
+build.py      a family into files, gone on with after a kill
 catalog.py    a row for each problem; catalog.parquet
-library.py    the user's folder: `fclib.collection` and `fclib.load`
+library.py    the package's and the user's folder: `fclib.collection` and `fclib.load`
 archives.py   publish and get
 figures.py    distributions and pictures
 """
@@ -20,7 +22,8 @@ from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
 from fclib.collections.library import Collection, load
-from fclib.collections.plan import Plan, Selection, family_names, sets
+from fclib.collections.plan import Plan, Selection, families
+from fclib.collections.sets import folders, plan_of, sets, version
 from fclib.collections.verify import verify
 
 __all__ = [
@@ -29,11 +32,14 @@ __all__ = [
     "Plan",
     "Selection",
     "build",
-    "family_names",
+    "families",
+    "folders",
     "get",
     "load",
+    "plan_of",
     "publish",
     "read_catalog",
     "sets",
     "verify",
+    "version",
 ]

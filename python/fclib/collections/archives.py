@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib.collections import catalog
-from fclib.collections.plan import family_names
+from fclib.collections.sets import folders
 
 REGISTRY = "registry.txt"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives
@@ -102,13 +102,13 @@ def get(
     A download that broke off is gone on with, where the server lets one ask for the rest.
 
     Args:
-        names: sets, families, or scenes that are published there.
+        names: sets, families, families in a set (SET/FAMILY), or scenes that are published there.
         url: where `registry.txt` lies.
         folder: the collection's folder; the archives are kept in its `.archives`.
         progress: called with the archive's name, the bytes there are, and how many there will be.
 
     Returns:
-        The families that are there now.
+        The folders SET/FAMILY that are there now.
 
     Raises:
         KeyError: a name that is no set and no family, or is not published there.
@@ -129,21 +129,14 @@ def get(
     except OSError as error:
         raise FetchError(f"{base}{REGISTRY}: is no registry: {error}") from error
 
-    published = {name: family for name in fetcher.registry for family in [family_of(name)]}
-    # an MJCF scene is no family of ours, and known by its archive alone
-    families = list(
-        dict.fromkeys(
-            family
-            for name in names
-            for family in ([name] if name in published.values() else family_names([name]))
-        )
-    )
-    for family in families:
-        found = [name for name, own in published.items() if own == family]
-        if not found:
-            raise KeyError(f"{family} is not published at {base}")
+    published = {folder_of(name): name for name in fetcher.registry if name.endswith(".zip")}
+    wanted = list(dict.fromkeys(own for name in names for own in wanted_of(name, [*published])))
+    for own in wanted:
+        if own not in published:
+            raise KeyError(f"{own} is not published at {base}")
+        archive = published[own]
 
-        def fetch(url: str, output_file: str, _pooch: Any, archive: str = found[0]) -> None:
+        def fetch(url: str, output_file: str, _pooch: Any, archive: str = archive) -> None:
             show = (lambda done, total: progress(archive, done, total)) if progress else None
             # pooch's own file is new each time; ours stays, and is gone on with
             target = archives / f"{archive}.part"
@@ -151,22 +144,34 @@ def get(
             shutil.move(target, output_file)
 
         try:
-            path = fetcher.fetch(found[0], downloader=fetch)
+            path = fetcher.fetch(archive, downloader=fetch)
         except ValueError as error:
-            raise FetchError(f"{base}{found[0]}: is not what the registry says: {error}") from error
+            raise FetchError(f"{base}{archive}: is not what the registry says: {error}") from error
         unpack(Path(path), folder)
     from fclib.collections.build import gather
 
     gather(folder)
-    return families
+    return wanted
 
 
-def family_of(archive: str) -> str | None:
-    """The family of an archive's name, None for another file."""
-    if not archive.endswith(".zip"):
-        return None
+def folder_of(archive: str) -> str:
+    """SET/FAMILY of an archive's name."""
     # the name of a set has no hyphen, that of a scene may
-    return archive.removesuffix(".zip").partition("-")[2]
+    return archive.removesuffix(".zip").replace("-", "/", 1)
+
+
+def wanted_of(name: str, published: Sequence[str]) -> list[str]:
+    """The folders that a name stands for, where these are published. KeyError for no name of ours.
+
+    An MJCF scene is no family of ours, and known by its archive alone.
+    """
+    try:
+        ours = folders([name])
+    except KeyError:
+        ours = []
+    there = [own for own in published if own in ours]
+    there = there or [own for own in published if name in (own, own.partition("/")[2])]
+    return there or folders([name])
 
 
 def download(url: str, target: Path, progress: Callable[[int, int], None] | None = None) -> None:

@@ -1,4 +1,4 @@
-"""From plans to files: each scene is simulated in a process, and its problems are stored.
+"""From plans to files: each family is made in a process, and its problems are stored.
 
     OUT/SET/FAMILY/0100-global.hdf5     problem and solution
                    0100-local.hdf5
@@ -17,7 +17,7 @@ import json
 import multiprocessing
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import fclib
+from fclib import scenes
 from fclib.collections import catalog
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
 
@@ -174,10 +175,46 @@ class Kept:
         self._numbers = set(self.plan.numbers().tolist())
 
 
-def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
-    """Simulate a scene and store its problems; go on where a build before was interrupted."""
+@dataclass(frozen=True)
+class Item:
+    """A problem of a plan with its solution, before it is stored."""
+
+    problem: Any
+    result: fclib.Result
+    step: int  # of the simulation, or the problem's number
+    time: float | None = None  # at the start of the step [s]
+    bodies: int | None = None
+    simulated: Step | None = None  # where it comes from
+
+
+def items(plan: Plan, kept: Kept, start: State | None) -> Iterator[Item]:
+    """The steps of a scene, those without contact too, or the wanted problems of a family.
+
+    Of the problems that are not wanted those of a simulation must be solved to go on.
+    """
+    if isinstance(plan.scene, scenes.Assembled):
+        for number in range(kept.looked, plan.total):
+            if not kept.wants(number):
+                kept.looked += 1
+                continue
+            problem = plan.scene.problem(number)
+            result = fclib.solve(problem, plan.solver, tol=plan.tol, **plan.options)
+            yield Item(problem, result, number)
+        return
     from fclib.simulate import simulate
 
+    # a scene that never touches anything would go on for ever
+    most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
+    done = start.index if start is not None else 0
+    for step in simulate(
+        plan.scene, most - done, solver=plan.solver, tol=plan.tol, start=start, **plan.options
+    ):
+        bodies = int(np.unique(step.model.trees[step.dofs]).size)
+        yield Item(step.problem, step.result, step.index, step.time, bodies, step)
+
+
+def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
+    """Make the problems of a plan and store them; go on where a build before was interrupted."""
     folder = out / plan.name
     state_folder = folder / STATE
     state_folder.mkdir(parents=True, exist_ok=True)
@@ -185,30 +222,25 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
     kept = Kept(plan)
     start = read_checkpoint(state_folder, kept)
 
-    # a scene that never touches anything would go on for ever
-    most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
-    done = start.index if start is not None else 0
-    steps = simulate(
-        plan.scene, most - done, solver=plan.solver, tol=plan.tol, start=start, **plan.options
-    )
     last = time.monotonic()
-    step = None
-    for step in steps:
+    item = None
+    for item in items(plan, kept, start):
         if time.monotonic() - last > CHECKPOINT:
-            write_checkpoint(state_folder, kept, step.start)
+            write_checkpoint(state_folder, kept, item.simulated.start if item.simulated else None)
             last = time.monotonic()
-        if step.problem.nc:
+        if item.problem.nc:
             if kept.wants(kept.looked):
-                store(plan, kept, step, out)
+                store(plan, kept, item, out)
             kept.looked += 1
             report(plan.name, kept.looked, plan.total)
             if kept.looked == plan.problems:
                 break
 
-    if pictures and step is not None:
+    if pictures and item is not None:
         from fclib.collections import figures
 
-        figures.draw_scene(step, folder)
+        if item.simulated is not None:
+            figures.draw_scene(item.simulated, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
     catalog.write_catalog(
         folder / catalog.FILE,
@@ -218,44 +250,46 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
     shutil.rmtree(state_folder)
 
 
-def store(plan: Plan, kept: Kept, step: Step, out: Path) -> None:
-    """Write a step's files, and remove those that it drives out."""
-    local = step.problem.condense()
+def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
+    """Write a problem's files, and remove those that it drives out."""
+    is_global = item.problem.kind.startswith("global")
+    local = item.problem.condense() if is_global else item.problem
     sweeps = None
     if plan.select == "hard":
         trial = fclib.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
         sweeps = trial.iterations
-    row = describe(plan, kept.looked, step) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
+    row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
     if plan.analyze:
         from fclib.analysis import analyze
 
-        record = analyze(step.problem, tol=plan.tol).record
+        record = analyze(item.problem, tol=plan.tol).record
         row |= {name: record.get(name) for name in catalog.ANALYSIS}
-    for form in plan.forms:
+    for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
-        problem = step.problem if form == "global" else local
-        solution = step.result.solution
+        problem = item.problem if form == "global" else local
+        solution = item.result.solution
         if form == "local":
             solution = fclib.Solution(r=solution.r, u=solution.u, l=solution.l)
         fclib.write(out / path, problem, solution)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
-        for form in plan.forms:
-            (out / gone[f"{form}_file"]).unlink(missing_ok=True)
+        for file, _ in catalog.files_of({**dict.fromkeys(catalog.FILES), **gone}):
+            (out / file).unlink(missing_ok=True)
 
 
-def describe(plan: Plan, number: int, step: Step) -> dict[str, Any]:
-    """The row of a step: all but its files."""
-    problem, result = step.problem, step.result
+def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
+    """The row of a problem: all but its files."""
+    problem, result = item.problem, item.result
     merit = fclib.merit(problem, result.solution)
     mu = np.asarray(problem.mu)
     return {
         "id": f"{plan.name}/{number:04d}",
         "collection": plan.collection,
+        "version": plan.version,
         "family": plan.scene.name,
         "number": number,
-        "step": step.index,
-        "time": step.time,
+        "step": item.step,
+        "time": item.time,
         "seed": plan.scene.seed,
         "title": problem.info.title,
         "formulation": problem.formulation,
@@ -263,12 +297,12 @@ def describe(plan: Plan, number: int, step: Step) -> dict[str, Any]:
         "n": problem.n,
         "p": problem.p,
         "nc": problem.nc,
-        "bodies": int(np.unique(step.model.trees[step.dofs]).size),
-        "density": problem.spacedim * problem.nc / problem.n,
+        "bodies": item.bodies,
+        "density": problem.spacedim * problem.nc / problem.n if problem.n else None,
         "mu_min": float(mu.min()),
         "mu_max": float(mu.max()),
-        "nnz_M": nnz(problem.M),
-        "nnz_H": nnz(problem.H),
+        "nnz_M": nnz(problem.M) if problem.n else None,
+        "nnz_H": nnz(problem.H) if problem.n else None,
         "open": merit.open,
         "stick": merit.stick,
         "slide": merit.slide,
@@ -285,18 +319,17 @@ def nnz(matrix: Any) -> int:
     return int(getattr(matrix, "nnz", np.size(matrix)))
 
 
-def write_checkpoint(folder: Path, kept: Kept, start: State) -> None:
-    """Store where to go on: the start of a step, and what was kept before it."""
+def write_checkpoint(folder: Path, kept: Kept, start: State | None) -> None:
+    """Store where to go on: the start of a step, if there is one, and what was kept before it."""
     content = io.BytesIO()
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
-    np.savez(content, known=known, **{f.name: getattr(start, f.name) for f in fields(start)})
+    state = {f.name: getattr(start, f.name) for f in fields(start)} if start is not None else {}
+    np.savez(content, known=known, **state)
     catalog.replace_file(folder / "state.npz", lambda path: path.write_bytes(content.getvalue()))
 
 
 def read_checkpoint(folder: Path, kept: Kept) -> State | None:
     """The state to go on from, None for the scene's start; `kept` takes what was stored."""
-    from fclib.simulate import State
-
     path = folder / "state.npz"
     if not path.is_file():
         return None
@@ -305,6 +338,10 @@ def read_checkpoint(folder: Path, kept: Kept) -> State | None:
     known = json.loads(str(values.pop("known")))
     kept.looked = known["looked"]
     kept.rows = {row["number"]: row for row in known["rows"]}
+    if not values:
+        return None
+    from fclib.simulate import State
+
     return State(**(values | {"index": int(values["index"])}))
 
 

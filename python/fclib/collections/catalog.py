@@ -21,18 +21,19 @@ FINGERPRINT = b"fclib.plan"
 COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("id", "string", "SET/FAMILY/NUMBER"),
     ("collection", "string", "the set"),
+    ("version", "string", "of the set"),
     ("family", "string", "the scene's family, or the name of its MJCF file"),
-    ("number", "int32", "counts the steps that have a contact"),
-    ("step", "int32", "of the simulation"),
-    ("time", "float64", "at the start of the step [s]"),
+    ("number", "int32", "counts the steps that have a contact, or the family's problems"),
+    ("step", "int32", "of the simulation; the number where there is none"),
+    ("time", "float64", "at the start of the step [s]; null without a simulation"),
     ("seed", "int64", "of the scene; null for an MJCF file"),
     ("title", "string", "of the problem"),
-    ("formulation", "string", "of the global form, in RT-0444's abbreviations"),
+    ("formulation", "string", "of the global form, or the only one, in RT-0444's abbreviations"),
     ("spacedim", "int32", "components of a contact"),
-    ("n", "int32", "degrees of freedom of the bodies that contacts move"),
+    ("n", "int32", "degrees of freedom of the bodies that contacts move; 0 for a local problem"),
     ("p", "int32", "bilateral constraints"),
     ("nc", "int32", "contacts"),
-    ("bodies", "int32", "bodies, or trees of bodies, among which the contacts are"),
+    ("bodies", "int32", "bodies, or trees of bodies, among which the contacts are, if simulated"),
     ("density", "float64", "spacedim nc / n, contact components for a degree of freedom"),
     ("mu_min", "float64", "smallest coefficient of friction"),
     ("mu_max", "float64", "largest coefficient of friction"),
@@ -47,12 +48,15 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("tol", "float64", "what it was asked for"),
     ("error", "float64", "relative natural-map error of the stored solution, global form"),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
-    ("digest", "string", "fclib.digest of the global form"),
+    ("digest", "string", "fclib.digest of the global form, or the only one"),
     ("global_file", "string", "path from the catalogue's folder"),
     ("global_sha256", "string", "of that file"),
     ("local_file", "string", "path from the catalogue's folder"),
     ("local_sha256", "string", "of that file"),
 )
+
+# of the files' paths and SHA-256
+FILES = ("global_file", "global_sha256", "local_file", "local_sha256")
 
 # further columns where a build was asked to analyze; docs/analysis.md has their meaning
 ANALYSIS: tuple[str, ...] = (
@@ -125,9 +129,14 @@ def read_catalog(path: str | Path) -> Any:
     except (OSError, pa.ArrowInvalid) as error:
         reason = str(error).splitlines()[0]
         raise CatalogError(f"{file}: cannot be read as a catalogue: {reason}") from None
-    missing = [name for name, *_ in COLUMNS if name not in table.column_names]
-    if missing:
-        raise CatalogError(f"{file}: is no catalogue, it has no column {missing[0]!r}")
+    for name in ("id", "digest", *FILES):
+        if name not in table.column_names:
+            raise CatalogError(f"{file}: is no catalogue, it has no column {name!r}")
+    # an older one lacks what came later
+    for place, (name, kind, _) in enumerate(COLUMNS):
+        if name not in table.column_names:
+            nothing = pa.nulls(table.num_rows, pa.type_for_alias(kind))
+            table = table.add_column(place, name, nothing)
     return table
 
 

@@ -1,4 +1,4 @@
-"""The user's folder: problems by their names, built or fetched when they are not there."""
+"""Problems by their names: from the package, or from the user's folder, built or fetched there."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any, overload
 
 import fclib
-from fclib import scenes
-from fclib.collections import archives, catalog
+from fclib.collections import archives, catalog, sets
 from fclib.collections.build import build
-from fclib.collections.plan import Plan, family_names
 
 FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
+FORMS = ("global", "local")
 SOURCE = "FCLIB_COLLECTION_URL"  # environment: where published archives lie
 
 
@@ -23,16 +22,15 @@ def default_folder() -> Path:
     return Path(named) if named else archives.cache_folder() / f"collection-{fclib.__version__}"
 
 
-def ensure(family: str, folder: Path) -> None:
-    """Make a family be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most."""
-    part = folder / scenes.get(family).collection / family / catalog.FILE
-    if part.is_file():
+def ensure(name: str, folder: Path) -> None:
+    """Make SET/FAMILY be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most."""
+    if (folder / name / catalog.FILE).is_file():
         return
     source = os.environ.get(SOURCE)
     if source:
-        archives.get([family], source, folder)
+        archives.get([name], source, folder)
     else:
-        build([Plan.of_family(family)], folder, pictures=False)
+        build([sets.plan_of(name)], folder, pictures=False)
 
 
 class Collection(Sequence[Any]):
@@ -46,8 +44,12 @@ class Collection(Sequence[Any]):
     def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
         """KeyError, with the known names, where there is no such set or family."""
         self.name = name
-        self.families = family_names([name])
-        self.folder = Path(folder) if folder is not None else default_folder()
+        self.folders = sets.folders([name])
+        shipped = all(own.split("/")[0] in sets.SHIPPED for own in self.folders)
+        if shipped:
+            self.folder = sets.DATA
+        else:
+            self.folder = Path(folder) if folder is not None else default_folder()
         self._catalog: Any = None
 
     def __repr__(self) -> str:
@@ -64,10 +66,9 @@ class Collection(Sequence[Any]):
         if self._catalog is None:
             pa = catalog.arrow()
             tables = []
-            for family in self.families:
-                ensure(family, self.folder)
-                collection = scenes.get(family).collection
-                tables.append(catalog.read_catalog(self.folder / collection / family))
+            for own in self.folders:
+                ensure(own, self.folder)
+                tables.append(catalog.read_catalog(self.folder / own))
             self._catalog = pa.concat_tables(
                 [table.replace_schema_metadata(None) for table in tables], promote_options="default"
             )
@@ -79,19 +80,23 @@ class Collection(Sequence[Any]):
         names: list[str] = self.catalog["id"].to_pylist()
         return names
 
-    def path(self, which: int | str, form: str = "global") -> Path:
-        """The file of a problem, by its place or its name. IndexError, KeyError."""
+    def path(self, which: int | str, form: str | None = None) -> Path:
+        """The file of a problem, by its place or its name. IndexError, KeyError.
+
+        The form is "global" or "local"; by default the global one of a problem that has both.
+        """
         ids = self.ids
         if isinstance(which, str):
             if which not in ids:
                 raise KeyError(f"{self.name} has no problem {which!r}; the first is {ids[0]!r}")
             which = ids.index(which)
-        file: str | None = self.catalog[f"{form}_file"][which].as_py()
-        if file is None:
-            raise KeyError(f"the {form} form of {ids[which]} was not built")
-        return self.folder / file
+        for name in (form,) if form else FORMS:
+            file: str | None = self.catalog[f"{name}_file"][which].as_py()
+            if file is not None:
+                return self.folder / file
+        raise KeyError(f"the {form} form of {ids[which]} was not built, or it has none")
 
-    def solution(self, which: int | str, form: str = "global") -> fclib.Solution | None:
+    def solution(self, which: int | str, form: str | None = None) -> fclib.Solution | None:
         """The stored solution of a problem."""
         return fclib.read_solution(self.path(which, form))
 
@@ -105,27 +110,33 @@ class Collection(Sequence[Any]):
     def __getitem__(self, which: slice) -> list[Any]: ...
 
     def __getitem__(self, which: int | str | slice) -> Any:
-        """The global form of a problem, by its place or its name."""
+        """The global form, or the only one, of a problem, by its place or its name."""
         if isinstance(which, slice):
             return [self[i] for i in range(*which.indices(len(self)))]
         return fclib.read(self.path(which))
 
 
-def load(name: str, form: str = "global", folder: str | Path | None = None) -> Any:
+def load(name: str, form: str | None = None, folder: str | Path | None = None) -> Any:
     """One problem by its name, as ``"rt444/KaplasTower/0100"``.
 
     Args:
         name: SET/FAMILY/NUMBER.
-        form: "global" or "local".
+        form: "global" or "local"; by default the global one of a problem that has both.
         folder: where the collection lies; by default the user's cache.
 
     Raises:
         KeyError: there is no such problem.
         ValueError: a form that is neither.
     """
-    if form not in ("global", "local"):
+    if form not in (None, *FORMS):
         raise ValueError(f'the form is "global" or "local", not {form!r}')
     parts = name.split("/")
     if len(parts) != 3:
         raise KeyError(f"a problem is named SET/FAMILY/NUMBER, not {name!r}")
-    return fclib.read(Collection(parts[1], folder).path(name, form))
+    if parts[0] in sets.SHIPPED:
+        # needs nothing that reads catalogues
+        for own in (form,) if form else FORMS:
+            path = sets.DATA / f"{name}-{own}.hdf5"
+            if path.is_file():
+                return fclib.read(path)
+    return fclib.read(Collection(f"{parts[0]}/{parts[1]}", folder).path(name, form))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,55 +14,51 @@ from fclib import scenes
 
 Form = Literal["global", "local", "both"]
 Selection = Literal["every", "hard"]
+Source: TypeAlias = scenes.Scene | scenes.Assembled
 
 # a problem's cost to NSGS, where the hard ones are selected
 HARD_TOLERANCE = 1e-6
 HARD_SWEEPS = 2000
 
 
-def sets() -> dict[str, list[str]]:
-    """The families of each set, by name."""
-    found: dict[str, list[str]] = {}
-    for name, family in scenes.families().items():
-        found.setdefault(family.collection, []).append(name)
-    return dict(sorted(found.items()))
+def families() -> dict[str, type[scenes.Described]]:
+    """All families, of scenes and of problems assembled directly, by name."""
+    return dict(sorted({**scenes.families(), **scenes.assemblies()}.items()))
 
 
-def family_names(names: list[str]) -> list[str]:
-    """Names of sets and families as families, each once. KeyError for a name that is neither."""
-    known = sets()
-    found: dict[str, None] = {}
-    for name in names:
-        if name in known:
-            found.update(dict.fromkeys(known[name]))
-        elif name in scenes.families():
-            found[name] = None
-        else:
-            families = ", ".join(scenes.families())
-            raise KeyError(
-                f"no set and no family is called {name!r}; sets: {', '.join(known)};"
-                f" families: {families}"
-            )
-    return list(found)
+def source(name: str, parameters: dict[str, Any] | None = None, seed: int = 0) -> Source:
+    """What a family's problems come from: a scene, or the family itself.
+
+    Raises:
+        KeyError: there is no such family.
+        TypeError, ValueError: it does not take the parameters.
+    """
+    if name in scenes.assemblies():
+        return scenes.Assembled(family=scenes.assemblies()[name](**(parameters or {})), seed=seed)
+    return scenes.get(name)(**(parameters or {})).scene(seed)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is built of one scene.
+    """What is built of one scene, or of a family assembled directly.
 
     With `count` below the number of problems, the rule of selection is
 
     every   problems at equal distances, the first and the last among them
     hard    those that take NSGS most sweeps to 1e-6 (2000 at most), the earlier one of two equals
+
+    A plan that names its `numbers` takes those.
     """
 
-    scene: scenes.Scene
+    scene: Source
     collection: str  # the set
+    version: str = ""  # of the set
     problems: int | None  # steps with contact that are looked at; None: as many as `steps` give
     steps: int | None = None  # at most; None: as many as `problems` need
     form: Form = "both"
     count: int | None = None  # problems kept; None: all
     select: Selection = "every"
+    chosen: tuple[int, ...] | None = None  # the numbers that are kept, in order
     analyze: bool = False  # also figures of `fclib.analysis.analyze`; a second a problem, or more
     solver: str = "auto"
     tol: float = 1e-8
@@ -70,16 +66,18 @@ class Plan:
 
     @classmethod
     def of_family(cls, name: str, seed: int = 0, **settings: Any) -> Plan:
-        """The plan of a family's default scene."""
-        family = scenes.get(name)
-        scene = family().scene(seed)
-        return cls(scene=scene, collection=family.collection, problems=family.problems, **settings)
+        """The plan of a family with its default parameters, in the set that it belongs to."""
+        family = families()[name] if name in families() else scenes.get(name)
+        own: dict[str, Any] = {"collection": family.collection, "problems": family.problems}
+        return cls(scene=source(name, seed=seed), **own | settings)
 
     def __post_init__(self) -> None:
         if self.count is not None and self.count < 1:
             raise ValueError(f"the count of problems must be at least 1, not {self.count}")
         if self.problems is None and self.steps is None:
             raise ValueError("a plan needs a number of problems or of steps")
+        if self.chosen is not None and (self.count is not None or self.select != "every"):
+            raise ValueError("a plan that names its problems takes no count and no selection")
 
     @property
     def name(self) -> str:
@@ -93,37 +91,30 @@ class Plan:
 
     @property
     def forms(self) -> tuple[str, ...]:
-        """The forms that are written."""
+        """The forms that are written, of a problem that has both."""
         return ("global", "local") if self.form == "both" else (self.form,)
 
     def numbers(self) -> npt.NDArray[np.int64]:
-        """The numbers kept by the rule `every`."""
+        """The numbers kept by the rule `every`, or chosen."""
+        if self.chosen is not None:
+            return np.array(self.chosen, dtype=np.int64)
         count = self.total if self.count is None else min(self.count, self.total)
         numbers = np.rint(np.linspace(0, self.total - 1, count)).astype(np.int64)
         return np.unique(numbers)
 
     def fingerprint(self) -> str:
         """All that decides what is built, as JSON."""
-        # the file names the version, hence the numbers, of what simulates
-        from fclib.simulate import _mujoco
-
         return json.dumps(
             {
                 "fclib": fclib.__version__,
-                "mujoco": _mujoco.VERSION,
-                "scene": self.scene.name,
-                "parameters": dict(self.scene.parameters),
-                "seed": self.scene.seed,
-                "restitution": self.scene.restitution,
-                "law": self.scene.law,
-                "time_step": self.scene.time_step,
-                "ignore": list(self.scene.ignore),
-                "planar": self.scene.planar,
+                "version": self.version,
+                **origin(self.scene),
                 "problems": self.problems,
                 "steps": self.steps,
                 "form": self.form,
                 "count": self.count,
                 "select": self.select,
+                "chosen": self.chosen,
                 "analyze": self.analyze,
                 "solver": self.solver,
                 "tol": self.tol,
@@ -131,3 +122,21 @@ class Plan:
             },
             sort_keys=True,
         )
+
+
+def origin(scene: Source) -> dict[str, Any]:
+    """What decides a source's problems, in JSON's types."""
+    known = {"scene": scene.name, "parameters": dict(scene.parameters), "seed": scene.seed}
+    if isinstance(scene, scenes.Assembled):
+        return known
+    # the file names the version, hence the numbers, of what simulates
+    from fclib.simulate import _mujoco
+
+    return known | {
+        "mujoco": _mujoco.VERSION,
+        "restitution": scene.restitution,
+        "law": scene.law,
+        "time_step": scene.time_step,
+        "ignore": list(scene.ignore),
+        "planar": scene.planar,
+    }

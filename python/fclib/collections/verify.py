@@ -30,8 +30,8 @@ class Verdict:
 def verify(folder: str | Path, progress: Callable[[str], None] | None = None) -> Iterator[Verdict]:
     """Hash each file of a folder again, read it, and judge its solution from the data alone.
 
-    A stored solution must be as good as the catalogue says, and the data of a global form must
-    have the digest that stands there.
+    A stored solution must be as good as the catalogue says, and the data of the form that the
+    catalogue describes must have the digest that stands there.
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -59,7 +59,7 @@ def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) 
     if solution is None:
         return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
     error = fclib.merit(problem, solution).error
-    if path == row["global_file"] and fclib.digest(problem) != row["digest"]:
+    if problem.formulation == row["formulation"] and fclib.digest(problem) != row["digest"]:
         return Verdict(name, path, "wrong digest", error, f"{file}: holds another problem")
     stored = float(row["error"])
     # the local form is another problem by rounding, and its error another number

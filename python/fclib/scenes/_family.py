@@ -1,12 +1,15 @@
-"""What a family of scenes is, and what it makes."""
+"""What a family is, and what it makes: a scene to simulate, or problems assembled directly."""
 
 from __future__ import annotations
 
 import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
+
+import fclib
 
 Law = Literal["velocity", "gap"]
 
@@ -90,10 +93,63 @@ class Scene:
         )
 
 
-class Family(Protocol):
-    """A frozen dataclass whose fields, all with defaults, are the parameters of its scenes.
+@dataclass(frozen=True, kw_only=True)
+class Assembled:
+    """The problems of a family that are assembled from its parameters, without a simulation."""
 
-    Among them are `restitution` and `time_step` [s].
+    family: Assembly
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Of the family."""
+        return type(self.family).__name__
+
+    @property
+    def title(self) -> str:
+        """Of the family."""
+        return self.family.title
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """Of the family."""
+        return asdict(self.family)
+
+    def problem(self, number: int) -> Any:
+        """Problem 0, 1, ...; the last line of its description is JSON and says where it is from.
+
+        Raises:
+            ValueError: the number is negative, or there are not so many problems.
+        """
+        family = self.family
+        if not 0 <= number < family.problems:
+            raise ValueError(f"{self.name} has problems 0 to {family.problems - 1}, not {number}")
+        problem = family.problem(number, self.seed)
+        origin = {
+            "generator": "fclib.scenes",
+            "fclib": fclib.__version__,
+            "scene": self.name,
+            "parameters": self.parameters,
+            "seed": self.seed,
+            "step": number,
+        }
+        words = [
+            family.description,
+            f"Field of application: {family.application}.",
+            f"Friction: {family.friction}.",
+            json.dumps(origin, default=str),
+        ]
+        info = fclib.ProblemInfo(
+            title=f"{family.title}, {problem.info.title}",
+            description="\n".join(words),
+            math_info=problem.info.math_info,
+        )
+        return problem.replace(info=info)
+
+
+class Described(Protocol):
+    """What every family says of itself: a frozen dataclass whose fields, all with defaults, are its
+    parameters.
     """
 
     title: ClassVar[str]
@@ -102,12 +158,28 @@ class Family(Protocol):
     authors: ClassVar[str]  # of the original family
     friction: ClassVar[str]  # the law of friction, in words
     collection: ClassVar[str]  # the set that it belongs to
-    problems: ClassVar[int]  # steps with contact that the set takes of its default scene
-    restitution: float
-    time_step: float
+    problems: ClassVar[int]  # that the set takes; of a scene, steps with contact
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init__(self, **parameters: Any) -> None: ...
+
+
+class Assembly(Described, Protocol):
+    """A family that makes its problems directly."""
+
+    def problem(self, number: int, seed: int = 0) -> Any:
+        """Problem `number`; the same number and seed give the same data, bit for bit.
+
+        The title of its info tells it from the others of the family.
+        """
+        ...
+
+
+class Family(Described, Protocol):
+    """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s]."""
+
+    restitution: float
+    time_step: float
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene of these parameters; the same seed gives the same scene, bit for bit."""

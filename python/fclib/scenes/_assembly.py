@@ -1,0 +1,162 @@
+"""Problems of one time step from rest, made from geometry alone: bodies, contacts, impulses.
+
+Free rigid bodies with M diagonal and axes along the world's. A contact has its two bodies (the
+ground is -1), its normal from the first to the second, and its point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+import fclib
+
+Vector: TypeAlias = npt.NDArray[np.float64]
+
+GRAVITY = 9.81  # [m/s^2]
+STEP = 5e-3  # h [s]
+# numbers of contacts of a ladder, about
+SIZES = (10, 30, 100, 300, 1000, 3000, 10000, 30000, 100000)
+ROUNDING = 1e-15  # entries of H below are none
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """n free rigid bodies with nc contacts, and what pushes them besides gravity."""
+
+    masses: Vector  # (n) [kg]
+    inertias: Vector  # (n x 3) about the axes of the world [kg m^2]
+    centres: Vector  # (n x 3) [m]
+    first: npt.NDArray[np.int64]  # (nc) a body, or -1
+    second: npt.NDArray[np.int64]  # (nc)
+    normals: Vector  # (nc x 3)
+    points: Vector  # (nc x 3) [m]
+    impulses: Vector  # (n x 3) [N s]
+    gravity: float = GRAVITY  # [m/s^2]
+
+    def problem(self, mu: Any, title: str) -> fclib.GlobalProblem:
+        """The problem G3DFC of a step from rest; mu is a number or (nc)."""
+        count, nc = len(self.masses), len(self.normals)
+        parts = [self._rows(self.second, 1.0), self._rows(self.first, -1.0)]
+        rows, columns, values = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        transposed = sp.csr_array((values, (rows, columns)), shape=(3 * nc, 6 * count))
+        transposed.data[np.abs(transposed.data) < ROUNDING] = 0
+        transposed.eliminate_zeros()
+        linear = np.repeat(self.masses[:, None], 3, axis=1)
+        f = np.zeros((count, 6))
+        f[:, 2] = -self.masses * self.gravity * STEP
+        f[:, :3] += self.impulses
+        return fclib.GlobalProblem(
+            M=sp.diags_array(np.concatenate([linear, self.inertias], axis=1).ravel()).tocsc(),
+            H=transposed.T.tocsc(),
+            f=f.ravel(),
+            w=np.zeros(3 * nc),
+            mu=np.broadcast_to(np.asarray(mu, dtype=float), (nc,)).copy(),
+            spacedim=3,
+            info=fclib.ProblemInfo(
+                title=title,
+                math_info=(
+                    f"one step from rest, h = {STEP:g} s; M v = H r + f, u = H^T v + w;"
+                    " v in m/s and rad/s, r in N s, components N, T1, T2"
+                ),
+            ),
+        )
+
+    def in_units(self, length: float, mass: float) -> Bodies:
+        """The same, measured in units of so many m and kg."""
+        return replace(
+            self,
+            masses=self.masses / mass,
+            inertias=self.inertias / (mass * length**2),
+            centres=self.centres / length,
+            points=self.points / length,
+            impulses=self.impulses / (mass * length),
+            gravity=self.gravity / length,
+        )
+
+    def repeated(self, times: int) -> Bodies:
+        """The same with so many copies of each contact, one beside the other."""
+        which = np.repeat(np.arange(len(self.normals)), times)
+        return replace(
+            self,
+            first=self.first[which],
+            second=self.second[which],
+            normals=self.normals[which],
+            points=self.points[which],
+        )
+
+    def _rows(
+        self, bodies: npt.NDArray[np.int64], sign: float
+    ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Vector]:
+        """Entries of H^T (rows, columns, values) for one side of the contacts."""
+        helper = np.where(np.abs(self.normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
+        t1 = np.cross(self.normals, helper)
+        t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
+        frames = np.stack([self.normals, t1, np.cross(self.normals, t1)], axis=1)
+        moving = np.flatnonzero(bodies >= 0)
+        arms = self.points[moving] - self.centres[bodies[moving]]
+        directions = frames[moving]
+        moments = np.cross(arms[:, None, :], directions)
+        values = sign * np.concatenate([directions, moments], axis=2)  # (., 3, 6)
+        rows = (3 * moving)[:, None, None] + np.arange(3)[:, None]
+        columns = 6 * bodies[moving][:, None, None] + np.arange(6)
+        return (
+            np.broadcast_to(rows, values.shape).ravel(),
+            np.broadcast_to(columns, values.shape).ravel(),
+            values.ravel(),
+        )
+
+
+def running_bond(
+    contacts: int, seed: int, *, push: float = 0.0, ratio: float = 1.0, spread: float = 0.05
+) -> Bodies:
+    """A wall of blocks, 2 x 1 x 1 m and 1000 kg, about twice as long as high, on the ground.
+
+    Args:
+        contacts: about so many; four for each pair of faces.
+        seed: of the masses.
+        push: horizontal impulse on the end of the top course, in weights of all blocks.
+        ratio: of the mass of the top course to that of the lowest, courses between in proportion.
+        spread: masses differ by this share.
+    """
+    random = np.random.Generator(np.random.PCG64(seed))
+    high = max(1, round(np.sqrt(contacts / 16)))
+    long = max(1, round(contacts / (8 * high)))
+    x, z = np.meshgrid(np.arange(long), np.arange(high))
+    centres = np.stack([2.0 * x + (z % 2), np.zeros(x.shape), z + 0.5], axis=-1).reshape(-1, 3)
+    ids = np.arange(centres.shape[0]).reshape(x.shape)
+    first, second, points = [], [], []
+    corners = [(sx, sy) for sx in (0, 1) for sy in (-0.5, 0.5)]
+    for row in range(high):
+        for column in range(long):
+            left = 2.0 * column + (row % 2) - 1
+            if row == 0:
+                spans = [(-1, left, left + 2)]
+            else:
+                shift = -1 if row % 2 == 0 else 0
+                halves = [(column + shift, left), (column + shift + 1, left + 1)]
+                spans = [(ids[row - 1, c], a, a + 1) for c, a in halves if 0 <= c < long]
+            for lower, a, b in spans:
+                for sx, sy in corners:
+                    first.append(lower)
+                    second.append(ids[row, column])
+                    points.append([a if sx == 0 else b, sy, float(row)])
+    masses = np.full(len(centres), 1000.0) * random.uniform(1 - spread, 1 + spread, len(centres))
+    if ratio != 1 and high > 1:
+        masses *= ratio ** (np.repeat(np.arange(high), long) / (high - 1))
+    impulses = np.zeros((len(centres), 3))
+    impulses[ids[-1, 0], 0] = push * masses.sum() * GRAVITY * STEP
+    return Bodies(
+        masses=masses,
+        inertias=masses[:, None] / 12 * np.array([[2.0, 5.0, 5.0]]),
+        centres=centres,
+        first=np.array(first),
+        second=np.array(second),
+        normals=np.tile([0.0, 0.0, 1.0], (len(first), 1)),
+        points=np.array(points),
+        impulses=impulses,
+    )

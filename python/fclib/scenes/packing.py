@@ -1,0 +1,89 @@
+"""Packings of spheres in growing sizes, assembled directly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fclib.scenes import _assembly, _mjcf
+from fclib.scenes._family import parameter
+
+SPACING = 0.02  # of the lattice [m]
+REACH = 1.12  # spacings at which two spheres touch
+
+
+@dataclass(frozen=True, kw_only=True)
+class Packing:
+    """Spheres of about 1 cm on a shaken lattice in a box without a lid, one step from rest.
+
+    Sizes grow, and every second packing is pushed from one side, by as much as the weight of all
+    spheres in that step.
+    """
+
+    title: ClassVar[str] = "Packing"
+    description: ClassVar[str] = "Spheres on a shaken lattice in an open box, one step from rest."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "the authors of FCLIB"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "ladder"
+    problems: ClassVar[int] = 10  # from 10 to 1000 contacts
+
+    mu: float = parameter(0.5, "1", "coefficient of friction")
+    push: float = parameter(1.0, "1", "impulse on every second packing, in weights of all spheres")
+    shake: float = parameter(0.08, "1", "deviation of a place, in spacings of the lattice")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(self, non_negative=("mu", "push", "shake"))
+
+    def problem(self, number: int, seed: int = 0) -> Any:
+        """Sizes of `_assembly.SIZES`, each at rest and pushed; the seed draws places and radii."""
+        size, pushed = divmod(number, 2)
+        return self.of_size(_assembly.SIZES[size], self.push if pushed else 0.0, seed)
+
+    def of_size(self, contacts: int, push: float, seed: int = 0) -> Any:
+        """A packing of about so many contacts."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        side = max(1, round((contacts / 3.3) ** (1 / 3)))
+        grid = np.stack(np.meshgrid(*[np.arange(side)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+        centres = SPACING * (grid + 0.5 + self.shake * random.standard_normal(grid.shape))
+        pairs = cKDTree(centres).query_pairs(REACH * SPACING, output_type="ndarray")
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))].reshape(-1, 2).astype(np.int64)
+        difference = centres[pairs[:, 1]] - centres[pairs[:, 0]]
+        normals = [difference / np.linalg.norm(difference, axis=1, keepdims=True)]
+        points = [0.5 * (centres[pairs[:, 1]] + centres[pairs[:, 0]])]
+        first, second = [pairs[:, 0]], [pairs[:, 1]]
+        # floor, then the four sides: axis, layer of the lattice that touches, direction inwards
+        for axis, layer, sign in (
+            (2, 0, 1),
+            (0, 0, 1),
+            (0, side - 1, -1),
+            (1, 0, 1),
+            (1, side - 1, -1),
+        ):
+            touching = np.flatnonzero(grid[:, axis] == layer)
+            normal = np.zeros(3)
+            normal[axis] = sign
+            normals.append(np.tile(normal, (len(touching), 1)))
+            points.append(centres[touching] - 0.5 * SPACING * normal)
+            first.append(np.full(len(touching), -1))
+            second.append(touching)
+        radii = 0.5 * SPACING * random.uniform(0.8, 1.0, len(centres))
+        masses = 2500 * 4 / 3 * np.pi * radii**3
+        impulses = np.zeros((len(centres), 3))
+        pushed = np.flatnonzero(grid[:, 0] == side - 1)
+        weight = masses.sum() * _assembly.GRAVITY * _assembly.STEP
+        impulses[pushed, 0] = -push * weight / len(pushed)
+        bodies = _assembly.Bodies(
+            masses=masses,
+            inertias=np.repeat((0.4 * masses * radii**2)[:, None], 3, axis=1),
+            centres=centres,
+            first=np.concatenate(first),
+            second=np.concatenate(second),
+            normals=np.concatenate(normals),
+            points=np.concatenate(points),
+            impulses=impulses,
+        )
+        return bodies.problem(self.mu, f"{len(centres)} spheres, push {push:g}")

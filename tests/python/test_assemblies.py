@@ -1,0 +1,128 @@
+"""Families assembled directly: what they say, and mechanics with a closed form."""
+
+import dataclasses
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from fclib import scenes
+from fclib.scenes import Assembled, _assembly
+
+FAMILIES: dict[str, Any] = dict(scenes.assemblies())
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_family_says_what_it_is(name: str) -> None:
+    family = FAMILIES[name]
+    for text in ("title", "description", "application", "authors", "friction", "collection"):
+        assert getattr(family, text).strip(), text
+    for parameter in dataclasses.fields(family):
+        assert parameter.default is not dataclasses.MISSING, parameter.name
+        assert parameter.metadata["unit"], parameter.name
+        assert parameter.metadata["doc"], parameter.name
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_problems_follow_from_parameters_number_and_seed(name: str) -> None:
+    family = FAMILIES[name]()
+    number = min(3, family.problems - 1)
+    problem = Assembled(family=family, seed=5).problem(number)
+    origin = json.loads(problem.info.description.splitlines()[-1])
+    assert (origin["scene"], origin["seed"], origin["step"]) == (name, 5, number)
+    again = Assembled(family=FAMILIES[name](**origin["parameters"]), seed=5).problem(number)
+    assert fclib.digest(again) == fclib.digest(problem)
+    assert again.info == problem.info
+    assert problem.info.title.startswith(family.title)
+    for wrong in (-1, family.problems):
+        with pytest.raises(ValueError, match=f"{name} has problems 0 to"):
+            Assembled(family=family, seed=0).problem(wrong)
+
+
+def blocks(name: str, number: int, **parameters: Any) -> Any:
+    return FAMILIES[name](**parameters).problem(number)
+
+
+def solved(problem: Any) -> Any:
+    result = fclib.solve(problem, tol=1e-10)
+    assert result.converged
+    return result.solution
+
+
+def test_sizes_grow_by_the_ladder() -> None:
+    for name, most in (("Wall", 8), ("Packing", 8)):
+        numbers = [blocks(name, number).nc for number in range(0, most, 2)]
+        wanted = _assembly.SIZES[: most // 2]
+        assert all(0.4 * size <= nc <= 1.1 * size for nc, size in zip(numbers, wanted, strict=True))
+        assert [blocks(name, number).nc for number in range(1, most, 2)] == numbers
+
+
+def test_wall_at_rest_stays_on_the_ground() -> None:
+    problem = blocks("Wall", 4)
+    solution = solved(problem)
+    np.testing.assert_allclose(solution.v, 0, atol=1e-6)
+    normal = solution.r.reshape(-1, 3)[:, 0]
+    ground = _assembly.running_bond(_assembly.SIZES[2], 0).first < 0
+    weight = problem.M.diagonal()[::6].sum() * _assembly.GRAVITY * _assembly.STEP
+    np.testing.assert_allclose(normal[ground].sum(), weight, rtol=1e-6)
+
+
+def test_pushed_packing_has_the_impulse() -> None:
+    rest, pushed = blocks("Packing", 4), blocks("Packing", 5, push=2.0)
+    weight = rest.M.diagonal()[::6].sum() * _assembly.GRAVITY * _assembly.STEP
+    np.testing.assert_allclose(rest.f[2::6].sum(), -weight)
+    np.testing.assert_allclose((pushed.f - rest.f)[0::6].sum(), -2 * weight)
+    assert not (pushed.f - rest.f)[2::6].any()
+
+
+def test_columns_turn_and_move_bodies_as_rigid() -> None:
+    """A rotation of everything about a point leaves no relative velocity but on the ground."""
+    bodies = _assembly.running_bond(60, 0)
+    problem: Any = bodies.problem(0.5, "")
+    omega, fixed = np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, 3.0])
+    linear = np.cross(omega, bodies.centres - fixed)
+    v = np.hstack((linear, np.tile(omega, (len(linear), 1)))).ravel()
+    u = np.reshape(problem.H.T @ v, (-1, 3))
+    ground = bodies.first < 0
+    np.testing.assert_allclose(u[~ground], 0, atol=1e-13)
+    speed = np.cross(omega, bodies.points[ground] - fixed)
+    np.testing.assert_allclose(np.linalg.norm(u[ground], axis=1), np.linalg.norm(speed, axis=1))
+    np.testing.assert_allclose(u[ground, 0], speed[:, 2], atol=1e-13)
+
+
+def test_units_are_one_mechanics() -> None:
+    """Natural error and all figures are those of m and kg, in other numbers."""
+    reference = blocks("Units", 4, contacts=60)
+    solution = solved(reference)
+    for number in range(9):
+        problem = blocks("Units", number, contacts=60)
+        length, mass = 1e-3 * 1e3 ** (number // 3), 1e-3 * 1e3 ** (number % 3)
+        v = solution.v.reshape(-1, 6) / ([length] * 3 + [1.0] * 3)
+        r = solution.r / (length * mass)
+        moved = fclib.Solution(v=v.ravel(), r=r)
+        assert fclib.merit(problem, moved).scaled_natural < 1e-9
+        assert fclib.merit(problem, moved).dynamics < 1e-9
+
+
+def test_repeated_contacts_move_bodies_alike() -> None:
+    once, often = (blocks("RepeatedContacts", number, contacts=60) for number in (0, 2))
+    assert often.nc == 4 * once.nc
+    first, second = (solved(problem).v for problem in (once, often))
+    np.testing.assert_allclose(first, second, atol=1e-6)
+
+
+def test_mass_ratios_and_friction_are_what_they_say() -> None:
+    for number, ratio in enumerate((1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)):
+        masses = blocks("MassRatios", number).M.diagonal()[::6]
+        assert 0.8 * ratio < masses.max() / masses.min() < 1.25 * ratio
+    mus = [float(blocks("FrictionRange", number).mu[0]) for number in range(9)]
+    assert (mus[0], mus[-1]) == (0.0, 10.0)
+    assert np.all(np.diff(mus) > 0)
+
+
+@pytest.mark.parametrize(("name", "value"), [("mu", -1.0), ("push", float("nan"))])
+def test_nonsense_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        FAMILIES["Wall"](**{name: value})

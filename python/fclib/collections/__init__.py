@@ -10,7 +10,7 @@ A problem is named SET/FAMILY/NUMBER, as rt444/KaplasTower/0100; its number coun
 the family's scene that have a contact, or the problems of a family assembled directly.
 
 plan.py       what is built of a family, and which of its problems are kept
-sets.py       the sets, their versions and their families; lists of chosen problems in data/
+known.py      the sets, their versions and their families; lists of chosen problems in data/
 build.py      a family into files, gone on with after a kill
 catalog.py    a row for each problem; catalog.parquet
 library.py    the package's and the user's folder: `fclib.collection` and `fclib.load`
@@ -21,9 +21,9 @@ figures.py    distributions and pictures
 from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
+from fclib.collections.known import folders, plan_of, sets, version
 from fclib.collections.library import Collection, load
 from fclib.collections.plan import Plan, Selection, families
-from fclib.collections.sets import folders, plan_of, sets, version
 from fclib.collections.verify import verify
 
 __all__ = [

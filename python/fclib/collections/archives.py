@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib.collections import catalog
-from fclib.collections.sets import folders
+from fclib.collections.known import folders
 
 REGISTRY = "registry.txt"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives

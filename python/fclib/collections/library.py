@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, overload
 
 import fclib
-from fclib.collections import archives, catalog, sets
+from fclib.collections import archives, catalog, known
 from fclib.collections.build import build
 
 FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
@@ -30,7 +30,7 @@ def ensure(name: str, folder: Path) -> None:
     if source:
         archives.get([name], source, folder)
     else:
-        build([sets.plan_of(name)], folder, pictures=False)
+        build([known.plan_of(name)], folder, pictures=False)
 
 
 class Collection(Sequence[Any]):
@@ -44,10 +44,10 @@ class Collection(Sequence[Any]):
     def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
         """KeyError, with the known names, where there is no such set or family."""
         self.name = name
-        self.folders = sets.folders([name])
-        shipped = all(own.split("/")[0] in sets.SHIPPED for own in self.folders)
+        self.folders = known.folders([name])
+        shipped = all(own.split("/")[0] in known.SHIPPED for own in self.folders)
         if shipped:
-            self.folder = sets.DATA
+            self.folder = known.DATA
         else:
             self.folder = Path(folder) if folder is not None else default_folder()
         self._catalog: Any = None
@@ -133,10 +133,10 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
     parts = name.split("/")
     if len(parts) != 3:
         raise KeyError(f"a problem is named SET/FAMILY/NUMBER, not {name!r}")
-    if parts[0] in sets.SHIPPED:
+    if parts[0] in known.SHIPPED:
         # needs nothing that reads catalogues
         for own in (form,) if form else FORMS:
-            path = sets.DATA / f"{name}-{own}.hdf5"
+            path = known.DATA / f"{name}-{own}.hdf5"
             if path.is_file():
                 return fclib.read(path)
     return fclib.read(Collection(f"{parts[0]}/{parts[1]}", folder).path(name, form))

@@ -353,7 +353,7 @@ class _Writer:
         return drawn
 
     def _families(self) -> list[dict[str, Any]]:
-        known = scenes.families()
+        known: dict[str, Any] = {**scenes.families(), **scenes.assemblies()}
         groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
         for row in self.problems.rows:
             groups[row.get("collection") or "", row["family"]].append(row)

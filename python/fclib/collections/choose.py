@@ -1,0 +1,294 @@
+"""Lists of chosen problems, by rules that anyone can repeat.
+
+hard    from stores of campaigns over a built collection: what most solvers fail on
+local   from a built collection: the contacts that one-contact solvers find hardest
+tiny    one problem of each kind, from the list below
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib import scenes
+from fclib.collections import catalog
+from fclib.collections.known import Choice
+from fclib.collections.plan import source
+
+Progress = Callable[[str, int, int], None]
+
+# one problem of each kind: family, parameters, number
+TINY: tuple[tuple[str, dict[str, Any], int], ...] = (
+    ("PlanarBlocks", {"courses": 4, "blocks": 3}, 90),  # d = 2
+    ("Capsules", {"capsules": 20}, 300),  # d = 3
+    ("KaplasTower", {"levels": 2}, 30),  # d = 3, reactions not unique
+    ("RollingDiscs", {"discs": 12, "per_row": 4}, 40),  # d = 3, planar rolling
+    ("RollingSpheres", {"spheres": 16, "per_layer": 4}, 60),  # d = 5
+    ("FourBar", {"linkages": 2}, 150),  # bilateral constraints
+    ("LocalProblems", {}, 0),  # local alone
+    ("Wall", {}, 3),  # assembled directly
+)
+
+
+def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -> None:
+    """Write a list as the package keeps it: by what rule, and the problems."""
+    rows = [json.dumps(asdict(choice), sort_keys=True) for choice in choices]
+    head = json.dumps(dict(rule), sort_keys=True)
+    text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
+    catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
+
+
+# ---- tiny
+
+
+def tiny() -> list[Choice]:
+    """The problems of TINY, each simulated up to its number."""
+    return [choice_of(family, parameters, 0, number) for family, parameters, number in TINY]
+
+
+def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int) -> Choice:
+    """A problem by its number. ValueError where the scene has not so many."""
+    scene = source(family, dict(parameters), seed)
+    if isinstance(scene, scenes.Assembled):
+        digest = fclib.digest(scene.problem(number))
+        return Choice(family, scene.parameters, seed, number, number, digest)
+    from fclib.simulate import simulate
+
+    looked = 0
+    for step in simulate(scene, 20 * number + 5000):
+        if step.problem.nc:
+            if looked == number:
+                digest = fclib.digest(step.problem)
+                return Choice(family, dict(scene.parameters), seed, number, step.index, digest)
+            looked += 1
+    raise ValueError(f"{family}: has no problem {number}")
+
+
+# ---- hard
+
+
+def hard(
+    runs: Sequence[Mapping[str, Any]],
+    folder: Path,
+    *,
+    tol: float = 1e-8,
+    share: float = 0.5,
+    per_family: int = 5,
+) -> list[Choice]:
+    """What most solvers fail on.
+
+    A problem is hard where at least `share` of the solvers that were run on it at this tolerance
+    did not solve it. Of each family the hardest are taken: those that most failed on, of equals
+    those whose fastest solver took longest in iterations, then the earlier.
+
+    Args:
+        runs: rows of the view `results` of stores, from campaigns over the folder's global files.
+        folder: the collection; its files say what their problems are made from.
+        tol: the tolerance of the runs that count.
+        share: of the solvers that must have failed.
+        per_family: problems of a family, at most.
+
+    Raises:
+        CatalogError: the folder has no catalogue.
+        ValueError: no run is of a problem of the catalogue.
+    """
+    rows = {row["digest"]: row for row in catalog.read_catalog(folder).to_pylist()}
+    solved: dict[str, dict[str, bool]] = defaultdict(dict)
+    effort: dict[str, list[float]] = defaultdict(list)
+    for run in runs:
+        if run["tol"] != tol or run["hash"] not in rows or run["status"] == "unsuitable":
+            continue
+        # of repeats one that was solved suffices
+        known = solved[run["hash"]]
+        known[run["solver"]] = known.get(run["solver"], False) or bool(run["solved"])
+        if run["solved"]:
+            effort[run["hash"]].append(run["iterations"])
+    if not solved:
+        raise ValueError(f"{folder}: no run at {tol:g} is of a problem of this catalogue")
+
+    families: dict[str, list[tuple[float, float, str]]] = defaultdict(list)
+    for digest, known in solved.items():
+        failed = 1 - sum(known.values()) / len(known)
+        if failed >= share:
+            least = min(effort[digest], default=np.inf)
+            families[rows[digest]["family"]].append((-failed, -least, rows[digest]["id"]))
+    by_id = {row["id"]: row for row in rows.values()}
+    taken = sorted(name for ranked in families.values() for *_, name in sorted(ranked)[:per_family])
+    return [choice_of_row(folder, by_id[name]) for name in taken]
+
+
+def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
+    """A problem of a catalogue, with the parameters that its file says."""
+    problem = fclib.read(folder / (row["global_file"] or row["local_file"]))
+    made = json.loads(problem.info.description.splitlines()[-1])
+    return Choice(
+        row["family"], made["parameters"], row["seed"], row["number"], row["step"], row["digest"]
+    )
+
+
+# ---- local
+
+# one-contact solvers of nsgs, in the order of the table
+LOCAL_SOLVERS = ("exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister")
+SWEEPS = 100  # of a contact, at most
+LOCAL_TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A problem of one contact, and the sweeps that each local solver took; SWEEPS + 1: failed."""
+
+    problem: Any
+    origin: str
+    sweeps: dict[str, int]
+
+    @property
+    def difficulty(self) -> tuple[int, int]:
+        """Solvers that failed, then all sweeps."""
+        sweeps = self.sweeps.values()
+        return sum(count > SWEEPS for count in sweeps), sum(sweeps)
+
+    def record(self) -> dict[str, Any]:
+        """As `local_problems.json` has it."""
+        mu_r = getattr(self.problem, "mu_r", None)
+        return {
+            "spacedim": self.problem.spacedim,
+            "W": np.asarray(self.problem.W).tolist(),
+            "q": np.asarray(self.problem.q).tolist(),
+            "mu": float(self.problem.mu[0]),
+            "mu_r": None if mu_r is None else float(mu_r[0]),
+            "origin": self.origin,
+            "sweeps": self.sweeps,
+        }
+
+
+def measure(problem: Any, origin: str) -> Contact:
+    """Let each local solver try a problem of one contact."""
+    sweeps = {}
+    for name in LOCAL_SOLVERS:
+        result = fclib.solve(
+            problem, "nsgs", tol=LOCAL_TOLERANCE, max_iterations=SWEEPS, local_solver=name
+        )
+        sweeps[name] = result.iterations if result.converged else SWEEPS + 1
+    return Contact(problem, origin, sweeps)
+
+
+def one_contact(W: Any, q: Any, mu: float, mu_r: float | None) -> Any:
+    """A problem of one contact from its block (d x d)."""
+    values: dict[str, Any] = {"spacedim": len(q), "W": W, "q": q, "mu": np.array([mu])}
+    if mu_r is None:
+        return fclib.LocalProblem(**values)
+    return fclib.LocalRollingProblem(**values, mu_r=np.array([mu_r]))
+
+
+def contacts_of(path: Path) -> Iterator[tuple[int, Any]]:
+    """The contacts of a local file that have a reaction: number, and problem at the solution.
+
+    q_c = u_c - W_cc r_c holds what the other contacts and the bilateral constraints do.
+    """
+    problem: Any = fclib.read(path)
+    solution: Any = fclib.read_solution(path)
+    d = problem.spacedim
+    W = problem.W.tocsr() if hasattr(problem.W, "tocsr") else problem.W
+    r, u = solution.r.reshape(-1, d), solution.u.reshape(-1, d)
+    for c in np.flatnonzero(r[:, 0] > 0).tolist():
+        own = slice(d * c, d * c + d)
+        block = W[own, own]
+        block = block.toarray() if hasattr(block, "toarray") else np.array(block)
+        mu_r = None if problem.kind == "local" else float(problem.mu_r[c])
+        yield c, one_contact(block, u[c] - block @ r[c], float(problem.mu[c]), mu_r)
+
+
+def spinning(seed: int) -> Any:
+    """A body that spins fast and touches the ground; W = H^T (M + h Gamma)^-1 H is not symmetric.
+
+    Gamma is the derivative of the gyroscopic moment omega x I omega, taken at the end of the step.
+    """
+    random = np.random.Generator(np.random.PCG64(seed))
+    inertia = random.uniform(0.1, 1.0) * np.diag(random.uniform(0.5, 1.0, 3)) * 1e-2
+    omega = random.uniform(-400, 400, 3)
+    arm = random.uniform(-0.2, 0.2, 3)
+    momentum = inertia @ omega
+    M = np.eye(6)
+    M[3:, 3:] = inertia + 5e-3 * (cross_matrix(omega) @ inertia - cross_matrix(momentum))
+    # the ground is below: N is z
+    axes = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    H = np.vstack((axes.T, np.cross(arm, axes).T))
+    W = H.T @ np.linalg.solve(M, H)
+    speed = random.uniform(-2, 2, 3)
+    speed[0] = -abs(speed[0])
+    return one_contact(W, speed, float(random.choice([0.1, 0.3, 0.7, 1.0, 2.0])), None)
+
+
+def cross_matrix(a: Any) -> Any:
+    """The matrix of a x ."""
+    return np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])
+
+
+def local(
+    folder: Path,
+    *,
+    sample: int = 40,
+    per_family: int = 4,
+    spins: int = 2000,
+    asymmetric: int = 16,
+    progress: Progress | None = None,
+) -> list[Contact]:
+    """The hardest contacts of each family of a collection, and of bodies that spin.
+
+    A contact that most local solvers fail on within SWEEPS sweeps is the hardest, then the one that
+    takes them most sweeps together. At most one is taken of a problem; contacts that no local
+    solver solves are left out.
+
+    Args:
+        folder: a built collection, with local forms.
+        sample: problems of each family, evenly spread.
+        per_family: contacts that are taken of each.
+        spins: spinning bodies, drawn by the seeds 0, 1, ...
+        asymmetric: those that are taken of them.
+        progress: called with SET/FAMILY, problems done and their number.
+
+    Raises:
+        CatalogError: the folder has no catalogue.
+    """
+    families: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for row in catalog.read_catalog(folder).to_pylist():
+        if row["local_file"] is not None and row["nc"] > 1:
+            families[f"{row['collection']}/{row['family']}"].append(row)
+    tell = progress or (lambda name, done, total: None)
+    found = []
+    for name, rows in families.items():
+        places = np.unique(np.linspace(0, len(rows) - 1, min(sample, len(rows))).round())
+        hardest = []
+        for done, place in enumerate(places.astype(int).tolist(), start=1):
+            row = rows[place]
+            own = [
+                measure(problem, f"{row['id']}, contact {c}")
+                for c, problem in contacts_of(folder / row["local_file"])
+            ]
+            hardest += take(own, 1)
+            tell(name, done, len(places))
+        found += take(hardest, per_family)
+    spun = [measure(spinning(seed), f"a spinning body, seed {seed}") for seed in range(spins)]
+    return found + take(spun, asymmetric)
+
+
+def take(contacts: Sequence[Contact], count: int) -> list[Contact]:
+    """The hardest of those that some local solver solves; of equals the first."""
+    solvable = [contact for contact in contacts if min(contact.sweeps.values()) <= SWEEPS]
+    return sorted(solvable, key=lambda contact: contact.difficulty, reverse=True)[:count]
+
+
+def write_local(path: Path, contacts: Iterable[Contact], rule: Mapping[str, Any]) -> None:
+    """Write the numbers of contacts, exact to the last bit."""
+    rows = [json.dumps(contact.record(), sort_keys=True) for contact in contacts]
+    head = json.dumps(dict(rule), sort_keys=True)
+    text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
+    catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))

@@ -1,0 +1,289 @@
+"""Sets: what they hold, the problems that come with the package, and how lists are chosen."""
+
+import json
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fclib
+from fclib import scenes
+from fclib.cli import app
+
+pytest.importorskip("pyarrow")
+
+from fclib import collections
+from fclib.collections import catalog, choose, known
+from fclib.collections.plan import Plan
+
+TINY = known.DATA / "tiny"
+FILES = sorted(TINY.glob("*/*.hdf5"))
+
+
+def invoke(*arguments: object) -> Any:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+# ---- sets
+
+
+def test_every_family_is_in_a_set_that_is_known() -> None:
+    sets = collections.sets()
+    for name, family in collections.families().items():
+        assert family.collection in known.KNOWN, name
+        assert f"{family.collection}/{name}" in sets[family.collection]
+        assert f"{family.collection}/{name}" in sets["extended"] + sets["rt444"] + sets["ladder"]
+
+
+def test_versions_are_in_list_plan_and_catalogue() -> None:
+    listed = [
+        json.loads(line)
+        for line in invoke("collection", "list", "--sets", "--json").output.splitlines()
+    ]
+    assert {row["set"]: row["version"] for row in listed}["rt444"] == collections.version("rt444")
+    plan = collections.plan_of("rt444/Chain")
+    assert (plan.version, plan.problems) == (collections.version("rt444"), 1514)
+    assert json.loads(plan.fingerprint())["version"] == plan.version
+    versions = collections.read_catalog(known.DATA)["version"].to_pylist()
+    assert set(versions) == {collections.version("tiny")}
+
+
+def test_set_is_shown_with_its_problems() -> None:
+    shown = invoke("collection", "show", "tiny")
+    assert shown.exit_code == 0
+    for choice in known.choices("tiny"):
+        assert choice.family in shown.output
+    assert "rt444/Chain" in invoke("collection", "show", "rt444").output
+
+
+def test_list_refuses_what_would_change_it(tmp_path: Path) -> None:
+    done = invoke("collection", "build", "tiny", "--count", 1, "--out", tmp_path)
+    assert done.exit_code == 2
+    assert "names its problems" in done.output
+
+
+def test_older_catalogue_without_version_is_read(tmp_path: Path) -> None:
+    pa = catalog.arrow()
+    table = collections.read_catalog(known.DATA).drop_columns(["version"])
+    pa.parquet.write_table(table, tmp_path / catalog.FILE)
+    assert collections.read_catalog(tmp_path)["version"].to_pylist() == [None] * table.num_rows
+
+
+# ---- tiny
+
+
+def test_tiny_has_every_kind_and_is_small() -> None:
+    problems: list[Any] = [fclib.read(path) for path in FILES]
+    kinds = {(problem.kind, problem.spacedim) for problem in problems}
+    assert kinds >= {(form, d) for form in ("global", "local") for d in (2, 3)}
+    assert kinds >= {(f"{form}_rolling", d) for form in ("global", "local") for d in (3, 5)}
+    assert {problem.formulation for problem in problems} >= {"GM3DFC", "M3DFC"}
+    assert sum(path.stat().st_size for path in TINY.rglob("*")) < 1e6
+
+
+def test_tiny_is_as_its_catalogue_says() -> None:
+    verdicts = list(collections.verify(known.DATA))
+    assert len(verdicts) == len(FILES)
+    assert all(verdict.ok for verdict in verdicts)
+    rows = collections.read_catalog(known.DATA).to_pylist()
+    assert not known.differing("tiny", rows)
+    assert [row["error"] <= 1e-8 for row in rows] == [True] * len(choose.TINY)
+
+
+def test_tiny_is_there_without_a_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path))
+    problems = fclib.collection("tiny")
+    assert len(problems) == len(choose.TINY)
+    for name, problem in zip(problems.ids, problems, strict=True):
+        assert fclib.digest(fclib.load(name)) == fclib.digest(problem)
+        solution: Any = problems.solution(name)
+        assert fclib.merit(problem, solution).error <= 1e-8
+    assert fclib.load("tiny/LocalProblems/0000").kind == "local"
+    assert fclib.load("tiny/Wall/0003", "local").kind == "local"
+    with pytest.raises(KeyError, match="no problem 'tiny/Wall/0004'"):
+        fclib.load("tiny/Wall/0004")
+    assert not list(tmp_path.iterdir())
+
+
+def test_tiny_needs_neither_pyarrow_nor_mujoco() -> None:
+    code = (
+        "import sys\n"
+        "for name in ('pyarrow', 'mujoco', 'pooch', 'matplotlib'): sys.modules[name] = None\n"
+        "import fclib\n"
+        "print(fclib.load('tiny/RollingDiscs/0040').formulation)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout.strip() == fclib.load("tiny/RollingDiscs/0040").formulation, done.stderr
+
+
+def close(first: Any, second: Any) -> bool:
+    """Whether two problems are equal but for rounding."""
+    for name in ("M", "H", "G", "f", "w", "b", "W", "q", "mu", "mu_r"):
+        pair: list[Any] = [getattr(problem, name, None) for problem in (first, second)]
+        if all(value is None for value in pair):
+            continue
+        a, b = (np.asarray(x.toarray() if hasattr(x, "toarray") else x) for x in pair)
+        bound = 1e-9 * np.abs(a).max(initial=1)
+        if a.shape != b.shape or not np.allclose(a, b, rtol=0, atol=bound):
+            return False
+    return True
+
+
+def test_tiny_is_regenerated(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    plans = [collections.plan_of(folder) for folder in collections.folders(["tiny"])]
+    collections.build(plans, tmp_path, pictures=False)
+    for path in FILES:
+        shipped, made = (
+            fclib.read(base / path.relative_to(TINY)) for base in (TINY, tmp_path / "tiny")
+        )
+        if fclib.digest(shipped) != fclib.digest(made):
+            # another machine's mathematical library may round otherwise
+            assert close(shipped, made), path
+            warnings.warn(f"{path.name}: equal but for rounding on this machine", stacklevel=1)
+
+
+def test_tiny_list_is_what_the_command_writes(tmp_path: Path) -> None:
+    """For a part of it, since the rest is regenerated above."""
+    listed = {choice.family: choice for choice in known.choices("tiny")}
+    assert [choice.family for choice in known.choices("tiny")] == [
+        family for family, *_ in choose.TINY
+    ]
+    for family, parameters, number in choose.TINY:
+        assert listed[family].number == number
+        assert listed[family].parameters.items() >= parameters.items()
+        if family in scenes.assemblies():
+            assert choose.choice_of(family, parameters, 0, number) == listed[family]
+    path = tmp_path / "list.json"
+    choose.write_list(path, listed.values(), {"kinds": len(listed)})
+    assert path.read_text() == (known.DATA / "tiny.json").read_text()
+
+
+# ---- hard
+
+
+def run_of(row: dict[str, Any], solver: str, solved: bool, **more: Any) -> dict[str, Any]:
+    run = {"hash": row["digest"], "solver": solver, "solved": int(solved), "tol": 1e-8}
+    return run | {"status": "converged", "iterations": 10} | more
+
+
+def test_hard_is_what_most_solvers_fail_on() -> None:
+    rows = {row["family"]: row for row in collections.read_catalog(known.DATA).to_pylist()}
+    capsules, kaplas, wall = rows["Capsules"], rows["KaplasTower"], rows["Wall"]
+    runs = [run_of(kaplas, name, name == "a") for name in "abc"]
+    runs += [run_of(capsules, name, name != "a") for name in "abc"]
+    runs += [run_of(wall, "a", False), run_of(wall, "b", True), run_of(wall, "b", False, repeat=1)]
+    # what does not count: another tolerance, no problem of these, a solver that does not take it
+    runs += [run_of(capsules, name, False, tol=1e-4) for name in "abc"]
+    runs += [
+        run_of(capsules, "d", False, status="unsuitable"),
+        run_of(capsules, "e", False, hash=""),
+    ]
+    chosen = choose.hard(runs, known.DATA)
+    assert [choice.family for choice in chosen] == ["KaplasTower", "Wall"]
+    listed = {choice.family: choice for choice in known.choices("tiny")}
+    # the files say the parameters of their scenes
+    assert chosen == [listed["KaplasTower"], listed["Wall"]]
+    assert [choice.family for choice in choose.hard(runs, known.DATA, share=0.6)] == ["KaplasTower"]
+    with pytest.raises(ValueError, match="no run at 1e-12 is of a problem"):
+        choose.hard(runs, known.DATA, tol=1e-12)
+
+
+def test_hard_is_chosen_from_a_store_and_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, data = tmp_path / "runs.sqlite", tmp_path / "data"
+    data.mkdir()
+    # the first solves another law
+    solvers = ("--solver", "associated", "--solver", "auto")
+    done = invoke(
+        *("bench", "--problems", TINY / "Wall", "--problems", TINY / "LocalProblems", *solvers),
+        *("--tol", 1e-8, "--time-limit", 5, "--store", store),
+    )
+    assert done.exit_code in (0, 1), done.output
+    args = ("collection", "choose", "hard", store, "--in", known.DATA)
+    assert invoke(*args, "--out", data / "hard.json").exit_code == 0
+    rule = json.loads((data / "hard.json").read_text())["rule"]
+    assert rule["time_limits"] == [5.0]
+    monkeypatch.setattr(known, "DATA", data)
+    known.choices.cache_clear()
+    try:
+        assert collections.folders(["hard"]) == ["hard/Wall"]
+        done = invoke("collection", "build", "hard", "--out", tmp_path / "built", "--no-pictures")
+        assert done.exit_code == 0, done.output
+        assert "1 of 1 problems of the set hard have the data" in done.output
+        row = collections.read_catalog(tmp_path / "built").to_pylist()[0]
+        assert (row["id"], row["version"]) == ("hard/Wall/0003", collections.version("hard"))
+        wrong = {**row, "digest": "0"}
+        assert known.differing("hard", [wrong]) == ["hard/Wall/0003"]
+    finally:
+        known.choices.cache_clear()
+
+
+def test_two_scenes_of_one_name_in_a_list_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wall = next(c for c in known.choices("tiny") if c.family == "Wall")
+    other = known.Choice("Wall", {**wall.parameters, "mu": 0.1}, 0, 1, 1, "")
+    choose.write_list(tmp_path / "odd.json", [wall, other], {})
+    monkeypatch.setattr(known, "DATA", tmp_path)
+    known.choices.cache_clear()
+    try:
+        with pytest.raises(ValueError, match=r"odd/Wall: the list odd\.json has two scenes"):
+            collections.plan_of("odd/Wall")
+    finally:
+        known.choices.cache_clear()
+
+
+# ---- local
+
+
+def test_one_contact_of_a_problem_has_its_solution() -> None:
+    """W_cc and q_c at the solution: r_c solves it."""
+    for name in ("KaplasTower/0030", "RollingDiscs/0040", "FourBar/0150"):
+        path = TINY / f"{name}-local.hdf5"
+        whole: Any = fclib.read_solution(path)
+        problem: Any = fclib.read(path)
+        d = problem.spacedim
+        contacts = list(choose.contacts_of(path))
+        assert contacts
+        for c, one in contacts:
+            own = fclib.Solution(r=whole.r[d * c : d * c + d])
+            size = np.linalg.norm(problem.q)
+            assert fclib.merit(one, own).natural * np.linalg.norm(one.q) < 1e-7 * size
+
+
+def test_hardest_contacts_are_found_again(tmp_path: Path) -> None:
+    settings: Any = {"per_family": 2, "spins": 40, "asymmetric": 3}
+    found = choose.local(known.DATA, **settings)
+    families = {contact.origin.split("/")[1] for contact in found[:-3]}
+    assert families == {family for family, *_ in choose.TINY} - {"LocalProblems"}
+    for contact in found[-3:]:
+        W = np.asarray(contact.problem.W)
+        assert np.abs(W - W.T).max() > 1e-3 * np.abs(W).max()
+    difficulties = [contact.difficulty for contact in found[-3:]]
+    assert difficulties == sorted(difficulties, reverse=True)
+    choose.write_local(tmp_path / "list.json", found, {})
+    rows = json.loads((tmp_path / "list.json").read_text())["problems"]
+    for row, contact in zip(rows, found, strict=True):
+        np.testing.assert_array_equal(row["W"], contact.problem.W)
+        np.testing.assert_array_equal(row["q"], contact.problem.q)
+
+
+def test_local_problems_are_solved_and_some_are_not_symmetric() -> None:
+    family: Any = scenes.assemblies()["LocalProblems"]
+    plan = Plan.of_family("LocalProblems")
+    assert plan.total == family.problems >= 40
+    asymmetric = 0
+    for number in range(plan.total):
+        problem: Any = family().problem(number)
+        assert problem.nc == 1
+        assert fclib.solve(problem, tol=1e-10).converged
+        W = np.asarray(problem.W)
+        asymmetric += bool(np.abs(W - W.T).max() > 1e-3 * np.abs(W).max())
+    assert asymmetric >= 10

@@ -202,7 +202,7 @@ def test_hard_is_chosen_from_a_store_and_built(
     # the first solves another law
     solvers = ("--solver", "associated", "--solver", "auto")
     done = invoke(
-        *("bench", "--problems", TINY / "Wall", "--problems", TINY / "LocalProblems", *solvers),
+        *("bench", "--problems", TINY / "Wall", *solvers),
         *("--tol", 1e-8, "--time-limit", 5, "--store", store),
     )
     assert done.exit_code in (0, 1), done.output

@@ -15,12 +15,13 @@ SOURCES := CMakeLists.txt pyproject.toml README.md \
                 -o -name py.typed \))
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
-.PHONY: setup demo test fuzz lint format clean help
+.PHONY: setup demo test docs fuzz lint format clean help
 
 help:
 	@echo "make setup   install what is missing, build, install fclib into $(VENV)"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests"
+	@echo "make docs    set up, then build the documentation into $(BUILD)/site"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make lint    check style and types (ruff, mypy, clang-format)"
 	@echo "make format  put the sources into the style that lint checks"
@@ -31,24 +32,28 @@ setup: $(VENV)/.installed
 demo: setup
 	$(BIN)/fclib demo
 
-test: setup $(VENV)/.test-tools $(VENV)/.test-system
+test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
 	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest
 
+docs: setup $(VENV)/.docs-tools
+	$(BIN)/python scripts/site/build.py $(BUILD)/site
+
 fuzz:
 	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)
 
-lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools
-	$(BIN)/ruff check python tests benchmarks examples
-	$(BIN)/ruff format --check python tests benchmarks examples
+lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
+	$(BIN)/ruff check python tests benchmarks examples scripts
+	$(BIN)/ruff format --check python tests benchmarks examples scripts
 	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
 	$(BIN)/mypy --package fclib
 	$(BIN)/mypy tests benchmarks examples/python
+	$(BIN)/mypy scripts/site
 
 format: $(VENV)/.lint-tools
-	$(BIN)/ruff check --fix python tests benchmarks examples
-	$(BIN)/ruff format python tests benchmarks examples
+	$(BIN)/ruff check --fix python tests benchmarks examples scripts
+	$(BIN)/ruff format python tests benchmarks examples scripts
 	$(BIN)/clang-format -i $(CXX_SOURCES)
 
 clean:
@@ -78,5 +83,5 @@ $(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml
 	@echo "== installing the tools of make $*"
-	@$(BIN)/python scripts/requirements.py $* | xargs $(BIN)/pip install --quiet
+	@$(BIN)/python scripts/requirements.py $* | tr '\n' '\0' | xargs -0 $(BIN)/pip install --quiet
 	@touch $@

@@ -1,0 +1,128 @@
+"""Build the documentation: build.py OUT [--quick], a site that opens from a folder and any host.
+
+Its sources are README.md, ARCHITECTURE.md, CHANGELOG.md, docs/, and pages that follow from the
+code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
+--quick draws no scene and runs no example.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import c_api
+import commands
+import examples
+import families
+import python_api
+import solvers
+from sphinx.cmd.build import main as sphinx
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+AS_THEY_ARE = {
+    "README.md": "index.md",
+    "ARCHITECTURE.md": "architecture.md",
+    "CHANGELOG.md": "changelog.md",
+}
+# the menu; FOLDER/* stands for the generated pages of a folder
+MENU = {
+    "Start": ["first-steps", "examples/index"],
+    "The problem": ["mathematics", "format", "analysis"],
+    "The collection": ["collection", "families/index", "families-of-your-own"],
+    "The solvers": ["choosing", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
+    "The bench": ["bench", "measurement", "report"],
+    "Interfaces": ["command-line", "python", "compiled", "c-api"],
+    "Around it": ["comparison", "migrating", "citing", "architecture", "changelog"],
+}
+STYLE = """\
+.content { width: 54em; }
+math {
+  font-family: "STIX Two Math", "Latin Modern Math", "Cambria Math", "DejaVu Math TeX Gyre", math;
+}
+div.math { overflow-x: auto; margin: 1em 0; }
+div.math math { margin: 0.4em 0; }
+article img { max-width: 100%; height: auto; }
+article table { font-size: 0.85em; }
+article .align-right { margin: 0 0 1em 1.5em; }
+@media (max-width: 46em) { article .align-right { float: none; margin: 1em 0; } }
+"""
+
+
+def pages(quick: bool) -> Iterator[tuple[str, str | bytes]]:
+    """Every page and picture that docs/ does not have, by its path."""
+    for source, page in AS_THEY_ARE.items():
+        yield page, (ROOT / source).read_text(encoding="utf-8")
+    yield "_static/site.css", STYLE
+    yield from families.pages(draws=not quick)
+    yield from solvers.pages(ROOT)
+    yield from commands.pages()
+    yield from python_api.pages()
+    yield from c_api.pages(ROOT)
+    yield from examples.pages(ROOT, runs=not quick)
+
+
+def gather(folder: Path, quick: bool) -> None:
+    """Bring all sources into a folder."""
+    shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
+    for name, content in pages(quick):
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if isinstance(content, bytes):
+            path.write_bytes(content)
+        else:
+            path.write_text(content, encoding="utf-8")
+    for path in sorted(folder.rglob("*.md")):
+        name = path.relative_to(folder).as_posix()
+        text = linked(path.read_text(encoding="utf-8"), "../" * name.count("/"))
+        if name == "index.md":
+            text += "".join(toctree(entries, title) for title, entries in MENU.items())
+        elif name.endswith("/index.md"):
+            below = sorted(p.stem for p in path.parent.glob("*.md") if p != path)
+            text += toctree(below)
+        path.write_text(text, encoding="utf-8")
+
+
+def toctree(entries: list[str], title: str = "") -> str:
+    """A part of the menu."""
+    caption = f":caption: {title}\n" if title else ""
+    return f"\n```{{toctree}}\n:hidden:\n{caption}\n" + "\n".join(entries) + "\n```\n"
+
+
+def linked(text: str, up: str) -> str:
+    """The text with the names of pages, as `docs/NAME.md`, as links; not in code."""
+    parts = re.split(r"(^```.*?^```$|^(?:    [^\n]*\n)+)", text, flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if k % 2 else with_links(part, up) for k, part in enumerate(parts))
+
+
+def with_links(text: str, up: str) -> str:
+    """A part of a text that is no code."""
+    text = re.sub(r'(?<=src=")docs/|(?<=\]\()docs/', "", text)
+    text = re.sub(r"`?(?<![\w/(])docs/([\w-]+)\.md`?", rf"[\1]({up}\1.md)", text)
+    for source, page in AS_THEY_ARE.items():
+        if source != "README.md":
+            text = re.sub(rf"(?<![\w/\[(])`?{source}`?(?![\w)])", f"[{source}]({up}{page})", text)
+    return text
+
+
+def main(out: Path, quick: bool) -> int:
+    """Build; the exit status of Sphinx."""
+    with tempfile.TemporaryDirectory() as folder:
+        sources = Path(folder) / "docs"
+        gather(sources, quick)
+        options = ["-b", "html", "-W", "--keep-going", "-q", "-E", "-d", f"{folder}/doctrees"]
+        options += ["-c", str(HERE), "-D", f"html_static_path={sources / '_static'}"]
+        status = sphinx([*options, str(sources), str(out)])
+    if status == 0:
+        print(f"{out}/index.html")
+    return status
+
+
+if __name__ == "__main__":
+    if len(sys.argv) < 2 or sys.argv[2:] not in ([], ["--quick"]):
+        sys.exit("usage: build.py OUT [--quick]")
+    sys.exit(main(Path(sys.argv[1]), quick=len(sys.argv) > 2))

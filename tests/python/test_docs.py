@@ -1,0 +1,171 @@
+"""The documentation: it builds without a warning, all links lead somewhere, nothing is fetched."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+import pytest
+
+import fclib
+from fclib import scenes
+
+pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
+pytest.importorskip("mujoco")
+pytest.importorskip("matplotlib")
+
+PHONE = {"width": 390, "height": 800}
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
+    """The site, built; its builder ends with an error where Sphinx warns.
+
+    Without what takes long and other tests do: pictures of the scenes, and runs of the examples.
+    """
+    # a folder whose name must be escaped in an address
+    folder = tmp_path_factory.mktemp("built") / "a site #1"
+    done = subprocess.run(
+        [sys.executable, root / "scripts/site/build.py", folder, "--quick"],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "WARNING" not in done.stderr
+    return folder
+
+
+class Page(HTMLParser):
+    """What a page refers to, and the places in it that can be referred to."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.ids: set[str] = set()
+        self.targets: list[str] = []  # that a person may follow
+        self.needs: list[str] = []  # that the browser fetches by itself
+        self.alone: list[str] = []  # pictures without a text
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = {name: value or "" for name, value in attrs}
+        if "id" in values:
+            self.ids.add(values["id"])
+        if tag == "a" and "href" in values:
+            self.targets.append(values["href"])
+        if tag == "link" and values.get("rel") not in ("canonical",):
+            self.needs.append(values["href"])
+        if "src" in values:
+            self.needs.append(values["src"])
+        if tag == "img" and not values.get("alt"):
+            self.alone.append(values.get("src", ""))
+
+
+@pytest.fixture(scope="session")
+def pages(site: Path) -> dict[Path, Page]:
+    found = {path: Page(path.read_text(encoding="utf-8")) for path in sorted(site.rglob("*.html"))}
+    assert len(found) > 40
+    return found
+
+
+def test_every_link_leads_somewhere(site: Path, pages: dict[Path, Page]) -> None:
+    wrong = []
+    for path, page in pages.items():
+        for address in [*page.targets, *page.needs]:
+            parts = urlsplit(address)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            if not target.is_file():
+                wrong.append(f"{path.relative_to(site)}: {address} does not exist")
+                continue
+            places = pages[target].ids if target in pages else {parts.fragment}
+            if parts.fragment and unquote(parts.fragment) not in places:
+                wrong.append(f"{path.relative_to(site)}: {address} has no such place")
+    assert not wrong
+
+
+def test_no_page_needs_another_host(site: Path, pages: dict[Path, Page]) -> None:
+    for path, page in pages.items():
+        foreign = [a for a in page.needs if urlsplit(a).scheme not in ("", "data") or a[:2] == "//"]
+        assert not foreign, path.relative_to(site)
+    for style in site.rglob("*.css"):
+        assert not re.search(r"url\([\"']?(https?:)?//", style.read_text()), style.name
+        assert not re.search(r"@import", style.read_text()), style.name
+
+
+def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:
+    assert not [(p.relative_to(site), page.alone) for p, page in pages.items() if page.alone]
+
+
+def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
+    for family in scenes.families():
+        text = (site / "families" / f"{family}.html").read_text()
+        assert scenes.get(family).title in text
+    solvers = "".join(path.read_text() for path in (site / "solvers").glob("*.html"))
+    for solver in fclib.solvers():
+        assert f'id="solver-{re.sub("[^a-zA-Z0-9_]+", "-", solver.name)}"' in solvers, solver.name
+        for option in solver.options:
+            assert f">{option.name}<" in solvers, (solver.name, option.name)
+    header = (site / "c-api.html").read_text()
+    for name in set(re.findall(r"\b(fclib_\w+)\(", (root / "include/fclib.h").read_text())):
+        assert f'id="{name.replace("_", "-")}"' in header, name
+    for script in (root / "examples/python").glob("*.py"):
+        assert (site / "examples" / f"{script.stem}.html").is_file()
+    python = (site / "python.html").read_text()
+    for name in fclib.__all__:
+        assert name.startswith("_") or f'id="{name.lower().replace("_", "-")}"' in python, name
+
+
+# ---- in a browser
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        found = [None, *filter(None, map(shutil.which, ("chromium", "chromium-browser")))]
+        for path in found:
+            try:
+                opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+            except api.Error:
+                continue
+            yield opened
+            opened.close()
+            return
+        pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")
+
+
+def test_pages_in_a_browser(site: Path, browser: Any) -> None:
+    wrong: list[str] = []
+    page = browser.new_page()
+    page.on("console", lambda m: wrong.append(m.text) if m.type == "error" else None)
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on(
+        "request",
+        lambda r: None if r.url.startswith(("file:", "data:")) else wrong.append(r.url),
+    )
+    page.set_viewport_size(PHONE)
+    for path in sorted(site.rglob("*.html")):
+        page.goto(path.as_uri())
+        width = page.evaluate("document.documentElement.scrollWidth")
+        if width > PHONE["width"]:
+            wrong.append(f"{path.name} is {width} wide on a phone")
+    assert not wrong
+
+
+def test_the_search_finds_and_formulas_are_drawn(site: Path, browser: Any) -> None:
+    page = browser.new_page()
+    page.goto((site / "mathematics.html").as_uri())
+    formula = page.locator("div.math math").first
+    assert formula.bounding_box()["width"] > 50
+    page.goto((site / "search.html").as_uri() + "?q=hyperplane")
+    page.wait_for_selector("ul.search li a")
+    assert page.locator("ul.search li").count() > 0
+    page.close()

@@ -10,58 +10,64 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes, simulate
-from fclib.collections.plan import Plan, sets
+from fclib.collections import plan
+from fclib.collections.sets import KNOWN
 
 SIZE = (720, 540)  # of a picture [pixels]
+Kind = type[scenes.Described]
 
 
 def pages(draws: bool) -> Iterator[tuple[str, str | bytes]]:
     """The pages, their index, and pictures where they are asked for and something can draw here."""
-    known = scenes.families()
-    rows = []
-    for name, families in sets().items():
-        rows += [(name, family, known[family]) for family in families]
-    yield "families/index.md", index(rows)
-    for name, family, kind in rows:
-        picture = draw(kind) if draws else None
+    known = plan.families()
+    order = {name: place for place, name in enumerate(KNOWN)}
+    by_set = sorted(known, key=lambda name: (order.get(known[name].collection, 99), name))
+    yield "families/index.md", index({name: known[name] for name in by_set})
+    for name in by_set:
+        picture = draw(name) if draws else None
         if picture is not None:
-            yield f"families/{family}.png", picture
-        yield f"families/{family}.md", page(name, family, kind, picture is not None)
+            yield f"families/{name}.png", picture
+        yield f"families/{name}.md", page(name, known[name], picture is not None)
 
 
-def index(rows: list[tuple[str, str, type[scenes.Family]]]) -> str:
-    """The families in a table."""
+def index(families: dict[str, Kind]) -> str:
+    """The sets and the families, in tables."""
     lines = [
         "# Families",
         "",
-        "All families of scenes, from their classes in `python/fclib/scenes/`; "
-        "[the collection](../collection.md) says how they are built, and "
+        "All families, from their classes in `python/fclib/scenes/`. "
+        "[The collection](../collection.md) says how they are built, and "
         "[a family of your own](../families-of-your-own.md) how one is added.",
         "",
-        "| set | family | problems | what |",
-        "|---|---|---:|---|",
+        "| set | version | what |",
+        "|---|---|---|",
     ]
+    lines += [f"| {name} | {version} | {what} |" for name, (version, what) in KNOWN.items()]
+    lines += ["", "| set | family | problems | what |", "|---|---|---:|---|"]
     lines += [
-        f"| {name} | [{family}]({family}.md) | {kind.problems} | {kind.description} |"
-        for name, family, kind in rows
+        f"| {kind.collection} | [{name}]({name}.md) | {kind.problems} | {kind.description} |"
+        for name, kind in families.items()
     ]
     return "\n".join(lines) + "\n"
 
 
-def page(name: str, family: str, kind: type[scenes.Family], drawn: bool) -> str:
+def page(name: str, kind: Kind, drawn: bool) -> str:
     """One family: what it is, its parameters, what is built of it."""
-    plan = Plan.of_family(family)
-    lines = [f"# {family}", "", f"**{kind.title}.** {kind.description}", ""]
+    planned = plan.Plan.of_family(name)
+    simulated = name in scenes.families()
+    lines = [f"# {name}", "", f"**{kind.title}.** {kind.description}", ""]
     if drawn:
-        lines += [f"![The scene of {family} at its start]({family}.png){{width=480px}}", ""]
+        lines += [f"![The scene of {name} at its start]({name}.png){{width=480px}}", ""]
+    number = f"the first {kind.problems} steps with contact" if simulated else f"{kind.problems}"
     lines += [inspect.getdoc(kind) or "", "", "| | |", "|---|---|"]
     lines += [
-        f"| set | {name} |",
+        f"| set | {kind.collection} |",
         f"| field of application | {kind.application} |",
         f"| friction | {kind.friction} |",
         f"| authors of the original | {kind.authors} |",
-        f"| problems | the first {kind.problems} steps with contact, seed {plan.scene.seed} |",
-        f"| forms | {', '.join(plan.forms)}; solved by `{plan.solver}` to {plan.tol:g} |",
+        f"| made by | {'simulation' if simulated else 'assembly, without a simulation'} |",
+        f"| problems | {number}, seed {planned.scene.seed} |",
+        f"| forms | {', '.join(planned.forms)}; solved by `{planned.solver}` to {planned.tol:g} |",
         "",
         "## Parameters",
         "",
@@ -79,19 +85,35 @@ def page(name: str, family: str, kind: type[scenes.Family], drawn: bool) -> str:
         "## To build it",
         "",
         "```sh",
-        f"fclib collection build {family} --out collection",
+        f"fclib collection build {name} --out collection",
         "```",
         "",
-        "Other parameters, from Python:",
+        "With other parameters, which go into the first brackets, from Python:",
         "",
         "```python",
-        "from fclib import scenes, simulate",
-        "",
-        f'scene = scenes.get("{family}")().scene(seed=0)  # parameters go into the first brackets',
-        "problems = [step.problem for step in simulate.simulate(scene, steps=10)]",
+        *(made_by_simulation(name) if simulated else made_by_assembly(name)),
         "```",
     ]
     return "\n".join(lines) + "\n"
+
+
+def made_by_simulation(name: str) -> list[str]:
+    """How problems of a scene are made."""
+    return [
+        "from fclib import scenes, simulate",
+        "",
+        f'scene = scenes.get("{name}")().scene(seed=0)',
+        "problems = [step.problem for step in simulate.simulate(scene, steps=10)]",
+    ]
+
+
+def made_by_assembly(name: str) -> list[str]:
+    """How a problem is assembled."""
+    return [
+        "from fclib import scenes",
+        "",
+        f'problem = scenes.assemblies()["{name}"]().problem(0, seed=0)',
+    ]
 
 
 def shown(value: object) -> str:
@@ -99,12 +121,15 @@ def shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else f"{value}".replace("|", r"\|")
 
 
-def draw(kind: type[scenes.Family]) -> bytes | None:
-    """A PNG of the default scene at its start."""
+def draw(name: str) -> bytes | None:
+    """A PNG of the default scene at its start; none of what has no scene."""
+    if name not in scenes.families():
+        return None
+    model = simulate.MujocoModel(scenes.get(name)().scene(0))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.png"
         try:
-            simulate.render(simulate.MujocoModel(kind().scene(0)), path, size=SIZE)
+            simulate.render(model, path, size=SIZE)
         except simulate.NoRenderer:
             return None
         return path.read_bytes()

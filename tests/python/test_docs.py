@@ -15,7 +15,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 
 import fclib
-from fclib import scenes
+from fclib.collections import plan
 
 pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
 pytest.importorskip("mujoco")
@@ -105,9 +105,8 @@ def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:
 
 
 def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
-    for family in scenes.families():
-        text = (site / "families" / f"{family}.html").read_text()
-        assert scenes.get(family).title in text
+    for name, family in plan.families().items():
+        assert family.title in (site / "families" / f"{name}.html").read_text()
     solvers = "".join(path.read_text() for path in (site / "solvers").glob("*.html"))
     for solver in fclib.solvers():
         assert f'id="solver-{re.sub("[^a-zA-Z0-9_]+", "-", solver.name)}"' in solvers, solver.name

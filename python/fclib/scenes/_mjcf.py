@@ -189,6 +189,36 @@ def lines(walls: Iterable[tuple[tuple[float, float], tuple[float, float]]], look
     return elements
 
 
+def uneven_ground(
+    random: np.random.Generator,
+    height: float,
+    edge: float,
+    along: tuple[float, float],
+    across: float,
+    mu: float,
+) -> list[str]:
+    """Fixed square blocks of drawn heights, up to `height` [m], edge by edge.
+
+    They cover along[0] < x < along[1] and |y| < across [m].
+    """
+    columns = math.ceil((along[1] - along[0]) / edge)
+    rows = math.ceil(2 * across / edge)
+    heights = height * random.uniform(size=(columns, rows))
+    elements = []
+    for i in range(columns):
+        for j in range(rows):
+            top = float(heights[i, j])
+            # deep enough to have a flat top only
+            place = (along[0] + (i + 0.5) * edge, (j + 0.5 - 0.5 * rows) * edge, top - 0.5 * edge)
+            tone = 0.5 + 0.2 * top / max(height, 1e-12)
+            elements.append(
+                f'<geom type="box" size="{numbers(0.5 * edge, 0.5 * edge, 0.5 * edge)}"'
+                f' pos="{numbers(*place)}" condim="3" friction="{mu!r}" material="solid"'
+                f' rgba="{tone:.3f} {tone:.3f} {0.95 * tone:.3f} 1"/>'
+            )
+    return elements
+
+
 def check(
     family: object,
     *,

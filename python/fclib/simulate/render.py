@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 BACKENDS: Final = ("egl", "osmesa")
 PROBE_LIMIT: Final = 60.0  # longest wait for a backend's answer [s]
 SUPERSAMPLING: Final = 2  # pixels drawn for one kept, along each axis
-FIELD_OF_VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
+FIELD_OF_UPRIGHT: Final = (960, 1280)  # [pixels]
+LYING: Final = (1280, 800)
+VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
 VIEW: Final = (125.0, -14.0)  # azimuth and elevation [deg]
 VIEW_OF_PLANE: Final = (90.0, -2.0)  # x to the right
 FILL: Final = 0.86  # share of the picture that the scene takes
@@ -63,14 +65,14 @@ def render(
     path: str | Path,
     *,
     reactions: Vector | None = None,
-    size: tuple[int, int] = (960, 1280),
+    size: tuple[int, int] | None = None,
 ) -> None:
     """Write a PNG of a step, or of the present state of a model.
 
     source     a step is drawn as it was at its start, with the reactions of its solution;
                a model is drawn as it is, without
     reactions  (d nc) impulses of a step to draw instead [N s]
-    size       width and height in pixels
+    size       width and height in pixels; by default UPRIGHT or LYING, as the scene is
 
     NoRenderer, in one line, where no OpenGL works; OSError where the file cannot be written.
     """
@@ -100,19 +102,22 @@ def render(
         m.geom_rgba[moving, 3] *= OPACITY
         m.mat_rgba[np.unique(m.geom_matid[moving][m.geom_matid[moving] >= 0]), 3] *= OPACITY
 
-    width, height = (SUPERSAMPLING * pixels for pixels in size)
-    m.vis.global_.offwidth, m.vis.global_.offheight = width, height
-    m.vis.global_.fovy = FIELD_OF_VIEW
-
     points = corners(m, d, moving)
     focus = model.scene.focus
     if focus is not None:
         points = np.array(focus[:3]) + focus[3] * np.array(
             [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
         )
+    view = VIEW_OF_PLANE if model.scene.planar else VIEW
+    if size is None:
+        extent = np.ptp(points @ axes_of(view).T, axis=0)
+        size = LYING if extent[0] > extent[1] else UPRIGHT
+    width, height = (SUPERSAMPLING * pixels for pixels in size)
+    m.vis.global_.offwidth, m.vis.global_.offheight = width, height
+    m.vis.global_.fovy = FIELD_OF_VIEW
+
     light_up(m, d, points)
     scene = mujoco.MjvScene(m, maxgeom=m.ngeom + m.nsite + m.ntendon * 100 + len(forces) + 1000)
-    view = VIEW_OF_PLANE if model.scene.planar else VIEW
     camera = framing_camera(points, width / height, view)
     mujoco.mjv_updateScene(
         m, d, mujoco.MjvOption(), None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene
@@ -198,10 +203,10 @@ def light_up(m: Any, d: Any, points: Vector) -> None:
     d.light_xpos[directional] = middle - 2.0 * radius * d.light_xdir[directional]
 
 
-def framing_camera(points: Vector, aspect: float, view: tuple[float, float]) -> Any:
-    """A free camera that sees all the points (k x 3) at the least distance; view in degrees."""
+def axes_of(view: tuple[float, float]) -> Vector:
+    """What is right, up and ahead in a picture (rows, 3 x 3), in the world; view in degrees."""
     azimuth, elevation = np.deg2rad(view)
-    forward = np.array(
+    ahead = np.array(
         [
             np.cos(elevation) * np.cos(azimuth),
             np.cos(elevation) * np.sin(azimuth),
@@ -209,13 +214,18 @@ def framing_camera(points: Vector, aspect: float, view: tuple[float, float]) -> 
         ]
     )
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
-    up = np.cross(right, forward)
+    return np.stack([right, np.cross(right, ahead), ahead])
+
+
+def framing_camera(points: Vector, aspect: float, view: tuple[float, float]) -> Any:
+    """A free camera that sees all the points (k x 3) at the least distance; view in degrees."""
+    axes = axes_of(view)
 
     # look at the middle of what is seen, not of what is there
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    seen = (points - middle) @ np.stack([right, up, forward]).T
+    seen = (points - middle) @ axes.T
     shift = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
-    middle = middle + shift @ np.stack([right, up, forward])
+    middle = middle + shift @ axes
     seen = np.abs(seen - shift) * [1, 1, 0] + (seen - shift) * [0, 0, 1]
 
     slope = FILL * np.tan(0.5 * np.deg2rad(FIELD_OF_VIEW))

@@ -1,0 +1,178 @@
+"""Masonry stands where limit analysis says so, falls where not, and rests on four points a face."""
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fclib import scenes
+from fclib.scenes import _masonry
+
+# MuJoCo has no release for the oldest Python that fclib takes
+pytest.importorskip("mujoco")
+
+from fclib.simulate import Step, simulate
+
+
+def last_of(scene: scenes.Scene, steps: int) -> Step:
+    *_, last = simulate(scene, steps)
+    return last
+
+
+def places(step: Step) -> npt.NDArray[np.float64]:
+    """Where the free stones are (nb x 3) [m]; supports that move come last."""
+    free = len(step.velocity) // 6
+    return step.position[: 7 * free].reshape(-1, 7)[:, :3]
+
+
+def weight(step: Step) -> float:
+    """Of the free stones [N]."""
+    model = step.model.model
+    free = len(step.velocity) // 6
+    return float(model.body_mass[1 : 1 + free].sum() * -model.opt.gravity[2])
+
+
+# ---- outlines
+
+
+@given(
+    st.lists(st.floats(0, 2 * math.pi), min_size=3, max_size=8, unique_by=lambda a: round(a, 1)),
+    st.floats(0, 0.5),
+)
+def test_grown_outline_moves_every_side(angles: list[float], distance: float) -> None:
+    outline = [_masonry.on_circle(2.0, angle) for angle in sorted(angles)]
+    for (x, z), (a, b), (c, d) in zip(
+        _masonry.grown(outline, distance), outline, [*outline[1:], outline[0]], strict=True
+    ):
+        normal = np.array([d - b, a - c]) / math.hypot(d - b, a - c)
+        # to the right of a side that runs counterclockwise is outside
+        assert normal @ (x - a, z - b) == pytest.approx(distance, abs=1e-9)
+
+
+def test_cut_outline_loses_its_corners() -> None:
+    square = _masonry.rectangle(0, 2, 0, 1)
+    shape = _masonry.cut(square, 0.1)
+    assert len(shape) == 8
+    assert _masonry.area(shape) == pytest.approx(2 - 4 * 0.5 * 0.1**2)
+
+
+def test_ring_is_a_polygon_of_its_thickness() -> None:
+    outlines = _masonry.ring(2.0, 0.3, 0.0, math.pi, 7)
+    # sin(2 phi) / 2 (R^2 - r^2) for each voussoir of half angle phi
+    each = 0.5 * math.sin(math.pi / 7) * (2.15**2 - 1.85**2)
+    np.testing.assert_allclose([_masonry.area(outline) for outline in outlines], each)
+
+
+# ---- arches
+
+
+def test_arch_rests_on_the_corners_of_its_joints() -> None:
+    family: Any = scenes.get("Arch")(voussoirs=6, spread=0.0)
+    step = next(iter(simulate(family.scene(), 1)))
+    contacts = step.contacts
+    pairs, counts = np.unique(contacts.pair, axis=0, return_counts=True)
+    assert len(pairs) == 7
+    np.testing.assert_array_equal(counts, 4)
+    np.testing.assert_allclose(contacts.gap, -family.lap, atol=1e-7)
+    radii = np.hypot(contacts.point[:, 0], contacts.point[:, 2] - family.springing)
+    edges = family.radius + 0.5 * family.thickness * np.array([-1, 1])
+    assert np.abs(radii[:, None] - edges).min(axis=1).max() < 1e-4
+    np.testing.assert_allclose(np.abs(contacts.point[:, 1]), 0.5 * family.depth, atol=1e-4)
+
+
+@pytest.mark.parametrize(("ratio", "stands"), [(0.115, True), (0.1, False)])
+def test_semicircular_arch_stands_above_couplets_thickness(ratio: float, stands: bool) -> None:
+    # 0.1075 in the limit of thin voussoirs (Milankovitch), R the radius of the middle line
+    family: Any = scenes.get("Arch")(
+        voussoirs=20, radius=2.0, thickness=2.0 * ratio, spread=0.0, time_step=1e-2
+    )
+    scene = family.scene()
+    start = places(next(iter(simulate(scene, 1))))
+    last = last_of(scene, 50)
+    moved = np.abs(places(last) - start).max()
+    if stands:
+        assert moved < 1e-5
+        assert np.abs(last.velocity).max() < 1e-6
+    else:
+        assert moved > 0.02
+        assert np.abs(last.velocity).max() > 0.1
+
+
+def test_arch_carries_its_weight_and_thrusts() -> None:
+    step = last_of(scenes.get("Arch")(voussoirs=10, spread=0.0).scene(), 3)
+    # impulses on the second body of each pair; the supports are the last two geometries
+    r = np.reshape(step.result.solution.r, (-1, 3))
+    force = np.einsum("cij,ci->cj", step.contacts.frame, r) / step.model.time_step
+    support = step.contacts.pair.max() - np.array([1, 0])
+    on = [force[step.contacts.pair[:, 1] == one].sum(axis=0) for one in support]
+    np.testing.assert_allclose(-(on[0] + on[1])[2], weight(step), rtol=1e-6)
+    # the left support is pushed to the left, the right one as much to the right
+    np.testing.assert_allclose(on[0][0], -on[1][0], rtol=1e-6)
+    assert on[0][0] < -0.1 * weight(step)
+
+
+def test_arch_cracks_into_hinges_where_its_supports_spread() -> None:
+    family: Any = scenes.get("Arch")(voussoirs=10, time_step=1e-2)
+    last = last_of(family.scene(), 60)
+    np.testing.assert_allclose(last.position[-1], 59 * 1e-2 * family.spread, rtol=1e-2)
+    # a joint that opens keeps the two contacts of one edge
+    pairs, counts = np.unique(last.contacts.pair, axis=0, return_counts=True)
+    assert len(pairs) == 11
+    assert np.sum(counts == 2) >= 3
+    # it stands on its hinges: nothing is faster than a few times the spread
+    assert np.abs(last.velocity).max() < 5 * family.spread
+    assert places(last)[:, 2].max() > 0.9 * (family.springing + family.radius)
+
+
+@pytest.mark.parametrize(
+    ("name", "smaller"),
+    [
+        ("Arch", {"voussoirs": 8, "thickness": 0.15, "spread": 0.0}),
+        ("LowWall", {"stretchers": 2, "courses": 2, "push": 0.0}),
+    ],
+)
+def test_energy_does_not_grow(name: str, smaller: dict[str, Any]) -> None:
+    energy = np.array(
+        [
+            step.model.energy()
+            for step in simulate(scenes.get(name)(**smaller).scene(), 60, tol=1e-10)
+        ]
+    )
+    assert np.diff(energy).max() < 1e-7 * np.abs(energy).max()
+
+
+# ---- walls
+
+
+def test_low_wall_stands_on_more_contacts_than_it_needs() -> None:
+    family: Any = scenes.get("LowWall")(push=0.0)
+    scene = family.scene()
+    first, *_, last = simulate(scene, 10)
+    assert 3 * first.problem.nc > 6 * first.problem.n
+    assert np.abs(places(last) - places(first)).max() < 1e-6
+    assert np.abs(last.velocity).max() < 1e-6
+
+
+def test_low_wall_has_no_gaps_and_no_overlaps() -> None:
+    family: Any = scenes.get("LowWall")(stretchers=4, courses=4, push=0.0)
+    step = next(iter(simulate(family.scene(), 1)))
+    volume = 4 * family.height * 4.5 * family.length * family.length
+    np.testing.assert_allclose(weight(step), volume * family.density * family.gravity, rtol=1e-3)
+    np.testing.assert_allclose(step.contacts.gap.max(), step.contacts.gap.min(), rtol=0.6)
+
+
+def test_ram_pushes_the_upper_courses() -> None:
+    family: Any = scenes.get("LowWall")(stretchers=2, courses=3, push=1.0)
+    scene = family.scene()
+    first, *_, last = simulate(scene, 25)
+    moved = (places(last) - places(first))[:, 1]
+    ram = last.position[-1]
+    np.testing.assert_allclose(ram, 24 * family.time_step, rtol=1e-2)
+    # the ram was 0.1 lengths away
+    assert moved.max() == pytest.approx(ram - 0.1 * family.length, abs=0.02)
+    assert abs(moved[0]) < 0.01
+    assert last.contacts.gap.min() > -0.02

@@ -1,0 +1,103 @@
+"""Mechanisms and robots with closed loops move as their kinematics say."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fclib import scenes
+
+# MuJoCo has no release for the oldest Python that fclib takes
+pytest.importorskip("mujoco")
+
+from fclib.simulate import MujocoModel, Step, simulate
+
+
+def last_of(scene: scenes.Scene, steps: int) -> Step:
+    *_, last = simulate(scene, steps)
+    return last
+
+
+def violation(step: Step) -> float:
+    """The largest violation of the bilateral constraints [m]."""
+    return float(np.abs(step.model.assemble(1e-3).violation).max())
+
+
+def coordinate(step: Step, joint: str) -> float:
+    """A joint's coordinate from where it is 0, at the start of a step."""
+    address = step.model.model.joint(joint).qposadr[0]
+    return float(step.position[address])
+
+
+# ---- slider-cranks
+
+
+def test_slider_follows_the_ideal_one_up_to_its_clearance() -> None:
+    family: Any = scenes.get("SliderCrank")(sliders=2, time_step=4e-4)
+    scene = family.scene(seed=3)
+    model = MujocoModel(scene).model
+    start = np.random.Generator(np.random.PCG64(3)).uniform(-math.pi, math.pi)
+    # of a pin in a regular polygon, in its corner
+    play = (family.pin + family.clearance) / math.cos(math.pi / family.sides) - family.pin
+    slack = []
+    turned = 0.0
+    for step in simulate(scene, 280):
+        turned = coordinate(step, "shaft")
+        if step.index % 20 == 0:
+            assert violation(step) < 0.1 * family.clearance
+        for i in range(2):
+            angle = start + math.pi * i + turned
+            x = model.body(f"slider{i}").pos[0] + coordinate(step, f"slider{i}")
+            # from the crank's pin to the slider's, which the ideal rod keeps at its length
+            apart = math.hypot(x - family.crank * math.cos(angle), family.crank * math.sin(angle))
+            slack.append(apart - family.rod)
+    assert turned > 2 * math.pi
+    slack_range = np.ptp(slack)
+    assert np.abs(slack).max() < play + 2e-4
+    # the pin goes from one side of the bore to the other
+    assert slack_range > 1.5 * family.clearance
+
+
+def test_slider_crank_needs_a_shorter_crank_than_rod() -> None:
+    with pytest.raises(ValueError, match=r"crank \(0\.2\)"):
+        scenes.get("SliderCrank")(crank=0.2)
+
+
+# ---- closed chains
+
+
+def test_closed_chains_stay_closed_and_do_not_pass_through_each_other() -> None:
+    family: Any = scenes.get("ClosedChains")(chains=3, links=6)
+    energy = []
+    met = set()
+    for step in simulate(family.scene(seed=0), 200):
+        assert step.result.converged
+        energy.append(step.model.energy())
+        bodies = step.model.model.geom_bodyid[step.contacts.pair[step.contacts.pair[:, 0] >= 0]]
+        met |= {tuple(np.minimum(pair, 1)) for pair in bodies.tolist()}
+    # with bodies that are fixed, and with each other
+    assert met == {(0, 1), (1, 1)}
+    assert step.problem.formulation == "GM3DFC"
+    assert violation(step) < 1e-3
+    assert step.contacts.gap.min() > -0.1 * family.radius
+    # all that is lost is lost in contacts and joints
+    assert np.diff(energy).max() < 1e-3 * energy[0]
+
+
+# ---- robots
+
+
+def test_quadruped_walks_over_uneven_ground() -> None:
+    family: Any = scenes.get("Quadruped")()
+    last = last_of(family.scene(seed=1), 300)
+    assert last.problem.formulation == "GM3DFC"
+    assert last.position[0] > 0.5
+    assert abs(last.position[1]) < 0.2
+    # upright
+    _, x, y, _ = last.position[3:7]
+    assert 1 - 2 * (x * x + y * y) > 0.95
+    assert violation(last) < 1e-3
+    # four loops of three rows, none redundant
+    G: Any = last.problem.G
+    assert np.linalg.matrix_rank(G.toarray()) == 12

@@ -33,9 +33,9 @@ if TYPE_CHECKING:
 BACKENDS: Final = ("egl", "osmesa")
 PROBE_LIMIT: Final = 60.0  # longest wait for a backend's answer [s]
 SUPERSAMPLING: Final = 2  # pixels drawn for one kept, along each axis
-FIELD_OF_UPRIGHT: Final = (960, 1280)  # [pixels]
+UPRIGHT: Final = (960, 1280)  # [pixels]
 LYING: Final = (1280, 800)
-VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
+FIELD_OF_VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
 VIEW: Final = (125.0, -14.0)  # azimuth and elevation [deg]
 VIEW_OF_PLANE: Final = (90.0, -2.0)  # x to the right
 FILL: Final = 0.86  # share of the picture that the scene takes

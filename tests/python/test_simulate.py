@@ -149,6 +149,27 @@ def test_rebound_is_newtons(e: float, body: str) -> None:
     np.testing.assert_allclose(impact.result.solution.v[2], -e * before, atol=1e-9)
 
 
+@pytest.mark.parametrize(("theta", "kept"), [(0.5, True), (1.0, False)])
+def test_spring_keeps_its_energy_at_the_midpoint(theta: float, kept: bool) -> None:
+    """A mass of 2 kg on a spring of 800 N/m, 20 rad/s."""
+    spring = (
+        '<body><joint type="slide" axis="1 0 0" stiffness="800"/><geom size="0.1" mass="2"/></body>'
+    )
+    scene = Scene(name="test", xml=mjcf(spring, floor=False, rest=start("0", "1")), theta=theta)
+    speed, place = [], []
+    for step in simulate(scene, 200):
+        speed.append(float(step.start.velocity[0]))
+        place.append(float(step.position[0]))
+    energy = np.square(speed) + 400 * np.square(place)
+    if kept:
+        np.testing.assert_allclose(energy, energy[0], rtol=1e-12)
+        # the midpoint rule turns by 2 atan(h omega / 2) a step
+        angle = 2 * math.atan(0.5 * H * 20)
+        np.testing.assert_allclose(speed, np.cos(angle * np.arange(200)), atol=1e-9)
+    else:
+        assert np.all(np.diff(energy) < 0)
+
+
 def test_fast_body_is_caught_before_it_passes() -> None:
     """A contact is active where g + h/2 u_N <= 0: at 100 m/s, 0.25 m ahead."""
     steps = run(mjcf(SPHERE, rest=start("0 0 2.8 1 0 0 0", "0 0 -100 0 0 0")), 10)
@@ -213,6 +234,7 @@ def test_only_active_contacts_enter() -> None:
         ({"h": 0.0}, "time step"),
         ({"h": H, "restitution": 1.5}, "restitution"),
         ({"h": H, "stabilization": -1}, "stabilization"),
+        ({"h": H, "theta": 0.4}, "theta must be in"),
         ({"h": H, "law": "force"}, '"velocity" or "gap"'),
         ({"h": H, "law": "gap", "restitution": 0.5}, "inelastic"),
     ],

@@ -129,13 +129,14 @@ def origin(scene: Source) -> dict[str, Any]:
     known = {"scene": scene.name, "parameters": dict(scene.parameters), "seed": scene.seed}
     if isinstance(scene, scenes.Assembled):
         return known
-    # the file names the version, hence the numbers, of what simulates
-    from fclib.simulate import _mujoco
+    # the version, hence the numbers, of what simulates
+    from fclib.simulate import engine
 
     return known | {
-        "mujoco": _mujoco.VERSION,
+        **engine(scene),
         "restitution": scene.restitution,
         "law": scene.law,
+        "theta": scene.theta,
         "time_step": scene.time_step,
         "ignore": list(scene.ignore),
         "planar": scene.planar,

@@ -10,25 +10,28 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
 
 import fclib
+from fclib.scenes._solids import Solids
 
 Law = Literal["velocity", "gap"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A mechanical scene, ready to be simulated: an MJCF model and how to step it.
+    """A mechanical scene, ready to be simulated: what is in it, and how to step it.
 
-    A keyframe named ``start`` gives the initial positions, velocities and controls; without it
-    the scene starts at rest in the positions of the model.
+    In an MJCF model a keyframe named ``start`` gives the initial positions, velocities and
+    controls; without it the scene starts at rest in the positions of the model.
 
     To solve a problem of a scene again, one needs what is here and nothing else.
     """
 
     name: str
-    xml: str  # MJCF text
+    xml: str = ""  # MJCF text, or
+    solids: Solids | None = None  # elastic blocks
     time_step: float | None = None  # h [s]; None: the one of the MJCF file
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
+    theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
     seed: int | None = None
     title: str = ""
@@ -43,7 +46,7 @@ class Scene:
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
 
     @classmethod
-    def of(cls, family: Any, seed: int, xml: str, **more: Any) -> Scene:
+    def of(cls, family: Any, seed: int, xml: str = "", **more: Any) -> Scene:
         """The scene of a family: its parameters and all that it says of itself."""
         return cls(
             name=type(family).__name__,
@@ -176,7 +179,10 @@ class Assembly(Described, Protocol):
 
 
 class Family(Described, Protocol):
-    """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s]."""
+    """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
+
+    Where the default scene takes long, `small` holds parameters of a quick one of the kind.
+    """
 
     restitution: float
     time_step: float

@@ -3,27 +3,32 @@
     for step in fclib.simulate.simulate(scene, steps=100):
         step.problem, step.result
 
-    scenes ──> MujocoModel ──> System ──> MoreauJean ──> GlobalProblem ──> fclib.solve
-                    ^                                                          │
-                    └───────────── integrate(h, v) ────────────────────────────┘
+    scenes ──> MujocoModel, DeformableModel ──> System ──> MoreauJean ──> GlobalProblem ──> solve
+                          ^                                                                   │
+                          └──────────────────── integrate(h, v) ──────────────────────────────┘
 
 moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
+deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
 simulation.py     the loop, warm starts, and what each problem says of its origin
 render.py         a picture of a state with its reactions
 
-Importing this package needs MuJoCo, in the version that `_mujoco.py` pins.
+Importing this package needs MuJoCo, in the version that `_mujoco.py` pins; deformable scenes need
+scikit-fem, in that of `_skfem.py`.
 """
 
+from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel, UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
-from fclib.simulate.simulation import State, Step, provenance, simulate
+from fclib.simulate.simulation import Model, State, Step, engine, provenance, simulate
 
 __all__ = [
     "ContactModel",
     "Contacts",
+    "DeformableModel",
+    "Model",
     "MoreauJean",
     "MujocoModel",
     "NoRenderer",
@@ -31,6 +36,7 @@ __all__ = [
     "Step",
     "System",
     "UnsupportedSceneError",
+    "engine",
     "provenance",
     "render",
     "simulate",

@@ -1,15 +1,18 @@
 """Moreau-Jean time stepping of a mechanical system with contact, Coulomb friction and impacts.
 
-One step of length h, theta = 1, springs and dampers linearised, other forces taken at its start:
+One step of length h, springs and dampers linearised and taken at theta, other forces as the model
+gives them:
 
-    M (v' - v) = h F(q', v') + H r + G lambda       dynamics, r and lambda impulses
+    M (v' - v) = h F(q_t, v_t) + H r + G lambda     dynamics, r and lambda impulses
     u = H^T v' + w                                  local velocities, N, T1, T2 for each contact
     G^T v' + b = 0                                  bilateral constraints
     K* contains u^, u^ . r = 0, r in K              Coulomb's law on the active contacts
-    q' = q (+) h v'                                 on the manifold of configurations
+    q' = q (+) h v_t                                on the manifold of configurations
 
-which is the problem GM3DFC (G3DFC without bilateral constraints) with the matrix
-M + h C + h^2 K and f = (M + h C) v + h F(q, v), since F(q', v') = F(q, v) - C (v' - v) - h K v'.
+with v_t = (1 - theta) v + theta v' and q_t = q (+) theta h v_t, which is the problem GM3DFC (G3DFC
+without bilateral constraints) with the matrix M + h theta C + h^2 theta^2 K and
+f = (M + h theta C - h^2 theta (1 - theta) K) v + h F(q, v), since F(q_t, v_t) = F(q, v) -
+theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the energy of springs.
 
     q, v    configuration and velocity at t; v' the velocity at t + h
     gap     g, signed distance at a contact [m], < 0 where bodies penetrate
@@ -20,9 +23,10 @@ Two unilateral laws:
 velocity (default)  a contact is active where g + h/2 u_N^- <= 0, with Newton's law of impact
                     u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
                     penetration (of order h u_N at an impact) is kept and not amplified.
-gap                 every contact within reach is active, with g + h u_N' >= 0, that is
-                    w_N = g / h. Where g < 0 only a share of it, the stabilization, is undone in
-                    a step, since all of it would throw the bodies apart. Inelastic: no e.
+gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
+                    w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
+                    step. Where g_m < 0 only a share of it, the stabilization, is undone in a
+                    step, since all of it would throw the bodies apart. Inelastic: no e.
 
 A bilateral constraint with violation c is corrected by the same share: b = stabilization c / h.
 
@@ -152,8 +156,8 @@ class ContactModel(Protocol):
         """
         ...
 
-    def integrate(self, h: float, v: Vector) -> None:
-        """Take v as the velocity and move by h v: q <- q (+) h v."""
+    def integrate(self, h: float, v: Vector, theta: float = 1.0) -> None:
+        """Take v as the velocity, moving by h v_t, v_t = (1 - theta) of the old + theta v."""
         ...
 
 
@@ -165,6 +169,7 @@ class MoreauJean:
     restitution: float = 0.0  # e of Newton's law, in [0, 1]
     law: Law = "velocity"
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
+    theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
 
     def __post_init__(self) -> None:
         if not self.h > 0:
@@ -173,6 +178,8 @@ class MoreauJean:
             raise ValueError(f"restitution must be in [0, 1], not {self.restitution}")
         if not 0 <= self.stabilization <= 1:
             raise ValueError(f"stabilization must be in [0, 1], not {self.stabilization}")
+        if not 0.5 <= self.theta <= 1:
+            raise ValueError(f"theta must be in [1/2, 1], not {self.theta}")
         if self.law not in ("velocity", "gap"):
             raise ValueError(f'the law must be "velocity" or "gap", not {self.law!r}')
         if self.law == "gap" and self.restitution:
@@ -195,14 +202,20 @@ class MoreauJean:
             contacts, H = contacts[active], H[:, block_columns(active, d)]
             w_n = self.restitution * before[active]
         else:
-            share = np.where(contacts.gap > 0, 1.0, self.stabilization)
-            w_n = share * contacts.gap / h
+            middle = contacts.gap
+            if self.theta < 1:
+                middle = middle + (1 - self.theta) * h * (H.T @ v)[0::d]
+            share = np.where(middle > 0, 1.0, self.stabilization)
+            w_n = share * middle / h
 
         w = np.zeros(d * len(contacts))
         w[0::d] = w_n
-        M = system.M + h * system.C
+        implicit = self.theta * h
+        M = system.M + implicit * system.C
         f = M @ v + h * system.force
-        M = sp.csc_array(M + h**2 * system.K)
+        if self.theta < 1:
+            f -= implicit * (h - implicit) * (system.K @ v)
+        M = sp.csc_array(M + implicit**2 * system.K)
         b = self.stabilization / h * system.violation
 
         inside, rows = linked(system.tree, M, H, system.G)

@@ -14,6 +14,7 @@ A planar scene moves in a plane y = const: slides along x and z, hinges about y 
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -133,10 +134,18 @@ class MujocoModel:
         self.data.qpos[:] = position
         self.data.qvel[:] = velocity
 
-    def integrate(self, h: float, v: Vector) -> None:
-        """Take v (n) as the velocity and move by h v: q <- q (+) h v."""
+    def integrate(self, h: float, v: Vector, theta: float = 1.0) -> None:
+        """Take v (n) as the velocity, moving by h v_t, v_t = (1 - theta) of the old + theta v."""
+        moved = v if theta == 1 else (1 - theta) * self.data.qvel + theta * v
         self.data.qvel[:] = v
-        mujoco.mj_integratePos(self.model, self.data.qpos, v, h)
+        mujoco.mj_integratePos(self.model, self.data.qpos, moved, h)
+
+    def drawing(self, position: Vector) -> tuple[Any, Any]:
+        """A copy of the MjModel, whose looks may change, and an MjData with bodies in place."""
+        m = copy.copy(self.model)
+        d = mujoco.MjData(m)
+        d.qpos[:] = position
+        return m, d
 
     def energy(self) -> float:
         """Kinetic plus potential energy [J] at (q, v)."""

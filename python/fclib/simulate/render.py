@@ -9,7 +9,6 @@ On Debian and Ubuntu libosmesa6 suffices; for EGL, libegl1, libopengl0 and libgl
 
 from __future__ import annotations
 
-import copy
 import functools
 import importlib
 import os
@@ -24,11 +23,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.simulate._mujoco import mujoco
+from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.mujoco_model import MujocoModel
 
 if TYPE_CHECKING:
     from fclib.simulate.moreau_jean import Vector
-    from fclib.simulate.simulation import Step
+    from fclib.simulate.simulation import Model, Step
 
 BACKENDS: Final = ("egl", "osmesa")
 PROBE_LIMIT: Final = 60.0  # longest wait for a backend's answer [s]
@@ -61,7 +61,7 @@ class NoRenderer(RuntimeError):  # noqa: N818
 
 
 def render(
-    source: MujocoModel | Step,
+    source: Model | Step,
     path: str | Path,
     *,
     reactions: Vector | None = None,
@@ -76,7 +76,7 @@ def render(
 
     NoRenderer, in one line, where no OpenGL works; OSError where the file cannot be written.
     """
-    if isinstance(source, MujocoModel):
+    if isinstance(source, (MujocoModel, DeformableModel)):
         if reactions is not None:
             raise ValueError("reactions need the contacts of a step: render(step, ...)")
         model, position, contacts = source, source.position, None
@@ -87,10 +87,7 @@ def render(
         # an impulse over a step is a mean force
         forces = contacts.forces(r) / model.time_step
 
-    # a copy, since the looks of the bodies change with what is drawn
-    m = copy.copy(model.model)
-    d = mujoco.MjData(m)
-    d.qpos[:] = position
+    m, d = model.drawing(position)
     mujoco.mj_kinematics(m, d)
     mujoco.mj_comPos(m, d)
     mujoco.mj_camlight(m, d)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 import fclib
 from fclib.scenes import Scene
-from fclib.simulate import _mujoco
+from fclib.simulate import _mujoco, _skfem
+from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import Contacts, MoreauJean, Vector
 from fclib.simulate.mujoco_model import MujocoModel
+
+Model: TypeAlias = MujocoModel | DeformableModel
 
 
 @dataclass(frozen=True)
@@ -42,7 +45,7 @@ class Step:
     contacts: Contacts  # nc, the active ones, at the start of the step
     position: Vector  # q (nq) at the start of the step
     start: State  # from which `simulate` does this step again, and goes on
-    model: MujocoModel  # shared by all steps
+    model: Model  # shared by all steps
 
 
 def simulate(
@@ -68,17 +71,19 @@ def simulate(
     A step whose solver misses the tolerance goes on with what it reached, and says so in
     `step.result`: later problems then depend on it.
 
-    Raises at once ValueError (bad MJCF, bad parameters) and UnsupportedSceneError; while stepping,
+    Raises at once ValueError (bad MJCF, bad parameters), UnsupportedSceneError, and ImportError
+    where a deformable scene lacks scikit-fem in the pinned version; while stepping,
     FloatingPointError where a velocity is no longer finite, and what `fclib.solve` raises.
     """
     if steps < 0:
         raise ValueError(f"the number of steps must be >= 0, not {steps}")
-    model = MujocoModel(scene)
+    model: Model = MujocoModel(scene) if scene.solids is None else DeformableModel(scene)
     scheme = MoreauJean(
         h=model.time_step,
         restitution=scene.restitution,
         law=scene.law,
         stabilization=stabilization,
+        theta=scene.theta,
     )
     settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
     if start is not None:
@@ -87,7 +92,7 @@ def simulate(
 
 
 def _march(
-    model: MujocoModel,
+    model: Model,
     scheme: MoreauJean,
     steps: int,
     settings: dict[str, Any],
@@ -130,7 +135,7 @@ def _march(
             state,
             model,
         )
-        model.integrate(scheme.h, after)
+        model.integrate(scheme.h, after, scheme.theta)
         r = np.reshape(result.solution.r, (-1, contacts.dimension))
         state = State(index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r)
 
@@ -171,7 +176,7 @@ def describe(
     origin = {
         "generator": "fclib.simulate",
         "fclib": fclib.__version__,
-        "mujoco": _mujoco.VERSION,
+        **engine(scene),
         "scene": scene.name,
         "parameters": dict(scene.parameters),
         "seed": scene.seed,
@@ -180,6 +185,7 @@ def describe(
         "time_step": scheme.h,
         "restitution": scheme.restitution,
         "law": scheme.law,
+        "theta": scheme.theta,
         "stabilization": scheme.stabilization,
         **settings,
         "step": index,
@@ -203,12 +209,20 @@ def describe(
         title=f"{scene.title or scene.name}, step {index}",
         description="\n".join([*words, json.dumps(origin, default=str)]).lstrip(),
         math_info=(
-            f"Moreau-Jean step, theta = 1, h = {scheme.h:g} s; {law}; Coulomb friction;"
+            f"Moreau-Jean step, theta = {scheme.theta:g}, h = {scheme.h:g} s; {law};"
+            " Coulomb friction;"
             " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
             f" v in m/s and rad/s, r in N s, components {words_of_components},"
             " r_R in N m s, mu_r in m)"
         ),
     )
+
+
+def engine(scene: Scene) -> dict[str, str]:
+    """What simulates a scene, in the version that its numbers depend on."""
+    if scene.solids is None:
+        return {"mujoco": _mujoco.VERSION}
+    return {"scikit-fem": _skfem.VERSION}
 
 
 def provenance(info: fclib.ProblemInfo) -> dict[str, Any]:

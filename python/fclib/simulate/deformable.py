@@ -1,0 +1,458 @@
+"""Elastic blocks by finite elements, in contact with each other and with a rigid floor.
+
+Hexahedra with 8 nodes, linear isotropic elasticity, consistent mass:
+
+    M a + C v + K u = f(t) + H r        u displacements of the nodes, C = damping K (Kelvin-Voigt)
+
+The degrees of freedom of the system are the velocities of the nodes [m/s], 3 a node, body after
+body; its configuration q is (u, t), so that loads may change with time. M is consistent, hence not
+diagonal, M + h theta C + h^2 theta^2 K constant, and H^T M^-1 H has full rank.
+
+Strains and rotations are taken to be small: K is that of the place where a block begins, while
+contacts follow the nodes. That is right where blocks are pressed, sheared and pushed a little, and
+wrong where one tips over; blocks may slide and fall as far as they like.
+
+Contacts are between a node of one surface, the slave, and a face of another, the master. The node
+is projected on the bilinear face, x = sum_j N_j(xi, eta) x_j, N is the face's outward normal there,
+and u = v_slave - sum_j N_j v_j in the frame N, T1, T2. Nodes of the later of two blocks are slaves
+of the earlier one's faces; a face's own nodes may enter the later block between its nodes. At an
+edge the horizontal face takes the node: with contacts of all nodes of a block with its neighbour
+and with what both stand on, W would lose its full rank.
+
+A contact's pair is the master, 0 for the floor and 1 + b for block b, and the slave's node.
+
+P. Wriggers, Computational Contact Mechanics, Springer, 2nd edition, 2006, sections 6.3 and 9.2.
+O. C. Zienkiewicz, R. L. Taylor, J. Z. Zhu, The Finite Element Method: Its Basis and Fundamentals,
+  Butterworth-Heinemann, 6th edition, 2005, chapter 6.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from fclib.scenes import Scene, _mjcf
+from fclib.scenes._solids import Block, Load, Solids
+from fclib.simulate import _skfem
+from fclib.simulate._mujoco import mujoco
+from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
+
+Indices = npt.NDArray[np.int64]
+
+FACES: Final = ("x-", "x+", "y-", "y+", "z-", "z+")
+OPPOSED: Final = -0.9  # scalar product of the normals of two faces that look at each other
+OUTSIDE: Final = 1e-3  # how far beyond its edges a face is touched, in its half width
+PROJECTIONS: Final = 8  # Gauss-Newton steps of a projection; the first is exact on a parallelogram
+# in edges of the smallest element: gaps that count as contact in any case, and the deepest one
+SKIN: Final = 1e-3
+DEPTH: Final = 0.1
+ROUNDING: Final = 1e-12  # a shape function this small is 0
+# integral of N_i N_j over a rectangle, nodes in a ring, for an area of 36
+FACE_MASS: Final = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36.0
+_CORNERS: Final = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A block's mesh where it begins, its nodes numbered from the system's first."""
+
+    x: Vector  # (k x 3) nodes [m]
+    elements: Indices  # (8 x elements) nodes
+    quads: dict[str, Indices]  # of each face: (quads x 4) nodes, in a ring about the outward normal
+    normals: dict[str, Vector]  # of each face: (3)
+
+
+class DeformableModel:
+    """A `ContactModel` made of the elastic blocks of a scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        """ImportError without scikit-fem, ValueError where the scene has no blocks or no step."""
+        if scene.solids is None or not scene.solids.blocks:
+            raise ValueError(f"{scene.name}: has no elastic blocks")
+        if scene.time_step is None:
+            raise ValueError(f"{scene.name}: a deformable scene needs a time step")
+        skfem = _skfem.load()
+        self.scene, self.solids = scene, scene.solids
+        self.time_step = float(scene.time_step)
+
+        known: dict[Any, tuple[Vector, Vector]] = {}
+        M, K, self.meshes = [], [], []
+        first = 0
+        for block in self.solids.blocks:
+            mesh = mesh_of(skfem, block, first)
+            key = (block.size, block.elements, block.young, block.poisson, block.density)
+            if key not in known:
+                known[key] = element_matrices(skfem, block)
+            mass, stiffness = known[key]
+            turn = np.kron(np.eye(8), rotation(block.yaw))
+            M.append(assembled(mesh, first, mass))
+            K.append(assembled(mesh, first, turn @ stiffness @ turn.T))
+            self.meshes.append(mesh)
+            first += len(mesh.x)
+        self.reference = np.concatenate([mesh.x for mesh in self.meshes])  # (nodes x 3) [m]
+        sizes = [len(mesh.x) for mesh in self.meshes]
+        self.body = np.repeat(np.arange(len(sizes)), sizes)  # (nodes) the block of each
+
+        self.M = sp.csc_array(sp.block_diag(M, format="csc"))
+        self.K = sp.csc_array(sp.block_diag(K, format="csc"))
+        for bed in self.solids.beds:
+            springs = bed.stiffness * face_mass(self.reference, self.meshes[bed.block], bed.face)
+            self.K = sp.csc_array(self.K + sp.kron(springs, np.eye(3)))
+        self.C = sp.csc_array(self.solids.damping * self.K)
+        self.C.eliminate_zeros()
+        n = 3 * first
+        self.weight = self.M @ np.tile((0.0, 0.0, -self.solids.gravity), first)  # (n) [N]
+        self._loads = [(load, load_mass(self, load)) for load in self.solids.loads]
+        self._floor = floor_nodes(self.meshes, self.solids)
+        self._candidates = candidates(self.meshes, self.solids.reach)
+        edges = [np.divide(block.size, block.elements).min() for block in self.solids.blocks]
+        self._edge = float(min(edges))
+
+        self._u, self._time = np.zeros(n), 0.0
+        self._v = np.repeat([block.velocity for block in self.solids.blocks], sizes, axis=0).ravel()
+
+    @property
+    def position(self) -> Vector:
+        """Configuration q (n + 1): displacements of the nodes [m] and the time [s], a copy."""
+        return np.append(self._u, self._time)
+
+    @property
+    def velocity(self) -> Vector:
+        """Velocity v (n) of the nodes [m/s], a copy."""
+        return self._v.copy()
+
+    @property
+    def trees(self) -> Indices:
+        """The block of each degree of freedom (n)."""
+        return np.repeat(self.body, 3)
+
+    def places(self, position: Vector | None = None) -> Vector:
+        """Where the nodes are (nodes x 3) [m], in a configuration or now."""
+        u = self._u if position is None else position[:-1]
+        x: Vector = self.reference + u.reshape(-1, 3)
+        return x
+
+    def set_state(self, position: Vector, velocity: Vector) -> None:
+        """Take a configuration q (n + 1) and a velocity v (n)."""
+        self._u, self._time = np.array(position[:-1]), float(position[-1])
+        self._v = np.array(velocity)
+
+    def integrate(self, h: float, v: Vector, theta: float = 1.0) -> None:
+        """Take v (n) as the velocity, moving by h v_t, v_t = (1 - theta) of the old + theta v."""
+        self._u = self._u + h * ((1 - theta) * self._v + theta * v)
+        self._v, self._time = np.array(v), self._time + h
+
+    def assemble(self, h: float, *, shared_speed: bool = False) -> System:
+        """The system at (q, v), loads in the middle of the step, contacts that may close within h.
+
+        Nodes share their speed in any case: what hits one moves the next.
+        """
+        u, v = self._u, self._v
+        force = self.weight + self.loads(self._time + 0.5 * h) - self.K @ u - self.C @ v
+        speed = float(np.linalg.norm(v.reshape(-1, 3), axis=1).max(initial=0.0))
+        reach = max(2 * h * speed + h**2 * self.solids.gravity, SKIN * self._edge)
+        H, contacts = self.contacts(reach)
+        n = len(v)
+        nothing = sp.csc_array((n, 0))
+        return System(self.M, force, self.C, self.K, H, contacts, nothing, np.zeros(0), self.trees)
+
+    def loads(self, time: float) -> Vector:
+        """Forces of the loads (n) at a time [N]."""
+        force = np.zeros((len(self.reference), 3))
+        for load, mass in self._loads:
+            share = load.share(time)
+            if share:
+                shape = share * wave(load, self.reference[:, 0], time)
+                force += (mass @ shape)[:, None] * np.array(load.traction)
+        return force.ravel()
+
+    def contacts(self, reach: float) -> tuple[Sparse, Contacts]:
+        """H (n x 3 nc) and the contacts nearer than `reach` [m], those with the floor first."""
+        x = self.places()
+        low = self._floor[x[self._floor, 2] <= reach]
+        slave, quad = self._candidates.slave, self._candidates.quad
+        middle = x[quad].mean(axis=1)
+        radius = np.linalg.norm(x[quad] - middle[:, None], axis=2).max(axis=1, initial=0.0)
+        near = np.linalg.norm(x[slave] - middle, axis=1) <= 1.1 * radius + max(
+            reach, DEPTH * self._edge
+        )
+        slave, quad = slave[near], quad[near]
+        shape, normal, outside = project(x[slave], x[quad])
+        touched = x[slave] - np.einsum("cj,cji->ci", shape, x[quad])
+        gap = np.einsum("ci,ci->c", normal, touched)
+        kept = np.flatnonzero((outside <= OUTSIDE) & (gap <= reach) & (gap >= -DEPTH * self._edge))
+        # of the faces of a block the one that has the node furthest inside, or the first of equals
+        order = np.lexsort((np.maximum(outside[kept], 0.0), self.body[quad[kept, 0]], slave[kept]))
+        kept = kept[order]
+        key = np.column_stack((slave[kept], self.body[quad[kept, 0]]))
+        first = np.ones(len(kept), dtype=bool)
+        first[1:] = (key[1:] != key[:-1]).any(axis=1)
+        kept = kept[first]
+
+        up = np.tile((0.0, 0.0, 1.0), (len(low), 1))
+        frame = frames(np.concatenate((up, normal[kept])))
+        slaves = np.concatenate((low, slave[kept]))
+        masters = np.concatenate((np.zeros(len(low), np.int64), 1 + self.body[quad[kept, 0]]))
+        gaps = np.concatenate((x[low, 2], gap[kept]))
+        contacts = Contacts(
+            pair=np.column_stack((masters, slaves)),
+            point=x[slaves] - 0.5 * gaps[:, None] * frame[:, 0],
+            frame=frame,
+            gap=gaps,
+            mu=np.full(len(slaves), self.solids.mu),
+        )
+        # the slave moves against the floor, or against the mean of its master's nodes
+        nodes = np.column_stack((slaves, np.zeros((len(slaves), 4), np.int64)))
+        nodes[len(low) :, 1:] = quad[kept]
+        weights = np.zeros((len(slaves), 5))
+        weights[:, 0] = 1.0
+        weights[len(low) :, 1:] = -shape[kept]
+        return columns(nodes, weights, frame, len(self._v)), contacts
+
+    def energy(self) -> float:
+        """Kinetic, elastic and potential energy [J] at (q, v), the loads' left out."""
+        u, v = self._u, self._v
+        return float(0.5 * v @ (self.M @ v) + 0.5 * u @ (self.K @ u) - self.weight @ u)
+
+    def drawing(self, position: Vector) -> tuple[Any, Any]:
+        """An MjModel and an MjData of the deformed blocks, their elements outlined."""
+        m = mujoco.MjModel.from_xml_string(picture(self, self.places(position)))
+        return m, mujoco.MjData(m)
+
+
+# ---- elements
+
+
+def rotation(yaw: float) -> Vector:
+    """The rotation (3 x 3) about the vertical; exact where there is none."""
+    c, s = (np.cos(yaw), np.sin(yaw)) if yaw else (1.0, 0.0)
+    return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
+
+
+def mesh_of(skfem: Any, block: Block, first: int) -> Mesh:
+    """A block's mesh, its nodes numbered from `first`."""
+    half = 0.5 * np.array(block.size)
+    grid = [np.linspace(-a, a, e + 1) for a, e in zip(half, block.elements, strict=True)]
+    mesh = skfem.MeshHex.init_tensor(*grid)
+    x: Vector = np.ascontiguousarray(mesh.p.T)
+    turn = rotation(block.yaw)
+    facets = mesh.facets[:, mesh.boundary_facets()].T
+    quads, normals = {}, {}
+    for number, face in enumerate(FACES):
+        axis, sign = number // 2, 2 * (number % 2) - 1
+        own = facets[(x[facets, axis] == sign * half[axis]).all(axis=1)]
+        # about the outward normal
+        b, c = [(1, 2), (2, 0), (0, 1)][axis][::sign]
+        out = x[own] - x[own].mean(axis=1, keepdims=True)
+        ring = np.argsort(np.arctan2(out[:, :, c], out[:, :, b]), axis=1)
+        quads[face] = first + np.take_along_axis(own, ring, axis=1).astype(np.int64)
+        normals[face] = sign * turn[:, axis]
+    return Mesh(
+        x @ turn.T + np.array(block.centre), first + mesh.t.astype(np.int64), quads, normals
+    )
+
+
+def element_matrices(skfem: Any, block: Block) -> tuple[Vector, Vector]:
+    """Consistent mass and stiffness (24 x 24) of one element: all of a block are equal."""
+    elasticity = importlib.import_module("skfem.models.elasticity")
+    edges = np.divide(block.size, block.elements)
+    one = skfem.MeshHex.init_tensor(*[np.array([0.0, edge]) for edge in edges])
+    basis = skfem.Basis(one, skfem.ElementVector(skfem.ElementHex1()))
+    stress = elasticity.linear_elasticity(*elasticity.lame_parameters(block.young, block.poisson))
+    inertia = skfem.BilinearForm(lambda u, v, _: block.density * (u * v).sum(axis=0))
+    order = basis.nodal_dofs[:, one.t[:, 0]].T.ravel()
+    mass, stiffness = (form.assemble(basis).toarray() for form in (inertia, stress))
+    return mass[np.ix_(order, order)], stiffness[np.ix_(order, order)]
+
+
+def assembled(mesh: Mesh, first: int, element: Vector) -> Sparse:
+    """The matrix of a block (3 k x 3 k) from that of one element; symmetric to the last bit."""
+    dofs = (3 * (mesh.elements.T[:, :, None] - first) + np.arange(3)).reshape(-1, 24)
+    rows = np.repeat(dofs, 24, axis=1).ravel()
+    entries = np.tile(element.ravel(), len(dofs))
+    size = 3 * len(mesh.x)
+    matrix = sp.csc_array((entries, (rows, np.tile(dofs, (1, 24)).ravel())), shape=(size, size))
+    return sp.csc_array(0.5 * (matrix + matrix.T))
+
+
+def face_mass(x: Vector, mesh: Mesh, face: str) -> Sparse:
+    """The integral of N_i N_j over a block's face (nodes x nodes) [m^2], of all blocks' nodes."""
+    quads = mesh.quads[face]
+    corners = x[quads]
+    areas = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]), axis=1
+    )
+    entries = areas[:, None, None] * FACE_MASS
+    rows, cols = np.repeat(quads, 4, axis=1), np.tile(quads, (1, 4))
+    return sp.csr_array((entries.ravel(), (rows.ravel(), cols.ravel())), shape=(len(x), len(x)))
+
+
+def load_mass(model: DeformableModel, load: Load) -> Sparse:
+    """What takes a traction at the nodes to their forces (nodes x nodes) [m^2]."""
+    x, meshes = model.reference, model.meshes
+    return sum(
+        (face_mass(x, meshes[block], load.face) for block in load.blocks),
+        sp.csr_array((len(x), len(x))),
+    )
+
+
+def wave(load: Load, x: Vector, time: float) -> Vector:
+    """The share of a load's traction at places x (k) along x [m]: 1, or its moving wave."""
+    if load.width is None:
+        return np.ones_like(x)
+    phase = (x - load.start - load.speed * time) / load.width
+    shape: Vector = np.where(np.abs(phase) < 0.5, np.cos(np.pi * phase) ** 2, 0.0)
+    return shape
+
+
+# ---- contacts
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Nodes, and faces of other blocks that they may touch."""
+
+    slave: Indices  # (k)
+    quad: Indices  # (k x 4)
+
+
+def slaves_of(mesh: Mesh, face: str) -> Indices:
+    """The nodes of a face that make contacts with it: at an edge the horizontal one has them."""
+    nodes = np.unique(mesh.quads[face])
+    if face[0] != "z":
+        nodes = np.setdiff1d(nodes, np.concatenate((mesh.quads["z-"], mesh.quads["z+"])))
+    return nodes
+
+
+def floor_nodes(meshes: list[Mesh], solids: Solids) -> Indices:
+    """The nodes that may touch the floor: those of the lower faces."""
+    if not solids.floor:
+        return np.zeros(0, np.int64)
+    return np.concatenate([slaves_of(mesh, "z-") for mesh in meshes])
+
+
+def candidates(meshes: list[Mesh], reach: float) -> Candidates:
+    """All nodes of a face with all quads of the faces that it looks at, nearer than `reach` [m]."""
+    found = list(_candidates(meshes, reach))
+    slave = [np.repeat(nodes, len(quads)) for nodes, quads in found]
+    quad = [np.tile(quads, (len(nodes), 1)) for nodes, quads in found]
+    return Candidates(
+        np.concatenate([np.zeros(0, np.int64), *slave]),
+        np.concatenate([np.zeros((0, 4), np.int64), *quad]),
+    )
+
+
+def _candidates(meshes: list[Mesh], reach: float) -> Iterator[tuple[Indices, Indices]]:
+    every = np.concatenate([mesh.x for mesh in meshes])
+    low = np.array([mesh.x.min(axis=0) for mesh in meshes]) - 0.5 * reach
+    high = np.array([mesh.x.max(axis=0) for mesh in meshes]) + 0.5 * reach
+    for later, mesh in enumerate(meshes):
+        near = ((low[:later] <= high[later]) & (low[later] <= high[:later])).all(axis=1)
+        for earlier in np.flatnonzero(near):
+            other = meshes[earlier]
+            for one in FACES:
+                for two in FACES:
+                    normal = other.normals[two]
+                    if normal @ mesh.normals[one] > OPPOSED:
+                        continue
+                    nodes, quads = slaves_of(mesh, one), other.quads[two]
+                    away = (every[nodes].mean(axis=0) - every[quads[0, 0]]) @ normal
+                    if nodes.size and abs(away) <= reach:
+                        yield nodes, quads
+
+
+def project(points: Vector, corners: Vector) -> tuple[Vector, Vector, Vector]:
+    """The nearest points of bilinear quads (k x 4 x 3) to points (k x 3).
+
+    Returns:
+        The shape functions there (k x 4), the unit normals (k x 3), and how far outside of it
+        the projection lies, in half widths of the quad (k); <= 0 is inside.
+    """
+    local = np.zeros((len(points), 2))
+    for _ in range(PROJECTIONS):
+        shape, along = shapes(local)
+        tangents = np.einsum("cja,cji->cai", along, corners)
+        rest = points - np.einsum("cj,cji->ci", shape, corners)
+        metric = np.einsum("cai,cbi->cab", tangents, tangents)
+        local = local + np.linalg.solve(metric, np.einsum("cai,ci->ca", tangents, rest)[..., None])[
+            ..., 0
+        ].clip(-2, 2)
+        # what has gone astray is far outside, and stays there
+        local = local.clip(-3, 3)
+    outside = np.abs(local).max(axis=1, initial=0.0) - 1
+    shape, along = shapes(local.clip(-1, 1))
+    tangents = np.einsum("cja,cji->cai", along, corners)
+    normal = np.cross(tangents[:, 0], tangents[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return shape, normal, outside
+
+
+def shapes(local: Vector) -> tuple[Vector, Vector]:
+    """Shape functions of a quad (k x 4) and their derivatives (k x 4 x 2) at (xi, eta) (k x 2)."""
+    factor = 1 + local[:, None, :] * _CORNERS  # (k x 4 x 2)
+    shape = 0.25 * factor[:, :, 0] * factor[:, :, 1]
+    along = 0.25 * _CORNERS * factor[:, :, ::-1]
+    shape[np.abs(shape) < ROUNDING] = 0.0
+    return shape, along
+
+
+def frames(normal: Vector) -> Vector:
+    """Frames (k x 3 x 3), rows N, T1, T2, of unit normals (k x 3); T1 as near to x as can be."""
+    axis = np.where(np.abs(normal[:, :1]) < 0.9, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+    first = axis - np.einsum("ci,ci->c", axis, normal)[:, None] * normal
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    return np.stack((normal, first, np.cross(normal, first)), axis=1)
+
+
+def columns(nodes: Indices, weights: Vector, frame: Vector, n: int) -> Sparse:
+    """H (n x 3 nc): of each contact its nodes (nc x k), their weights (nc x k) and the frame."""
+    nc = len(nodes)
+    entries = weights[:, :, None, None] * frame.transpose(0, 2, 1)[:, None]  # nc, k, dof, column
+    rows = np.broadcast_to(3 * nodes[:, :, None, None] + np.arange(3)[:, None], entries.shape)
+    cols = np.broadcast_to(3 * np.arange(nc)[:, None, None, None] + np.arange(3), entries.shape)
+    H = sp.csc_array((entries.ravel(), (rows.ravel(), cols.ravel())), shape=(n, 3 * nc))
+    H.eliminate_zeros()
+    return H
+
+
+# ---- pictures
+
+
+def picture(model: DeformableModel, x: Vector) -> str:
+    """MJCF that draws the blocks with their nodes at x (nodes x 3): each quad outlined."""
+    count = len(model.meshes)
+    assets, bodies = [], []
+    for i, mesh in enumerate(model.meshes):
+        quads = np.concatenate([mesh.quads[face] for face in FACES])
+        corner = 4 * np.arange(len(quads))[:, None]
+        triangles = (corner + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
+        sheet = np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (len(quads), 1))
+        colour = " ".join(_mjcf.shade(i, count).split()[:3])
+        assets += [
+            f'<texture name="t{i}" type="2d" builtin="flat" mark="edge" rgb1="{colour}"'
+            ' markrgb="0.2 0.24 0.3" width="64" height="64"/>',
+            f'<material name="m{i}" texture="t{i}" specular="0.2" shininess="0.3"/>',
+            f'<mesh name="b{i}" inertia="shell" vertex="{_mjcf.numbers(*x[quads].ravel())}"'
+            f' texcoord="{_mjcf.numbers(*sheet.ravel())}"'
+            f' face="{" ".join(map(str, triangles.ravel().tolist()))}"/>',
+        ]
+        bodies.append(
+            f'<body><freejoint/><geom type="mesh" mesh="b{i}" material="m{i}" mass="1"/></body>'
+        )
+    extent = float(np.ptp(x, axis=0).max())
+    return _mjcf.document(
+        model.scene.name,
+        bodies=bodies,
+        assets=assets,
+        time_step=model.time_step,
+        gravity=model.solids.gravity,
+        floor_mu=model.solids.mu,
+        floor_z=0.0 if model.solids.floor else float(x[:, 2].min()),
+        tile=0.25 * extent,
+    )

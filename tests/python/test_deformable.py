@@ -145,7 +145,8 @@ def test_free_vibration_keeps_its_energy_at_the_midpoint(theta: float, kept: boo
     for _ in range(40):
         energy.append(model.energy())
         part = scheme.problem(scheme.assemble(model), model.velocity)
-        model.integrate(1e-3, fclib.solve(part.problem).solution.v, theta)
+        solution: Any = fclib.solve(part.problem).solution
+        model.integrate(1e-3, solution.v, theta)
     if kept:
         np.testing.assert_allclose(energy, energy[0], rtol=1e-10)
     else:
@@ -217,7 +218,7 @@ def test_patch_test_across_matching_meshes() -> None:
     # one step so long that inertia does not matter
     h = 30.0
     pressed = scene(below, above, loads=(load,), gravity=0.0, theta=1.0, time_step=h)
-    last = next(iter(simulate(pressed, 1, tol=1e-11)))
+    last: Any = next(iter(simulate(pressed, 1, tol=1e-11)))
     x, strain = last.model.reference, -pressure / YOUNG
     u = h * last.velocity.reshape(-1, 3)
     expected = np.column_stack((-POISSON * strain * x[:, :2], strain * x[:, 2]))
@@ -297,6 +298,7 @@ def test_families_have_the_matrices_they_promise(name: str) -> None:
     """M + h^2 theta^2 K + h theta C, not diagonal, symmetric to the last bit; W of full rank."""
     family: Any = scenes.get(name)
     of = family(**family.small).scene(seed=0)
+    step: Any
     *_, step = simulate(of, 12)
     model, h = step.model, step.model.time_step
     assert of.theta == 0.5
@@ -327,10 +329,10 @@ def test_same_seed_same_bits_also_from_the_middle() -> None:
     assert "theta = 0.5" in steps[5].problem.info.math_info
     again = scenes.get(origin["scene"])(**origin["parameters"]).scene(origin["seed"])
     from_the_middle = list(simulate(again, 3, start=steps[5].start))
-    for one, other in zip(steps[5:], from_the_middle, strict=True):
-        for a, b in zip(arrays(one), arrays(other), strict=True):
+    for one, twin in zip(steps[5:], from_the_middle, strict=True):
+        for a, b in zip(arrays(one), arrays(twin), strict=True):
             np.testing.assert_array_equal(a, b)
-    other = next(iter(simulate(family().scene(seed=6), 1)))
+    other: Any = next(iter(simulate(family().scene(seed=6), 1)))
     assert np.any(other.problem.H.toarray() != steps[0].problem.H.toarray())
 
 

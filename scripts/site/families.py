@@ -11,7 +11,7 @@ from typing import Any
 
 from fclib import scenes, simulate
 from fclib.collections import plan
-from fclib.collections.sets import KNOWN
+from fclib.collections.known import KNOWN
 
 SIZE = (720, 540)  # of a picture [pixels]
 Kind = type[scenes.Described]

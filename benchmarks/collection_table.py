@@ -1,0 +1,109 @@
+"""The families of a built collection beside the published sets, as a Markdown table.
+
+    .venv/bin/python benchmarks/collection_table.py FOLDER... [--sample 8] [--limit 3000]
+
+Sizes and density, contact components for a degree of freedom, are those of the catalogues. The rank
+ratio (contact components over the rank of W) and the conditioning of W (its largest singular value
+over the smallest that is not zero) are computed by fclib.analysis for a sample of each family,
+evenly spread, of the problems that have at most LIMIT contact components; docs/analysis.md has
+methods and thresholds.
+
+published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
+contact problems with Coulomb friction: formulations and numerical comparisons, 2018, table
+"Description of the test sets of FCLib library (v1.0)".
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fclib
+from fclib import collections
+from fclib.analysis import analyze
+
+PUBLISHED = Path(__file__).with_name("published_sets.csv")
+HEAD = ("set", "mu", "problems", "dof", "contacts", "density", "rank ratio", "conditioning")
+
+
+def span(values: Iterable[Any]) -> str:
+    """From the least to the largest, as short as they differ."""
+    known = sorted(float(value) for value in values if value is not None and np.isfinite(value))
+    if not known:
+        return ""
+    texts = [f"{value:.3g}" if value < 1000 else f"{value:.5g}" for value in (known[0], known[-1])]
+    texts = [
+        f"{v:.1e}" if v >= 1e5 else t for v, t in zip((known[0], known[-1]), texts, strict=True)
+    ]
+    return texts[0] if texts[0] == texts[1] else " to ".join(texts)
+
+
+def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: int) -> list[Any]:
+    """Rank ratio and conditioning of W of a sample of a family's problems."""
+    small = [row for row in rows if row["spacedim"] * row["nc"] <= limit]
+    found = []
+    for place in np.unique(np.linspace(0, len(small) - 1, min(sample, len(small))).round()):
+        row = small[int(place)]
+        problem = fclib.read(folder / (row["global_file"] or row["local_file"]))
+        record = analyze(problem).record
+        if record["rank_W"]:
+            components = row["spacedim"] * row["nc"]
+            found.append((components / record["rank_W"], record["conditioning_W"]))
+    return found
+
+
+def line(name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any]) -> str:
+    """The line of a family of ours."""
+    cells = [
+        name,
+        span(row[key] for row in rows for key in ("mu_min", "mu_max")),
+        str(len(rows)),
+        span(row["n"] or None for row in rows),
+        span(row["nc"] for row in rows),
+        span(row["density"] for row in rows),
+        span(ratio for ratio, _ in figures),
+        span(conditioning for _, conditioning in figures),
+    ]
+    return "| " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    """Print the table: each published set, then ours beside it; then those that stand alone."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("--sample", type=int, default=8)
+    parser.add_argument("--limit", type=int, default=3000)
+    arguments = parser.parse_args()
+    families: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    where: dict[str, Path] = {}
+    for folder in arguments.folders:
+        for row in collections.read_catalog(folder).to_pylist():
+            name = f"{row['collection']}/{row['family']}"
+            if where.setdefault(name, folder) == folder:
+                families[name].append(row)
+
+    def ours(name: str) -> str:
+        rows = families.pop(name)
+        return line(name, rows, spectra(where[name], rows, arguments.sample, arguments.limit))
+
+    print("| " + " | ".join(HEAD) + " |")
+    print("|" + "---|" * len(HEAD), flush=True)
+    with PUBLISHED.open(newline="") as file:
+        for row in csv.DictReader(file):
+            beside = row.pop("ours")
+            row["set"] = f"*{row['set']}*"
+            print("| " + " | ".join(row.values()) + " |", flush=True)
+            if beside in families:
+                print(ours(beside), flush=True)
+    for name in sorted(families):
+        print(ours(name), flush=True)
+
+
+if __name__ == "__main__":
+    main()

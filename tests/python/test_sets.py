@@ -1,5 +1,6 @@
 """Sets: what they hold, the problems that come with the package, and how lists are chosen."""
 
+import importlib.util
 import json
 import subprocess
 import sys
@@ -65,6 +66,19 @@ def test_list_refuses_what_would_change_it(tmp_path: Path) -> None:
     done = invoke("collection", "build", "tiny", "--count", 1, "--out", tmp_path)
     assert done.exit_code == 2
     assert "names its problems" in done.output
+
+
+def test_family_of_local_problems_is_built_with_its_figure(tmp_path: Path) -> None:
+    table = collections.build([Plan.of_family("LocalProblems", count=3)], tmp_path)
+    assert table["global_file"].to_pylist() == [None] * 3
+    assert table["density"].to_pylist() == [None] * 3
+    assert all(verdict.ok for verdict in collections.verify(tmp_path))
+    problems = fclib.collection("LocalProblems", tmp_path)
+    assert problems.path(0).name == "0000-local.hdf5"
+    with pytest.raises(KeyError, match="global form"):
+        problems.path(0, "global")
+    if importlib.util.find_spec("matplotlib"):
+        assert (tmp_path / "local/LocalProblems/distribution.svg").is_file()
 
 
 def test_older_catalogue_without_version_is_read(tmp_path: Path) -> None:

@@ -46,7 +46,8 @@ def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: st
         figure = figure_module.Figure(figsize=(9, 2.6), layout="constrained")
         axes = figure.subplots(1, len(MEASURES), sharey=True)
         for axis, (column, label) in zip(axes, MEASURES, strict=True):
-            values = [row[column] for row in rows]
+            # a local problem has no density
+            values = [row[column] for row in rows if row[column] is not None]
             axis.hist(values, bins=BINS, color="#3b6ea5", linewidth=0)
             axis.set_xlabel(label)
             axis.spines[["top", "right"]].set_visible(False)

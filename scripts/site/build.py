@@ -102,10 +102,12 @@ def linked(text: str, up: str) -> str:
 def with_links(text: str, up: str) -> str:
     """A part of a text that is no code."""
     text = re.sub(r'(?<=src=")docs/|(?<=\]\()docs/', "", text)
-    text = re.sub(r"`?(?<![\w/(])docs/([\w-]+)\.md`?", rf"[\1]({up}\1.md)", text)
+    text = re.sub(r"`?(?<![\w/])(?<!\]\()docs/([\w-]+)\.md`?", rf"[\1]({up}\1.md)", text)
     for source, page in AS_THEY_ARE.items():
         if source != "README.md":
-            text = re.sub(rf"(?<![\w/\[(])`?{source}`?(?![\w)])", f"[{source}]({up}{page})", text)
+            text = re.sub(
+                rf"(?<![\w/\[])(?<!\]\()`?{source}`?(?!\w|\]\()", f"[{source}]({up}{page})", text
+            )
     return text
 
 

@@ -61,7 +61,9 @@ def page(script: Path, title: str, rest: str, output: str, pictures: list[Path])
     """The script, and what came of it."""
     arguments = " ".join(["", *ARGUMENTS.get(script.stem, [])])
     lines = [f"# {script.name}", "", title, rest, "", "```python"]
-    lines += [script.read_text(encoding="utf-8").rstrip(), "```", ""]
+    text = script.read_text(encoding="utf-8")
+    after = ast.parse(text).body[0].end_lineno or 0  # the docstring stands above
+    lines += ["\n".join(text.splitlines()[after:]).strip(), "```", ""]
     lines += ["```sh", f"python examples/python/{script.name}{arguments}", "```", ""]
     if output:
         lines += ["```text", output.rstrip(), "```", ""]

@@ -125,7 +125,9 @@ def draw(name: str) -> bytes | None:
     """A PNG of the default scene at its start; none of what has no scene."""
     if name not in scenes.families():
         return None
-    model = simulate.MujocoModel(scenes.get(name)().scene(0))
+    scene = scenes.get(name)().scene(0)
+    rigid = scene.solids is None
+    model = simulate.MujocoModel(scene) if rigid else simulate.DeformableModel(scene)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.png"
         try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import importlib.resources
 import inspect
+import re
+import textwrap
 from collections.abc import Iterator
 
 import fclib
@@ -53,10 +55,10 @@ def written(name: str) -> list[str]:
     if name == "Problem":
         return [f"```python\nProblem = {str(thing).replace('fclib._core.', '')}\n```", ""]
     if isinstance(thing, type) and issubclass(thing, Exception):
-        return ["```text", doc, "```", ""]
+        return prose(doc)
     signature = str(inspect.signature(thing)).replace("fclib._core.", "").replace("_core.", "")
     kind = "class" if isinstance(thing, type) else "def"
-    return [f"```python\n{kind} {name}{signature}\n```", "", "```text", doc, "```", ""]
+    return [f"```python\n{kind} {name}{signature}\n```", "", *prose(doc)]
 
 
 def described(definition: Definition) -> list[str]:
@@ -91,7 +93,7 @@ def signature(node: ast.FunctionDef) -> str:
     head = f"{node.name}({ast.unparse(node.args)})"
     head = head.replace("numpy.typing.", "").replace("numpy.", "")
     if len(head) > 88:
-        head = head.replace(", ", ",\n    ").replace("(", "(\n    ", 1)
+        head = re.sub(r", (?=\*|/|\w+[:=])", ",\n    ", head).replace("(", "(\n    ", 1)
     result = f" -> {ast.unparse(node.returns)}" if node.returns else ""
     return head + result.replace("numpy.typing.", "").replace("numpy.", "")
 
@@ -103,8 +105,16 @@ def fenced(code: str) -> list[str]:
 
 def text_of(node: Definition) -> list[str]:
     """The docstring, as it is."""
-    doc = ast.get_docstring(node)
-    return ["```text", doc, "```", ""] if doc else []
+    return prose(ast.get_docstring(node) or "")
+
+
+def prose(doc: str) -> list[str]:
+    """A docstring in a fence, long lines folded."""
+    lines: list[str] = []
+    for line in doc.splitlines():
+        indent = " " * (len(line) - len(line.lstrip()))
+        lines += textwrap.wrap(line, 96, subsequent_indent=indent) if len(line) > 96 else [line]
+    return ["```text", *lines, "```", ""] if doc else []
 
 
 def cell(text: str) -> str:

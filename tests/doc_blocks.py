@@ -47,7 +47,7 @@ class Block:
             # what follows after two blanks is a remark or an explanation
             command = re.split(r"\s{2,}|\s+# ", line.strip())[0]
             if command and not command.startswith("#"):
-                yield command
+                yield from command.split(" && ")
 
 
 def pages() -> list[Path]:

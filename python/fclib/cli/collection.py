@@ -173,8 +173,9 @@ def show(
         return
     for key, value in record.items():
         out.print(f"{key:12}{value}", highlight=False)
-    out.print()
-    out.print(make_table(parameters))
+    if parameters:
+        out.print()
+        out.print(make_table(parameters))
     if ranges:
         out.print()
         out.print(make_table(ranges))

@@ -516,6 +516,22 @@ NB_MODULE(_core, m) {
   nb::set_leak_warnings(
       false);  // module-level references at exit are the interpreter's own business
   m.attr("version") = version;
+  m.def(
+      "build_info",
+      [] {
+        const auto dotted = [](int major, int minor, int patch) {
+          return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(patch);
+        };
+        return std::map<std::string, std::string>{
+            {"compiler", compiler},
+            {"eigen", dotted(EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
+            {"hdf5", hdf5_loaded_version()},
+            {"hdf5_compiled", hdf5_compiled_version()},
+            {"hdf5_bundled", hdf5_bundled ? "yes" : ""},
+            {"nanobind", dotted(NB_VERSION_MAJOR, NB_VERSION_MINOR, NB_VERSION_PATCH)}};
+      },
+      "What the core was built with, by its name, and the version of HDF5 that is loaded.\n\n"
+      "hdf5_bundled is empty where HDF5 is a library of the system.");
   bind_errors(m);
 
   nb::class_<ProblemInfo> info(m, "ProblemInfo", "What a file says about its problem in words.");

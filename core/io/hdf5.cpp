@@ -22,6 +22,19 @@
 
 namespace fclib {
 
+std::string hdf5_compiled_version() {
+  return std::to_string(H5_VERS_MAJOR) + "." + std::to_string(H5_VERS_MINOR) + "." +
+         std::to_string(H5_VERS_RELEASE);
+}
+
+std::string hdf5_loaded_version() {
+  unsigned major = 0;
+  unsigned minor = 0;
+  unsigned release = 0;
+  H5get_libversion(&major, &minor, &release);
+  return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release);
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -32,10 +45,21 @@ namespace fs = std::filesystem;
 
 std::string system_message() { return std::strerror(errno); }
 
+/// HDF5 ends the process where another version is loaded than it was compiled with.
+void require_same_version() {
+  static const bool same = hdf5_loaded_version() == hdf5_compiled_version() ||
+                           std::getenv("HDF5_DISABLE_VERSION_CHECK") != nullptr;
+  if (!same) {
+    fail("", "HDF5 " + hdf5_loaded_version() + " is loaded, but fclib was built with HDF5 " +
+                 hdf5_compiled_version() + ": build fclib anew, or put that HDF5 first");
+  }
+}
+
 /// Holds the library's lock, and keeps HDF5 from printing its error stack to the host's stderr.
 class Session {
  public:
   Session() : lock_(mutex()) {
+    require_same_version();
     H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }

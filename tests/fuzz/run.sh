@@ -20,7 +20,7 @@ if ! echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, long) { return 0; 
   exit 1
 fi
 # shellcheck disable=SC2086
-cmake -S "$source" -B "$folder" -G Ninja -DFCLIB_FUZZ=ON -DFCLIB_PYTHON=OFF -DFCLIB_SHARED=OFF \
+cmake -S "$source" -B "$folder" -G Ninja -DFCLIB_FUZZ=ON -DFCLIB_PYTHON=OFF -DFCLIB_C=OFF \
   -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_C_COMPILER=clang \
   ${FUZZ_CMAKE:-} >"$folder/cmake.log" || { cat "$folder/cmake.log" >&2; exit 1; }
 ninja -C "$folder" fuzz

@@ -51,6 +51,7 @@ PYTHON: dict[str, set[str]] = {
     "collections": {"api", "analysis", "scenes", "simulate"},
     "report": {"api", "bench", "collections", "scenes"},
     "demo": {"api", "scenes", "simulate", "bench", "report"},
+    "doctor": {"_core", "api", "external"},
     "cli": {
         "api",
         "analysis",
@@ -61,6 +62,7 @@ PYTHON: dict[str, set[str]] = {
         "bench",
         "report",
         "demo",
+        "doctor",
     },
     "__main__": {"cli"},
 }

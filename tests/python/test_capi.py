@@ -599,7 +599,8 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
 
     found: list[Path] = []
     run(cmake, "--build", folder, "--target", "fclib_package")
-    run(cmake, "--install", folder, "--prefix", prefix, "--component", "c")
+    for component in ("library", "development"):
+        run(cmake, "--install", folder, "--prefix", prefix, "--component", component)
     assert (prefix / "include/fclib.h").read_bytes() == (HEADERS / "fclib.h").read_bytes()
 
     # by CMake

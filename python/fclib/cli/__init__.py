@@ -7,7 +7,10 @@ standard error. The exit status is 0 only if all went well, 1 if not, 2 for a us
 
 from __future__ import annotations
 
+from typing import Any
+
 import typer
+from typer.core import TyperGroup
 
 import fclib
 from fclib.cli import (
@@ -17,6 +20,7 @@ from fclib.cli import (
     collection,
     convert,
     demo,
+    doctor,
     info,
     profile,
     report,
@@ -27,11 +31,26 @@ from fclib.cli import (
 )
 from fclib.cli._output import fail, print_version
 
+
+class Commands(TyperGroup):
+    """The commands, with a help that fits a screen: what shells ask for is left out of it."""
+
+    def get_params(self, ctx: Any) -> list[Any]:
+        """The options, those of completion hidden."""
+        params = super().get_params(ctx)
+        for param in params:
+            if param.name in ("install_completion", "show_completion"):
+                param.hidden = True
+        return params
+
+
 app = typer.Typer(
     name="fclib",
-    help="Frictional contact problems, and a test bench for the algorithms that solve them.",
+    cls=Commands,
+    help="Frictional contact problems, and a test bench for the solvers of them.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # plain help, in which a command is a line, and all of them a screen
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for module in (
@@ -46,6 +65,7 @@ for module in (
     profile,
     report,
     view,
+    doctor,
 ):
     app.command(module.__name__.rpartition(".")[2])(module.command)
 app.add_typer(collection.app, name="collection")

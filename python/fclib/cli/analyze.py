@@ -93,7 +93,7 @@ def command(
     ] = 20.0,
     as_json: Json = False,
 ) -> None:
-    """Say what problems are: ranks, units, existence with its proof, uniqueness.
+    """Find ranks, units, existence with its proof, and uniqueness.
 
     Of several problems in a file it is the global one. The exit status is 1 where a problem could
     not be analysed, or a reference solution not be certified.

@@ -37,7 +37,7 @@ class WithDefault(TyperGroup):
 app = typer.Typer(
     cls=WithDefault,
     no_args_is_help=True,
-    help="Run campaigns: problems x solvers x tolerances, with hard limits.\n\n"
+    help="Run campaigns: problems x solvers x tolerances, within limits.\n\n"
     "CAMPAIGN is a TOML file, or the name of a published one; the word run may be left out.",
 )
 

@@ -42,9 +42,10 @@ def command(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Judge the stored solutions from the data alone, of several in a file the global one's.
+    """Judge the stored solutions from the data alone.
 
-    The last columns count the contacts that are open, stick and slide.
+    Of several problems in a file, it is the global one's. The last columns count the contacts that
+    are open, stick and slide.
     """
     report = Report(as_json, hidden=("n", "formulation", "scaled_natural", "says"))
     for path in each_file(files, "checking"):

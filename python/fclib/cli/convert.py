@@ -264,7 +264,7 @@ def command(
     force: Annotated[bool, typer.Option("--force", help="Replace what is there already.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Convert between FCLIB files and Siconos' texts (.dat), formulations and storages.
+    """Convert files to other formulations, storages, Siconos' texts.
 
     What an input is in, its content says. Solutions, guesses and what is known of the matrices go
     with the problem as far as they hold for what it becomes. Siconos' texts have no place for

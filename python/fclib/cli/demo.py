@@ -68,7 +68,10 @@ def command(
     ] = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate a falling stack, store its problems, solve and judge them; compare solvers."""
+    """Simulate a falling stack, solve its problems, compare solvers.
+
+    The problems are stored, and the solutions judged.
+    """
     try:
         from fclib.simulate import NoRenderer
     except ImportError as error:

@@ -48,7 +48,10 @@ def describe(path: Path, kind: str | None, contents: Contents) -> dict[str, Any]
 
 
 def command(files: Files, as_json: Json = False) -> None:
-    """Print formulation, sizes and friction of FCLIB files, and what else they hold."""
+    """Print the formulation, sizes and friction of problems.
+
+    And what else their files hold: solutions, guesses, titles, what is known of matrices.
+    """
     report = Report(as_json, hidden=("nnz_of", "description", "math_info", "spacedim", "m"))
     for path in each_file(files, "reading"):
         try:

@@ -74,7 +74,10 @@ def command(
     formats: Annotated[str, typer.Option("--format", help="Of the pictures.")] = "pdf,svg,png",
     as_json: Json = False,
 ) -> None:
-    """Compare the solvers of a store: profiles, means, ratios, as tables and pictures."""
+    """Compare the solvers of a store: profiles, means, ratios.
+
+    As tables, and with --out as pictures.
+    """
     try:
         run(
             store,

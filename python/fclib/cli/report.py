@@ -49,7 +49,10 @@ def command(
     ] = 60,
     title: Annotated[str, typer.Option(help="Of the site.")] = "",
 ) -> None:
-    """Make a site from stores and a catalogue; open its index.html, no server is needed."""
+    """Make a site to browse from stores and a catalogue.
+
+    Open its index.html; no server is needed.
+    """
     try:
         from fclib import report
         from fclib.collections import CatalogError

@@ -51,10 +51,10 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF file by Moreau-Jean, and store the problem and solution of each step.
+    """Simulate an MJCF file, and store the problem of each step.
 
-    Steps without contact give no problem. What is stored is a collection: fclib collection verify
-    and publish take it.
+    The scheme is that of Moreau and Jean; the solutions are stored too. Steps without contact give
+    no problem. What is stored is a collection: fclib collection verify and publish take it.
     """
     if law not in ("velocity", "gap"):
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')

@@ -68,7 +68,10 @@ def command(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Solve problems, and judge the solutions; of several in a file the global one."""
+    """Solve problems, and judge the solutions.
+
+    Of several problems in a file it is the global one.
+    """
     if kind is not None and write:
         # the one solution of a file is that of its global problem
         raise typer.BadParameter("--write stores the solution of the main problem, not of a --kind")

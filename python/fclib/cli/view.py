@@ -23,7 +23,10 @@ def command(
         Path | None, typer.Option("--out", help="Write the page here, and open nothing.")
     ] = None,
 ) -> None:
-    """Show bodies, contact points, normals and reactions of a problem, to turn and to zoom."""
+    """Show the network of contacts of a problem in the browser.
+
+    Bodies, contact points, normals and reactions, to turn and to zoom.
+    """
     from fclib.report import view
 
     try:

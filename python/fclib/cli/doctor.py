@@ -1,0 +1,54 @@
+"""``fclib doctor``: what there is, what is missing, what is broken, and what to do about it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+
+import typer
+from rich.text import Text
+
+from fclib import doctor
+from fclib.cli._output import Json, out, progress_bar
+
+STYLE = {"ok": "green", "absent": "yellow", "broken": "red"}
+
+
+def show(finding: doctor.Finding) -> None:
+    """A line, and what to do where there is something to do."""
+    line = Text("  ")
+    line.append(f"{finding.state:6}", STYLE[finding.state])
+    line.append(f"  {finding.name:12}", "bold")
+    line.append("  ".join(filter(None, ("", finding.found, finding.purpose))))
+    out.print(line, soft_wrap=True)
+    for word in filter(None, (finding.problem, finding.remedy)):
+        lead = "->" if word is finding.remedy else "  "
+        out.print(Text(f"          {lead} {word}"), soft_wrap=True)
+
+
+def command(as_json: Json = False) -> None:
+    """Look at the installation: what there is, lacks or is broken.
+
+    Exits with 0 unless something is broken; an optional part that is not there is not.
+    """
+    with progress_bar(1) as show_progress:
+        show_progress("looking")
+        findings = doctor.examine()
+    broken = sum(finding.state == "broken" for finding in findings)
+    absent = sum(finding.state == "absent" for finding in findings)
+    if as_json:
+        for finding in findings:
+            typer.echo(json.dumps(asdict(finding)))
+        raise typer.Exit(int(broken > 0))
+    part = ""
+    for finding in findings:
+        if finding.part != part:
+            part = finding.part
+            out.print(part, style="bold", highlight=False)
+        show(finding)
+    if broken:
+        out.print(f"\n{broken} broken: do what its arrow says, then run fclib doctor again.")
+    else:
+        rest = f"; {absent} optional, not here" if absent else ""
+        out.print(f"\nNothing is broken{rest}.", highlight=False)
+    raise typer.Exit(int(broken > 0))

@@ -1,0 +1,161 @@
+"""``fclib doctor``: what it finds, what it calls broken, and what it says to do."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fclib
+from fclib import _core, doctor
+
+
+def run(
+    *arguments: str, **environment: str
+) -> tuple[dict[str, dict[str, Any]], subprocess.CompletedProcess[str]]:
+    """The findings by their names, and the process."""
+    done = subprocess.run(
+        [sys.executable, "-m", "fclib", "doctor", "--json", *arguments],
+        capture_output=True,
+        text=True,
+        env=os.environ | environment,
+    )
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    return {finding["name"]: finding for finding in found}, done
+
+
+def before(*folders: Path) -> str:
+    """A PYTHONPATH with these folders first."""
+    return os.pathsep.join(filter(None, [*map(str, folders), os.environ.get("PYTHONPATH")]))
+
+
+def pretend(folder: Path, name: str, version: str, code: str = "") -> Path:
+    """A package that is found before the one that is installed."""
+    (folder / name).mkdir(parents=True)
+    (folder / name / "__init__.py").write_text(code)
+    info = folder / f"{name}-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    return folder
+
+
+def test_what_is_here() -> None:
+    findings, done = run()
+    assert done.returncode == 0, done.stdout + done.stderr
+    keys = ["part", "name", "state", "found", "purpose", "problem", "remedy"]
+    assert all(list(finding) == keys for finding in findings.values())
+    assert findings["fclib"]["found"] == fclib.__version__
+    assert findings["HDF5"]["found"] == _core.build_info()["hdf5_compiled"]
+    assert findings["Eigen"]["found"].startswith("3.")
+    for name in ("Python", "numpy", "scipy", "trial"):
+        assert findings[name]["state"] == "ok", findings[name]
+    for name in ("mujoco", "clarabel", "scs", "pyarrow", "matplotlib", "dask", "siconos"):
+        assert name in findings
+    assert "rendering" in findings
+    # whoever only uses fclib needs none of these
+    assert not {"pytest", "ruff", "mypy"} & set(findings)
+    for finding in findings.values():
+        assert finding["state"] in ("ok", "absent"), finding
+        assert bool(finding["remedy"]) <= (finding["state"] == "absent")
+
+
+def test_what_is_broken_is_said_with_what_to_do(tmp_path: Path) -> None:
+    pretend(tmp_path, "clarabel", "99.0", "import nowhere")
+    pretend(tmp_path, "scs", "0.1")
+    pretend(tmp_path, "mujoco", "4.0.1")
+    pretend(tmp_path, "pooch", "9.0", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    findings, done = run(PYTHONPATH=before(tmp_path))
+    assert done.returncode == 1
+    assert "No module named 'nowhere'" in findings["clarabel"]["problem"]
+    assert "pip install --force-reinstall" in findings["clarabel"]["remedy"]
+    assert findings["scs"]["problem"] == "is 0.1, and fclib needs >=3.2.4"
+    assert findings["scs"]["remedy"] == 'pip install "scs>=3.2.4"'
+    assert findings["pooch"]["problem"] == "the process was ended by SIGSEGV"
+    if sys.version_info >= (3, 11):
+        assert findings["mujoco"]["problem"] == "is 4.0.1, and fclib needs 4.0.0"
+        assert findings["mujoco"]["remedy"] == 'pip install "mujoco==4.0.0"'
+    broken = {name for name, finding in findings.items() if finding["state"] == "broken"}
+    assert broken >= {"clarabel", "scs", "pooch"}
+    assert "numpy" not in broken
+
+
+def test_a_folder_that_takes_no_files_is_found(tmp_path: Path) -> None:
+    code = (
+        "import tempfile\nfrom fclib import doctor\n"
+        f"tempfile.tempdir = {str(tmp_path / 'nowhere')!r}\n"
+        "finding = doctor.check_work()\n"
+        "print(finding.state, finding.remedy)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.startswith("broken make room")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="takes LD_PRELOAD")
+def test_another_hdf5_is_an_error_and_not_the_end(tmp_path: Path) -> None:
+    compiler = shutil.which("cc")
+    if compiler is None or _core.build_info()["hdf5_bundled"]:
+        pytest.skip("needs a C compiler, and an HDF5 that is a library of the system")
+    source, library = tmp_path / "other.c", tmp_path / "other.so"
+    source.write_text(
+        "int H5get_libversion(unsigned* a, unsigned* b, unsigned* c)\n"
+        "{ *a = 9; *b = 8; *c = 7; return 0; }\n"
+    )
+    subprocess.run([compiler, "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
+    code = "import fclib\ntry:\n    fclib.read('x')\nexcept fclib.FileError as e:\n    print(e)\n"
+    environment = os.environ | {"LD_PRELOAD": str(library)}
+    environment.pop("HDF5_DISABLE_VERSION_CHECK", None)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True
+    )
+    assert "HDF5 9.8.7 is loaded" in done.stdout
+
+    findings = subprocess.run(
+        [sys.executable, "-c", "from fclib import doctor\nprint(*doctor.check_core(), sep='\\n')"],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=True,
+    )
+    assert "state='broken', found='9.8.7'" in findings.stdout
+
+
+@pytest.mark.parametrize(
+    ("versions", "found", "allowed"),
+    [
+        (">=3.8", "3.8.0", True),
+        (">=3.8", "3.10.1", True),
+        (">=3.8", "3.7.9", False),
+        (">=14", "26.0.1", True),
+        (">=3.2.4", "3.2.4rc1", True),
+        ("==4.0.0", "4.0.0", True),
+        ("==4.0.0", "4.0.1", False),
+        ("", "1", True),
+    ],
+)
+def test_versions_are_compared_by_their_numbers(versions: str, found: str, allowed: bool) -> None:
+    assert doctor.Requirement("x", versions, (), True).allows(found) == allowed
+
+
+def test_every_extra_has_a_purpose() -> None:
+    """A new extra is looked at, or is one for those who work on fclib."""
+    extras = {extra for one in doctor.requirements() for extra in one.extras}
+    assert set(doctor.PURPOSE) <= extras
+    assert extras - set(doctor.PURPOSE) <= {"test", "lint", "package", "docs"}
+
+
+def test_the_table_is_for_people(tmp_path: Path) -> None:
+    path = before(pretend(tmp_path, "scs", "0.1"))
+    done = subprocess.run(
+        [sys.executable, "-m", "fclib", "doctor"],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    assert done.returncode == 1
+    assert "broken  scs" in done.stdout
+    assert '-> pip install "scs>=3.2.4"' in done.stdout
+    assert "1 broken" in done.stdout

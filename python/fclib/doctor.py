@@ -209,18 +209,20 @@ def check_adapter(adapter: external.Adapter, known: Sequence[str]) -> Finding | 
 
 def check_rendering() -> Finding:
     """Whether pictures of scenes can be drawn."""
-    name, purpose = "rendering", "pictures of scenes, offscreen"
+    part, name, purpose = "pictures", "rendering", "pictures of scenes, offscreen"
     code = (
-        "from fclib.simulate import render\n"
-        "try:\n    print(render.backend())\n"
-        "except render.NoRenderer:\n    pass\n"
+        "from fclib.simulate.render import NoRenderer, backend\n"
+        "try:\n    print(backend())\n"
+        "except NoRenderer:\n    pass\n"
     )
     found, problem = run(code)
-    if problem:
+    if "ImportError" in problem:
         # the line on MuJoCo says what to do
-        return Finding("pictures", name, "absent", "", f"{purpose}; needs MuJoCo", "", "")
-    remedy = "apt-get install libosmesa6" if not found else ""
-    return Finding("pictures", name, "ok" if found else "absent", found, purpose, "", remedy)
+        return Finding(part, name, "absent", "", f"{purpose}; needs MuJoCo")
+    if problem:
+        return Finding(part, name, "broken", "", purpose, problem, "set MUJOCO_GL to osmesa")
+    remedy = "" if found else "apt-get install libosmesa6"
+    return Finding(part, name, "ok" if found else "absent", found, purpose, "", remedy)
 
 
 def check_h5py() -> Finding | None:

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 
 import fclib
-from fclib import _core, doctor
+from fclib import _core, cli, doctor
 
 
 def run(
@@ -55,7 +56,8 @@ def test_what_is_here() -> None:
         assert findings[name]["state"] == "ok", findings[name]
     for name in ("mujoco", "clarabel", "scs", "pyarrow", "matplotlib", "dask", "siconos"):
         assert name in findings
-    assert "rendering" in findings
+    if findings["mujoco"]["state"] == "ok":
+        assert "MuJoCo" not in findings["rendering"]["purpose"]
     # whoever only uses fclib needs none of these
     assert not {"pytest", "ruff", "mypy"} & set(findings)
     for finding in findings.values():
@@ -147,15 +149,24 @@ def test_every_extra_has_a_purpose() -> None:
     assert extras - set(doctor.PURPOSE) <= {"test", "lint", "package", "docs"}
 
 
-def test_the_table_is_for_people(tmp_path: Path) -> None:
-    path = before(pretend(tmp_path, "scs", "0.1"))
-    done = subprocess.run(
-        [sys.executable, "-m", "fclib", "doctor"],
-        capture_output=True,
-        text=True,
-        env=os.environ | {"PYTHONPATH": path},
-    )
-    assert done.returncode == 1
-    assert "broken  scs" in done.stdout
-    assert '-> pip install "scs>=3.2.4"' in done.stdout
-    assert "1 broken" in done.stdout
+def test_the_table_is_for_people(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = [
+        doctor.Finding("core", "HDF5", "ok", "1.10.8"),
+        doctor.Finding("solvers", "scs", "broken", "0.1", "", "is 0.1", 'pip install "scs>=3"'),
+        doctor.Finding("solvers", "pinocchio", "absent", "", "", "", "pip install pin"),
+    ]
+    monkeypatch.setattr(doctor, "examine", lambda: found)
+    with pytest.raises(typer.Exit) as stop:
+        cli.doctor.command()
+    assert stop.value.exit_code == 1
+    text = capsys.readouterr().out
+    assert '-> pip install "scs>=3"' in text
+    assert "-> pip install pin" in text
+    assert "1 broken: do what its arrow says" in text
+    monkeypatch.setattr(doctor, "examine", lambda: [found[0], found[2]])
+    with pytest.raises(typer.Exit) as stop:
+        cli.doctor.command()
+    assert stop.value.exit_code == 0
+    assert "Nothing is broken; 1 optional, not here." in capsys.readouterr().out

@@ -18,7 +18,7 @@ def show(finding: doctor.Finding) -> None:
     """A line, and what to do where there is something to do."""
     line = Text("  ")
     line.append(f"{finding.state:6}", STYLE[finding.state])
-    line.append(f"  {finding.name:12}", "bold")
+    line.append(f"  {finding.name:14}", "bold")
     line.append("  ".join(filter(None, ("", finding.found, finding.purpose))))
     out.print(line, soft_wrap=True)
     for word in filter(None, (finding.problem, finding.remedy)):

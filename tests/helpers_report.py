@@ -18,13 +18,14 @@ NAMES = {"auto": "auto", "under_score": "nsn-ac"}
 TOLERANCES = (1e-4, 1e-8)
 
 
-def make_collection(folder: Path) -> Path:
+def make_collection(folder: Path, analyze: bool = False) -> Path:
     """A stack of three cubes that lands: a dozen problems in both forms."""
     from fclib import collections, scenes
     from fclib.collections.plan import Plan
 
     scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
-    collections.build([Plan(scene=scene, collection="small", problems=12)], folder, pictures=False)
+    plan = Plan(scene=scene, collection="small", problems=12, analyze=analyze)
+    collections.build([plan], folder, pictures=False)
     # a picture as a build would draw it
     part = next(folder.rglob("*-global.hdf5")).parent
     (part / "distribution.svg").write_text(

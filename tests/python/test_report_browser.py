@@ -1,6 +1,7 @@
 """The site in a real browser, from the file system: no error, no request, no server."""
 
 import csv
+import importlib.util
 import io
 import shutil
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ import pytest
 import fclib
 from fclib.bench import profiles
 from fclib.report import Campaigns, build_site, view_of, write_view
-from helpers_report import LABELS, add_runs, made_facts, make_collection, make_store, read_data
+from helpers_report import LABELS, make_collection, make_store, read_data
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -445,21 +446,95 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
         assert not go.wrong
 
 
-def test_a_large_campaign_is_paged(browser: Any, tmp_path: Path) -> None:
-    """Few solvers here; benchmarks/report_size.py has 200,000 runs and the times."""
-    store = tmp_path / "large.sqlite"
-    add_runs(store, made_facts(400), ["auto", "nsgs"], history=False)
-    with Campaigns([store]) as campaigns:
-        build_site(campaigns, tmp_path / "site", views=0)
-    go = Opener(browser, tmp_path / "site")
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site of 40,000 runs, 1,000 problems by 40 solvers; the benchmark makes one of 200,000."""
+    benchmark = Path(__file__).parents[2] / "benchmarks" / "report_size.py"
+    spec = importlib.util.spec_from_file_location("report_size", benchmark)
+    assert spec is not None
+    assert spec.loader is not None
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    folder = tmp_path_factory.mktemp("large")
+    made.fill(folder / "runs.sqlite", 1000, 40)
+    with Campaigns([folder / "runs.sqlite"]) as campaigns:
+        counts = build_site(campaigns, folder / "site", views=0)
+    assert counts["runs"] == 40_000
+    return folder / "site"
+
+
+def test_a_large_campaign_is_browsed(browser: Any, large: Path) -> None:
+    go = Opener(browser, large)
     page = go("#/catalogue?sort=nc:down&page=3")
     assert page.locator("main tbody tr").count() == 50
-    assert "101–150 of 400" in page.inner_text("main")
+    assert "101–150 of 1000" in page.inner_text("main")
     page.get_by_role("link", name="Next page").click()
     page.wait_for_function("location.hash.includes('page=4')")
-    assert "151–200 of 400" in page.inner_text("main")
+    assert "151–200 of 1000" in page.inner_text("main")
+    # a filter starts from the first page, and the data of a page come when it is asked for
+    page.get_by_label("filter").fill("nc<=10")
+    page.wait_for_function("location.hash.includes('q=nc') && !location.hash.includes('page')")
+    assert "13 of 1000 problems" in page.locator("main > div > [role=status]").inner_text()
+    assert page.evaluate("Object.keys(Fclib.values).sort()") == ["catalogue", "site"]
+    assert page.evaluate("typeof Plotly") == "undefined"
+    page.click("main tbody a >> nth=0")
+    page.wait_for_selector("main[data-page=problem]")
+    assert "40 runs" in page.inner_text("main")
+
     page = go("#/profiles")
-    draw(page, "main .plot >> nth=1")
+    plot = draw(page, traces=40)
+    costs = read_data(large, "t0-cpu_s")
+    best = np.nanmin(np.array(costs, dtype=float), axis=0)
+    fastest = [np.mean(np.array(own, dtype=float) <= best) for own in costs]
+    shown = plot.evaluate("plot => plot.data.map(trace => trace.y[0])")
+    np.testing.assert_allclose(shown, fastest, atol=1e-12)
+    # so many values are read from a table, and no more than an eye can tell
+    assert plot.evaluate("plot => plot.data[0].x.length") == 1000
+    points = draw(page, "main .plot >> nth=1")
+    first, second = (np.array(own, dtype=float) for own in costs[:2])
+    either = np.isfinite(first) | np.isfinite(second)
+    count = "plot => plot.data.reduce((sum, trace) => sum + trace.x.length, 0)"
+    assert points.evaluate(count) == either.sum()
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
+def test_what_was_analysed_is_shown(browser: Any, tmp_path: Path) -> None:
+    """Rank and conditioning, where the collection was built with --analyze."""
+    from fclib.collections import read_catalog
+
+    make_collection(tmp_path / "collection", analyze=True)
+    build_site(None, tmp_path / "site", tmp_path / "collection", views=0)
+    rows = {row["id"]: row for row in read_catalog(tmp_path / "collection").to_pylist()}
+    go = Opener(browser, tmp_path / "site")
+    page = go("#/catalogue?q=rank_W>6&sort=conditioning_W")
+    heads = page.locator("main thead th").all_inner_texts()
+    ids = column(page, 0)
+    assert set(ids) == {name for name, row in rows.items() if row["rank_W"] > 6}
+    for key, label in (("rank_W", "rank W"), ("rank_H", "rank H"), ("islands", "islands")):
+        at = next(k for k, text in enumerate(heads) if text.strip() == label)
+        assert column(page, at) == [str(rows[name][key]) for name in ids]
+    conditioning = [rows[name]["conditioning_W"] for name in ids]
+    # up to the six digits that the site has
+    assert conditioning == pytest.approx(sorted(conditioning), rel=1e-5)
+    page.get_by_role("button", name="columns").click()
+    page.locator(".dt-button-collection").get_by_text("rank W", exact=True).click()
+    page.wait_for_function("!document.querySelector('main thead').textContent.includes('rank W')")
+    page.keyboard.press("Escape")
+    page.click("main tbody a >> nth=0")
+    page.wait_for_selector("main[data-page=problem]")
+    facts = dict(
+        zip(
+            page.locator("main dl.facts dt").all_inner_texts(),
+            page.locator("main dl.facts dd").all_inner_texts(),
+            strict=True,
+        )
+    )
+    row = rows[page.inner_text("main h1")]
+    assert facts["rank W"] == str(row["rank_W"])
+    assert float(facts["conditioning W"]) == pytest.approx(row["conditioning_W"], rel=5e-3)
+    assert facts["existence"] == row["existence"]
     for context in go.contexts:
         context.close()
     assert not go.wrong

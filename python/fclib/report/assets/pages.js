@@ -44,6 +44,7 @@
     return h("div", { class: "copy" }, h("pre", { tabindex: 0 }, code), button);
   };
   const facts = (pairs) => h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [h("dt", {}, name), h("dd", {}, v)]));
+  const shown = (v) => typeof v === "boolean" ? v ? "yes" : "no" : number(v);
   const status = (name) => h("span", { class: name === "converged" ? "good" : "bad" }, name);
 
   const summaryColumns = (order) => [
@@ -238,7 +239,7 @@
       says.textContent = `${found.length} of ${cat.size} problems${wrong.length ? `; not understood: ${wrong.join(", ")}` : ""}`;
       return found;
     };
-    const format = { view: (v) => v ? "yes" : "", best_tol: (v) => v ? Fclib.tolerance(v) : "–" };
+    const format = { view: (v) => v ? "yes" : "", slater: shown, best_tol: (v) => v ? Fclib.tolerance(v) : "–" };
     const columns = cat.columns.filter((c) => !c.hidden).map((c) => ({
       key: c.key, label: c.label, title: c.doc, head: c.key === "id", format: format[c.key],
       type: c.words || ["id", "family", "formulation", "status", "best_solver", "view"].includes(c.key) ? "text" : "number",
@@ -314,7 +315,7 @@
     const neighbour = (j, text) => j >= 0 && j < cat.size && read.family(j) === row.family ? h("a", { href: problemHref(read.id(j)) }, text) : null;
     page.append(h("h1", {}, id), h("p", { class: "small" }, [neighbour(k - 1, "← previous"), h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family), neighbour(k + 1, "next →")].filter(Boolean).map((a, i) => [i ? " · " : "", a])),
       read.title && row.title && row.title !== id && h("p", {}, row.title));
-    const labelled = cat.columns.filter((c) => !c.hidden && !["id", "family", "view"].includes(c.key)).map((c) => [c.label, row[c.key] === null || row[c.key] === undefined ? null : c.key === "best_solver" ? solverLink(row.best_solver) : c.key === "status" ? status(row.status) : c.key === "best_tol" ? Fclib.tolerance(row.best_tol) : number(row[c.key])]);
+    const labelled = cat.columns.filter((c) => !c.hidden && !["id", "family", "view"].includes(c.key)).map((c) => [h("span", { title: c.doc }, c.label), row[c.key] === null || row[c.key] === undefined ? null : c.key === "best_solver" ? solverLink(row.best_solver) : c.key === "status" ? status(row.status) : c.key === "best_tol" ? Fclib.tolerance(row.best_tol) : shown(row[c.key])]);
     const half = Math.ceil(labelled.length / 2);
     page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
     if (view) {

@@ -9,7 +9,6 @@
   const order = (sign) => (a, b) => none(a) || none(b) ? none(a) - none(b) : sign * compare(a, b);
   DataTable.type("value", { order: { asc: order(1), desc: order(-1) } });
   DataTable.ext.errMode = "throw";
-  DataTable.Buttons.defaults.dom.button.className = "";
 
   /* options: columns [{key, label, type, title, head, wrap, value(row), cell(row), format(value)}], rows, caption,
      page: rows a page, sort: {key, down}, at: page, q: words to look for, search: whether it has a field for them,
@@ -20,10 +19,10 @@
     const table = h("table", { class: "compact hover" }, h("caption", {}, caption),
       h("thead", {}, h("tr", {}, columns.map((c) => h("th", { title: c.title }, c.label)))));
     const box = h("div", { class: columns.length < 4 && !columns.some((c) => c.wrap) && "narrow" }, table);
-    const many = rows.length > page;
+    const many = rows.length > page, wide = columns.length > 12;
     const csv = { extend: "csvHtml5", text: "↓ CSV", filename: name || caption, title: null, bom: false, footer: false, fieldBoundary: '"',
       exportOptions: { orthogonal: "raw", stripHtml: false, decodeEntities: false, format: { header: (text, k) => typeof columns[k].key === "string" ? columns[k].key : columns[k].label } } };
-    const buttons = [csv, ...columns.length > 12 ? [{ extend: "colvis", text: "columns" }] : []];
+    const buttons = [csv, ...wide ? [{ extend: "colvis", text: "columns", background: false, collectionLayout: "three-column" }] : []];
     const api = new DataTable(table, {
       data: rows, autoWidth: false, deferRender: true, caption: null, pageLength: page, displayStart: at * page,
       search: { search: q }, order: columns.flatMap((c, k) => sort && String(c.key) === String(sort.key) ? [[k, sort.down ? "desc" : "asc"]] : []),
@@ -42,13 +41,13 @@
       language: { info: "_START_–_END_ of _TOTAL_", infoEmpty: "none", infoFiltered: "(of _MAX_)", emptyTable: "none", zeroRecords: "none", thousands: "", search: "search",
         aria: { paginate: { first: "First page", previous: "Previous page", next: "Next page", last: "Last page", number: "Page " } } },
       layout: {
-        topStart: null, topEnd: search ? "search" : null,
-        bottomStart: name || rows.length > 7 ? { buttons } : null, bottomEnd: many ? { info: {}, paging: { buttons: 5 } } : null,
+        topStart: wide ? { buttons } : null, topEnd: search ? "search" : null,
+        bottomStart: !wide && (name || rows.length > 7) ? { buttons } : null, bottomEnd: many ? { info: {}, paging: { buttons: 5 } } : null,
       },
     });
     const scroll = table.closest(".dt-layout-table");
     Fclib.set(scroll, { tabindex: 0, role: "region", "aria-label": caption });
-    if (onstate) api.on("order.dt page.dt search.dt", () => {
+    if (onstate) api.on("draw.dt", () => {
       const [first] = api.order();
       onstate({ sort: first && { key: columns[first[0]].key, down: first[1] === "desc" }, at: api.page(), q: api.search() });
     });

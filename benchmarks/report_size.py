@@ -113,10 +113,12 @@ def main() -> None:
         store = Path(folder) / "runs.sqlite"
         fill(store, options.problems, options.solvers)
         site = options.out or Path(folder) / "site"
-        start = time.perf_counter()
+        start, busy = time.perf_counter(), time.process_time()
         with Campaigns([store]) as campaigns:
             counts = build_site(campaigns, site, views=0)
-        print(f"built       {time.perf_counter() - start:.1f} s, {counts['runs']} runs")
+        busy = time.process_time() - busy
+        print(f"built       {time.perf_counter() - start:.1f} s, {busy:.1f} s of CPU")
+        print(f"runs        {counts['runs']}")
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(f"memory      {memory:.0f} MB")
         files = list((site / "data").rglob("*.js"))

@@ -5,6 +5,8 @@ import itertools
 import json
 import math
 import re
+import shutil
+import subprocess
 from collections import Counter
 from importlib import metadata
 from pathlib import Path
@@ -21,6 +23,7 @@ from fclib.cli import app
 from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
 from fclib.report.libraries import as_script
 from fclib.report.network import network_of
+from fclib.report.recipes import recipes
 from fclib.report.view import hulls_of
 from helpers_report import LABELS, TOLERANCES, make_collection, make_store, read_data
 
@@ -263,6 +266,31 @@ def test_a_module_becomes_a_script() -> None:
     for wrong in ("var a=1;", module + module, "export{b};"):
         with pytest.raises(ReportError, match="another version of itables"):
             as_script(wrong, "default", "A")
+
+
+# ---- recipes
+
+
+@pytest.mark.parametrize(
+    "formulation", ["2DFC", "3DFC", "M3DFC", "G3DFC", "GM3DFC", "R3DFC", "GR3DFC"]
+)
+def test_recipes_in_c_compile(formulation: str, tmp_path: Path) -> None:
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("there is no C compiler")
+    (tmp_path / "recipe.c").write_text(recipes([formulation])[formulation]["c"])
+    include = Path(__file__).parents[2] / "include"
+    command = [compiler, "-std=c11", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
+    subprocess.run([*command, f"-I{include}", tmp_path / "recipe.c"], check=True)
+
+
+def test_recipes_in_python_run(collection: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = sorted(collection.rglob("*-global.hdf5"))[-1]
+    monkeypatch.chdir(file.parent)
+    text = recipes(["G3DFC"])["G3DFC"]["python"].replace("{path}", file.name)
+    found: dict[str, Any] = {}
+    exec(text, found)
+    assert found["result"].status == "converged"
 
 
 # ---- networks

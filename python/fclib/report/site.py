@@ -28,6 +28,7 @@ from fclib import scenes
 from fclib.bench.profiles import METRICS, PENALTY, SHIFT
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
+from fclib.report.recipes import recipes
 from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns
 from fclib.report.view import ASSETS, as_json, rounded, view_of
 
@@ -280,6 +281,7 @@ class _Writer:
         site["families"] = self._families()
         site["views"] = drawn
         site["problems"] = len(self.problems.rows)
+        site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
         self.put("catalogue", {"size": len(self.problems.rows), "columns": self.problems.columns()})
         self.put("site", site)
         return {

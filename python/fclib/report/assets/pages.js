@@ -288,24 +288,11 @@
   };
 
   // ---- a problem
-  const C_KINDS = { true: "global", false: "local" };
-  const recipes = (row, cat) => {
-    const { read } = cat, id = row.id, file = (read.global_file && row.global_file) || (read.local_file && row.local_file);
-    const global = /^G/.test(row.formulation), rolling = /R/.test(row.formulation.replace(/^GM?|^M/, "")) ? "_rolling" : "";
-    const kind = `${C_KINDS[global]}${rolling}`, path = file ? `collection/${file}` : `${id.split("/").pop()}.hdf5`;
-    const built = Boolean(site().families.find((f) => f.name === row.family && f.parameters) && file);
-    const cli = [...built ? [`fclib collection build ${row.family} --out collection`] : [], `fclib solve --tol 1e-8 ${path}`, `fclib view ${path}`].join("\n");
-    const python = ["import fclib", "", built ? `problem = fclib.load("${id}")` : `problem = fclib.read("${path}")`, "result = fclib.solve(problem, tol=1e-8)", "print(result.status, fclib.merit(problem, result.solution).error)"].join("\n");
-    const size = global ? "problem->H->n" : "problem->W->m";
-    const c = ["#include <fclib.h>", "#include <stdlib.h>", "",
-      `struct fclib_${kind}* problem = fclib_read_${kind}("${path}");`,
-      ...global ? ["double* v = calloc(problem->M->n, sizeof *v);"] : [],
-      `double* u = calloc(${size}, sizeof *u);`, `double* r = calloc(${size}, sizeof *r);`,
-      ...row.p ? [`double* l = calloc(${global ? "problem->G->n" : "problem->R->m"}, sizeof *l);`] : [],
-      `struct fclib_solution solution = {${global ? "v" : "NULL"}, u, r, ${row.p ? "l" : "NULL"}};`,
-      "struct fclib_solve_options options = {0};", "options.tolerance = 1e-8;", "struct fclib_solve_result result;",
-      `fclib_solve_${kind}(problem, "auto", &options, &solution, &result);`].join("\n");
-    return h("div", {}, h("h3", {}, "Command line"), copyable(cli), h("h3", {}, "Python"), copyable(python), h("h3", {}, "C"), copyable(c));
+  const recipes = (row, read) => {
+    const file = (read.global_file && row.global_file) || (read.local_file && row.local_file), name = row.id.split("/").pop();
+    const built = file && site().families.some((f) => f.name === row.family && f.parameters), own = site().recipes[row.formulation];
+    const filled = (text) => text.replaceAll("{path}", file ? `collection/${file}` : `${name}.hdf5`).replaceAll("{id}", row.id).replaceAll("{family}", row.family);
+    return [["Command line", built ? own.build : own.shell], ["Python", built ? own.load : own.python], ["C", own.c]].map(([title, text]) => [h("h3", {}, title), copyable(filled(text))]);
   };
   Fclib.pages.problem = async (page, rest, params, keep) => {
     const s = site(), cat = await catalogue(), id = rest.join("/"), k = cat.places.get(id);
@@ -357,7 +344,7 @@
         page.append(h("h2", {}, "Convergence"), h("div", { class: "controls" }, select("over", [["time", "time"], ["iteration", "iterations"]], state.over, (v) => { state.over = v; keep({ over: v }); draw(); }), select("tolerance", tols.map((v) => [v, Fclib.tolerance(v)]), state.tol, (v) => { state.tol = Number(v); keep({ tol: v }); draw(); })), box);
       }
     } else if (s.overview) page.append(h("p", { class: "soft" }, "No run of it in the stores of this report."));
-    page.append(h("h2", {}, "Get it and solve it"), recipes(row, cat));
+    page.append(h("h2", {}, "Get it and solve it"), ...recipes(row, read).flat());
   };
 
   // ---- solvers

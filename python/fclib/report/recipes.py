@@ -1,0 +1,66 @@
+"""Lines to copy from the page of a problem: how to get it and solve it, from a shell, Python and C.
+
+`{path}`, `{id}` and `{family}` stand for those of the problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+BUILD = "fclib collection build {family} --out collection\n"
+SHELL = "fclib solve --tol 1e-8 {path}\nfclib view {path}"
+PYTHON = """\
+import fclib
+
+problem = fclib.%s
+result = fclib.solve(problem, tol=1e-8)
+print(result.status, fclib.merit(problem, result.solution).error)"""
+C = """\
+#include <fclib.h>
+#include <stdlib.h>
+
+int main(void)
+{{
+    struct fclib_{kind}* problem = fclib_read_{kind}("{{path}}");
+    if (!problem) return 1;
+{arrays}
+    struct fclib_solution solution = {{{members}}};
+    struct fclib_solve_options options = {{0}};
+    options.tolerance = 1e-8;
+    struct fclib_solve_result result;
+    return fclib_solve_{kind}(problem, "auto", &options, &solution, &result);
+}}"""
+
+
+def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
+    """By formulation (RT-0444's abbreviations): `shell`, `python`, `c`.
+
+    `build` and `load` take the place of the first lines where the problem is of a collection.
+    """
+    return {
+        name: {
+            "build": BUILD + SHELL,
+            "shell": SHELL,
+            "load": PYTHON % 'load("{id}")',
+            "python": PYTHON % 'read("{path}")',
+            "c": _c(name),
+        }
+        for name in formulations
+    }
+
+
+def _c(formulation: str) -> str:
+    whole = formulation.startswith("G")
+    mixed = "M" in formulation
+    kind = ("global" if whole else "local") + ("_rolling" if "R" in formulation else "")
+    size = "problem->H->n" if whole else "problem->W->m"
+    sizes = {"v": "problem->M->n" if whole else "", "u": size, "r": size, "l": ""}
+    if mixed:
+        sizes["l"] = "problem->G->n" if whole else "problem->R->m"
+    arrays = [
+        f"    double* {name} = calloc({count}, sizeof *{name});"
+        for name, count in sizes.items()
+        if count
+    ]
+    members = ", ".join(name if count else "NULL" for name, count in sizes.items())
+    return C.format(kind=kind, arrays="\n".join(arrays), members=members)

@@ -43,6 +43,8 @@ class Scene:
     focus: tuple[float, float, float, float] | None = None
     planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
+    # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
+    period: tuple[float, float] | None = None
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
 
     @classmethod

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 import numpy as np
+import numpy.typing as npt
 
 # the looks do not act on the mechanics; angles in radians everywhere
 _DOCUMENT = """\
@@ -61,6 +62,7 @@ def document(
     floor_mu_r: float = 0.0,
     rest: Iterable[str] = (),
     velocity: Iterable[float] | None = None,
+    multiccd: bool = True,
 ) -> str:
     """An MJCF document: the bodies above a horizontal floor.
 
@@ -68,8 +70,14 @@ def document(
     the floor's height in m; tile is the edge of the floor's squares in m; velocity at the start
     (n); rest: further elements, as equality constraints. MuJoCo takes for a contact the larger
     friction of its two geometries.
+
+    multiccd: several points where faces of meshes or of cylinders meet. Near contact, MuJoCo 4.0.0
+    then gives false distances for cylinders and capsules with each other, with boxes and with
+    meshes; a scene with such pairs must do without.
     """
     elements = list(rest)
+    if not multiccd:
+        elements.append('<option><flag multiccd="disable"/></option>')
     if velocity is not None:
         elements.append(f'<keyframe><key name="start" qvel="{numbers(*velocity)}"/></keyframe>')
     return _DOCUMENT.format(
@@ -107,6 +115,51 @@ def block_mesh(name: str, length: float, width: float, height: float) -> str:
     return f'<mesh name="{name}" vertex="{"  ".join(corners)}"/>'
 
 
+def polyhedra(random: np.random.Generator, count: int) -> npt.NDArray[np.float64]:
+    """The corners (count x 8 x 3) of random convex polyhedra, on the unit sphere.
+
+    One corner in each octant, away from its edges: none is flat, none a needle.
+    """
+    octants = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    corners = octants * random.uniform(0.4, 1.0, size=(count, 8, 3))
+    unit: npt.NDArray[np.float64] = corners / np.linalg.norm(corners, axis=2, keepdims=True)
+    return unit
+
+
+def polyhedron_mesh(name: str, corners: npt.NDArray[np.float64]) -> str:
+    """The convex hull of corners (k x 3) [m], its origin where the coordinates have theirs."""
+    return f'<mesh name="{name}" vertex="{"  ".join(numbers(*corner) for corner in corners)}"/>'
+
+
+def rotations(random: np.random.Generator, count: int) -> npt.NDArray[np.float64]:
+    """Unit quaternions (count x 4), uniform over all rotations."""
+    draws = random.standard_normal(size=(count, 4))
+    unit: npt.NDArray[np.float64] = draws / np.linalg.norm(draws, axis=1, keepdims=True)
+    return unit
+
+
+def surface(mu: float, mu_r: float | None = None) -> str:
+    """The attributes of a geometry's friction; with mu_r [m] its contacts roll, d = 5."""
+    if mu_r is None:
+        return f'friction="{mu!r}" condim="3"'
+    return f'friction="{mu!r} 0 {mu_r!r}" condim="6"'
+
+
+def grain(
+    name: str,
+    place: Iterable[float],
+    shape: str,
+    friction: str,
+    colour: str,
+    rotation: Iterable[float] = (1, 0, 0, 0),
+) -> str:
+    """A free body of one geometry: type, sizes and mass in `shape`, the rest from `surface`."""
+    return (
+        f'<body name="{name}" pos="{numbers(*place)}" quat="{numbers(*rotation)}"><freejoint/>'
+        f'<geom {shape} {friction} material="solid" rgba="{colour}"/></body>'
+    )
+
+
 def shade(index: int, count: int) -> str:
     """The colour of body `index` of `count`: from blue to sand, every second one lighter."""
     t = index / max(count - 1, 1)
@@ -116,28 +169,36 @@ def shade(index: int, count: int) -> str:
     return f"{red:.3f} {green:.3f} {blue:.3f} 1"
 
 
-def walls(reach: float, height: float, mu: float, condim: int = 3) -> list[str]:
+def walls(
+    reach: float | tuple[float, float], height: float, mu: float, condim: int = 3
+) -> list[str]:
     """Four walls without end, at x = +-reach and y = +-reach [m], drawn as a frame of some height.
 
-    A plane hides what is behind it, so the walls themselves are not drawn.
+    Two reaches are those along x and along y. A plane hides what is behind it, so the walls
+    themselves are not drawn.
     """
+    half = np.broadcast_to(reach, 2)
     elements = [
         f'<geom name="wall{side}" type="plane" size="0 0 1" pos="{numbers(*place)}"'
         f' zaxis="{numbers(*(-np.sign(place)))}" condim="{condim}" friction="{mu!r}"'
         ' rgba="0 0 0 0"/>'
         for side, place in enumerate(
-            reach * np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
+            np.array([*half, 0]) * np.array([(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
         )
     ]
-    ring = reach * np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)])
+    return elements + posts(reach, height)
+
+
+def posts(reach: float | tuple[float, float], height: float) -> list[str]:
+    """A frame around x = +-reach, y = +-reach [m], drawn and touched by nothing."""
+    half = np.broadcast_to(reach, 2)
+    elements = []
+    ring = np.array([*half, 0]) * np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0)])
     top = np.array([0, 0, height])
     for i, corner in enumerate(ring):
         following = ring[(i + 1) % 4]
         for start, end in ((corner, corner + top), (corner + top, following + top)):
-            elements.append(
-                f'<geom type="capsule" size="{0.01 * reach!r}" contype="0" conaffinity="0" mass="0"'
-                f' fromto="{numbers(*start, *end)}" rgba="0.45 0.47 0.5 1"/>'
-            )
+            elements.append(bar(start, end, 0.01 * float(half.max())))
     return elements
 
 
@@ -217,6 +278,14 @@ def uneven_ground(
                 f' rgba="{tone:.3f} {tone:.3f} {0.95 * tone:.3f} 1"/>'
             )
     return elements
+
+
+def bar(start: Iterable[float], end: Iterable[float], radius: float) -> str:
+    """A rod from one point to another [m], drawn and touched by nothing."""
+    return (
+        f'<geom type="capsule" size="{radius!r}" contype="0" conaffinity="0" mass="0"'
+        f' fromto="{numbers(*start, *end)}" rgba="0.45 0.47 0.5 1"/>'
+    )
 
 
 def check(

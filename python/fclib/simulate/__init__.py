@@ -11,6 +11,7 @@ moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows 
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
+periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
 simulation.py     the loop, warm starts, and what each problem says of its origin
 render.py         a picture of a state with its reactions
 

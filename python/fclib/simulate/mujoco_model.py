@@ -15,7 +15,7 @@ A planar scene moves in a plane y = const: slides along x and z, hinges about y 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -25,6 +25,7 @@ import scipy.sparse as sp
 from fclib.scenes import Scene
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector, components
+from fclib.simulate.periodic import PeriodicCell, add_ghosts
 from fclib.simulate.plane import NORMAL, in_plane
 
 MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
@@ -59,6 +60,7 @@ class MujocoModel:
             refuse_out_of_plane(scene, self.model, self.data)
 
         m = self.model
+        self._cell = None if scene.period is None else periodic_cell(scene, m)
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
         self._pattern = mass_pattern(m)
@@ -72,6 +74,8 @@ class MujocoModel:
         start = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_KEY, "start")
         if start >= 0:
             mujoco.mj_resetDataKeyframe(m, self.data, start)
+        if self._cell:
+            self._cell.wrap(m, self.data.qpos)
 
     @property
     def time_step(self) -> float:
@@ -103,6 +107,8 @@ class MujocoModel:
         kind that has no problem yet.
         """
         m, d = self.model, self.data
+        if self._cell:
+            self._cell.place(m, d)
         mujoco.mj_kinematics(m, d)
         mujoco.mj_comPos(m, d)
         if m.ntendon:
@@ -117,6 +123,8 @@ class MujocoModel:
         self._check_warnings()
 
         rows = jacobian(m, d)
+        if self._cell:
+            rows = sp.csr_array(rows + self._cell.rows(m, d))
         H, contacts = contact_columns(self, rows)
         if self.scene.planar:
             sizes = m.geom_rbound[np.maximum(contacts.pair, 0)].max(axis=1)
@@ -124,6 +132,9 @@ class MujocoModel:
                 H, contacts = in_plane(H, contacts, sizes)
             except ValueError as error:
                 raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
+        if self._cell:
+            # no limits in such a scene: all pairs are geometries
+            contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
         G, violation = equality_columns(d, rows)
         force = self._force()
         C, K = linear_forces(m, d)
@@ -133,12 +144,16 @@ class MujocoModel:
         """Take a configuration q (nq) and a velocity v (n)."""
         self.data.qpos[:] = position
         self.data.qvel[:] = velocity
+        if self._cell:
+            self._cell.wrap(self.model, self.data.qpos)
 
     def integrate(self, h: float, v: Vector, theta: float = 1.0) -> None:
         """Take v (n) as the velocity, moving by h v_t, v_t = (1 - theta) of the old + theta v."""
         moved = v if theta == 1 else (1 - theta) * self.data.qvel + theta * v
         self.data.qvel[:] = v
         mujoco.mj_integratePos(self.model, self.data.qpos, moved, h)
+        if self._cell:
+            self._cell.wrap(self.model, self.data.qpos)
 
     def drawing(self, position: Vector) -> tuple[Any, Any]:
         """A copy of the MjModel, whose looks may change, and an MjData with bodies in place."""
@@ -166,6 +181,8 @@ class MujocoModel:
         speed += np.linalg.norm(omega, axis=1) * m.geom_rbound
         if shared_speed:
             speed[:] = speed.max(initial=0.0)
+        if self._cell:
+            speed = speed[self._cell.geometry]
         reach = h * speed + h**2 * np.linalg.norm(m.opt.gravity)
 
         m.geom_margin[:] = np.maximum(self._margin, reach)
@@ -219,6 +236,8 @@ def compile_scene(scene: Scene) -> Any:
             spec = mujoco.MjSpec.from_file(str(scene.path))
         else:
             spec = mujoco.MjSpec.from_string(scene.xml)
+        if scene.period is not None:
+            add_ghosts(spec)
         if spec.memory < 0:
             spec.memory = MEMORY
         m = spec.compile()
@@ -242,6 +261,14 @@ def compile_scene(scene: Scene) -> Any:
         if flag is not None:
             m.opt.disableflags |= int(flag)
     return m
+
+
+def periodic_cell(scene: Scene, m: Any) -> PeriodicCell:
+    """The cell of a scene that has a period. ValueError where a body is too large for it."""
+    try:
+        return PeriodicCell(m, scene.period or (0.0, 0.0))
+    except ValueError as error:
+        raise ValueError(f"{scene.name}: {error}") from None
 
 
 def has_condim(m: Any, condim: int) -> bool:

@@ -1,0 +1,161 @@
+"""Polyhedra and spheres that flow down a chute."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+Vector: TypeAlias = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chute:
+    """Grains that start as a bed on a steep slope, slide down between two walls, and pile up below.
+
+    A grain is a sphere or a polyhedron with eight corners. Those that slide together are in loose
+    contact; those that come to rest in the trough are the hyperstatic end of the set.
+
+    After the sets Chute_1000 and Chute_4000 of the FCLIB library by V. Acary and S. Sinclair: 1000
+    and 4000 random polyhedra, mu = 1. `grains` takes those numbers; `across` and `layers` widen the
+    bed. The spheres, the slope, the trough and the positions at the start are chosen here.
+    """
+
+    title: ClassVar[str] = "Chute"
+    description: ClassVar[str] = "Polyhedra and spheres that flow down a chute and pile up below."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "V. Acary, S. Sinclair"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "granular"
+    problems: ClassVar[int] = 400
+
+    grains: int = parameter(240, "1", "number of grains, at least 1")
+    spheres: float = parameter(0.25, "1", "share of the grains that are spheres, in [0, 1]")
+    shapes: int = parameter(40, "1", "polyhedra that differ, at least 1")
+    radius: float = parameter(0.1, "m", "largest radius of a grain, to its corners")
+    spread: float = parameter(0.4, "1", "the smallest radius is smaller by this share, in [0, 1)")
+    density: float = parameter(2500.0, "kg/m^3", "mass density")
+    mu: float = parameter(1.0, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    slope: float = parameter(1.0, "rad", "angle of the slope, in (0, pi/2)")
+    across: int = parameter(6, "1", "grains of the bed from wall to wall, at least 1")
+    layers: int = parameter(5, "1", "layers of the bed, at least 1")
+    trough: float = parameter(1.2, "m", "length of the floor below the slope")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(4e-3, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__
+        _mjcf.check(
+            self,
+            positive=("radius", "density", "slope", "trough", "time_step"),
+            non_negative=("mu", "spread", "spheres"),
+            at_least={"grains": 1, "shapes": 1, "across": 1, "layers": 1},
+        )
+        for what, bound in (("spread", 1), ("slope", math.pi / 2)):
+            if not getattr(self, what) < bound:
+                raise ValueError(f"{name}: {what} must be < {bound:g}, not {getattr(self, what)}")
+        if not self.spheres <= 1:
+            raise ValueError(f"{name}: spheres must be <= 1, not {self.spheres}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the grains and how they are turned."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        corners = _mjcf.polyhedra(random, self.shapes)
+        corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
+        draws = random.uniform(size=(self.grains, 3))
+        turned = _mjcf.rotations(random, self.grains)
+
+        pitch = 2.05 * self.radius
+        width = pitch * self.across
+        # up the slope, along the wall, away from the slope
+        up = np.array([-math.cos(self.slope), 0, math.sin(self.slope)])
+        away = np.array([math.sin(self.slope), 0, math.cos(self.slope)])
+        bodies = self._chute(pitch, width, up, away)
+        for i, (kind, size, shape) in enumerate(draws.tolist()):
+            row, cell = divmod(i, self.across * self.layers)
+            layer, column = divmod(cell, self.across)
+            # the lowest row begins where its lower layers are above the floor
+            place = pitch * (row + 1 + self.layers / math.tan(self.slope)) * up
+            place += pitch * (layer + 0.5) * away
+            place[1] = pitch * (column + 0.5) - 0.5 * width
+            form = (
+                f'type="sphere" size="{self.radius * (1 - self.spread * size)!r}"'
+                if kind < self.spheres
+                else f'type="mesh" mesh="grain{int(shape * self.shapes)}"'
+            )
+            bodies.append(
+                _mjcf.grain(
+                    f"grain{i}",
+                    place,
+                    f'{form} density="{self.density!r}"',
+                    self._surface(),
+                    _mjcf.shade(i, self.grains),
+                    turned[i],
+                )
+            )
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                type(self).__name__,
+                bodies=bodies,
+                assets=[_mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=2 * pitch,
+            ),
+        )
+
+    def _surface(self) -> str:
+        """The friction of a grain; that of a contact is the larger one of its two geometries."""
+        return _mjcf.surface(self.mu)
+
+    def _chute(self, pitch: float, width: float, up: Vector, away: Vector) -> list[str]:
+        """The slope, and walls beside it and at the end of the trough; planes without end."""
+        friction = _mjcf.surface(self.mu)
+        rows = -(-self.grains // (self.across * self.layers))
+        length = pitch * (rows + 2 + self.layers / math.tan(self.slope))
+        elements = [
+            f'<geom name="slope" type="plane" size="{_mjcf.numbers(0.5 * width, 0.5 * length, 1)}"'
+            f' pos="{_mjcf.numbers(*(0.5 * length * up))}"'
+            f' xyaxes="{_mjcf.numbers(0, 1, 0, *up)}" {friction} rgba="0.62 0.6 0.57 1"/>'
+        ]
+        height = 2 * self.layers * pitch
+        walls = (
+            ((0, -0.5 * width, 0), (0, 1, 0)),
+            ((0, 0.5 * width, 0), (0, -1, 0)),
+            ((self.trough, 0, 0), (-1, 0, 0)),
+        )
+        for i, (place, axis) in enumerate(walls):
+            elements.append(
+                f'<geom name="wall{i}" type="plane" size="0 0 1" pos="{_mjcf.numbers(*place)}"'
+                f' zaxis="{_mjcf.numbers(*axis)}" {friction} rgba="0 0 0 0"/>'
+            )
+        # the frame: along the slope's edges, the trough and its end
+        for y in (-0.5 * width, 0.5 * width):
+            side = np.array([0, y, 0])
+            corner, top = np.array([self.trough, y, 0]), np.array([self.trough, y, height])
+            rim = side + height * away
+            for start, end in (
+                (side, side + length * up),
+                (side, corner),
+                (corner, top),
+                (rim, rim + length * up),
+            ):
+                elements.append(_mjcf.bar(start, end, 0.1 * self.radius))
+        elements.append(
+            _mjcf.bar(
+                (self.trough, -0.5 * width, height),
+                (self.trough, 0.5 * width, height),
+                0.1 * self.radius,
+            )
+        )
+        return elements

@@ -1,0 +1,97 @@
+"""Polyhedra stacked in a cell that repeats itself on all sides."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeriodicBox:
+    """Random polyhedra that fall on a floor, in a square cell with periodic boundaries.
+
+    What leaves on one side comes in on the other, so that the stack has no walls. A contact across
+    the boundary acts on its two bodies like any other; see `fclib.simulate.periodic`. The law of
+    contact is that of gaps, near to the one of LMGC90.
+
+    After the set 100_PR_PerioBox of the FCLIB library: 100 polyhedra, mu = 0.8, a period of 25 along
+    x and y, by LMGC90. The polyhedra and their size in the cell are chosen here.
+    """
+
+    title: ClassVar[str] = "Polyhedra in a periodic box"
+    description: ClassVar[str] = (
+        "Random polyhedra stacked on a floor, in a cell with periodic boundaries."
+    )
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "granular"
+    problems: ClassVar[int] = 220
+
+    polyhedra: int = parameter(100, "1", "number of polyhedra, at least 1")
+    shapes: int = parameter(25, "1", "polyhedra that differ, at least 1")
+    radius: float = parameter(3.0, "m", "largest radius of a polyhedron, to its corners")
+    spread: float = parameter(0.3, "1", "the smallest radius is smaller by this share, in [0, 1)")
+    density: float = parameter(2500.0, "kg/m^3", "mass density")
+    mu: float = parameter(0.8, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    period: float = parameter(25.0, "m", "edge of the cell, along x and along y")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(0.02, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(
+            self,
+            positive=("radius", "density", "time_step"),
+            non_negative=("mu", "spread"),
+            at_least={"polyhedra": 1, "shapes": 1, "period": 4.2 * self.radius},
+        )
+        if not self.spread < 1:
+            raise ValueError(f"PeriodicBox: spread must be < 1, not {self.spread}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the polyhedra and how they are turned."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        corners = _mjcf.polyhedra(random, self.shapes)
+        corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
+        kinds = random.integers(self.shapes, size=self.polyhedra)
+        turned = _mjcf.rotations(random, self.polyhedra)
+
+        side = math.floor(self.period / (2.05 * self.radius))
+        pitch, height = self.period / side, 2.05 * self.radius
+        bodies = _mjcf.posts(0.5 * self.period, self.period)
+        for i in range(self.polyhedra):
+            layer, cell = divmod(i, side * side)
+            x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
+            bodies.append(
+                _mjcf.grain(
+                    f"polyhedron{i}",
+                    (x, y, height * (layer + 0.5)),
+                    f'type="mesh" mesh="shape{kinds[i]}" density="{self.density!r}"',
+                    _mjcf.surface(self.mu),
+                    _mjcf.shade(i, self.polyhedra),
+                    turned[i],
+                )
+            )
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "PeriodicBox",
+                bodies=bodies,
+                assets=[_mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=0.125 * self.period,
+            ),
+            law="gap",
+            period=(self.period, self.period),
+            focus=(0.0, 0.0, 0.5 * self.period, 0.55 * self.period),
+        )

@@ -1,0 +1,99 @@
+"""Equal spheres in a box, pressed by a wall that moves."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpheresBox:
+    """Equal spheres on a cubic lattice, a little disturbed, under a heavy lid that slides down.
+
+    The layers land one upon another, and the lattice gives way to denser packings. The last
+    problems have nearly two contacts a sphere, and each costs seconds; what follows costs more.
+
+    After the set 945_SP_Box_PL of the FCLIB library: 945 spheres, mu = 0.8, by LMGC90. Its box is
+    not documented; the lattice of 9 x 7 x 15 places and the lid are chosen here.
+    """
+
+    title: ClassVar[str] = "Spheres in a box under a lid"
+    description: ClassVar[str] = "Equal spheres in a box, pressed by a wall that moves down."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "granular"
+    problems: ClassVar[int] = 45
+
+    spheres: int = parameter(945, "1", "number of spheres, at least 1")
+    along_x: int = parameter(9, "1", "spheres of a layer along x, at least 1")
+    along_y: int = parameter(7, "1", "spheres of a layer along y, at least 1")
+    radius: float = parameter(1.0, "m", "radius of a sphere")
+    density: float = parameter(2500.0, "kg/m^3", "mass density")
+    mu: float = parameter(0.8, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    offset: float = parameter(0.05, "1", "largest offset at the start, in radii, at most 0.2")
+    load: float = parameter(0.2, "1", "mass of the lid, for that of all spheres")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(0.02, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(
+            self,
+            positive=("radius", "density", "load", "time_step"),
+            non_negative=("mu", "offset"),
+            at_least={"spheres": 1, "along_x": 1, "along_y": 1},
+        )
+        if not self.offset <= 0.2:
+            raise ValueError(f"SpheresBox: offset must be <= 0.2, not {self.offset}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the offsets."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        draws = random.uniform(-self.offset, self.offset, size=(self.spheres, 3))
+        friction = _mjcf.surface(self.mu)
+        pitch = 2 * (1 + self.offset) * self.radius
+        sides = np.array([self.along_x, self.along_y])
+        bodies = []
+        for i, draw in enumerate(draws):
+            layer, cell = divmod(i, self.along_x * self.along_y)
+            place = np.array([*divmod(cell, self.along_y), layer + 0.5])
+            place[:2] -= 0.5 * (sides - 1)
+            bodies.append(
+                _mjcf.grain(
+                    f"sphere{i}",
+                    pitch * place + self.radius * draw,
+                    f'type="sphere" size="{self.radius!r}" density="{self.density!r}"',
+                    friction,
+                    _mjcf.shade(i, self.spheres),
+                )
+            )
+        layers = -(-self.spheres // (self.along_x * self.along_y))
+        x, y = (0.5 * pitch * sides).tolist()
+        height, half = pitch * layers, 0.5 * self.radius
+        mass = self.load * self.spheres * self.density * 4 / 3 * math.pi * self.radius**3
+        bodies.append(
+            f'<body name="lid" pos="{_mjcf.numbers(0, 0, height + half)}">'
+            '<joint type="slide" axis="0 0 1"/>'
+            f'<geom type="box" size="{_mjcf.numbers(x, y, half)}" mass="{mass!r}" {friction}'
+            ' material="solid" rgba="0.45 0.47 0.5 1"/></body>'
+        )
+        bodies += _mjcf.walls((x, y), height, self.mu)
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "SpheresBox",
+                bodies=bodies,
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=4 * self.radius,
+            ),
+        )

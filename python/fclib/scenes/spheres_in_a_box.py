@@ -1,0 +1,89 @@
+"""Spheres of many sizes that fill a box."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from fclib.scenes import _mjcf
+from fclib.scenes._family import Scene, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpheresInABox:
+    """Spheres of a range of sizes, poured into an open box, that come to rest.
+
+    As many as the box's section holds lie in a layer of the start, the layers a little apart. The
+    packing is disordered, and its masses differ by (1 - spread)^-3.
+
+    Spheres in a box are a set of the FCLIB library; all figures are chosen here.
+    """
+
+    title: ClassVar[str] = "Spheres in a box"
+    description: ClassVar[str] = "Spheres of many sizes poured into an open box, under gravity."
+    application: ClassVar[str] = "granular matter"
+    authors: ClassVar[str] = "V. Acary"
+    friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
+    collection: ClassVar[str] = "granular"
+    problems: ClassVar[int] = 240
+
+    spheres: int = parameter(150, "1", "number of spheres, at least 1")
+    radius: float = parameter(1.0, "m", "largest radius of a sphere")
+    spread: float = parameter(0.4, "1", "the smallest radius is smaller by this share, in [0, 1)")
+    density: float = parameter(2500.0, "kg/m^3", "mass density")
+    mu: float = parameter(0.7, "1", "coefficient of friction")
+    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    width: float = parameter(10.6, "m", "inner edge of the box, a square")
+    gap: float = parameter(0.1, "m", "clearance of two places of the grid at the start")
+    gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
+    time_step: float = parameter(0.0125, "s", "time step h")
+
+    def __post_init__(self) -> None:
+        _mjcf.check(
+            self,
+            positive=("radius", "density", "time_step"),
+            non_negative=("mu", "spread", "gap"),
+            at_least={"spheres": 1, "width": 2 * self.radius + self.gap},
+        )
+        if not self.spread < 1:
+            raise ValueError(f"SpheresInABox: spread must be < 1, not {self.spread}")
+
+    def scene(self, seed: int = 0) -> Scene:
+        """The scene; the seed draws the radii, and the places in their cells."""
+        random = np.random.Generator(np.random.PCG64(seed))
+        # one row a sphere, drawn at once: more spheres begin like fewer
+        draws = random.uniform(size=(self.spheres, 4))
+        radii = self.radius * (1 - self.spread * draws[:, 0])
+        pitch = 2 * self.radius + self.gap
+        side = math.floor(self.width / pitch)
+        bodies = _mjcf.walls(0.5 * self.width, self.width, self.mu)
+        for i, radius in enumerate(radii.tolist()):
+            layer, cell = divmod(i, side * side)
+            # somewhere in the cell, without touching its faces
+            room = self.radius - radius
+            x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
+            place = np.array([x, y, pitch * (layer + 0.5)]) + room * (2 * draws[i, 1:] - 1)
+            bodies.append(
+                _mjcf.grain(
+                    f"sphere{i}",
+                    place,
+                    f'type="sphere" size="{radius!r}" density="{self.density!r}"',
+                    _mjcf.surface(self.mu),
+                    _mjcf.shade(i, self.spheres),
+                )
+            )
+        return Scene.of(
+            self,
+            seed,
+            _mjcf.document(
+                "SpheresInABox",
+                bodies=bodies,
+                time_step=self.time_step,
+                gravity=self.gravity,
+                floor_mu=self.mu,
+                tile=0.25 * self.width,
+            ),
+        )

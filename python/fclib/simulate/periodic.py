@@ -1,0 +1,117 @@
+"""A periodic cell: bodies that leave it on one side come in on the other.
+
+Each body has four ghosts, its images shifted by the periods: (Lx, 0), (0, Ly), (Lx, Ly) and
+(Lx, -Ly). Of two opposite shifts one is there, since i touching j shifted by s is j touching i
+shifted by -s: no contact is found twice. A ghost is a body without degrees of freedom that stands
+where its original says, and touches originals only. For a contact with it MuJoCo gives the rows of
+the other body; those of the original, at the same point of it, are added here:
+
+    u = H_i^T v_i + H_j^T v_j,  H_j from the lever arm x - (x_j + s)
+
+so that the cell as a whole feels no force from itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from fclib.simulate._mujoco import mujoco
+from fclib.simulate.moreau_jean import Sparse, Vector
+
+SHIFTS: Final = np.array([(1, 0, 0), (0, 1, 0), (1, 1, 0), (1, -1, 0)])  # in periods
+BIT: Final = 1 << 30  # of contype, which ghosts touch
+
+
+class PeriodicCell:
+    """The ghosts of a compiled model, and where its bodies are wrapped to."""
+
+    def __init__(self, m: Any, period: tuple[float, float]) -> None:
+        """The cell of a model that `add_ghosts` made. ValueError where a body is too large."""
+        self.period = np.array([*period, 0.0])
+        ghosts = np.flatnonzero(m.body_mocapid >= 0)
+        # the bodies in their order, then the four ghosts of each
+        self._ghost = ghosts.reshape(-1, len(SHIFTS))
+        self._body = np.arange(1, 1 + len(self._ghost))
+        self.original = np.arange(m.nbody)  # (nbody) of a ghost its body, of another itself
+        self.original[self._ghost] = self._body[:, None]
+        # (ngeom) likewise; the geometries of a ghost are in the order of its original's
+        self.geometry = m.body_geomadr[self.original[m.geom_bodyid]] + (
+            np.arange(m.ngeom) - m.body_geomadr[m.geom_bodyid]
+        )
+        # compiling turns free bodies to their principal axes, and leaves their ghosts as they were
+        for field in (m.geom_pos, m.geom_quat, m.geom_sameframe):
+            field[:] = field[self.geometry]
+        size = 2 * (m.geom_rbound + np.linalg.norm(m.geom_pos, axis=1))
+        largest = size[np.isin(m.geom_bodyid, self._body)].max(initial=0.0)
+        if not largest < min(period):
+            raise ValueError(f"the period must be above a body's size, {largest:g}, not {period}")
+
+    def wrap(self, m: Any, q: Vector) -> None:
+        """Bring the bodies of a configuration q (nq) into the cell around the origin, in place."""
+        places = m.jnt_qposadr[m.body_jntadr[self._body]][:, None] + np.arange(2)
+        L = self.period[:2]
+        q[places] -= L * np.floor(q[places] / L + 0.5)
+
+    def place(self, m: Any, d: Any) -> None:
+        """Put the ghosts where the configuration of the data puts their originals."""
+        q = m.jnt_qposadr[m.body_jntadr[self._body]]
+        mocap = m.body_mocapid[self._ghost]
+        d.mocap_pos[mocap] = d.qpos[q[:, None] + np.arange(3)][:, None] + self.period * SHIFTS
+        d.mocap_quat[mocap] = d.qpos[q[:, None] + np.arange(3, 7)][:, None]
+
+    def rows(self, m: Any, d: Any) -> Sparse:
+        """What the originals of ghosts add to MuJoCo's constraint rows (nefc x n)."""
+        contact = d.contact
+        body = m.geom_bodyid[contact.geom.reshape(-1, 2)]
+        is_ghost = m.body_mocapid[body] >= 0
+        values: list[Vector] = []
+        rows: list[npt.NDArray[Any]] = []
+        columns: list[npt.NDArray[Any]] = []
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            which = np.flatnonzero(is_ghost[:, side] & (contact.efc_address >= 0))
+            ghost = body[which, side]
+            first = m.body_dofadr[self.original[ghost]]
+            arm = contact.pos[which] - d.xpos[ghost]
+            turn = d.xmat[ghost].reshape(-1, 3, 3)  # from the body to the world
+            frame = contact.frame[which].reshape(-1, 3, 3)
+            # of three forces and three moments along N, T1, T2; MuJoCo's spin is in the body
+            gradient = np.zeros((len(which), 6, 6))
+            gradient[:, :3, :3] = frame
+            gradient[:, :3, 3:] = np.cross(arm[:, None], frame) @ turn
+            gradient[:, 3:, 3:] = frame @ turn
+            there = np.arange(6) < contact.dim[which][:, None]
+            k, row = np.nonzero(there)
+            values.append(sign * gradient[k, row].ravel())
+            rows.append(np.repeat(contact.efc_address[which][k] + row, 6))
+            columns.append((first[k][:, None] + np.arange(6)).ravel())
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sp.csr_array(entries, shape=(d.nefc, m.nv))
+
+
+def add_ghosts(spec: Any) -> None:
+    """Give each body of a model its ghosts. ValueError where one is not a single free body."""
+    spec.copy_during_attach = True
+    bodies = list(spec.worldbody.bodies)
+    for body in bodies:
+        joints = list(body.joints)
+        free = len(joints) == 1 and joints[0].type == mujoco.mjtJoint.mjJNT_FREE
+        if not free or list(body.bodies):
+            raise ValueError(f"a periodic scene has free bodies only, not {body.name!r}")
+        for geom in body.geoms:
+            geom.contype |= BIT
+    for body in bodies:
+        for k in range(len(SHIFTS)):
+            ghost = spec.worldbody.add_frame().attach_body(body, "", f"@{k}")
+            for joint in list(ghost.joints):
+                spec.delete(joint)
+            ghost.mocap = True
+            for geom in ghost.geoms:
+                geom.contype, geom.conaffinity = 0, BIT
+                # no weight in the energy, not drawn
+                geom.mass = 0
+                geom.rgba = (0, 0, 0, 0)
+                geom.material = ""

@@ -90,7 +90,7 @@ def test_a_shifted_cell_has_the_same_problem(
     np.testing.assert_allclose(gaps[1], gaps[0], atol=1e-12)
     # the order of the contacts is another, and which of two bodies is the first
     np.testing.assert_allclose(spectrum(there), spectrum(here), atol=1e-12)
-    after = [fclib.solve(problem, tol=1e-10).solution.v for problem in (here, there)]
+    after: list[Any] = [fclib.solve(each, tol=1e-10).solution.v for each in (here, there)]
     np.testing.assert_allclose(after[1], after[0], atol=1e-7)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fclib import scenes
+from fclib.scenes import _mjcf
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
@@ -225,6 +226,118 @@ def test_rolling_discs_come_to_rest_as_a_heap() -> None:
     assert last.problem.kind == "global_rolling"
     assert np.abs(last.velocity).max() < 0.5
     assert last.contacts.gap.min() > -0.1 * family.radius
+
+
+# ---- grains: few of them, until they have landed
+
+GRAINS: dict[str, tuple[dict[str, Any], int, float]] = {
+    # smaller scene, steps, largest penetration for the radius
+    "Spheres": ({"spheres": 27, "across": 3, "bed": 6}, 60, 0.08),
+    "SpheresInABox": ({"spheres": 18, "width": 6.6}, 90, 0.08),
+    "SpheresBox": ({"spheres": 18, "along_x": 3, "along_y": 3}, 60, 0.05),
+    "Chute": ({"grains": 24, "across": 3, "layers": 2, "shapes": 5}, 160, 0.2),
+    "RollingChute": ({"grains": 12, "across": 3, "layers": 2, "shapes": 5}, 130, 0.2),
+    "PrimitiveSoup": ({"bodies": 12, "width": 4.3}, 110, 0.08),
+    "RollingSoup": ({"bodies": 8, "width": 4.3}, 90, 0.08),
+    "PeriodicBox": ({"polyhedra": 18, "shapes": 5, "period": 19.0}, 80, 0.04),
+}
+
+
+@pytest.fixture(scope="module", params=GRAINS)
+def landed(request: pytest.FixtureRequest) -> tuple[str, list[Step]]:
+    """All steps of a smaller scene of grains."""
+    smaller, steps, _ = GRAINS[request.param]
+    scene = scenes.get(request.param)(**smaller).scene(seed=0)
+    return request.param, list(simulate(scene, steps))
+
+
+def test_grains_land_and_do_not_sink_into_each_other(landed: tuple[str, list[Step]]) -> None:
+    name, steps = landed
+    family: Any = scenes.get(name)(**GRAINS[name][0])
+    assert all(step.result.converged for step in steps)
+    last = steps[-1]
+    # all, or nearly all, touch something
+    assert last.problem.nc > 0.5 * last.problem.n / 6
+    assert last.problem.n > 0.6 * len(last.velocity)
+    deepest = min(step.contacts.gap.min(initial=0.0) for step in steps)
+    assert -GRAINS[name][2] * family.radius < deepest
+    assert last.problem.spacedim == (5 if "Rolling" in name else 3)
+
+
+def test_grains_stay_inside(landed: tuple[str, list[Step]]) -> None:
+    name, steps = landed
+    family: Any = scenes.get(name)(**GRAINS[name][0])
+    q = steps[-1].position
+    centres = q[: 7 * (len(q) // 7)].reshape(-1, 7)[:, :3]
+    assert centres[:, 2].min() > 0.25 * family.radius
+    sides = np.abs(centres[:, :2]).max(axis=0)
+    if name in ("SpheresInABox", "PrimitiveSoup", "RollingSoup"):
+        assert sides.max() < 0.5 * family.width - 0.3 * family.radius
+    elif name == "SpheresBox":
+        # the lid came down on the spheres, and lies on them
+        assert (sides <= 2.05 * family.radius * 1.5 - 0.9 * family.radius).all()
+        assert -1.5 * family.radius < q[-1] < 0
+    elif name == "PeriodicBox":
+        assert sides.max() <= 0.5 * family.period
+    elif name.endswith("Chute"):
+        width = 2.05 * family.radius * family.across
+        assert sides[1] < 0.5 * width - 0.3 * family.radius
+        # above the slope, before the end of the trough, and lower than at the start
+        away = centres[:, [0, 2]] @ [np.sin(family.slope), np.cos(family.slope)]
+        assert away.min() > 0.25 * family.radius
+        assert centres[:, 0].max() < family.trough
+        start = steps[0].position.reshape(-1, 7)[:, 2]
+        assert centres[:, 2].mean() < 0.7 * start.mean()
+
+
+def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
+    _, steps = landed
+    # the gap law pushes out what penetrates, and may so add a little
+    tolerance = 1e-3 if steps[0].model.scene.law == "gap" else 1e-6
+    model = steps[0].model
+    energy = []
+    for step in steps:
+        model.set_state(step.position, step.start.velocity)
+        energy.append(model.energy())
+    assert np.diff(energy).max() < tolerance * np.abs(energy).max()
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"),
+    [
+        ("Spheres", {"offset": 0.3}),
+        ("SpheresBox", {"load": 0.0}),
+        ("SpheresInABox", {"width": 1.0}),
+        ("SpheresInABox", {"spread": 1.0}),
+        ("Chute", {"slope": 2.0}),
+        ("Chute", {"spheres": 1.5}),
+        ("RollingChute", {"mu_r": -1.0}),
+        ("RollingSoup", {"mu_r": -1.0}),
+        ("PrimitiveSoup", {"bodies": 0}),
+        ("PeriodicBox", {"period": 9.0}),
+        ("PeriodicBox", {"spread": 1.0}),
+    ],
+)
+def test_grains_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=f"{name}: {next(iter(wrong))}"):
+        scenes.get(name)(**wrong)
+
+
+@pytest.mark.parametrize("grains", [1000, 4000])
+def test_chute_has_the_published_sizes(grains: int) -> None:
+    scene = scenes.get("Chute")(grains=grains, across=10, layers=8).scene(seed=0)
+    assert scene.xml.count("<freejoint/>") == grains
+
+
+def test_polyhedra_are_convex_and_neither_flat_nor_needles() -> None:
+    from scipy.spatial import ConvexHull
+
+    corners = _mjcf.polyhedra(np.random.Generator(np.random.PCG64(0)), 200)
+    for each in corners:
+        hull = ConvexHull(each)
+        assert len(hull.vertices) == 8
+        # of a ball of the same radius
+        assert 0.1 < hull.volume / (4 / 3 * np.pi) < 0.5
 
 
 @pytest.mark.parametrize(

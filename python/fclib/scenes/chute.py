@@ -128,7 +128,7 @@ class Chute:
             f' pos="{_mjcf.numbers(*(0.5 * length * up))}"'
             f' xyaxes="{_mjcf.numbers(0, 1, 0, *up)}" {friction} rgba="0.62 0.6 0.57 1"/>'
         ]
-        height = 2 * self.layers * pitch
+        height = 1.2 * self.layers * pitch
         walls = (
             ((0, -0.5 * width, 0), (0, 1, 0)),
             ((0, 0.5 * width, 0), (0, -1, 0)),
@@ -139,23 +139,14 @@ class Chute:
                 f'<geom name="wall{i}" type="plane" size="0 0 1" pos="{_mjcf.numbers(*place)}"'
                 f' zaxis="{_mjcf.numbers(*axis)}" {friction} rgba="0 0 0 0"/>'
             )
-        # the frame: along the slope's edges, the trough and its end
+        # the frame: the edges of the slope and of the trough, and the rim of the side walls
+        ends = []
         for y in (-0.5 * width, 0.5 * width):
-            side = np.array([0, y, 0])
-            corner, top = np.array([self.trough, y, 0]), np.array([self.trough, y, height])
-            rim = side + height * away
-            for start, end in (
-                (side, side + length * up),
-                (side, corner),
-                (corner, top),
-                (rim, rim + length * up),
-            ):
-                elements.append(_mjcf.bar(start, end, 0.1 * self.radius))
-        elements.append(
-            _mjcf.bar(
-                (self.trough, -0.5 * width, height),
-                (self.trough, 0.5 * width, height),
-                0.1 * self.radius,
-            )
-        )
+            foot, end = np.array([0, y, 0]), np.array([self.trough, y, 0])
+            top = end + [0, 0, height]
+            rim = foot + height / math.sin(self.slope) * up
+            for start, stop in ((foot, foot + length * up), (foot, end), (end, top), (top, rim)):
+                elements.append(_mjcf.bar(start, stop, 0.1 * self.radius))
+            ends.append(top)
+        elements.append(_mjcf.bar(*ends, 0.1 * self.radius))
         return elements

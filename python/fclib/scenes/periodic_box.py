@@ -20,8 +20,8 @@ class PeriodicBox:
     the boundary acts on its two bodies like any other; see `fclib.simulate.periodic`. The law of
     contact is that of gaps, near to the one of LMGC90.
 
-    After the set 100_PR_PerioBox of the FCLIB library: 100 polyhedra, mu = 0.8, a period of 25 along
-    x and y, by LMGC90. The polyhedra and their size in the cell are chosen here.
+    After the set 100_PR_PerioBox of the FCLIB library: 100 polyhedra, mu = 0.8, a period of 25
+    along x and y, by LMGC90. The polyhedra and their size in the cell are chosen here.
     """
 
     title: ClassVar[str] = "Polyhedra in a periodic box"

@@ -143,7 +143,7 @@ class Chute:
         ends = []
         for y in (-0.5 * width, 0.5 * width):
             foot, end = np.array([0, y, 0]), np.array([self.trough, y, 0])
-            top = end + [0, 0, height]
+            top = np.array([self.trough, y, height])
             rim = foot + height / math.sin(self.slope) * up
             for start, stop in ((foot, foot + length * up), (foot, end), (end, top), (top, rim)):
                 elements.append(_mjcf.bar(start, stop, 0.1 * self.radius))

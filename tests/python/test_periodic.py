@@ -118,7 +118,8 @@ def test_momentum_is_kept_without_a_floor(model: MujocoModel) -> None:
     xml = model.scene.xml.replace('type="plane"', 'type="plane" pos="0 0 -100"')
     free = dataclasses.replace(model.scene, xml=xml, time_step=REACH)
     for step in simulate(free, 3, tol=1e-10):
-        assert across(step.contacts, step.model).any()
+        here: Any = step.model
+        assert across(step.contacts, here).any()
         M, (before, after) = step.problem.M, (step.start.velocity, step.velocity)
         gained = (M @ (after - before)[step.dofs]).reshape(-1, 6)[:, :3].sum(axis=0)
         weight = 9.81 * M.diagonal()[0::6].sum()

@@ -84,9 +84,9 @@ def hard(
 ) -> list[Choice]:
     """What most solvers fail on.
 
-    A problem is hard where at least `share` of the solvers that were run on it at this tolerance
-    did not solve it. Of each family the hardest are taken: those that most failed on, of equals
-    those whose fastest solver took longest in iterations, then the earlier.
+    A problem that all solvers of the runs were tried on is hard where at least `share` of those
+    that take such problems did not solve it. Of each family the hardest are taken: those that most
+    failed on, of equals those whose fastest solver took most iterations, then the first by name.
 
     Args:
         runs: rows of the view `results` of stores, from campaigns over the folder's global files.
@@ -97,21 +97,28 @@ def hard(
 
     Raises:
         CatalogError: the folder has no catalogue.
-        ValueError: no run is of a problem of the catalogue.
+        ValueError: no problem of the catalogue has runs of all solvers at this tolerance.
     """
     rows = {row["digest"]: row for row in catalog.read_catalog(folder).to_pylist()}
     solved: dict[str, dict[str, bool]] = defaultdict(dict)
     effort: dict[str, list[float]] = defaultdict(list)
+    tried: dict[str, set[str]] = defaultdict(set)
     for run in runs:
-        if run["tol"] != tol or run["hash"] not in rows or run["status"] == "unsuitable":
+        if run["tol"] != tol or run["hash"] not in rows:
+            continue
+        tried[run["hash"]].add(run["solver"])
+        if run["status"] == "unsuitable":
             continue
         # of repeats one that was solved suffices
         known = solved[run["hash"]]
         known[run["solver"]] = known.get(run["solver"], False) or bool(run["solved"])
         if run["solved"]:
             effort[run["hash"]].append(run["iterations"])
+    solvers = set().union(*tried.values())
+    # a campaign that was cut short has problems that only some were tried on
+    solved = {digest: known for digest, known in solved.items() if tried[digest] == solvers}
     if not solved:
-        raise ValueError(f"{folder}: no run at {tol:g} is of a problem of this catalogue")
+        raise ValueError(f"{folder}: has no problem that all solvers were run on at {tol:g}")
 
     families: dict[str, list[tuple[float, float, str]]] = defaultdict(list)
     for digest, known in solved.items():

@@ -148,5 +148,5 @@ class Chute:
             for start, stop in ((foot, foot + length * up), (foot, end), (end, top), (top, rim)):
                 elements.append(_mjcf.bar(start, stop, 0.1 * self.radius))
             ends.append(top)
-        elements.append(_mjcf.bar(*ends, 0.1 * self.radius))
+        elements.append(_mjcf.bar(ends[0], ends[1], 0.1 * self.radius))
         return elements

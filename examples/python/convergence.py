@@ -36,8 +36,8 @@ def main(problem: fclib.Problem) -> None:
             f"error {result.error:.0e}  {1e3 * result.cpu_s:.1f} ms"
         )
         errors = np.maximum(history["error"], 1e-16)
-        left.loglog(history["iteration"] + 1, errors, ".-", label=name)
-        right.loglog(1e3 * history["time"] + 1e-3, errors, ".-", label=name)
+        left.loglog(history["iteration"] + 1, errors, label=name)
+        right.loglog(1e3 * history["time"] + 1e-3, errors, label=name)
     left.set(xlabel="iteration", ylabel="relative error of the natural map")
     right.set(xlabel="wall clock [ms]")
     for axes in (left, right):

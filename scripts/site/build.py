@@ -112,7 +112,11 @@ def with_links(text: str, up: str) -> str:
 
 
 def main(out: Path, quick: bool) -> int:
-    """Build; the exit status of Sphinx."""
+    """Build in the place of what an earlier build left; the exit status of Sphinx."""
+    if (out / ".buildinfo").is_file():
+        shutil.rmtree(out)
+    elif out.exists() and any(out.iterdir()):
+        sys.exit(f"{out}: is a folder that holds something else than this site; name another one")
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder) / "docs"
         gather(sources, quick)

@@ -28,6 +28,7 @@ html_theme_options = {"sidebar_hide_name": False}
 html_math_renderer = "mathml"
 html_copy_source = False
 html_show_sphinx = False
+html_show_copyright = False
 html_css_files = ["site.css"]
 copybutton_exclude = ".linenos, .gp, .go"
 

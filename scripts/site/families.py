@@ -125,9 +125,7 @@ def draw(name: str) -> bytes | None:
     """A PNG of the default scene at its start; none of what has no scene."""
     if name not in scenes.families():
         return None
-    scene = scenes.get(name)().scene(0)
-    rigid = scene.solids is None
-    model = simulate.MujocoModel(scene) if rigid else simulate.DeformableModel(scene)
+    model = simulate.model_of(scenes.get(name)().scene(0))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "scene.png"
         try:

@@ -34,7 +34,7 @@ class CubesH8:
     authors: ClassVar[str] = "V. Acary; original simulation by the developers of LMGC90"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
-    problems: ClassVar[int] = 50
+    problems: ClassVar[int] = 40
 
     elements: int = parameter(5, "1", "elements along an edge of a cube, at least 1")
     size: float = parameter(1.0, "m", "edge of the lower cube")
@@ -125,7 +125,7 @@ class CubesH8x2(CubesH8):
 class CubesH8x20(CubesH8):
     """The cubes with twenty elements a side: 55,566 degrees of freedom."""
 
-    problems: ClassVar[int] = 3
+    problems: ClassVar[int] = 2
     small: ClassVar[Mapping[str, Any]] = {"elements": 3}
 
     elements: int = parameter(20, "1", "elements along an edge of a cube, at least 1")

@@ -23,7 +23,7 @@ from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel, UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
-from fclib.simulate.simulation import Model, State, Step, engine, provenance, simulate
+from fclib.simulate.simulation import Model, State, Step, engine, model_of, provenance, simulate
 
 __all__ = [
     "ContactModel",
@@ -38,6 +38,7 @@ __all__ = [
     "System",
     "UnsupportedSceneError",
     "engine",
+    "model_of",
     "provenance",
     "render",
     "simulate",

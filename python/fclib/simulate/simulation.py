@@ -77,7 +77,7 @@ def simulate(
     """
     if steps < 0:
         raise ValueError(f"the number of steps must be >= 0, not {steps}")
-    model: Model = MujocoModel(scene) if scene.solids is None else DeformableModel(scene)
+    model = model_of(scene)
     scheme = MoreauJean(
         h=model.time_step,
         restitution=scene.restitution,
@@ -89,6 +89,11 @@ def simulate(
     if start is not None:
         model.set_state(start.position, start.velocity)
     return _march(model, scheme, steps, settings, start)
+
+
+def model_of(scene: Scene) -> Model:
+    """The model of a scene, at its start; raises as `simulate` does."""
+    return MujocoModel(scene) if scene.solids is None else DeformableModel(scene)
 
 
 def _march(

@@ -176,3 +176,76 @@ def test_ram_pushes_the_upper_courses() -> None:
     assert moved.max() == pytest.approx(ram - 0.1 * family.length, abs=0.02)
     assert abs(moved[0]) < 0.01
     assert last.contacts.gap.min() > -0.02
+
+
+# ---- bridges and aqueducts
+
+
+def test_arcade_is_filled_without_gaps() -> None:
+    arcade = _masonry.Arcade(
+        spans=2,
+        voussoirs=9,
+        radius=1.5,
+        thickness=0.3,
+        start=0.0,
+        between=0.15,
+        base=1.0,
+        cover=0.15,
+        slab=0.15,
+        slabs=7,
+    )
+    # all that is above the springings, less the polygons below the rings
+    whole = 2 * arcade.end * (arcade.top - arcade.base)
+    opening = 9 * 0.5 * math.sin(math.pi / 9) * arcade.inner**2
+    total = sum(_masonry.area(outline) for _, outline in arcade.stones())
+    assert total == pytest.approx(whole - 2 * opening)
+
+
+@pytest.mark.parametrize(
+    ("name", "still"),
+    [
+        ("Bridge", {"spread": 0.0, "load": 0.0}),
+        ("Aqueduct", {"spans": 2, "settlement": 0.0}),
+        ("Aqueduct", {"spans": 2, "tiers": 1, "settlement": 0.0, "split": True}),
+    ],
+)
+def test_masonry_stands_on_supports_that_stay(name: str, still: dict[str, Any]) -> None:
+    scene = scenes.get(name)(**still).scene()
+    first, *_, last = simulate(scene, 5)
+    assert np.abs(places(last) - places(first)).max() < 1e-6
+    assert np.abs(last.velocity).max() < 1e-6
+    # every joint is closed from the start, and none by more than the lap
+    lap = scene.parameters["lap"]
+    np.testing.assert_allclose(first.contacts.gap, -lap, rtol=0.05)
+    # diagonal stones do not touch: a face has at least four corners
+    _, counts = np.unique(first.contacts.pair, axis=0, return_counts=True)
+    assert counts.min() >= 4
+
+
+def test_aqueduct_divided_across_has_the_contact_density_of_the_published_one() -> None:
+    family: Any = scenes.get("Aqueduct")(spans=2, settlement=0.0, split=True)
+    step = next(iter(simulate(family.scene(), 1)))
+    assert 3 * step.problem.nc > 6 * step.problem.n
+
+
+def test_wagon_crosses_a_bridge_that_stands() -> None:
+    family: Any = scenes.get("Bridge")(spread=0.0, load=1000.0, speed=20.0)
+    scene = family.scene()
+    first, *_, last = simulate(scene, 60)
+    wagon = (last.position - first.position)[-7:-4]
+    # it loses a little at the joints of the deck
+    assert wagon[0] == pytest.approx(59 * family.time_step * family.speed, rel=0.1)
+    assert abs(wagon[2]) < 0.01
+    # its wheels are the only contacts without friction
+    assert set(last.problem.mu) == {0.0, family.mu}
+    stones = places(last)[:-1] - places(first)[:-1]
+    assert np.abs(stones).max() < 0.01
+
+
+def test_bridge_fails_where_its_abutment_gives_way() -> None:
+    family: Any = scenes.get("Bridge")(spread=1.0, time_step=1e-2)
+    scene = family.scene()
+    first, *_, last = simulate(scene, 70)
+    fallen = (places(first) - places(last))[:, 2]
+    assert fallen.max() > 0.3
+    assert last.contacts.gap.min() > -0.03

@@ -101,3 +101,14 @@ def test_quadruped_walks_over_uneven_ground() -> None:
     # four loops of three rows, none redundant
     G: Any = last.problem.G
     assert np.linalg.matrix_rank(G.toarray()) == 12
+
+
+def test_carrier_stands_with_its_bar_on_uneven_ground() -> None:
+    last = last_of(scenes.get("Carrier")().scene(seed=0), 250)
+    assert last.problem.formulation == "GM3DFC"
+    # two hands, three rows each, none redundant
+    G: Any = last.problem.G
+    assert np.linalg.matrix_rank(G.toarray()) == 6
+    assert violation(last) < 1e-3
+    # not fallen: the trunk is near where it began
+    assert last.position[2] > 0.7

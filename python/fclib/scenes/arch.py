@@ -87,9 +87,9 @@ class Arch:
         outer = _masonry.on_circle(self.radius + 0.5 * self.thickness + more, start, centre)
         right = [(inner[0], 0.0), (outer[0], 0.0), outer, inner]
         left = [(-x, z) for x, z in reversed(right)]
-        masonry.support("left", left, front - more, back + more)
+        masonry.support("left", [left], front - more, back + more)
         masonry.support(
-            "right", right, front - more, back + more, axis=(1, 0, 0), speed=self.spread
+            "right", [right], front - more, back + more, axis=(1, 0, 0), speed=self.spread
         )
         return Scene.of(
             self,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -86,6 +86,11 @@ LIMBS = [
     *_side("left", 1),
     *_side("right", -1),
 ]
+# hands in front of the body, where a bar is held
+HOLDING = {
+    f"forearm.{side}": {"end": (0.27, 0, 0), "joints": (("pitch", 0.0, -0.8, 1.5),)}
+    for side in ("left", "right")
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,14 +121,17 @@ class Humanoid:
     drop: float = parameter(0.05, "m", "height of the soles above the stones at the start")
     stones: int = parameter(16, "1", "stones under the feet, at least 0")
     stone: float = parameter(0.04, "m", "largest half axis of a stone")
+    roughness: float = parameter(0.0, "m", "largest height of the ground's blocks; 0: a floor")
+    block: float = parameter(0.15, "m", "edge of a block of the ground, seen from above")
+    bar: float = parameter(0.0, "kg", "mass of a bar that both hands hold, two loops; 0: none")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
         _mjcf.check(
             self,
-            positive=("height", "mass", "stone", "time_step"),
-            non_negative=("mu", "stiffness", "damping", "drop"),
+            positive=("height", "mass", "stone", "block", "time_step"),
+            non_negative=("mu", "stiffness", "damping", "drop", "roughness", "bar"),
             at_least={"stones": 0},
         )
 
@@ -133,7 +141,7 @@ class Humanoid:
         draws = random.uniform(-1.0, 1.0, size=(self.stones, 3))
         # sole below the hips: thigh, shin, foot
         hip = (0.1 + 0.4 + 0.38 + 0.07) * self._scale
-        top = 1.2 * self.stone if self.stones else 0.0
+        top = (1.2 * self.stone if self.stones else 0.0) + self.roughness
         bodies = [self._trunk(top + self.drop + hip)]
         side = max(1, int(np.ceil(np.sqrt(self.stones))))
         for i, (x, y, size) in enumerate(draws.tolist()):
@@ -142,22 +150,57 @@ class Humanoid:
             place = np.array(divmod(i, side)) - 0.5 * (side - 1)
             place = 2.4 * self.stone * place + 0.15 * self.stone * np.array([x, y])
             bodies.append(
-                f'<body name="stone{i}" pos="{_mjcf.numbers(*place, 0.6 * a)}"><freejoint/>'
+                f'<body name="stone{i}" pos="{_mjcf.numbers(*place, self.roughness + 0.6 * a)}">'
+                f"<freejoint/>"
                 f'<geom type="ellipsoid" size="{_mjcf.numbers(a, 0.8 * a, 0.6 * a)}"'
                 f' density="2500" friction="{self.mu!r}" condim="3" material="solid"'
                 f' rgba="{_mjcf.shade(i, self.stones)}"/></body>'
             )
+        if self.roughness:
+            reach = 0.5 * self.height
+            bodies += _mjcf.uneven_ground(
+                random, self.roughness, self.block, (-reach, reach), reach, self.mu
+            )
+        rest = []
+        if self.bar:
+            bodies.append(self._bar(top + self.drop + hip))
+            for side in ("left", "right"):
+                anchor = self._numbers(*HOLDING[f"forearm.{side}"]["end"])
+                pair = f'body1="forearm.{side}" body2="bar"'
+                rest += [
+                    f'<equality><connect {pair} anchor="{anchor}"/></equality>',
+                    f"<contact><exclude {pair}/></contact>",
+                ]
         return Scene.of(
             self,
             seed,
             _mjcf.document(
-                "Humanoid",
+                type(self).__name__,
                 bodies=bodies,
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=0.25 * self.height,
+                rest=rest,
             ),
+        )
+
+    @property
+    def _limbs_held(self) -> list[Limb]:
+        """The limbs, as the hands hold a bar or not."""
+        if not self.bar:
+            return LIMBS
+        return [replace(limb, **HOLDING.get(limb.name, {})) for limb in LIMBS]
+
+    def _bar(self, z: float) -> str:
+        """A bar across in both hands, hips at a height z [m]."""
+        # shoulder, elbow, hand
+        x, y, up = 0.27, 0.4, 0.38 - 0.28
+        place = _mjcf.numbers(self._scale * x, 0, z + self._scale * up)
+        return (
+            f'<body name="bar" pos="{place}"><freejoint/>'
+            f'<geom type="capsule" size="{self._numbers(0.02)}" mass="{self.bar!r}"'
+            f' fromto="{self._numbers(0, -y, 0, 0, y, 0)}" {self._surface(len(LIMBS))}/></body>'
         )
 
     @property
@@ -183,7 +226,7 @@ class Humanoid:
         return "".join(
             f'<body name="{limb.name}" pos="{self._numbers(*limb.at)}">'
             f"{self._joints(limb)}{self._shape(limb, 1 + i)}{self._limbs(limb.name)}</body>"
-            for i, limb in enumerate(LIMBS)
+            for i, limb in enumerate(self._limbs_held)
             if limb.parent == parent
         )
 

@@ -72,9 +72,11 @@ class LowWall:
             top = (self.courses - 0.25) * self.height
             masonry.support(
                 "ram",
-                _masonry.rectangle(
-                    -0.75 * self.length, 0.75 * self.length, top - 1.5 * self.height, top
-                ),
+                [
+                    _masonry.rectangle(
+                        -0.75 * self.length, 0.75 * self.length, top - 1.5 * self.height, top
+                    )
+                ],
                 -1.3 * self.length,
                 -0.6 * self.length,
                 axis=(0, 1, 0),

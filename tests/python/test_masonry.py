@@ -15,7 +15,13 @@ from fclib.scenes import _masonry
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 
-from fclib.simulate import Step, simulate
+from fclib.simulate import MujocoModel, Step, simulate
+
+
+def mujoco_of(step: Step) -> Any:
+    """MuJoCo's model behind a step."""
+    assert isinstance(step.model, MujocoModel)
+    return step.model.model
 
 
 def last_of(scene: scenes.Scene, steps: int) -> Step:
@@ -31,7 +37,7 @@ def places(step: Step) -> npt.NDArray[np.float64]:
 
 def weight(step: Step) -> float:
     """Of the free stones [N]."""
-    model = step.model.model
+    model = mujoco_of(step)
     free = len(step.velocity) // 6
     return float(model.body_mass[1 : 1 + free].sum() * -model.opt.gravity[2])
 
@@ -229,13 +235,13 @@ def test_aqueduct_divided_across_has_the_contact_density_of_the_published_one() 
 
 
 def test_wagon_crosses_a_bridge_that_stands() -> None:
-    family: Any = scenes.get("Bridge")(spread=0.0, load=1000.0, speed=20.0)
+    family: Any = scenes.get("Bridge")(spread=0.0, load=1000.0, speed=4.0, time_step=2e-2)
     scene = family.scene()
     first, *_, last = simulate(scene, 60)
     wagon = (last.position - first.position)[-7:-4]
-    # it loses a little at the joints of the deck
-    assert wagon[0] == pytest.approx(59 * family.time_step * family.speed, rel=0.1)
-    assert abs(wagon[2]) < 0.01
+    # its wheels lose speed at the joints of the deck, never gain any
+    assert 0.8 < wagon[0] / (59 * family.time_step * family.speed) < 1 + 1e-9
+    assert abs(wagon[2]) < 0.05
     # its wheels are the only contacts without friction
     assert set(last.problem.mu) == {0.0, family.mu}
     stones = places(last)[:-1] - places(first)[:-1]

@@ -14,6 +14,12 @@ pytest.importorskip("mujoco")
 from fclib.simulate import MujocoModel, Step, simulate
 
 
+def mujoco_of(step: Step) -> Any:
+    """MuJoCo's model behind a step."""
+    assert isinstance(step.model, MujocoModel)
+    return step.model.model
+
+
 def last_of(scene: scenes.Scene, steps: int) -> Step:
     *_, last = simulate(scene, steps)
     return last
@@ -26,7 +32,7 @@ def violation(step: Step) -> float:
 
 def coordinate(step: Step, joint: str) -> float:
     """A joint's coordinate from where it is 0, at the start of a step."""
-    address = step.model.model.joint(joint).qposadr[0]
+    address = mujoco_of(step).joint(joint).qposadr[0]
     return float(step.position[address])
 
 
@@ -74,7 +80,7 @@ def test_closed_chains_stay_closed_and_do_not_pass_through_each_other() -> None:
     for step in simulate(family.scene(seed=0), 200):
         assert step.result.converged
         energy.append(step.model.energy())
-        bodies = step.model.model.geom_bodyid[step.contacts.pair[step.contacts.pair[:, 0] >= 0]]
+        bodies = mujoco_of(step).geom_bodyid[step.contacts.pair[step.contacts.pair[:, 0] >= 0]]
         met |= {tuple(np.minimum(pair, 1)) for pair in bodies.tolist()}
     # with bodies that are fixed, and with each other
     assert met == {(0, 1), (1, 1)}

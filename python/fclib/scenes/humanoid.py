@@ -86,11 +86,13 @@ LIMBS = [
     *_side("left", 1),
     *_side("right", -1),
 ]
-# hands in front of the body, where a bar is held
-HOLDING = {
-    f"forearm.{side}": {"end": (0.27, 0, 0), "joints": (("pitch", 0.0, -0.8, 1.5),)}
-    for side in ("left", "right")
-}
+
+
+def holding(limb: Limb) -> Limb:
+    """A limb of a body that holds a bar: its hands are in front."""
+    if not limb.name.startswith("forearm"):
+        return limb
+    return replace(limb, end=(0.27, 0, 0), joints=(("pitch", 0.0, -0.8, 1.5),))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,9 +166,11 @@ class Humanoid:
         rest = []
         if self.bar:
             bodies.append(self._bar(top + self.drop + hip))
-            for side in ("left", "right"):
-                anchor = self._numbers(*HOLDING[f"forearm.{side}"]["end"])
-                pair = f'body1="forearm.{side}" body2="bar"'
+            for limb in self._limbs_held:
+                if not limb.name.startswith("forearm"):
+                    continue
+                anchor = self._numbers(*limb.end)
+                pair = f'body1="{limb.name}" body2="bar"'
                 rest += [
                     f'<equality><connect {pair} anchor="{anchor}"/></equality>',
                     f"<contact><exclude {pair}/></contact>",
@@ -188,9 +192,7 @@ class Humanoid:
     @property
     def _limbs_held(self) -> list[Limb]:
         """The limbs, as the hands hold a bar or not."""
-        if not self.bar:
-            return LIMBS
-        return [replace(limb, **HOLDING.get(limb.name, {})) for limb in LIMBS]
+        return [holding(limb) for limb in LIMBS] if self.bar else LIMBS
 
     def _bar(self, z: float) -> str:
         """A bar across in both hands, hips at a height z [m]."""

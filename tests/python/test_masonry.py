@@ -235,13 +235,13 @@ def test_aqueduct_divided_across_has_the_contact_density_of_the_published_one() 
 
 
 def test_wagon_crosses_a_bridge_that_stands() -> None:
-    family: Any = scenes.get("Bridge")(spread=0.0, load=1000.0, speed=4.0, time_step=2e-2)
+    family: Any = scenes.get("Bridge")(spread=0.0, load=1000.0, speed=4.0)
     scene = family.scene()
-    first, *_, last = simulate(scene, 60)
+    first, *_, last = simulate(scene, 90)
     wagon = (last.position - first.position)[-7:-4]
     # its wheels lose speed at the joints of the deck, never gain any
-    assert 0.8 < wagon[0] / (59 * family.time_step * family.speed) < 1 + 1e-9
-    assert abs(wagon[2]) < 0.05
+    assert 0.95 < wagon[0] / (89 * family.time_step * family.speed) < 1 + 1e-9
+    assert abs(wagon[2]) < 0.01
     # its wheels are the only contacts without friction
     assert set(last.problem.mu) == {0.0, family.mu}
     stones = places(last)[:-1] - places(first)[:-1]

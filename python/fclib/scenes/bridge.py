@@ -125,11 +125,11 @@ class Bridge:
         )
 
     def _wagon(self, x: float, z: float) -> str:
-        """A wagon that stands on the deck, z its top [m]; the priority of its wheels' friction."""
+        """A wagon on the deck, z its top [m]; its wheels without friction come before the stones'."""
         a = WAGON * self.width
         wheels = "".join(
-            f'<geom type="sphere" size="{0.4 * a!r}" mass="{0.05 * self.load!r}" condim="3"'
-            f' pos="{_mjcf.numbers(along * a, across * a, 0.4 * a)}" friction="0 0 0" priority="1"'
+            f'<geom type="sphere" size="{0.4 * a!r}" mass="{0.05 * self.load!r}" condim="1"'
+            f' pos="{_mjcf.numbers(along * a, across * a, 0.4 * a)}" priority="1"'
             ' material="solid" rgba="0.25 0.26 0.28 1"/>'
             for along in (-1, 1)
             for across in (-0.8, 0.8)

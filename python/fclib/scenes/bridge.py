@@ -125,7 +125,7 @@ class Bridge:
         )
 
     def _wagon(self, x: float, z: float) -> str:
-        """A wagon on the deck, z its top [m]; its wheels without friction come before the stones'."""
+        """A wagon on the deck, z its top [m]; the wheels' lack of friction comes first."""
         a = WAGON * self.width
         wheels = "".join(
             f'<geom type="sphere" size="{0.4 * a!r}" mass="{0.05 * self.load!r}" condim="1"'

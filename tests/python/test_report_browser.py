@@ -19,6 +19,7 @@ from helpers_report import LABELS, make_collection, make_store, read_data
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 pytest.importorskip("plotly")
+image = pytest.importorskip("matplotlib.image")
 pytest.importorskip("itables")
 api = pytest.importorskip("playwright.sync_api")
 # what they give is of one kind here
@@ -90,7 +91,7 @@ class Opener:
         )
         self.contexts.append(context)
         page = context.new_page()
-        page.set_default_timeout(10_000)
+        page.set_default_timeout(60_000)
         page.on("console", lambda message: self.hear(address, message))
         page.on("pageerror", lambda error: self.wrong.append(f"{address}: {error}"))
         page.on("request", self.judge)
@@ -326,22 +327,11 @@ def test_a_problem_shows_its_runs(go: Opener, site: Path) -> None:
 
 
 def test_the_network_turns_zooms_and_answers(go: Opener) -> None:
-    page = go("#/problem/small/BoxesStack/0011")
+    page = go("#/problem/small/BoxesStack/0011", viewport={"width": 640, "height": 480})
     scene = draw(page, ".scene .plot")
     canvas = scene.locator("canvas").first
     eye = "plot => Object.values(plot.layout.scene.camera.eye)"
     start = scene.evaluate(eye)
-    ink = """async plot => {
-        const image = new Image();
-        image.src = await Plotly.toImage(plot, { format: "png", width: 300, height: 200 });
-        await image.decode();
-        const context = new OffscreenCanvas(300, 200).getContext("2d");
-        context.drawImage(image, 0, 0);
-        const { data } = context.getImageData(0, 0, 300, 200);
-        return new Set(new Uint32Array(data.buffer)).size;
-    }"""
-    # a picture of many shades and not an empty one
-    assert scene.evaluate(ink) > 100
     scene.focus()
     for key in ("ArrowLeft", "ArrowUp", "+"):
         page.keyboard.press(key)
@@ -362,6 +352,11 @@ def test_the_network_turns_zooms_and_answers(go: Opener) -> None:
     )
     traces = scene.evaluate("plot => plot.data.map(trace => trace.type)")
     assert {"mesh3d", "scatter3d", "cone"} <= set(traces)
+    with page.expect_download() as saved:
+        page.locator(".scene").get_by_role("button", name="PNG").click()
+    picture = image.imread(saved.value.path(), format="png")
+    # of many shades, and not an empty one
+    assert len(np.unique(picture.reshape(-1, picture.shape[-1]), axis=0)) > 100
     page.locator(".scene").get_by_role("checkbox", name="bodies").uncheck()
     page.wait_for_function(
         "plot => !plot.data.some(trace => trace.type === 'mesh3d')", arg=scene.element_handle()
@@ -404,8 +399,15 @@ def test_light_and_dark_can_be_read(go: Opener) -> None:
             text = luminance(page.evaluate(style.format(what, "color")))
             assert (max(text, back) + 0.05) / (min(text, back) + 0.05) >= 4.5, (scheme, what)
     assert luminance(colours["light"]) > luminance(colours["dark"])
-    # the button turns it round, and the choice stays
+    # the button turns it round, the pictures too, and the choice stays
+    plot = draw(page)
+    paper = "plot => getComputedStyle(plot.querySelector('.main-svg')).backgroundColor"
+    assert plot.evaluate(paper) == colours["dark"]
     page.click("#theme")
+    page.wait_for_function(
+        f"([plot, colour]) => ({paper})(plot) === colour",
+        arg=[plot.element_handle(), colours["light"]],
+    )
     assert page.evaluate(style.format("body", "backgroundColor")) == colours["light"]
     page.reload()
     page.wait_for_selector("main h1")

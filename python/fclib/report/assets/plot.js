@@ -55,7 +55,7 @@
     const fill = () => { if (table.children.length === 1) table.append(options.table()); return table.lastChild; };
     table.addEventListener("toggle", fill);
     const save = async (format) => {
-      await box.draw();
+      if (!box.dataset.drawn) await box.draw();
       const Plotly = await Fclib.plotly();
       return Plotly.downloadImage(box, { format, filename: name, width: box.clientWidth, height: box.clientHeight, scale: format === "png" ? 2 : 1 });
     };

@@ -79,7 +79,7 @@
         const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: s.solvers.findIndex((v) => v.label === name), mean: mean[k] })).sort((a, b) => b.mean - a.mean);
         charts.append(h("section", {}, h("h3", {}, `Tolerance ${Fclib.tolerance(s.tolerances[t])}`),
           Fclib.lines({
-            name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), step: true, xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
+            name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
             ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
             note: `${head.instances} instances${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
           }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
@@ -161,10 +161,9 @@
       if (performance) { low = 1; high = Math.max(2, Math.min(1e4, high)); if (state.axis === "linear") high = Math.min(high, 20); }
       if (high <= low) high = low * 2;
       const series = order.map((k, i) => ({ name: labels[k], style: k, ...Fclib.shares(shown[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
-      series.forEach((one) => { one.mean = one.y[one.y.length - 1]; });
       const metric = s.metrics[state.metric];
       box.replaceChildren(Fclib.lines({
-        name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, step: true, xlog: state.axis === "log",
+        name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, xlog: state.axis === "log",
         xrange: performance ? [1, state.axis === "log" ? high * 1.1 : high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
         xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
         note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run${state.family ? `, family ${state.family}` : ""}.`,
@@ -336,7 +335,7 @@
           let [low, high] = [Math.min(...xs), Math.max(...xs)];
           if (low === high) high = 2 * low;
           box.replaceChildren(Fclib.lines({
-            name: `convergence-${id.replaceAll("/", "-")}`, title: `Convergence on ${id}, tolerance ${state.tol}`, series, step: true, xlog: true, ylog: true, xrange: [low, high], yrange: [Math.min(...ys) / 2, Math.max(...ys) * 2],
+            name: `convergence-${id.replaceAll("/", "-")}`, title: `Convergence on ${id}, tolerance ${state.tol}`, series, xlog: true, ylog: true, xrange: [low, high], yrange: [Math.min(...ys) / 2, Math.max(...ys) * 2],
             xname: at ? "time [s]" : "iteration", xlabel: at ? "time [s]" : "iteration", ylabel: "least error so far", note: "The error that the solver sees, of the reduced problem; a solver that reports once has no curve.",
           }));
         };

@@ -1,7 +1,6 @@
 """Build the documentation: build.py OUT [--quick], a site that opens from a folder and any host.
 
-Its sources are README.md, ARCHITECTURE.md, CHANGELOG.md, docs/, and pages that follow from the
-code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
+Its sources are README.md, ARCHITECTURE.md and their like, docs/, and pages that follow from the code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
 --quick draws no scene and runs no example.
 """
 
@@ -27,6 +26,7 @@ ROOT = HERE.parents[1]
 AS_THEY_ARE = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "architecture.md",
+    "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
 # the menu; FOLDER/* stands for the generated pages of a folder
@@ -37,7 +37,7 @@ MENU = {
     "The solvers": ["choosing", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
     "Interfaces": ["command-line", "python", "compiled", "c-api"],
-    "Around it": ["comparison", "migrating", "citing", "architecture", "changelog"],
+    "Around it": ["comparison", "migrating", "citing", "architecture", "contributing", "changelog"],
 }
 STYLE = """\
 .content { width: 54em; }

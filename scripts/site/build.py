@@ -1,6 +1,7 @@
 """Build the documentation: build.py OUT [--quick], a site that opens from a folder and any host.
 
-Its sources are README.md, ARCHITECTURE.md and their like, docs/, and pages that follow from the code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
+Its sources are README.md, ARCHITECTURE.md and their like, docs/, and pages that follow from the
+code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
 --quick draws no scene and runs no example.
 """
 

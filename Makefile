@@ -77,8 +77,8 @@ wheel: sdist
 	HDF5_SOURCE="$(HDF5_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
 	rm -rf $(BUILD)/wheel dist/*.whl
 	$(BIN)/pip wheel --no-deps --wheel-dir $(BUILD)/wheel \
-	  --config-settings=cmake.define.FCLIB_BUNDLED=$(CURDIR)/$(BUILD)/bundled dist/fclib-*.tar.gz
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/auditwheel repair --wheel-dir dist $(BUILD)/wheel/*.whl
+	  --config-settings=cmake.define.FCLIB_BUNDLED=$(abspath $(BUILD)/bundled) dist/fclib-*.tar.gz
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir dist $(BUILD)/wheel/*.whl
 	$(BIN)/python scripts/check_wheel.py dist/*.whl
 
 deb:

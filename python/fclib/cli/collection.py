@@ -295,7 +295,7 @@ def run(
             worst = max(unsolved, key=lambda row: float(row["error"]))
             out.print(
                 f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
-                f" {worst['id']}, error {worst['error']:.1e}. The simulation went on from there."
+                f" {worst['id']}, error {worst['error']:.1e}. A simulation went on from there."
             )
         for name in dict.fromkeys(plan.collection for plan in plans if plan.chosen):
             own = [row for row in rows if row["collection"] == name]

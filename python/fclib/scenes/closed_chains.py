@@ -18,8 +18,9 @@ class ClosedChains:
 
     A loop is a tree of joints in minimal coordinates, closed by a bilateral constraint of three
     rows: M is dense in each loop, and the loops that touch are coupled by contacts. They hang
-    over the bar and over each other, slide off it and lie on the floor. Without restitution the
-    law is the one on gaps: contacts within reach are in the problem whether they close or not.
+    over the bar and over each other; with a larger `offset` they slide off to the floor. Without
+    restitution the law is the one on gaps: contacts within reach are in the problem whether they
+    close or not.
     """
 
     title: ClassVar[str] = "Closed chains"
@@ -126,6 +127,6 @@ class ClosedChains:
                 f'<geom type="capsule" size="{self.radius!r}"'
                 f' fromto="{_mjcf.numbers(0, 0, 0, self.length, 0, 0)}" condim="3"'
                 f' friction="{self.mu!r}" density="{self.density!r}" material="solid"'
-                f' rgba="{_mjcf.shade(2 * chain + k % 2, 2 * self.chains)}"/>{inner}</body>'
+                f' rgba="{_mjcf.shade(chain, self.chains)}"/>{inner}</body>'
             )
         return inner

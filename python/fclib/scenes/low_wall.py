@@ -17,7 +17,7 @@ class LowWall:
 
     A stone rests on three or four others and touches its neighbours, each in four points: the
     problem has seven times as many contact components as degrees of freedom. A ram pushes against
-    the upper courses, the wall cracks, and stones fall.
+    the upper courses, the wall cracks and the stones come loose.
 
     The friction is that of LowWall_FEM in the table of V. Acary, M. Bremond and O. Huber, On
     solving contact problems with Coulomb friction: formulations and numerical comparisons,

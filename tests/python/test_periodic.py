@@ -209,3 +209,11 @@ def test_rolling_moments_cross_the_boundary() -> None:
         np.testing.assert_allclose(H[3:6, 3:] + H[9:, 3:], 0, atol=1e-12)
     same = dataclasses.replace(model.scene, period=None)
     assert MujocoModel(same).assemble(1e-2).H.shape[1] == 5
+
+
+def test_what_only_looks_is_left_alone() -> None:
+    look = '<geom size="1" contype="0" conaffinity="0" mass="1"/>'
+    bodies = "".join(f'<body pos="{x} 0 0"><freejoint/>{look}</body>' for x in (-4.5, 4.0))
+    xml = f"<mujoco><worldbody>{bodies}</worldbody></mujoco>"
+    model = MujocoModel(Scene(name="looks", xml=xml, period=(9.0, 9.0)))
+    assert len(model.assemble(1e-2).contacts) == 0

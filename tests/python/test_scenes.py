@@ -315,6 +315,8 @@ def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
         ("RollingSoup", {"mu_r": -1.0}),
         ("PrimitiveSoup", {"bodies": 0}),
         ("PeriodicBox", {"period": 9.0}),
+        ("PeriodicBox", {"restitution": 0.5}),
+        ("RollingSoup", {"restitution": 0.5}),
         ("PeriodicBox", {"spread": 1.0}),
     ],
 )

@@ -40,7 +40,7 @@ class PeriodicBox:
     spread: float = parameter(0.3, "1", "the smallest radius is smaller by this share, in [0, 1)")
     density: float = parameter(2500.0, "kg/m^3", "mass density")
     mu: float = parameter(0.8, "1", "coefficient of friction")
-    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    restitution: float = parameter(0.0, "1", "0: the law of gaps is inelastic")
     period: float = parameter(25.0, "m", "edge of the cell, along x and along y")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.02, "s", "time step h")
@@ -52,6 +52,8 @@ class PeriodicBox:
             non_negative=("mu", "spread"),
             at_least={"polyhedra": 1, "shapes": 1, "period": 4.2 * self.radius},
         )
+        if self.restitution:
+            raise ValueError(f"PeriodicBox: restitution must be 0, not {self.restitution}")
         if not self.spread < 1:
             raise ValueError(f"PeriodicBox: spread must be < 1, not {self.spread}")
 

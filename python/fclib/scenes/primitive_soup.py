@@ -45,7 +45,7 @@ class PrimitiveSoup:
     radius: float = parameter(1.0, "m", "of the ball in which a body fits")
     density: float = parameter(1000.0, "kg/m^3", "mass density")
     mu: float = parameter(0.7, "1", "coefficient of friction")
-    restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
+    restitution: float = parameter(0.0, "1", "0: the law of gaps is inelastic")
     width: float = parameter(8.5, "m", "inner edge of the box, a square")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.0125, "s", "time step h")
@@ -57,6 +57,9 @@ class PrimitiveSoup:
             non_negative=("mu",),
             at_least={"bodies": 1, "width": 2.1 * self.radius},
         )
+        if self.restitution:
+            name = type(self).__name__
+            raise ValueError(f"{name}: restitution must be 0, not {self.restitution}")
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the shapes and how they are turned."""

@@ -93,7 +93,10 @@ class PeriodicCell:
 
 
 def add_ghosts(spec: Any) -> None:
-    """Give each body of a model its ghosts. ValueError where one is not a single free body."""
+    """Give each body of a model its ghosts. ValueError where one is not a single free body.
+
+    Across the boundary all geometries touch that touch anything, whatever their bits are.
+    """
     spec.copy_during_attach = True
     bodies = list(spec.worldbody.bodies)
     for body in bodies:
@@ -102,7 +105,8 @@ def add_ghosts(spec: Any) -> None:
         if not free or list(body.bodies):
             raise ValueError(f"a periodic scene has free bodies only, not {body.name!r}")
         for geom in body.geoms:
-            geom.contype |= BIT
+            if geom.contype or geom.conaffinity:
+                geom.contype |= BIT
     for body in bodies:
         for k in range(len(SHIFTS)):
             ghost = spec.worldbody.add_frame().attach_body(body, "", f"@{k}")
@@ -110,7 +114,8 @@ def add_ghosts(spec: Any) -> None:
                 spec.delete(joint)
             ghost.mocap = True
             for geom in ghost.geoms:
-                geom.contype, geom.conaffinity = 0, BIT
+                geom.conaffinity = geom.contype & BIT
+                geom.contype = 0
                 # no weight in the energy, not drawn
                 geom.mass = 0
                 geom.rgba = (0, 0, 0, 0)

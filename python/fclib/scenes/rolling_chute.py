@@ -28,7 +28,7 @@ class RollingChute(Chute):
     authors: ClassVar[str] = "V. Acary"
     friction: ClassVar[str] = "Coulomb and rolling, the same coefficients everywhere"
     collection: ClassVar[str] = "rolling"
-    problems: ClassVar[int] = 250
+    problems: ClassVar[int] = 230
 
     grains: int = parameter(120, "1", "number of grains, at least 1")
     across: int = parameter(4, "1", "grains of the bed from wall to wall, at least 1")

@@ -29,7 +29,7 @@ class SpheresBox:
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
-    problems: ClassVar[int] = 45
+    problems: ClassVar[int] = 40
 
     spheres: int = parameter(945, "1", "number of spheres, at least 1")
     along_x: int = parameter(9, "1", "spheres of a layer along x, at least 1")

@@ -40,6 +40,9 @@ class CoupledSystem {
   /// The same without refinement, for iterations that mend it themselves.
   void solve_plain(Vector& x) { solve_once(x); }
 
+  /// Of det(B + D W): 1 or -1, after factorise().
+  [[nodiscard]] int determinant_sign() const { return lu_.determinant_sign(); }
+
   [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
   /// Multiplications of one factorisation.
   [[nodiscard]] double flops() const { return lu_.flops(); }

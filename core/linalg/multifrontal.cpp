@@ -335,6 +335,17 @@ bool Multifrontal::factorise(const std::vector<double>& values) {
   return true;
 }
 
+int Multifrontal::determinant_sign() const {
+  bool negative = false;
+  for (const Front& front : fronts_) {
+    for (Index k = 0; k < front.pivots; ++k) {
+      if (front.diagonal(k, k) < 0) negative = !negative;
+      if (front.exchanged[static_cast<std::size_t>(k)] != k) negative = !negative;
+    }
+  }
+  return negative ? -1 : 1;
+}
+
 void Multifrontal::solve(Vector& b) const {
   const Index n = static_cast<Index>(position_.size());
   for (Index node = 0; node < n; ++node) {

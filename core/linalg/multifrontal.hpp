@@ -44,6 +44,9 @@ class Multifrontal {
   /// is not finite.
   bool factorise(const std::vector<double>& values);
 
+  /// Of the determinant of the matrix factorised last: 1 or -1.
+  [[nodiscard]] int determinant_sign() const;
+
   /// b <- A^-1 b, b of length size().
   void solve(Vector& b) const;
 

@@ -10,13 +10,12 @@
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)
-//   8  interior point thrice again, residual and gap held together: paths that fold elsewhere
-//   9  proximal point with an accurate inner solution, the last resort; then semismooth Newton on
-//      two other functions, and the proximal point from nothing
+//   8  homotopy: the path by its arclength, around its folds
+//   9  proximal point with an accurate inner solution, the last resort
 //
-// Every stage starts from, and returns to, the best iterate so far; each island is held to its
-// share of the tolerance. What a stage may cost is counted in operations, not in time: the same
-// problem takes the same path on every machine.
+// 4 to 6 are for Coulomb's cone alone. Every stage starts from, and returns to, the best iterate so
+// far; each island is held to its share of the tolerance. What a stage may cost is counted in
+// operations, not in time: the same problem takes the same path on every machine.
 
 #include <algorithm>
 #include <chrono>
@@ -27,6 +26,7 @@
 #include "cones/coulomb.hpp"
 #include "cones/rolling.hpp"
 #include "kernels/gauss_seidel.hpp"
+#include "kernels/homotopy.hpp"
 #include "kernels/interior_point.hpp"
 #include "kernels/natural_error.hpp"
 #include "kernels/no_solution.hpp"
@@ -78,8 +78,8 @@ constexpr Index few_contacts = 10;
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
 
-/// Of the proximal point method from nothing, tried last of all.
-constexpr std::int64_t last_factorisations = 400;
+/// Of a path with folds: those that are passed at all mostly take fewer.
+constexpr std::int64_t homotopy_factorisations = 1500;
 
 /// A proof that there is no solution must hold for reactions this many times the usual size.
 constexpr double safe_bound = 1e4;
@@ -261,20 +261,7 @@ class Island {
       if (!done()) semismooth_newton<NaturalMap<Cone>>();
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
-    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      // R and tau go down together, slowly
-      for (const InteriorPointRules& rules :
-           {InteriorPointRules{.delta = 1e-2,
-                               .delta_follows = false,
-                               .balance = 30,
-                               .max_iterations = 200,
-                               .patience = 40},
-            InteriorPointRules{
-                .step_cap = 0.8, .balance = 30, .max_iterations = 200, .patience = 40},
-            InteriorPointRules{.balance = 10, .max_iterations = 300, .patience = 60}}) {
-        if (!done()) stage("interior point, patient", [&] { interior_point(rules); });
-      }
-    }
+    if (!done()) stage("homotopy", [&] { homotopy(); });
     // from the associated solution, then from the best iterate, which is another
     std::int64_t left = options_.last_resort;
     for (std::int64_t limit = 400; !done() && left > 0; limit *= 2) {
@@ -283,17 +270,6 @@ class Island {
             [&] { proximal({.kappa = 10, .max_factorisations = limit}, start_); });
       left -= limit;
       start_ = best_;
-    }
-    // what is left is near a solution of some, and which method passes there differs
-    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      if (!done()) semismooth_newton<FischerBurmeister<Cone>>();
-      if (!done()) semismooth_newton<JeanMoreau<Cone>>();
-    }
-    if (!done()) {
-      stage("proximal point", [&] {
-        proximal({.kappa = 10, .max_factorisations = last_factorisations},
-                 Vector::Zero(problem_.m()));
-      });
     }
   }
 
@@ -386,6 +362,22 @@ class Island {
       }
       return done();
     });
+  }
+
+  /// Around the folds of the path.
+  void homotopy() {
+    Homotopy<Cone> method(problem_, system());
+    double next_polish = 10 * options_.polish_below;
+    method.solve({.max_factorisations = homotopy_factorisations},
+                 [&](double error, const Vector& r) {
+                   if (take(1, error, r)) return true;
+                   if (error < next_polish) {
+                     polish(r);
+                     next_polish = error / 10;
+                   }
+                   return done();
+                 });
+    if (!done()) proximal({.kappa = 100, .max_factorisations = 200}, best_);
   }
 
   /// Started anew by sweeps where it stands still. From nothing: where it converges, it does from

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import strategies as st
 
 import fclib
+from fclib.scenes.packing import Packing
 from helpers import (
     contact_states,
     dense,
@@ -293,3 +294,13 @@ def test_a_contact_that_nothing_can_move() -> None:
     result = fclib.solve(problem)
     assert result.status == "infeasible"
     np.testing.assert_array_equal(result.certificate, [1.0])
+
+
+@pytest.mark.parametrize("push", [0.0, 1.0])
+@pytest.mark.parametrize("mu", [0.2, 0.5, 0.9])
+def test_a_folded_path(push: float, mu: float) -> None:
+    """Hyperstatic packings, where the path of the interior point folds: the homotopy goes on."""
+    problem = Packing(mu=mu).of_size(300, push)
+    result = fclib.solve(problem, solver="homotopy", tol=1e-8)
+    assert result.converged, result
+    assert judge(problem, result.solution).error <= 1.01e-8

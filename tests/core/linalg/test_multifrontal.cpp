@@ -104,6 +104,22 @@ TEST(Multifrontal, ExchangesRowsInsideAFront) {
   EXPECT_EQ(b, Vector(Vector::Ones(3)));
 }
 
+TEST(Multifrontal, KnowsTheSignOfTheDeterminant) {
+  testing::RandomData random(5);
+  int negative = 0;
+  for (int trial = 0; trial < 40; ++trial) {
+    const BlockPattern pattern = random_pattern(random, 2 + trial % 9, 3, 0.3);
+    const auto values = random_values(random, pattern, 0);
+    Multifrontal lu(pattern);
+    ASSERT_TRUE(lu.factorise(values));
+    const double determinant = dense(pattern, values).determinant();
+    EXPECT_EQ(lu.determinant_sign(), determinant < 0 ? -1 : 1) << trial;
+    negative += determinant < 0;
+  }
+  EXPECT_GT(negative, 5);
+  EXPECT_LT(negative, 35);
+}
+
 TEST(Multifrontal, RefusesWhatIsNotFinite) {
   testing::RandomData random(3);
   const BlockPattern pattern = random_pattern(random, 50, 3, 0.1);

@@ -1,0 +1,126 @@
+// Homotopy: the central path of Coulomb's law, from a convex problem, by its arclength.
+//
+// kernels/homotopy.hpp has the path and its sources. Slow, and sure: where an interior point stops
+// at a fold of its path, this goes around it. The last digits come from the proximal Newton method.
+
+#include "kernels/homotopy.hpp"
+
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "kernels/proximal_point.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib::homotopy {
+
+namespace {
+
+struct Options : HomotopyRules {
+  double polish_below = 1e-5;
+
+  static constexpr auto fields() {
+    using O = Options;
+    return std::tuple{
+        OptionField<O, double>{
+            .name = "rounding",
+            .member = &O::rounding,
+            .unit = "1",
+            .doc = "of the kink of de Saxce's term, over the velocity on the path of "
+                   "a contact that sticks",
+            .lowest = 1e-3,
+            .highest = 100},
+        OptionField<O, double>{.name = "stride",
+                               .member = &O::stride,
+                               .unit = "1",
+                               .doc = "longest step of a contact, in the metric of its barrier",
+                               .lowest = 1e-3,
+                               .highest = 10},
+        OptionField<O, double>{.name = "accuracy",
+                               .member = &O::accuracy,
+                               .unit = "1",
+                               .doc = "of a point of the path, in the metric of the barrier",
+                               .lowest = 1e-10,
+                               .highest = 0.5},
+        OptionField<O, double>{.name = "cosine",
+                               .member = &O::cosine,
+                               .unit = "1",
+                               .doc = "least, between the directions of the path at two points",
+                               .lowest = 0,
+                               .highest = 0.99},
+        OptionField<O, double>{.name = "polish_below",
+                               .member = &O::polish_below,
+                               .unit = "1",
+                               .doc = "error under which the proximal Newton method is tried",
+                               .lowest = 0}};
+  }
+};
+
+template <class Cone>
+Outcome iterate(const Delassus& problem, Options options, const Settings& settings, Vector& r) {
+  Monitor monitor(settings);
+  Vector u;
+  problem.velocity(r, u);
+  double best = std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  if (const auto stop = monitor.report(0, best)) return {*stop, 0};
+
+  CoupledSystem system(problem);
+  Homotopy<Cone> method(problem, system);
+  ProximalPoint<Cone> newton(problem, system);
+  options.max_factorisations = std::numeric_limits<std::int64_t>::max() / 2;
+  std::int64_t iterations = 0;
+  double next_polish = options.polish_below;
+  std::optional<Status> stopped;
+  const auto take = [&](double error, const Vector& at) {
+    if (error < best) {
+      best = error;
+      r = at;
+    }
+    stopped = monitor.report(++iterations, error);
+    return stopped.has_value();
+  };
+  const auto polish = [&](std::int64_t factorisations) {
+    Vector polished = r;
+    const double reached =
+        newton.solve({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = factorisations},
+                     settings.tolerance, polished, [](double) { return false; });
+    return take(reached, polished);
+  };
+  method.solve(options, [&](double error, const Vector& at) {
+    if (take(error, at)) return true;
+    if (error > next_polish) return false;
+    next_polish = error / 10;
+    return polish(12);
+  });
+  if (!stopped) polish(200);
+  return {stopped.value_or(Status::stalled), iterations};
+}
+
+Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+              Vector& r) {
+  const auto options = parse_options<Options>(values);
+  if (problem.rolling()) {
+    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
+                            : iterate<Rolling<5>>(problem, options, settings, r);
+  }
+  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
+                          : iterate<Coulomb<3>>(problem, options, settings, r);
+}
+
+}  // namespace
+
+const Solver& solver() {
+  static const Solver entry{
+      .name = "homotopy",
+      .family = "interior point",
+      .title = "The central path from a convex problem, by arclength",
+      .citation = "Chow, Mallet-Paret & Yorke 1978; Keller 1977; the path is this project's",
+      .dimensions = {2, 3},
+      .rolling_dimensions = {3, 5},
+      .options = describe_options<Options>(),
+      .max_iterations = 100000,
+      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
+      .solve = solve,
+  };
+  return entry;
+}
+
+}  // namespace fclib::homotopy

@@ -4,6 +4,7 @@
 //   0  r = 0, where nothing approaches
 //   1  Gauss-Seidel sweeps on the whole, then on each island (contacts linked through W) left over
 //   2  conjugate gradients on W r = -q, before the sweeps of an island: all may stick and rest
+//      (before the sweeps of an island too: a few steps of Newton from a guess that is good)
 //   3  proximal Newton ("polish"), where the error is small already
 //   4  interior point with the shift in the Newton system, polished as it comes near; where its
 //      path folds, again with shorter steps
@@ -77,6 +78,11 @@ constexpr Index few_contacts = 10;
 
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
+
+/// Newton's method from a guess, where the error is less, needs few iterations, or fails: it must
+/// be cheap where it does.
+constexpr double good_guess = 0.03;
+constexpr std::int64_t guess_iterations = 12;
 
 /// Of a path with folds: those that are passed at all mostly take fewer.
 constexpr std::int64_t homotopy_factorisations = 1500;
@@ -159,11 +165,13 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
-  Island(const Delassus& problem, const Options& options, Tracker& tracker, double tolerance)
+  Island(const Delassus& problem, const Options& options, Tracker& tracker, double tolerance,
+         bool guessed)
       : problem_(problem),
         options_(options),
         tracker_(tracker),
         tolerance_(tolerance),
+        guessed_(guessed),
         gauss_seidel_(problem) {}
 
   /// From r; the best iterate ends in r. Its error relative to the problem's scale.
@@ -174,6 +182,10 @@ class Island {
     error_ = error_of(u_, r_);
     tracker_.report(0, error_);
     if (!whole && problem_.nc() >= 20) stage("conjugate gradients", [&] { conjugate_gradients(); });
+    if (!whole && guessed_ && problem_.nc() >= 5 && error_ < good_guess && !done()) {
+      semismooth_newton<AlartCurnier<Cone>>("newton from the guess", {.sweeps = 0, .patience = 3},
+                                            best_, guess_iterations);
+    }
     if (!done()) stage("gauss-seidel", [&] { return sweep(sweeps, whole); });
     if (!whole && !done()) continue_by_newton();
     r = best_;
@@ -257,8 +269,12 @@ class Island {
               [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
       }
       if (!done()) stage("associated", [&] { associated(); });
-      // slower than the proximal point on rolling contacts
-      if (!done()) semismooth_newton<NaturalMap<Cone>>();
+      // from nothing: where it converges, it does from there as well as from an iterate that
+      // another method is stuck at; slower than the proximal point on rolling contacts
+      if (!done()) {
+        semismooth_newton<NaturalMap<Cone>>("semismooth newton", {}, Vector::Zero(problem_.m()),
+                                            newton_iterations);
+      }
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
     if (!done()) stage("homotopy", [&] { homotopy(); });
@@ -380,16 +396,13 @@ class Island {
     if (!done()) proximal({.kappa = 100, .max_factorisations = 200}, best_);
   }
 
-  /// Started anew by sweeps where it stands still. From nothing: where it converges, it does from
-  /// there as well as from an iterate that another method is stuck at.
   template <class Function>
-  void semismooth_newton() {
-    tracker_.stage("semismooth newton", [&] {
+  void semismooth_newton(std::string_view name, const NewtonRules& rules, Vector r,
+                         std::int64_t left) {
+    tracker_.stage(name, [&] {
       SemismoothNewton<Function> newton(problem_);
-      Vector r = Vector::Zero(problem_.m());
-      std::int64_t left = newton_iterations;
       double least = std::numeric_limits<double>::infinity();
-      newton.solve({}, r, [&](double error) {
+      newton.solve(rules, r, [&](double error) {
         least = std::min(least, error);
         return tracker_.report(1, error) || error <= tolerance_ || --left == 0;
       });
@@ -468,6 +481,7 @@ class Island {
   const Options& options_;
   Tracker& tracker_;
   double tolerance_;
+  bool guessed_;
   GaussSeidel<Cone> gauss_seidel_;
   std::optional<CoupledSystem> system_;
   Vector r_, u_, best_;
@@ -512,7 +526,8 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
 
   const double tolerance = tracker.tolerance();
   std::optional<Island<Cone>> whole;
-  whole.emplace(problem, options, tracker, tolerance);
+  const bool guessed = (r.array() != 0).any();
+  whole.emplace(problem, options, tracker, tolerance, guessed);
   whole->solve(r, nc <= 2 ? 5 : options.sweeps, true);
   if (tracker.stopped()) return outcome();
   const std::vector<Index> group = problem.W.components();
@@ -551,7 +566,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     sum = std::max(0.0, sum - squared[k]);
     tracker.set_others(sum);
     const double error =
-        Island<Cone>(part, options, tracker, share).solve(x, options.island_sweeps, false);
+        Island<Cone>(part, options, tracker, share, guessed).solve(x, options.island_sweeps, false);
     sum += error * error;
     if (tracker.certificate().size() > 0) {
       Vector whole_certificate = Vector::Zero(nc);

@@ -38,7 +38,7 @@ PURPOSE: Final = {
     "solvers": "solvers to compare with",
 }
 # a package whose module bears another name
-MODULE: Final = {"dask-jobqueue": "dask_jobqueue"}
+MODULE: Final = {"dask-jobqueue": "dask_jobqueue", "scikit-fem": "skfem"}
 
 
 @dataclass(frozen=True)

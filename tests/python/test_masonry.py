@@ -125,10 +125,11 @@ def test_arch_cracks_into_hinges_where_its_supports_spread() -> None:
     family: Any = scenes.get("Arch")(voussoirs=10, time_step=1e-2)
     last = last_of(family.scene(), 60)
     np.testing.assert_allclose(last.position[-1], 59 * 1e-2 * family.spread, rtol=1e-2)
-    # a joint that opens keeps the two contacts of one edge
+    # a joint that opens keeps the contacts of one edge, all of them or all but one
     pairs, counts = np.unique(last.contacts.pair, axis=0, return_counts=True)
     assert len(pairs) == 11
-    assert np.sum(counts == 2) >= 3
+    assert np.sum(counts < 4) >= 3
+    assert counts.min() == 2
     # it stands on its hinges: nothing is faster than a few times the spread
     assert np.abs(last.velocity).max() < 5 * family.spread
     assert places(last)[:, 2].max() > 0.9 * (family.springing + family.radius)

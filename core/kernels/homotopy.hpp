@@ -230,7 +230,7 @@ class Homotopy {
     return across_.allFinite() && along_.allFinite();
   }
 
-  /// <x, y>_a at r_, the metric of the barrier.
+  /// <x, y> of contact a at a base point, the metric of the barrier.
   [[nodiscard]] double product(const Vector& base, Index a, const Vector& x,
                                const Vector& y) const {
     const Cone cone(problem_.friction, a);

@@ -8,7 +8,8 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -170,6 +171,44 @@ def test_killed_builds_go_on_and_end_the_same(tmp_path: Path, select: str) -> No
     assert looked[-1] >= 5
     assert start(killed).wait(120) == 0
     assert files(killed) == files(whole)
+
+
+def test_no_process_outlives_a_killed_build(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "fclib", "collection", "build", "Chain", "Capsules"]
+    with subprocess.Popen(
+        [*command, "--out", str(tmp_path / "out"), "--jobs", "2"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as build:
+        assert build.stdout is not None
+        wait_for(lambda: len(list((tmp_path / "out").rglob("*-local.hdf5"))) > 2)
+        assert len(group(build.pid)) > 3
+        build.kill()
+        build.stdout.close()
+        build.wait(60)
+        wait_for(lambda: not group(build.pid))
+
+
+def wait_for(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + 120
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.1)
+
+
+def group(leader: int) -> list[int]:
+    """The processes that are alive in a process group."""
+    found = []
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            # pid (name) state parent group ...
+            state, _, number = stat.read_text().rpartition(")")[2].split()[:3]
+        except (OSError, ValueError):
+            continue
+        if int(number) == leader and state != "Z":
+            found.append(int(stat.parent.name))
+    return found
 
 
 def test_finished_families_are_left_alone(built: Path) -> None:

@@ -15,11 +15,15 @@ import heapq
 import io
 import json
 import multiprocessing
+import os
 import shutil
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field, fields
+from multiprocessing import connection
+from multiprocessing.managers import SyncManager
 from pathlib import Path
 from queue import Empty
 from typing import TYPE_CHECKING, Any
@@ -89,7 +93,12 @@ def build_in_processes(
 ) -> None:
     """Build each plan in a process of a pool."""
     context = multiprocessing.get_context("spawn")
-    with context.Manager() as manager, ProcessPoolExecutor(jobs, mp_context=context) as pool:
+    manager = SyncManager(ctx=context)
+    manager.start(end_with_parent)
+    with (
+        manager,
+        ProcessPoolExecutor(jobs, mp_context=context, initializer=end_with_parent) as pool,
+    ):
         messages = manager.Queue()
         # the long ones first
         ordered = sorted(plans, key=lambda plan: -plan.total)
@@ -103,6 +112,19 @@ def build_in_processes(
                 pass
             for future in done:
                 future.result()
+
+
+def end_with_parent() -> None:
+    """End this process where the build is killed: nobody would take its results."""
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+
+    def watch() -> None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def build_and_tell(plan: Plan, out: Path, messages: Any, pictures: bool) -> None:

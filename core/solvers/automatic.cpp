@@ -277,7 +277,10 @@ class Island {
       }
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
-    if (!done()) stage("homotopy", [&] { homotopy(); });
+    // another rounding is another path
+    for (const double rounding : {0.3, 1.0}) {
+      if (!done()) stage("homotopy", [&] { homotopy(rounding); });
+    }
     // from the associated solution, then from the best iterate, which is another
     std::int64_t left = options_.last_resort;
     for (std::int64_t limit = 400; !done() && left > 0; limit *= 2) {
@@ -381,19 +384,23 @@ class Island {
   }
 
   /// Around the folds of the path.
-  void homotopy() {
+  void homotopy(double rounding) {
     Homotopy<Cone> method(problem_, system());
     double next_polish = 10 * options_.polish_below;
-    method.solve({.max_factorisations = homotopy_factorisations},
+    Vector last = best_;
+    method.solve({.rounding = rounding, .max_factorisations = homotopy_factorisations},
                  [&](double error, const Vector& r) {
                    if (take(1, error, r)) return true;
+                   last = r;
                    if (error < next_polish) {
                      polish(r);
                      next_polish = error / 10;
                    }
                    return done();
                  });
-    if (!done()) proximal({.kappa = 100, .max_factorisations = 200}, best_);
+    if (!done()) {
+      proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 200}, last);
+    }
   }
 
   template <class Function>

@@ -116,7 +116,8 @@ def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
         text=True,
         check=True,
     ).stdout
-    entries = [json.loads(line) for line in found.splitlines()]
+    lines = map(json.loads, found.splitlines())
+    entries = [line for line in lines if "absent" not in line]
     assert len(entries) > 20
     for entry in entries:
         name = entry["solver"]

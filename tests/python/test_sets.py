@@ -21,6 +21,7 @@ pytest.importorskip("pyarrow")
 from fclib import collections
 from fclib.collections import catalog, choose, known
 from fclib.collections.plan import Plan
+from fclib.scenes.local_problems import LocalProblems
 
 TINY = known.DATA / "tiny"
 FILES = sorted(TINY.glob("*/*.hdf5"))
@@ -279,8 +280,16 @@ def test_hardest_contacts_are_found_again(tmp_path: Path) -> None:
     for contact in found[-3:]:
         W = np.asarray(contact.problem.W)
         assert np.abs(W - W.T).max() > 1e-3 * np.abs(W).max()
-    difficulties = [contact.difficulty for contact in found[-3:]]
-    assert difficulties == sorted(difficulties, reverse=True)
+    assert [contact.problem.spacedim for contact in found[-3:]] == [3, 3, 5]
+    # the hardest first, and none that is the same to all local solvers
+    by_family: dict[str, list[choose.Contact]] = {}
+    for contact in found:
+        family = contact.origin.rpartition("/")[0] or str(contact.problem.spacedim)
+        by_family.setdefault(family, []).append(contact)
+    for own in by_family.values():
+        difficulties = [contact.difficulty for contact in own]
+        assert difficulties == sorted(difficulties, reverse=True)
+        assert len({tuple(contact.sweeps.values()) for contact in own}) == len(own)
     choose.write_local(tmp_path / "list.json", found, {})
     rows = json.loads((tmp_path / "list.json").read_text())["problems"]
     for row, contact in zip(rows, found, strict=True):
@@ -291,12 +300,25 @@ def test_hardest_contacts_are_found_again(tmp_path: Path) -> None:
 def test_local_problems_are_solved_and_some_are_not_symmetric() -> None:
     family: Any = scenes.assemblies()["LocalProblems"]
     plan = Plan.of_family("LocalProblems")
-    assert plan.total == family.problems >= 40
-    asymmetric = 0
+    assert plan.total == family.problems >= 100
+    found = set()
+    asymmetric = {3: 0, 5: 0}
     for number in range(plan.total):
         problem: Any = family().problem(number)
         assert problem.nc == 1
         assert fclib.solve(problem, tol=1e-10).converged
         W = np.asarray(problem.W)
-        asymmetric += bool(np.abs(W - W.T).max() > 1e-3 * np.abs(W).max())
-    assert asymmetric >= 10
+        if np.abs(W - W.T).max() > 1e-3 * np.abs(W).max():
+            asymmetric[problem.spacedim] += 1
+        found.add((problem.kind, problem.spacedim))
+    assert found == {("local", 2), ("local", 3), ("local_rolling", 3), ("local_rolling", 5)}
+    assert min(asymmetric.values()) >= 8
+
+
+def test_local_problems_come_from_all_kinds_of_families() -> None:
+    origins = [problem.info.title for problem in map(LocalProblems().problem, range(126))]
+    families = {tuple(origin.split("/")[:2]) for origin in origins}
+    assert {name for name, _ in families} >= {"ladder", "rt444", *known.EXTENDED} - {"local"}
+    assert len(families) >= 30
+    for name, family in families:
+        assert sum(origin.startswith(f"{name}/{family}/") for origin in origins) <= 4

@@ -419,7 +419,7 @@ def choose_hard(
 def choose_local(
     folder: Folder,
     target: List,
-    sample: Annotated[int, typer.Option(help="Problems of a family that are looked at.")] = 40,
+    sample: Annotated[int, typer.Option(help="Problems of a family that are looked at.")] = 200,
     per_family: PerFamily = 4,
     spins: Annotated[int, typer.Option(help="Spinning bodies that are drawn.", min=0)] = 2000,
     asymmetric: Annotated[int, typer.Option(help="Of them, those that are taken.", min=0)] = 16,

@@ -32,11 +32,11 @@ KNOWN: dict[str, tuple[str, str]] = {
     "deformable": ("1", "elastic bodies, meshes of finite elements"),
     "mixed": ("1", "mechanisms and robots, with bilateral constraints"),
     "planar": ("1", "bodies in a plane"),
-    "local": ("1", "problems of one contact"),
+    "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("1", "all families that came after RT-0444"),
+    "extended": ("2", "all families that came after RT-0444"),
     "hard": ("1", "what most solvers fail on; chosen by the bench"),
-    "tiny": ("1", "one problem of each kind; comes with the package"),
+    "tiny": ("2", "one problem of each kind; comes with the package"),
 }
 EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import json
 import os
 import platform
 import re
@@ -198,13 +199,16 @@ def check_adapter(adapter: external.Adapter, known: Sequence[str]) -> Finding | 
     if name in known or name == "cmd":
         return None
     code = (
+        "import json\n"
         "from fclib.external import adapters\n"
         f"adapter, = (a for a in adapters() if a.PREFIX == {adapter.PREFIX!r})\n"
-        "print(adapter.missing())\n"
+        "missing = adapter.missing()\n"
+        "print(json.dumps([missing, '' if missing else adapter.version()]))\n"
     )
-    missing, problem = run(code)
+    told, problem = run(code)
+    missing, version = json.loads(told or '["", ""]')
     state: State = "broken" if problem else "absent" if missing else "ok"
-    return Finding("solvers", name, state, "", adapter.SOLVERS, problem, missing)
+    return Finding("solvers", name, state, version, adapter.SOLVERS, problem, missing)
 
 
 def check_rendering() -> Finding:

@@ -4,13 +4,17 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
+from typer.testing import CliRunner
 
 import fclib
+from fclib import cli
 from helpers import judge, planted_global, planted_local
 
 SOLVE_KEYS = [
@@ -359,6 +363,44 @@ def test_version_and_help() -> None:
             result = run(*command, flag)
             assert result.returncode == 0
             assert "Usage" in result.stdout
+
+
+def every_command(path: tuple[str, ...] = (), command: Any = None) -> Iterator[Any]:
+    """All commands and groups: the words that call it, and what Typer knows of it."""
+    command = command or typer.main.get_command(cli.app)
+    yield pytest.param(path, command, id=" ".join(("fclib", *path)))
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from every_command((*path, name), inner)
+
+
+@pytest.mark.parametrize(("path", "command"), list(every_command()))
+def test_the_help_says_every_word_that_was_written(path: tuple[str, ...], command: Any) -> None:
+    """Units in brackets among them, which some would take for markup."""
+    shown = CliRunner().invoke(cli.app, [*path, "--help"], env={"COLUMNS": "80"})
+    assert shown.exit_code == 0
+    assert "\\" not in shown.stdout
+    text = " ".join(shown.stdout.split())
+    params = [
+        param
+        for param in command.get_params(typer.Context(command))
+        if not getattr(param, "hidden", False)
+    ]
+    written = [command.help, *(getattr(param, "help", None) for param in params)]
+    for words in filter(None, written):
+        assert " ".join(words.split()) in text
+
+
+def test_brackets_and_colons_of_a_path_are_printed_as_they_are(tmp_path: Path) -> None:
+    case = planted_local(1, nc=2)
+    names = ("[s].hdf5", "[bold]a.hdf5", ":bug:.hdf5")
+    for name in names:
+        fclib.write(tmp_path / name, case.problem, case.solution)
+    shown = run("check", "--contacts", *(tmp_path / name for name in names)).stdout.splitlines()
+    titles = [line.strip() for line in shown if len(line.split()) == 1]
+    assert titles == list(names)
+    assert [line.split()[0] for line in shown[-3:]] == list(names)
+    errors = run("info", *(tmp_path / f"no{name}" for name in names)).stderr.splitlines()
+    assert all(f"no{name}: " in line for name, line in zip(names, errors, strict=True))
 
 
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:

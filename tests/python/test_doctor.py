@@ -34,13 +34,14 @@ def before(*folders: Path) -> str:
     return os.pathsep.join(filter(None, [*map(str, folders), os.environ.get("PYTHONPATH")]))
 
 
-def pretend(folder: Path, name: str, version: str, code: str = "") -> Path:
-    """A package that is found before the one that is installed."""
+def pretend(folder: Path, name: str, version: str, code: str = "", package: str = "") -> Path:
+    """A module, and its package, that are found before those that are installed."""
     (folder / name).mkdir(parents=True)
     (folder / name / "__init__.py").write_text(code)
-    info = folder / f"{name}-{version}.dist-info"
+    package = package or name
+    info = folder / f"{package}-{version}.dist-info"
     info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: {version}\n")
     return folder
 
 
@@ -83,6 +84,15 @@ def test_what_is_broken_is_said_with_what_to_do(tmp_path: Path) -> None:
     broken = {name for name, finding in findings.items() if finding["state"] == "broken"}
     assert broken >= {"clarabel", "scs", "pooch"}
     assert "numpy" not in broken
+
+
+def test_solvers_that_are_no_extra_have_their_versions(tmp_path: Path) -> None:
+    pretend(tmp_path, "pinocchio", "99.1", "ADMMConstraintSolver = PGSConstraintSolver = 0", "pin")
+    pretend(tmp_path, "siconos", "99.2", "version = '99.3'")
+    findings, _ = run(PYTHONPATH=before(tmp_path), FCLIB_SICONOS_PYTHON=sys.executable)
+    assert findings["pinocchio"]["found"] == "99.1"
+    # the word of the other interpreter, not what is installed beside fclib
+    assert findings["siconos"]["found"] == f"99.3 in {sys.executable}"
 
 
 def test_a_folder_that_takes_no_files_is_found(tmp_path: Path) -> None:

@@ -26,10 +26,12 @@ from rich.text import Text
 
 import fclib
 
-out = Console()
+# text is printed as it is: no brackets of a unit, no path is taken for markup
+out = Console(markup=False, emoji=False)
 if not out.is_terminal:
-    out = Console(width=240)  # nothing is folded on its way into a file or a pipe
-err = Console(stderr=True, soft_wrap=True)
+    # nothing is folded on its way into a file or a pipe
+    out = Console(width=240, markup=False, emoji=False)
+err = Console(stderr=True, soft_wrap=True, markup=False, emoji=False)
 
 WRAPPED = (
     "problem",
@@ -59,7 +61,7 @@ def print_version(
 
 def fail(message: str) -> NoReturn:
     """End the process with one line on the standard error and exit status 1."""
-    err.print(f"fclib: {message}", style="red", markup=False, highlight=False)
+    err.print(f"fclib: {message}", style="red", highlight=False)
     raise SystemExit(1)
 
 
@@ -87,7 +89,7 @@ def progress_bar(total: int) -> Iterator[Callable[[str], None]]:
     """
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
@@ -174,7 +176,7 @@ class Report:
         self.failed = True
         if self.as_json:
             typer.echo(json.dumps({"problem": str(path), "message": str(error)}))
-        err.print(f"fclib: {error}", style="red", markup=False, highlight=False)
+        err.print(f"fclib: {error}", style="red", highlight=False)
 
     def finish(self) -> NoReturn:
         """Print the table, and exit with the status."""

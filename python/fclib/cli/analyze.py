@@ -134,5 +134,5 @@ def command(
         if found.existence.verdict in (analysis.PROVEN_NOT, analysis.UNDECIDED):
             words.append(f"{path.name}: {found.existence.reason}")
     for line in words:
-        err.print(line, markup=False, highlight=False)
+        err.print(line, highlight=False)
     report.finish()

@@ -54,10 +54,10 @@ def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
     """Show how far a campaign is: a bar on a terminal, else a line every ten seconds."""
     columns = (
         SpinnerColumn(),
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[words]}"),
+        TextColumn("{task.fields[words]}", markup=False),
     )
     said = time.monotonic()
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
@@ -159,7 +159,7 @@ def run(
         usage_error(error)
 
     def tell(word: str) -> None:
-        err.print(word, markup=False, highlight=False)
+        err.print(word, highlight=False)
 
     for word in chosen.missing:
         tell(f"left out: {word}")

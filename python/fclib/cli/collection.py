@@ -66,7 +66,7 @@ Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distributi
 def many_bars() -> Iterator[Callable[[str, int, int], None]]:
     """A bar for each family on the standard error, where that is a terminal."""
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
@@ -320,7 +320,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         with progress_bar(files) as bar:
             for verdict in collections.verify(folder, bar):
                 if not verdict.ok:
-                    err.print(f"fclib: {verdict.message}", style="red", markup=False)
+                    err.print(f"fclib: {verdict.message}", style="red")
                 if not verdict.ok or as_json:
                     report.add(
                         {

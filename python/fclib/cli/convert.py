@@ -196,7 +196,7 @@ def say_lost(source: Path, lost: Sequence[str]) -> None:
     what = " and ".join(filter(None, [", ".join(lost[:-1]), lost[-1]]))
     verb, rest = ("is", "it") if lost == ["the solution"] else ("are", "them")
     note = f"fclib: {source}: {what} {verb} left out, Siconos' text has no place for {rest}"
-    err.print(note, markup=False, highlight=False)
+    err.print(note, highlight=False)
 
 
 def targets_of(

@@ -156,7 +156,6 @@ def show(
         f"{len(costs.instances)} problems{' at a tolerance' if several else ''}, {words};"
         f" shifted geometric means, shift {shift:g}, failures as {penalty:g} x the limit",
         highlight=False,
-        markup=False,
     )
     if costs.left_out:
         out.print(f"{costs.left_out} left out, which not all solvers have run", highlight=False)

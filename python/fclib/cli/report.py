@@ -17,7 +17,7 @@ from fclib.cli._output import err, fail, out
 @contextmanager
 def bars() -> Iterator[Callable[[str, int, int], None]]:
     """A bar for each part of the work on the standard error, where that is a terminal."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as shown:
         tasks = {}
 
@@ -68,7 +68,7 @@ def command(
             if pdf:
                 assert campaigns is not None
                 for path in report.write_paper(campaigns, folder):
-                    out.print(str(path), markup=False, highlight=False)
+                    out.print(str(path), highlight=False)
                 return
             show = stack.enter_context(bars())
             counts = report.build_site(
@@ -81,6 +81,5 @@ def command(
     out.print(
         f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
         f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
-        markup=False,
         highlight=False,
     )

@@ -30,7 +30,7 @@ class Trace:
     def __init__(self, name: str) -> None:
         self.next = 0.0
         self.stage = ""
-        err.print(f"{name}\n{'iteration':>10}  {'error':>9}  {'time [s]':>9}  stage", markup=False)
+        err.print(f"{name}\n{'iteration':>10}  {'error':>9}  {'time [s]':>9}  stage")
 
     def __call__(self, iteration: int, error: float, seconds: float, stage: str) -> None:
         """A line where the stage changes, or the iterations have grown by a tenth."""
@@ -38,7 +38,7 @@ class Trace:
             return
         self.stage, self.next = stage, max(iteration + 1, 1.1 * iteration)
         line = f"{iteration:10}  {error:9.1e}  {seconds:9.2e}  {stage}"
-        err.print(line, markup=False, highlight=False)
+        err.print(line, highlight=False)
 
     def finish(self, stages: list[dict[str, Any]]) -> None:
         """The stages: how often each was entered, and how often it solved."""

@@ -74,7 +74,7 @@ def show(solver: fclib.SolverInfo) -> None:
     rolling = {3: "planar", 5: "spatial"}
     takes = [f"{d}D" for d in solver.dimensions]
     takes += [f"{rolling[d]} rolling" for d in solver.rolling_dimensions]
-    out.print(f"[bold]{solver.name}[/]  {solver.title}", highlight=False)
+    out.print(Text.assemble((solver.name, "bold"), f"  {solver.title}"))
     lines = {
         "family": solver.family,
         "from": solver.origin,
@@ -84,9 +84,9 @@ def show(solver: fclib.SolverInfo) -> None:
     }
     for name, text in lines.items():
         if text:
-            out.print(f"  {name:10}  {text}", markup=False, highlight=False)
+            out.print(f"  {name:10}  {text}", highlight=False)
     for option in solver.options:
-        out.print(f"  [bold]{option.name}[/] = {default_of(option)}", highlight=False)
+        out.print(Text.assemble("  ", (option.name, "bold"), f" = {default_of(option)}"))
         for line in (domain_of(option), option.doc):
             out.print(Padding(Text(line), (0, 0, 0, 6), expand=False))
     if solver.options:
@@ -135,4 +135,4 @@ def command(
     out.print("\nfclib solvers NAME... shows them with their options and citations.")
     out.print("Any program is one, too: cmd:PROGRAM {input} {output}", highlight=False)
     for absent in external.absent():
-        out.print(f"Not here: {absent.solvers}: {absent.missing}", markup=False, highlight=False)
+        out.print(f"Not here: {absent.solvers}: {absent.missing}", highlight=False)

@@ -42,6 +42,6 @@ def command(
         view.write_view(record, path, title=file.name)
     except fclib.Error as error:
         fail(str(error))
-    out.print(str(path), markup=False, highlight=False)
+    out.print(str(path), highlight=False)
     if target is None and not webbrowser.open(path.resolve().as_uri()):
         err.print("There is no browser here; open the page in one.", highlight=False)

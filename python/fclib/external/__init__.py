@@ -5,6 +5,7 @@ One file, one adapter, found by being here. An adapter has
     PREFIX       of its solvers' names, ``siconos:``
     SOLVERS      what it offers, in words
     missing()    what is to be installed, empty where nothing is
+    version()    of the package, where nothing is missing; empty where it tells none
     solvers()    its entries, where nothing is missing
     find(name)   the entry of this name, or None
 
@@ -31,6 +32,9 @@ class Adapter(Protocol):
 
     def missing(self) -> str:
         """What is to be installed, empty where nothing is."""
+
+    def version(self) -> str:
+        """The version of the package, where nothing is missing; empty where it tells none."""
 
     def solvers(self) -> Sequence[fclib.SolverInfo]:
         """The entries, where nothing is missing."""

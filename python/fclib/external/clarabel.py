@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.metadata
 import importlib.util
 from collections.abc import Sequence
 from typing import Any
@@ -23,6 +24,11 @@ SOLVERS = "clarabel:aclm, clarabel:relaxation"
 def missing() -> str:
     """What is to be installed."""
     return "" if importlib.util.find_spec("clarabel") else "pip install clarabel"
+
+
+def version() -> str:
+    """Of the package."""
+    return importlib.metadata.version("clarabel")
 
 
 @functools.cache

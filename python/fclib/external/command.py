@@ -45,6 +45,11 @@ def missing() -> str:
     return "" if hasattr(os, "waitid") else "works on POSIX systems alone"
 
 
+def version() -> str:
+    """None: a program is asked for nothing but solutions."""
+    return ""
+
+
 def solvers() -> Sequence[fclib.SolverInfo]:
     """None is listed: their names are commands."""
     return ()

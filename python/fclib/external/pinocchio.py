@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.metadata
 import importlib.util
 import math
 import time
@@ -43,6 +44,11 @@ def missing() -> str:
     if not hasattr(importlib.import_module("pinocchio"), "ADMMConstraintSolver"):
         return "pip install 'pin>=4.1': the one that is there has no such solvers"
     return ""
+
+
+def version() -> str:
+    """Of the package."""
+    return importlib.metadata.version("pin")
 
 
 @functools.cache

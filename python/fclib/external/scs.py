@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import importlib.metadata
 import importlib.util
 import math
 from collections.abc import Sequence
@@ -25,6 +26,11 @@ MAX_ITERATIONS = 20_000  # of one convex problem
 def missing() -> str:
     """What is to be installed."""
     return "" if importlib.util.find_spec("scs") else "pip install scs"
+
+
+def version() -> str:
+    """Of the package."""
+    return importlib.metadata.version("scs")
 
 
 @functools.cache

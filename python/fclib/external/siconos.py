@@ -127,6 +127,16 @@ def missing() -> str:
     return _probe(python())
 
 
+def version() -> str:
+    """As its interpreter says, with that interpreter; Debian's 4.4.0 calls itself 4.5.0."""
+    code = "import siconos; print(siconos.version)"
+    run = subprocess.run(
+        [python(), "-c", code], capture_output=True, text=True, timeout=30, check=False
+    )
+    told = run.stdout.strip() if run.returncode == 0 else ""
+    return f"{told} in {python()}".lstrip()
+
+
 @functools.cache
 def solvers() -> Sequence[fclib.SolverInfo]:
     """The entries."""

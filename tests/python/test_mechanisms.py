@@ -5,8 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fclib import scenes
+from fclib.scenes.walker import SHIN, THIGH, Walker
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
@@ -118,3 +121,74 @@ def test_carrier_stands_with_its_bar_on_uneven_ground() -> None:
     assert violation(last) < 1e-3
     # not fallen: the trunk is near where it began
     assert last.position[2] > 0.7
+
+
+@given(st.sampled_from([1, -1]), st.floats(0, 3), st.floats(1.2, 1.9), st.floats(0, 0.35))
+def test_legs_of_the_walker_reach_what_is_planned(
+    side: int, time: float, height: float, stride: float
+) -> None:
+    family = Walker(height=height, stride=stride)
+    roll, pitch, knee, ankle, foot = family.angles(side, time)
+    assert 0 < knee < 2.4
+    assert pitch + knee + ankle == pytest.approx(0, abs=1e-12)
+    assert roll + foot == 0
+    # thigh and shin hang down and turn about y, then all turns about x
+    lengths, angles = height / 1.7 * np.array([THIGH, SHIN]), np.array([pitch, pitch + knee])
+    x, down = -lengths @ np.sin(angles), lengths @ np.cos(angles)
+    reached = [x, down * math.sin(roll), -down * math.cos(roll)]
+    np.testing.assert_allclose(reached, family.ankle(side, time), atol=1e-12)
+
+
+def test_plan_of_the_walker_leaves_a_foot_where_it_stands() -> None:
+    family = Walker()
+    times = np.linspace(0, 2 * family.period, 481)
+    trunk = np.array([[family.stride * t / family.period, family.trunk(t), 0.0] for t in times])
+    aloft = {}
+    for side in (1, -1):
+        foot = trunk + [family.ankle(side, t) for t in times]
+        stands = foot[:, 2] < foot[:, 2].min() + 1e-9
+        aloft[side] = ~stands
+        assert stands.mean() == pytest.approx(1 - family.airborne, abs=0.02)
+        # in one place until the next step, which is a stride ahead
+        places = np.unique(foot[stands, 0].round(9))
+        assert len(places) >= 2
+        np.testing.assert_allclose(np.diff(places), family.stride)
+        assert np.ptp(foot[:, 1]) < 1e-12
+        assert foot[:, 2].max() - foot[:, 2].min() == pytest.approx(family.lift, abs=1e-3)
+    assert not (aloft[1] & aloft[-1]).any()
+    # the zero moment point is over the foot that stands
+    height = -family.ankle(1, 0.0)[2] + 0.1
+    point = trunk[1:-1, 1] - height / family.gravity * np.diff(trunk[:, 1], 2) / times[1] ** 2
+    np.testing.assert_allclose(np.abs(point).max(), family.sway, rtol=1e-3)
+    assert point[aloft[-1][1:-1]].min() > 0
+    assert point[aloft[1][1:-1]].max() < 0
+
+
+def test_walker_that_cannot_reach_is_refused() -> None:
+    with pytest.raises(ValueError, match="do not reach the feet's way"):
+        Walker(stride=3.0)
+    with pytest.raises(ValueError, match=r"airborne must be < 0\.5"):
+        Walker(airborne=0.5)
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.01])
+def test_walker_walks(roughness: float) -> None:
+    family = Walker(roughness=roughness)
+    steps = 450
+    loaded: dict[str, list[bool]] = {"left": [], "right": []}
+    for step in simulate(family.scene(), steps):
+        normal = np.reshape(step.result.solution.r, (-1, 3))[:, 0]
+        for side, record in loaded.items():
+            sole = mujoco_of(step).body(f"foot.{side}").geomadr[0]
+            on = (step.contacts.pair == sole).any(axis=1)
+            record.append(bool(normal[on].sum() > 0))
+    assert step.problem.formulation == "GM3DFC"
+    # each foot is lifted for its share of the time and carries the body for more
+    for record in loaded.values():
+        assert 0.15 < 1 - np.mean(record) < 0.5
+    # nearly as far as planned, and upright
+    way = family.stride / family.period * steps * family.time_step
+    assert 0.6 * way < step.position[0] < 1.4 * way
+    _, x, y, _ = step.position[3:7]
+    assert 1 - 2 * (x * x + y * y) > 0.98
+    assert violation(step) < 1e-3

@@ -415,6 +415,53 @@ def test_bilateral_constraint_with_contact() -> None:
         np.testing.assert_allclose(step.problem.M @ v, impulse, atol=1e-7)
 
 
+# ---- controls that change with time
+
+SERVO = (
+    '<body pos="0 0 1"><joint name="slide" type="slide" axis="1 0 0"/>'
+    '<geom type="sphere" size="0.1" mass="1" contype="0" conaffinity="0"/></body>'
+    '<body pos="2 0 0.1"><freejoint/><geom type="sphere" size="0.1"/></body>'
+)
+
+
+def gait(*keys: tuple[float, float]) -> str:
+    """A stiff servo, and keyframes of its control: time, place."""
+    texts = [f'<key name="gait{i}" time="{t}" ctrl="{x}"/>' for i, (t, x) in enumerate(keys)]
+    servo = '<position joint="slide" kp="1e8" kv="0"/>'
+    return f"<actuator>{servo}</actuator><keyframe>{''.join(texts)}</keyframe>"
+
+
+def test_controls_of_a_gait_follow_its_keyframes_and_come_back() -> None:
+    steps = run(mjcf(SERVO, rest=gait((0, 0), (0.02, 0.4), (0.05, 0.1), (0.06, 0))), 25)
+    times = np.array([step.time for step in steps])
+    wanted = np.interp(times % 0.06, [0, 0.02, 0.05, 0.06], [0, 0.4, 0.1, 0])
+    places = [step.position[0] for step in steps]
+    np.testing.assert_allclose(places, wanted, atol=1e-3)
+    np.testing.assert_allclose([step.position[-1] for step in steps], times, atol=1e-12)
+
+
+def test_gait_goes_on_from_a_step_in_its_middle() -> None:
+    scene = Scene(name="test", xml=mjcf(SERVO, rest=gait((0, 0), (0.02, 0.4), (0.06, 0))))
+    whole = list(simulate(scene, 20))
+    for one, other in zip(whole[13:], simulate(scene, 7, start=whole[13].start), strict=True):
+        for a, b in zip(arrays(one), arrays(other), strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("keys", "reason"),
+    [
+        ([(0, 0)], "two or more"),
+        ([(0.1, 0), (0.2, 0)], "from 0"),
+        ([(0, 0), (0.2, 1), (0.1, 0)], "increasing"),
+        ([(0, 0), (0.2, 1)], "'gait0' and 'gait1'"),
+    ],
+)
+def test_gait_that_makes_no_cycle_is_refused(keys: Any, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        run(mjcf(SERVO, rest=gait(*keys)), 1)
+
+
 # ---- the simulation
 
 

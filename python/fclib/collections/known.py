@@ -30,7 +30,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "rolling": ("1", "grains with rolling friction"),
     "masonry": ("1", "blocks laid without mortar"),
     "deformable": ("1", "elastic bodies, meshes of finite elements"),
-    "mixed": ("1", "mechanisms and robots, with bilateral constraints"),
+    "mixed": ("2", "mechanisms and robots, with bilateral constraints"),
     "planar": ("1", "bodies in a plane"),
     "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),

@@ -20,7 +20,8 @@ class Scene:
     """A mechanical scene, ready to be simulated: what is in it, and how to step it.
 
     In an MJCF model a keyframe named ``start`` gives the initial positions, velocities and
-    controls; without it the scene starts at rest in the positions of the model.
+    controls; without it the scene starts at rest in the positions of the model. Keyframes whose
+    names begin with ``gait`` give controls at times, from 0 on, which repeat after the last.
 
     To solve a problem of a scene again, one needs what is here and nothing else.
     """

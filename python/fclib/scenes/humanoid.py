@@ -11,6 +11,8 @@ import numpy as np
 from fclib.scenes import _mjcf
 from fclib.scenes._family import Scene, parameter
 
+Triple = tuple[float, float, float]
+
 _AXES = {"roll": (1, 0, 0), "pitch": (0, 1, 0), "yaw": (0, 0, 1)}
 
 
@@ -144,15 +146,18 @@ class Humanoid:
         # sole below the hips: thigh, shin, foot
         hip = (0.1 + 0.4 + 0.38 + 0.07) * self._scale
         top = (1.2 * self.stone if self.stones else 0.0) + self.roughness
-        bodies = [self._trunk(top + self.drop + hip)]
+        hips = top + self.drop + hip
+        bodies = [self._trunk(hips)]
+        places = []  # of the free bodies after the trunk
         side = max(1, int(np.ceil(np.sqrt(self.stones))))
         for i, (x, y, size) in enumerate(draws.tolist()):
             a = self.stone * (0.85 + 0.15 * size)
             # a grid with a little disorder, so that no two stones overlap
             place = np.array(divmod(i, side)) - 0.5 * (side - 1)
             place = 2.4 * self.stone * place + 0.15 * self.stone * np.array([x, y])
+            places.append((*place.tolist(), self.roughness + 0.6 * a))
             bodies.append(
-                f'<body name="stone{i}" pos="{_mjcf.numbers(*place, self.roughness + 0.6 * a)}">'
+                f'<body name="stone{i}" pos="{_mjcf.numbers(*places[-1])}">'
                 f"<freejoint/>"
                 f'<geom type="ellipsoid" size="{_mjcf.numbers(a, 0.8 * a, 0.6 * a)}"'
                 f' density="2500" friction="{self.mu!r}" condim="3" material="solid"'
@@ -161,11 +166,13 @@ class Humanoid:
         if self.roughness:
             reach = 0.5 * self.height
             bodies += _mjcf.uneven_ground(
-                random, self.roughness, self.block, (-reach, reach), reach, self.mu
+                random, self.roughness, self.block, (-reach, reach + self._way), reach, self.mu
             )
         rest = []
         if self.bar:
-            bodies.append(self._bar(top + self.drop + hip))
+            # shoulder, elbow, hand
+            places.append((self._scale * 0.27, 0.0, hips + self._scale * (0.38 - 0.28)))
+            bodies.append(self._bar(places[-1]))
             for limb in self._limbs_held:
                 if not limb.name.startswith("forearm"):
                     continue
@@ -175,6 +182,7 @@ class Humanoid:
                     f'<equality><connect {pair} anchor="{anchor}"/></equality>',
                     f"<contact><exclude {pair}/></contact>",
                 ]
+        rest += self._drive(hips, places)
         return Scene.of(
             self,
             seed,
@@ -194,15 +202,22 @@ class Humanoid:
         """The limbs, as the hands hold a bar or not."""
         return [holding(limb) for limb in LIMBS] if self.bar else LIMBS
 
-    def _bar(self, z: float) -> str:
-        """A bar across in both hands, hips at a height z [m]."""
-        # shoulder, elbow, hand
-        x, y, up = 0.27, 0.4, 0.38 - 0.28
-        place = _mjcf.numbers(self._scale * x, 0, z + self._scale * up)
+    @property
+    def _way(self) -> float:
+        """How far the body goes ahead [m]."""
+        return 0.0
+
+    def _drive(self, hips: float, places: Sequence[Triple]) -> list[str]:
+        """Motors and a start; hips at a height [m], and where the other free bodies are."""
+        return []
+
+    def _bar(self, place: Triple) -> str:
+        """A bar across in both hands."""
+        surface = self._surface(len(LIMBS))
         return (
-            f'<body name="bar" pos="{place}"><freejoint/>'
+            f'<body name="bar" pos="{_mjcf.numbers(*place)}"><freejoint/>'
             f'<geom type="capsule" size="{self._numbers(0.02)}" mass="{self.bar!r}"'
-            f' fromto="{self._numbers(0, -y, 0, 0, y, 0)}" {self._surface(len(LIMBS))}/></body>'
+            f' fromto="{self._numbers(0, -0.4, 0, 0, 0.4, 0)}" {surface}/></body>'
         )
 
     @property
@@ -235,10 +250,14 @@ class Humanoid:
     def _joints(self, limb: Limb) -> str:
         return "".join(
             f'<joint name="{limb.name}.{axis}" axis="{_mjcf.numbers(*_AXES[axis])}"'
-            f' springref="{rest!r}" stiffness="{self.stiffness!r}" damping="{self.damping!r}"'
+            f" {self._held(limb, rest)}"
             f' limited="true" range="{_mjcf.numbers(low, high)}"/>'
             for axis, rest, low, high in limb.joints
         )
+
+    def _held(self, limb: Limb, rest: float) -> str:
+        """What holds a joint of a limb; the springs rest at an angle [rad]."""
+        return f'springref="{rest!r}" stiffness="{self.stiffness!r}" damping="{self.damping!r}"'
 
     def _shape(self, limb: Limb, index: int) -> str:
         ends: Sequence[float] = (0, 0, 0, *limb.end)

@@ -9,6 +9,9 @@ A limit of a joint or a tendon is a contact without friction: its row is N, its 
 and its pair is (-1 - kind, index). Contacts of condim 6 make rolling problems; their spin
 friction, which FCLIB's law does not have, is left out.
 
+Keyframes called gait... hold controls at their times: straight between them, the last one's are the
+first one's again, and so on. The configuration of such a scene is (q, t).
+
 A planar scene moves in a plane y = const: slides along x and z, hinges about y (`plane.py`).
 """
 
@@ -71,6 +74,7 @@ class MujocoModel:
         m.jnt_margin[:] = REACH
         m.tendon_margin[:] = REACH
 
+        self._gait = Gait.of(scene, m)
         start = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_KEY, "start")
         if start >= 0:
             mujoco.mj_resetDataKeyframe(m, self.data, start)
@@ -84,9 +88,9 @@ class MujocoModel:
 
     @property
     def position(self) -> Vector:
-        """Configuration q (nq), a copy."""
+        """Configuration q (nq), with a gait (q, t) (nq + 1), a copy."""
         q: Vector = self.data.qpos.copy()
-        return q
+        return np.append(q, self.data.time) if self._gait else q
 
     @property
     def velocity(self) -> Vector:
@@ -136,12 +140,17 @@ class MujocoModel:
             # no limits in such a scene: all pairs are geometries
             contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
         G, violation = equality_columns(d, rows)
+        if self._gait:
+            # at the end of the step, where its springs are taken too
+            d.ctrl[:] = self._gait.controls(d.time + h)
         force = self._force()
         C, K = linear_forces(m, d)
         return System(self._pattern.fill(d.M), force, C, K, H, contacts, G, violation, self.trees)
 
     def set_state(self, position: Vector, velocity: Vector) -> None:
-        """Take a configuration q (nq) and a velocity v (n)."""
+        """Take a configuration, as `position` gives it, and a velocity v (n)."""
+        if self._gait:
+            position, self.data.time = position[:-1], float(position[-1])
         self.data.qpos[:] = position
         self.data.qvel[:] = velocity
         if self._cell:
@@ -152,6 +161,7 @@ class MujocoModel:
         moved = v if theta == 1 else (1 - theta) * self.data.qvel + theta * v
         self.data.qvel[:] = v
         mujoco.mj_integratePos(self.model, self.data.qpos, moved, h)
+        self.data.time += h
         if self._cell:
             self._cell.wrap(self.model, self.data.qpos)
 
@@ -159,7 +169,7 @@ class MujocoModel:
         """A copy of the MjModel, whose looks may change, and an MjData with bodies in place."""
         m = copy.copy(self.model)
         d = mujoco.MjData(m)
-        d.qpos[:] = position
+        d.qpos[:] = position[: m.nq]
         return m, d
 
     def energy(self) -> float:
@@ -221,6 +231,43 @@ class MujocoModel:
                 )
         if self.data.warning[kinds.mjWARN_INERTIA].number:
             raise ValueError(f"{self.scene.name}: the mass matrix is singular")
+
+
+@dataclass(frozen=True)
+class Gait:
+    """Controls that change with time and come back: those of the keyframes gait..., in turn."""
+
+    times: Vector  # (k) from 0, increasing; the last one is the period [s]
+    values: Vector  # (k x nu) controls
+
+    @classmethod
+    def of(cls, scene: Scene, m: Any) -> Gait | None:
+        """The gait of a model, None where it has none. ValueError where it makes no cycle."""
+        keys = [m.key(i) for i in range(m.nkey) if m.key(i).name.startswith("gait")]
+        if not keys:
+            return None
+        times = np.array([key.time[0] for key in keys])
+        values = np.array([key.ctrl for key in keys])
+        if len(keys) < 2 or times[0] != 0 or not (np.diff(times) > 0).all():
+            raise ValueError(
+                f"{scene.name}: the keyframes gait... must be two or more, their times from 0 and"
+                f" increasing, not {times.tolist()}"
+            )
+        if (values[0] != values[-1]).any():
+            raise ValueError(
+                f"{scene.name}: the controls of the keyframes {keys[0].name!r} and"
+                f" {keys[-1].name!r}, the first and the last, differ: the gait would jump"
+            )
+        return cls(times, values)
+
+    def controls(self, time: float) -> Vector:
+        """At a time [s] (nu)."""
+        time = time % self.times[-1]
+        after = min(int(np.searchsorted(self.times, time, side="right")), len(self.times) - 1)
+        start, end = self.times[after - 1], self.times[after]
+        share = (time - start) / (end - start)
+        controls: Vector = (1 - share) * self.values[after - 1] + share * self.values[after]
+        return controls
 
 
 def compile_scene(scene: Scene) -> Any:

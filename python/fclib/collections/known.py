@@ -26,7 +26,7 @@ SHIPPED = ("tiny",)  # whose problems are there without a build
 # name, version, what it is; a set that a family names and that is not here has version 1
 KNOWN: dict[str, tuple[str, str]] = {
     "rt444": ("1", "the four families of RT-0444"),
-    "granular": ("1", "grains that fall, flow and are pressed"),
+    "granular": ("2", "grains that fall, flow and are pressed"),
     "rolling": ("1", "grains with rolling friction"),
     "masonry": ("1", "blocks laid without mortar"),
     "deformable": ("1", "elastic bodies, meshes of finite elements"),

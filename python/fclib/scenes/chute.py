@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -23,8 +24,8 @@ class Chute:
     contact; those that come to rest in the trough are the hyperstatic end of the set.
 
     After the sets Chute_1000 and Chute_4000 of the FCLIB library by V. Acary and S. Sinclair: 1000
-    and 4000 random polyhedra, mu = 1. `grains` takes those numbers; `across` and `layers` widen the
-    bed. The spheres, the slope, the trough and the positions at the start are chosen here.
+    and 4000 random polyhedra, mu = 1; Chute1000 and Chute4000 are as large. The spheres, the slope,
+    the trough and the positions at the start are chosen here.
     """
 
     title: ClassVar[str] = "Chute"
@@ -150,3 +151,35 @@ class Chute:
             ends.append(top)
         elements.append(_mjcf.bar(ends[0], ends[1], 0.1 * self.radius))
         return elements
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chute1000(Chute):
+    """The chute with 1000 grains, until most have reached the trough.
+
+    After the set Chute_1000 of the FCLIB library by V. Acary and S. Sinclair.
+    """
+
+    title: ClassVar[str] = "Chute, 1000 grains"
+    problems: ClassVar[int] = 140
+    small: ClassVar[Mapping[str, Any]] = {"grains": 24, "across": 3, "layers": 2, "shapes": 5}
+
+    grains: int = parameter(1000, "1", "number of grains, at least 1")
+    across: int = parameter(10, "1", "grains of the bed from wall to wall, at least 1")
+    layers: int = parameter(8, "1", "layers of the bed, at least 1")
+    time_step: float = parameter(8e-3, "s", "time step h")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chute4000(Chute1000):
+    """The chute with 4000 grains, as long as all of them slide.
+
+    After the set Chute_4000 of the FCLIB library by V. Acary and S. Sinclair.
+    """
+
+    title: ClassVar[str] = "Chute, 4000 grains"
+    problems: ClassVar[int] = 90
+
+    grains: int = parameter(4000, "1", "number of grains, at least 1")
+    across: int = parameter(16, "1", "grains of the bed from wall to wall, at least 1")
+    layers: int = parameter(10, "1", "layers of the bed, at least 1")

@@ -594,15 +594,16 @@ constexpr std::size_t chunked_from = 64;
 /// What a reader's cache of one dataset holds, by HDF5's default.
 constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 /// What the index of a dataset in chunks takes, in bytes.
-constexpr std::size_t index_bytes = 190;
+constexpr std::size_t index_bytes = 254;
 /// What filters are tried on.
 constexpr std::size_t sample_entries = std::size_t{1} << 16;
 /// Datasets up to this many bytes lie in their own header.
 constexpr std::size_t compact_bytes = 4096;
 /// Groups of up to this many members keep them in their own header: all of ours do.
 constexpr unsigned compact_links = 32;
-/// Chunks under a node of the index of a dataset, halved; few datasets have more than one.
-constexpr unsigned index_rank = 1;
+/// Entries under a node of an index, halved: few datasets have more than one chunk. With 1 an index
+/// gets a level for each entry, and HDF5 fails, or ends its process, beyond 255.
+constexpr unsigned index_rank = 2;
 
 void check(herr_t status, const std::string& where) {
   if (status < 0) fail(where, "cannot be written by HDF5");
@@ -939,7 +940,7 @@ class MemoryFile {
     const Handle properties(H5Pcreate(H5P_FILE_CREATE), H5Pclose);
     keep_small(properties.id());
     check(H5Pset_istore_k(properties.id(), index_rank), "");
-    check(H5Pset_sym_k(properties.id(), 1, 1), "");
+    check(H5Pset_sym_k(properties.id(), index_rank, 1), "");
     check(H5Pset_local_heap_size_hint(properties.id(), 64), "");
     Handle file(H5Fcreate(name, H5F_ACC_TRUNC, properties.id(), access), H5Fclose);
     if (!file.ok()) fail("", "cannot be created by HDF5");

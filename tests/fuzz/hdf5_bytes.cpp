@@ -61,6 +61,7 @@ std::vector<Input> seeds() {
     const Solution solution = small_solution(problem);
     write_file(path, &problem, &solution);
     if (is_mixed(problem)) write_guesses(path, {solution});
+    write_attributes(path, "solution", {{"error", 1e-9}, {"solver", std::string("nsgs")}});
     result.push_back({name, read_file(path)});
     // the old layout has no checksums, which changed bytes would fail
     result.push_back({name + "-plain", copied_plainly(path, H5F_LIBVER_EARLIEST)});

@@ -116,6 +116,8 @@ std::vector<Base> make_bases() {
     const Solution solution = small_solution(problem);
     write_file(path, &informed, &solution);
     if (is_mixed(problem)) write_guesses(path, {solution, solution});
+    write_attributes(path, "solution", {{"error", 1e-9}, {"solver", std::string("nsgs")}});
+    write_attributes(path, "info", {{"rank", 3.0}, {"existence", std::string("yes")}});
     add();
   });
   // several in one file
@@ -340,12 +342,36 @@ std::vector<double> numbers_of(hid_t file, const std::string& path) {
   return values;
 }
 
+/// Whether a dataset in chunks takes seconds to write: very many chunks, or much larger ones than
+/// their data.
+bool is_slow(hid_t dataset, hid_t made) {
+  constexpr double most_chunks = 2000;
+  constexpr double most_room = 1 << 24;
+  std::array<hsize_t, H5S_MAX_RANK> chunk{};
+  std::array<hsize_t, H5S_MAX_RANK> extents{};
+  const int rank = H5Pget_chunk(made, H5S_MAX_RANK, chunk.data());
+  const hid_t space = H5Dget_space(dataset);
+  H5Sget_simple_extent_dims(space, extents.data(), nullptr);
+  H5Sclose(space);
+  const hid_t type = H5Dget_type(dataset);
+  double chunks = 1;
+  auto room = static_cast<double>(H5Tget_size(type));
+  H5Tclose(type);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(rank); ++k) {
+    const double along = std::ceil(static_cast<double>(extents[k]) / static_cast<double>(chunk[k]));
+    chunks *= along;
+    room *= along * static_cast<double>(chunk[k]);
+  }
+  return chunks > most_chunks || room > most_room;
+}
+
 /// A virtual dataset is left unwritten: HDF5 1.10 follows one that leads to itself without end, and
 /// leaves the files open where it fails.
 void write(hid_t dataset, hid_t type, hid_t memory, hid_t space, hid_t transfer,
            const void* values) {
   const hid_t made = H5Dget_create_plist(dataset);
-  if (H5Pget_layout(made) != H5D_VIRTUAL) {
+  const H5D_layout_t layout = H5Pget_layout(made);
+  if (layout != H5D_VIRTUAL && (layout != H5D_CHUNKED || !is_slow(dataset, made))) {
     H5Dwrite(dataset, type, memory, space, transfer, values);
   }
   H5Pclose(made);
@@ -386,6 +412,12 @@ void store_otherwise(hid_t file, Choices& choices, const std::string& path) {
   H5Tclose(type);
 }
 
+/// Whether any bytes are a value of the type.
+bool is_plain(hid_t type) {
+  return H5Tdetect_class(type, H5T_VLEN) <= 0 && H5Tis_variable_str(type) <= 0 &&
+         H5Tget_class(type) != H5T_REFERENCE;
+}
+
 /// Any dataset, filled with bytes, or with text of variable length, or not at all.
 void store_anything(hid_t file, Choices& choices, const std::string& path) {
   remove(file, path);
@@ -397,10 +429,8 @@ void store_anything(hid_t file, Choices& choices, const std::string& path) {
   if (dataset >= 0) {
     const auto points = static_cast<double>(H5Sget_simple_extent_npoints(space));
     const auto bytes = points * static_cast<double>(H5Tget_size(type));
-    const bool plain = H5Tdetect_class(type, H5T_VLEN) <= 0 && H5Tis_variable_str(type) <= 0 &&
-                       H5Tget_class(type) != H5T_REFERENCE;
     if (bytes > 0 && bytes <= static_cast<double>(most_bytes) && choices.one_in(2)) {
-      if (plain) {
+      if (is_plain(type)) {
         std::string values(static_cast<std::size_t>(bytes), '\0');
         std::array<char, 8> pattern{};
         for (char& value : pattern) value = static_cast<char>(choices.byte());
@@ -424,8 +454,17 @@ void add_attribute(hid_t file, Choices& choices, const std::string& path) {
   const hid_t object = H5Oopen(file, path.c_str(), H5P_DEFAULT);
   constexpr hssize_t most_points = 1000;  // HDF5 would hold them all in memory
   if (object >= 0 && H5Sget_simple_extent_npoints(space) <= most_points) {
-    const hid_t attribute = H5Acreate2(object, "attribute", type, space, H5P_DEFAULT, H5P_DEFAULT);
-    if (attribute >= 0) H5Aclose(attribute);
+    static const char* const names[] = {"attribute", "error", "solver", "a\nb"};
+    const char* const name = choices.one_of(names);
+    if (H5Aexists(object, name) > 0) H5Adelete(object, name);
+    const hid_t attribute = H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT);
+    if (attribute >= 0) {
+      const auto value = choices.byte();
+      const std::string bytes(static_cast<std::size_t>(most_points) * H5Tget_size(type),
+                              static_cast<char>(value));
+      if (is_plain(type)) H5Awrite(attribute, type, bytes.data());
+      H5Aclose(attribute);
+    }
   }
   if (object >= 0) H5Oclose(object);
   H5Sclose(space);
@@ -500,7 +539,7 @@ void run(std::string_view bytes) {
   require(file >= 0, "the file can be opened");
   constexpr int most_changes = 16;
   for (int k = 0; k < most_changes && !choices.empty(); ++k) change(file, choices, base);
-  H5Fclose(file);
+  require(H5Fclose(file) >= 0, "the changed file can be closed");
   require(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL) == 0, "the changes leave nothing open");
   read_all(path, writes_too(bytes));
   require(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL) == 0, "the readers leave nothing open");

@@ -52,6 +52,8 @@ bool same(const Solution& a, const Solution& b) {
   return equal;
 }
 
+constexpr const char* attributed[] = {"solution", "info"};  // groups
+
 void write_into(const std::string& path) {
   Problem outline;
   if (!accepted(path, [&] { outline = read_outline(path); })) return;
@@ -65,6 +67,15 @@ void write_into(const std::string& path) {
             "guesses are read as they were written");
   }
   accepted(path, [&] { write_int_attribute(path, "attribute", 7); });
+  for (const char* group : attributed) {
+    const Attributes told{{"attribute", 0.5}, {"word", std::string("some text")}};
+    if (!accepted(path, [&] { write_attributes(path, group, told); })) continue;
+    const Attributes again = read_attributes(path, group);
+    for (const auto& [name, value] : told) {
+      require(again.contains(name) && again.at(name) == value,
+              "attributes are read as they were written");
+    }
+  }
 }
 
 }  // namespace
@@ -75,6 +86,7 @@ void read_all(const std::string& path, bool write_too) {
   std::optional<Solution> solution;
   accepted(path, [&] { solution = read_solution(path); });
   accepted(path, [&] { read_guesses(path); });
+  for (const char* group : attributed) accepted(path, [&] { read_attributes(path, group); });
 
   // opening a file takes longer than all the rest: each kind by its name only where there are more
   std::vector<std::string> kinds{""};

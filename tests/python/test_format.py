@@ -163,6 +163,22 @@ def test_what_the_page_says_of_types(tmp_path: Path) -> None:
         assert group["M/p"].chunks, "repeats itself, and is stored compressed"
 
 
+def test_others_may_add_to_our_files(tmp_path: Path) -> None:
+    """Small indices make small files, and must not end in HDF5 failing at what is added."""
+    path = tmp_path / "ours.hdf5"
+    problem = planted_local(1, nc=2).problem
+    fclib.write(path, problem)
+    added = np.arange(1000, dtype="i2")
+    with h5py.File(path, "r+") as file:
+        file.create_dataset("added", data=added, chunks=(1,))
+        for number in range(1000):
+            file.create_group(f"group-{number:04}")
+    with h5py.File(path) as file:
+        assert (file["added"][:] == added).all()
+        assert len(file) == 1002
+    assert (fclib.read(path).q == problem.q).all()
+
+
 def test_what_a_reader_of_ours_takes(tmp_path: Path) -> None:
     path = tmp_path / "other.hdf5"
     with h5py.File(path, "w") as file:

@@ -176,7 +176,9 @@ def test_others_may_add_to_our_files(tmp_path: Path) -> None:
     with h5py.File(path) as file:
         assert (file["added"][:] == added).all()
         assert len(file) == 1002
-    assert (fclib.read(path).q == problem.q).all()
+    again = fclib.read(path)
+    assert isinstance(again, fclib.LocalProblem)
+    assert (again.q == problem.q).all()
 
 
 def test_what_a_reader_of_ours_takes(tmp_path: Path) -> None:

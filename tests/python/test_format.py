@@ -167,6 +167,7 @@ def test_others_may_add_to_our_files(tmp_path: Path) -> None:
     """Small indices make small files, and must not end in HDF5 failing at what is added."""
     path = tmp_path / "ours.hdf5"
     problem = planted_local(1, nc=2).problem
+    assert isinstance(problem, fclib.LocalProblem)
     fclib.write(path, problem)
     added = np.arange(1000, dtype="i2")
     with h5py.File(path, "r+") as file:

@@ -76,6 +76,7 @@ PAIRS = (
     Pair("apgd"),
     Pair("bb"),
     Pair("nsip"),
+    Pair("homotopy"),
     Pair("auto"),
 )
 

@@ -14,7 +14,11 @@ template <class Cone>
 class BestIterate {
  public:
   BestIterate(const Delassus& problem, const Settings& settings, const Vector& r)
-      : problem_(problem), monitor_(settings), best_(r), fresh_(r.size()) {}
+      : problem_(problem),
+        monitor_(settings),
+        time_limit_(settings.time_limit),
+        best_(r),
+        fresh_(r.size()) {}
 
   /// The error of r; u = W r + q may carry the rounding of updates.
   [[nodiscard]] double error_of(const Vector& r, const Vector& u) const {
@@ -32,14 +36,24 @@ class BestIterate {
   }
   bool report(std::int64_t count, const Vector& r, double error) {
     last_ = error;
-    if (first_ || error < error_) {
-      error_ = error;
-      best_ = r;
-    }
-    iterations_ += count;
+    keep(count, r, error);
     if (first_ || count > 0) stopped_ = monitor_.report(iterations_, error);
     first_ = false;
     return stopped_.has_value();
+  }
+
+  /// Tells of r between the iterates that a schedule has reported, because one is `due`. Whether to
+  /// stop. As the clock says when, the error counts only where a limit ends the solver here.
+  bool glance(std::int64_t count, const Vector& r) {
+    problem_.velocity(r, fresh_);
+    const double error = error_of(r, fresh_);
+    const std::int64_t now = iterations_ + count;
+    const auto status = monitor_.report(now, error);
+    const bool last = now >= monitor_.max_iterations() || monitor_.elapsed() > time_limit_;
+    if (!status || (*status == Status::converged && !last)) return false;
+    keep(count, r, error);
+    stopped_ = status;
+    return true;
   }
 
   /// Whether a report is wanted after `count` iterations since the last.
@@ -53,15 +67,26 @@ class BestIterate {
   [[nodiscard]] bool stopped() const { return stopped_.has_value(); }
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
 
-  /// Leaves the best iterate in r. Stalled where nothing else ended the solver.
-  Outcome outcome(Vector& r) const {
+  /// Leaves the best iterate in r. Stalled where nothing else ended the solver. `cpu_s` is that of
+  /// a solver with threads of its own.
+  Outcome outcome(Vector& r, std::optional<double> cpu_s = {}) const {
     r = best_;
-    return {stopped_.value_or(Status::stalled), iterations_};
+    return {
+        .status = stopped_.value_or(Status::stalled), .iterations = iterations_, .cpu_s = cpu_s};
   }
 
  private:
+  void keep(std::int64_t count, const Vector& r, double error) {
+    if (first_ || error < error_) {
+      error_ = error;
+      best_ = r;
+    }
+    iterations_ += count;
+  }
+
   const Delassus& problem_;
   Monitor monitor_;
+  double time_limit_;
   Vector best_, fresh_;
   double error_ = 0;
   double last_ = 0;

@@ -2,23 +2,17 @@
 
 #include <algorithm>
 #include <chrono>
-#include <ctime>
 
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
+#include "kernels/cpu_time.hpp"
 
 namespace fclib {
 
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double cpu_time() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 /// How often the solver is sent back to work where its own error met the tolerance and the merit
 /// of the original problem did not (conversions round).
@@ -63,7 +57,9 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
   for (int correction = 0;; ++correction) {
     const double start = cpu_time();
     const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
-    result.cpu_s += outcome.cpu_s.value_or(cpu_time() - start);
+    const double own = cpu_time() - start;
+    result.cpu_s += outcome.cpu_s.value_or(own);
+    result.setup_s -= own;
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = outcome.stages;
@@ -151,7 +147,7 @@ Result solve_any(const P& problem, const Solver& solver, const Settings& setting
   const Request request{solver, settings, options};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
-  result.setup_s = std::max(0.0, cpu_time() - start - result.cpu_s);
+  result.setup_s += cpu_time() - start;  // what the thread spent in the solver is taken off already
   return result;
 }
 

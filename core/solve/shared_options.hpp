@@ -2,6 +2,7 @@
 // from a base.
 #pragma once
 
+#include "kernels/local_step.hpp"
 #include "solve/options.hpp"
 
 namespace fclib {
@@ -32,6 +33,60 @@ constexpr auto interior_point_fields() {
                                     "this many times",
                              .lowest = 1,
                              .highest = 1e12},
+  };
+}
+
+/// Of sweeps over the contacts: kernels/sweeps.hpp, kernels/local_step.hpp.
+struct SweepOptions {
+  LocalSolver local_solver = LocalSolver::exact;
+  std::int64_t local_iterations = 10;
+  double local_accuracy = 1e-14;
+  bool symmetric = false;
+  std::int64_t threads = 1;
+  std::int64_t error_interval = 0;
+
+  template <class Cone>
+  [[nodiscard]] LocalStep<Cone> local_step() const {
+    return {local_solver, local_accuracy, static_cast<int>(local_iterations)};
+  }
+};
+
+template <class O>
+constexpr auto sweep_fields() {
+  return std::tuple{
+      OptionField<O, LocalSolver>{.name = "local_solver",
+                                  .member = &O::local_solver,
+                                  .doc = local_solvers_doc,
+                                  .choices = local_solvers},
+      OptionField<O, std::int64_t>{.name = "local_iterations",
+                                   .member = &O::local_iterations,
+                                   .unit = "1",
+                                   .doc = "limit of the iterations of the projection or of Newton",
+                                   .lowest = 1,
+                                   .highest = 1e6},
+      OptionField<O, double>{.name = "local_accuracy",
+                             .member = &O::local_accuracy,
+                             .unit = "1",
+                             .doc = "relative step at which the projection stops, relative "
+                                    "residual of Newton",
+                             .lowest = 0,
+                             .highest = 1},
+      OptionField<O, bool>{
+          .name = "symmetric", .member = &O::symmetric, .doc = "every second sweep runs backwards"},
+      OptionField<O, std::int64_t>{
+          .name = "threads",
+          .member = &O::threads,
+          .unit = "threads",
+          .doc = "from 2 on the contacts are swept colour by colour, those of a colour on all "
+                 "threads at once, with one result for any number; 1: in the order as given",
+          .lowest = 1,
+          .highest = 256},
+      OptionField<O, std::int64_t>{
+          .name = "error_interval",
+          .member = &O::error_interval,
+          .unit = "sweeps",
+          .doc = "sweeps between evaluations of the error; 0 adapts it to the convergence",
+          .lowest = 0},
   };
 }
 

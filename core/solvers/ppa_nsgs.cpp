@@ -8,7 +8,9 @@
 // point algorithm" (1976).
 //
 // Differs from the papers in: alpha is relative to the mean of tr(W_aa) / d; an inner problem is
-// solved until its error is a fraction of the error at r_k, or for a number of sweeps; W is not
+// solved until its error is a fraction of the error at r_k, or for a number of sweeps; where these
+// end farther away than they began, r_k is taken again with four times the alpha, which comes back
+// afterwards: Gauss-Seidel may leave a solution of a problem whose alpha is small; W is not
 // changed, alpha enters the one-contact problems. Slower than nsgs alone where that converges: it
 // is there for problems whose W is singular.
 
@@ -92,6 +94,9 @@ class Iteration {
     return std::sqrt(natural_map_squared<Cone>(shifted_, r_, problem_.friction)) / problem_.scale;
   }
 
+  /// Gives the inner iterates up: r is r_k again.
+  void go_back() { r_ = anchor_; }
+
   /// r_k is the r of now, and u as it should be.
   void start_inner(double alpha) {
     problem_.velocity(r_, u_);
@@ -142,12 +147,14 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   if (const auto stop = monitor.report(0, error)) return {*stop, 0};
   double best = error;
   std::int64_t sweeps = 0;
+  double caution = 1;  // factor of alpha, after inner problems that were not solved
   for (;;) {
     const double alpha = options.rule == Rule::constant
                              ? options.alpha
                              : options.sigma * std::pow(std::min(error, 1.0), options.nu);
-    const double goal = options.inner_accuracy * error;
-    at.start_inner(alpha * at.size());
+    const double start = error;
+    at.start_inner(caution * alpha * at.size());
+    double inner_error = start;
     for (std::int64_t inner = 0; inner < options.inner_sweeps;) {
       const std::int64_t count =
           std::min({interval, options.inner_sweeps - inner, monitor.max_iterations() - sweeps});
@@ -160,7 +167,15 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
         r = at.r();
       }
       if (const auto stop = monitor.report(sweeps, error)) return {*stop, sweeps};
-      if (at.inner_error() <= goal) break;
+      inner_error = at.inner_error();
+      if (inner_error <= options.inner_accuracy * start) break;
+    }
+    if (inner_error >= start) {
+      at.go_back();
+      error = start;
+      caution *= 4;
+    } else {
+      caution = std::max(1.0, 0.5 * caution);
     }
   }
 }

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import sparse
 
 import fclib
 from helpers import dense, local_problem, planted_local, planted_rolling
@@ -95,6 +96,75 @@ def test_relaxed_sweeps_stay_in_the_cone(omega: float) -> None:
         r = result.solution.r.reshape(-1, 3)
         excess = np.hypot(r[:, 1], r[:, 2]) - packing().mu * r[:, 0]
         assert excess.max() <= 1e-12
+
+
+# ---- several threads
+
+
+def row(nc: int = 400, seed: int = 3) -> fclib.LocalProblem:
+    """Contacts in a row, each coupled with three on either side."""
+    random = np.random.default_rng(seed)
+    H = sparse.lil_array((3 * (nc + 3), 3 * nc))
+    for a in range(nc):
+        H[3 * a : 3 * a + 12, 3 * a : 3 * a + 3] = random.normal(size=(12, 3))
+    H = H.tocsc()
+    W = H.T @ H + 0.1 * sparse.eye_array(3 * nc)
+    return fclib.LocalProblem(
+        spacedim=3, W=W.tocsc(), q=random.normal(size=3 * nc), mu=random.uniform(0, 1, nc)
+    )
+
+
+@pytest.mark.parametrize(
+    ("method", "options"),
+    [("psor", {"omega": 1.2}), ("psor", {"symmetric": True}), ("nsgs", {})]
+    + [("nsgs", options) for options in SWEEPS],
+)
+def test_the_number_of_threads_does_not_change_a_bit(method: str, options: dict[str, Any]) -> None:
+    two = fclib.solve(row(), method, 1e-10, threads=2, **options)
+    assert two.converged
+    for threads in (3, 7):
+        more = fclib.solve(row(), method, 1e-10, threads=threads, **options)
+        assert more.iterations == two.iterations
+        np.testing.assert_array_equal(more.solution.r, two.solution.r)
+    one = fclib.solve(row(), method, 1e-10, **options)
+    np.testing.assert_allclose(two.solution.r, one.solution.r, atol=1e-8)
+
+
+@pytest.mark.parametrize("method", ["nsgs", "psor"])
+def test_threads_take_all_that_one_takes(method: str) -> None:
+    for d in (2, 3):
+        case = planted_local(1, d=d)
+        result = fclib.solve(case.problem, method, 1e-11, threads=4)
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-8)
+    for d in (3, 5):
+        problem, r = planted_rolling(d, seed=1)
+        result = fclib.solve(problem, method, 1e-9, threads=4, time_limit=20)
+        np.testing.assert_allclose(result.solution.r, r, atol=1e-6)
+    mu = np.array([0.5])
+    empty = fclib.LocalProblem(spacedim=3, W=np.zeros((0, 0)), q=np.zeros(0), mu=mu[:0])
+    assert fclib.solve(empty, method, threads=4).converged
+
+
+@pytest.mark.parametrize("threads", [0, -1, 257, 10**9, 1.5, "all"])
+def test_a_number_of_threads_that_makes_no_sense_is_refused(threads: Any) -> None:
+    with pytest.raises(fclib.OptionError, match="threads"):
+        fclib.solve(row(10), "nsgs", threads=threads)
+
+
+def test_more_threads_than_contacts_and_limits_are_kept() -> None:
+    assert fclib.solve(row(10), "nsgs", 1e-8, threads=256).converged
+    result = fclib.solve(row(), "nsgs", 0, threads=3, max_iterations=7)
+    assert (result.status, result.iterations) == ("iteration_limit", 7)
+    result = fclib.solve(row(), "nsgs", 0, threads=3, max_iterations=10**12, time_limit=0.1)
+    assert result.status == "time_limit"
+    result = fclib.solve(row(), "psor", 0, threads=3, callback=lambda *_: False)
+    assert result.status == "interrupted"
+
+
+def test_times_of_all_threads_are_told() -> None:
+    result = fclib.solve(row(4000), "nsgs", 0, threads=2, max_iterations=30)
+    assert result.cpu_s > 0
+    assert result.setup_s > 0
 
 
 # ---- projections on the variational inequality

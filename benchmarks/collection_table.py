@@ -39,7 +39,8 @@ def span(values: Iterable[Any]) -> str:
         return ""
     texts = [f"{value:.3g}" if value < 1000 else f"{value:.5g}" for value in (known[0], known[-1])]
     texts = [
-        f"{v:.1e}" if v >= 1e5 else t for v, t in zip((known[0], known[-1]), texts, strict=True)
+        f"{v:.1e}".replace("e+0", "e").replace("e+", "e") if v >= 1e5 else t
+        for v, t in zip((known[0], known[-1]), texts, strict=True)
     ]
     return texts[0] if texts[0] == texts[1] else " to ".join(texts)
 

@@ -308,6 +308,7 @@ def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
     [
         ("Spheres", {"offset": 0.3}),
         ("SpheresBox", {"load": 0.0}),
+        ("SpheresBox", {"restitution": 0.5}),
         ("SpheresInABox", {"width": 1.0}),
         ("SpheresInABox", {"spread": 1.0}),
         ("Chute", {"slope": 2.0}),

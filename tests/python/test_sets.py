@@ -316,7 +316,8 @@ def test_local_problems_are_solved_and_some_are_not_symmetric() -> None:
 
 
 def test_local_problems_come_from_all_kinds_of_families() -> None:
-    origins = [problem.info.title for problem in map(LocalProblems().problem, range(126))]
+    found = range(LocalProblems.problems - 16)  # those that spin come last
+    origins = [problem.info.title for problem in map(LocalProblems().problem, found)]
     families = {tuple(origin.split("/")[:2]) for origin in origins}
     assert {name for name, _ in families} >= {"ladder", "rt444", *known.EXTENDED} - {"local"}
     assert len(families) >= 30

@@ -17,16 +17,23 @@ SAME = [solver.name for solver in OWN if solver.family in FAMILIES]
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("solver", SAME)
 def test_agrees_with_gauss_seidel(solver: str, d: int) -> None:
-    # an interior point loses digits where contacts rest on the boundary of their cones
-    tol, near = (1e-6, 1e-4) if solver == "nsip" else (1e-9, 1e-7)
     for seed in range(5):
         case = planted_local(seed, d=d, nc=12)
         expected = fclib.solve(case.problem, "nsgs", 1e-11)
-        result = fclib.solve(case.problem, solver, tol)
+        result = fclib.solve(case.problem, solver, 1e-9)
         assert expected.converged
         assert result.converged
-        np.testing.assert_allclose(result.solution.r, expected.solution.r, atol=near)
-        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=near)
+        np.testing.assert_allclose(result.solution.r, expected.solution.r, atol=1e-7)
+        np.testing.assert_allclose(result.solution.r, case.solution.r, atol=1e-7)
+
+
+def test_sweeps_find_the_direction_of_sliding_that_the_interior_point_cannot() -> None:
+    plain = 0
+    for seed in range(20):
+        case = planted_local(seed, d=3, nc=12)
+        plain += fclib.solve(case.problem, "nsip", 1e-10, sweeps=0).converged
+        assert fclib.solve(case.problem, "nsip", 1e-10).converged
+    assert plain < 20
 
 
 @pytest.mark.parametrize("solver", NEWTON)

@@ -9,8 +9,10 @@
 // and ends the call by returning true; `due(count)` asks whether it wants to be told now.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "kernels/accelerated_gradient.hpp"
@@ -18,6 +20,11 @@
 #include "kernels/convex_residual.hpp"
 
 namespace fclib {
+
+/// Those that start from the last iterate.
+enum class ConvexMethod { gauss_seidel, projected_gradient, admm };
+inline constexpr std::array<std::string_view, 3> convex_methods{"gauss_seidel",
+                                                                "projected_gradient", "admm"};
 
 template <class Set>
 class ConvexProgram {
@@ -39,6 +46,20 @@ class ConvexProgram {
   /// ||r - P(r - u - s)||, relative to the problem's scale: zero at the solution.
   [[nodiscard]] double residual(const Set& set, const Vector& r, const Vector& u) const {
     return convex_residual(problem_, set, shift_, r, u);
+  }
+
+  /// By a method; `steps` of Gauss-Seidel on a contact.
+  template <class Due, class Follow>
+  void solve(ConvexMethod method, const Set& set, int steps, double accuracy, std::int64_t limit,
+             Vector& r, Vector& u, const Due& due, const Follow& follow) {
+    switch (method) {
+      case ConvexMethod::gauss_seidel:
+        return gauss_seidel(set, steps, accuracy, limit, r, u, due, follow);
+      case ConvexMethod::projected_gradient:
+        return projected_gradient(set, accuracy, limit, r, u, due, follow);
+      case ConvexMethod::admm:
+        return admm(set, {}, accuracy, limit, r, u, due, follow);
+    }
   }
 
   /// Sweeps over the contacts; u is kept up to date by columns of W.

@@ -90,6 +90,20 @@ constexpr auto sweep_fields() {
   };
 }
 
+/// Of projected gradients: whether de Saxce's shift follows the iterates.
+enum class Shift { iterated, none };
+inline constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
+
+template <class O>
+constexpr auto shift_field() {
+  return OptionField<O, Shift>{.name = "shift",
+                               .member = &O::shift,
+                               .doc =
+                                   "iterated: Coulomb's law; none: the convex relaxation, which "
+                                   "is NOT Coulomb's law where contacts slide",
+                               .choices = shifts};
+}
+
 /// Of a fixed point over convex problems.
 struct FixedPointOptions {
   double inner_accuracy = 0.1;

@@ -14,7 +14,6 @@
 //   interior point returns is finished by a few projected gradients;
 // - rolling friction adds its term to the shift.
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -30,9 +29,10 @@ namespace fclib::aclm {
 
 namespace {
 
-enum class Inner { gauss_seidel, projected_gradient, interior_point, admm };
-constexpr std::array<std::string_view, 4> inners{"gauss_seidel", "projected_gradient",
-                                                 "interior_point", "admm"};
+// those of ConvexMethod first
+enum class Inner { gauss_seidel, projected_gradient, admm, interior_point };
+constexpr std::array<std::string_view, 4> inners{convex_methods[0], convex_methods[1],
+                                                 convex_methods[2], "interior_point"};
 
 struct Options : FixedPointOptions {
   Inner inner = Inner::projected_gradient;
@@ -102,32 +102,22 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   while (!best.stopped()) {
     const double accuracy = options.inner_accuracy * best.last_error();
     const std::int64_t before = best.iterations();
-    switch (options.inner) {
-      case Inner::gauss_seidel:
-        program.gauss_seidel(cones, static_cast<int>(options.local_iterations), accuracy,
-                             options.inner_iterations, r, u, due, follow);
-        break;
-      case Inner::projected_gradient:
-        program.projected_gradient(cones, accuracy, options.inner_iterations, r, u, due, follow);
-        break;
-      case Inner::admm:
-        program.admm(cones, {}, accuracy, options.inner_iterations, r, u, due, follow);
-        break;
-      case Inner::interior_point:
-        if constexpr (!rolling) {
-          if (!interior_point) interior_point.emplace(problem);
-          std::int64_t count = 0;  // its first iterate is its own starting point
-          interior_point->solve(program.shift(), longest, r, u,
-                                [&](const Vector& reaction, const Vector& velocity) {
-                                  if (count++ == 0) return false;
-                                  return best.report(1, reaction, velocity) ||
-                                         program.residual(cones, reaction, velocity) <= accuracy;
-                                });
-          if (!best.stopped()) {  // its iterates keep a distance from the boundary of the cones
-            program.projected_gradient(cones, accuracy, finishing, r, u, due, follow);
-          }
-        }
-        break;
+    if (options.inner != Inner::interior_point) {
+      program.solve(static_cast<ConvexMethod>(options.inner), cones,
+                    static_cast<int>(options.local_iterations), accuracy, options.inner_iterations,
+                    r, u, due, follow);
+    } else if constexpr (!rolling) {
+      if (!interior_point) interior_point.emplace(problem);
+      std::int64_t count = 0;  // its first iterate is its own starting point
+      interior_point->solve(program.shift(), longest, r, u,
+                            [&](const Vector& reaction, const Vector& velocity) {
+                              if (count++ == 0) return false;
+                              return best.report(1, reaction, velocity) ||
+                                     program.residual(cones, reaction, velocity) <= accuracy;
+                            });
+      if (!best.stopped()) {  // its iterates keep a distance from the boundary of the cones
+        program.projected_gradient(cones, accuracy, finishing, r, u, due, follow);
+      }
     }
     if (best.iterations() == before) break;  // nothing could be done
     problem.velocity(r, u);

@@ -16,20 +16,15 @@
 // - steps are measured by tr(W_aa) / d of each contact, so that masses may differ;
 // - W x is kept with x, so that a step costs one product with W.
 
-#include <array>
-#include <cstdint>
-
 #include "kernels/accelerated_gradient.hpp"
 #include "kernels/convex_residual.hpp"
 #include "kernels/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/shared_options.hpp"
 
 namespace fclib::apgd {
 
 namespace {
-
-enum class Shift { iterated, none };
-constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
 
 struct Options {
   Shift shift = Shift::iterated;
@@ -41,11 +36,7 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, Shift>{.name = "shift",
-                              .member = &O::shift,
-                              .doc = "iterated: Coulomb's law; none: the convex relaxation, which "
-                                     "is NOT Coulomb's law where contacts slide",
-                              .choices = shifts},
+        shift_field<O>(),
         OptionField<O, bool>{.name = "restart",
                              .member = &O::restart,
                              .doc = "start the momentum afresh where it goes uphill"},

@@ -27,13 +27,11 @@
 #include "kernels/convex_sets.hpp"
 #include "kernels/with_cone.hpp"
 #include "solve/best_iterate.hpp"
+#include "solve/shared_options.hpp"
 
 namespace fclib::bb {
 
 namespace {
-
-enum class Shift { iterated, none };
-constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
 
 enum class Step { longest, shortest, alternating };
 constexpr std::array<std::string_view, 3> steps{"long", "short", "alternating"};
@@ -48,11 +46,7 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, Shift>{.name = "shift",
-                              .member = &O::shift,
-                              .doc = "iterated: Coulomb's law; none: the convex relaxation, which "
-                                     "is NOT Coulomb's law where contacts slide",
-                              .choices = shifts},
+        shift_field<O>(),
         OptionField<O, Step>{.name = "step",
                              .member = &O::step,
                              .doc = "which of the two steps of Barzilai and Borwein",

@@ -12,8 +12,6 @@
 //   solution, and never to more than that;
 // - rolling friction has a threshold of its own.
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 
 #include "kernels/convex_program.hpp"
@@ -25,21 +23,18 @@ namespace fclib::tresca {
 
 namespace {
 
-enum class Inner { gauss_seidel, projected_gradient, admm };
-constexpr std::array<std::string_view, 3> inners{"gauss_seidel", "projected_gradient", "admm"};
-
 struct Options : FixedPointOptions {
   Options() { local_iterations = 5; }
 
-  Inner inner = Inner::projected_gradient;
+  ConvexMethod inner = ConvexMethod::projected_gradient;
 
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(
-        std::tuple{OptionField<O, Inner>{.name = "inner",
-                                         .member = &O::inner,
-                                         .doc = "solver of the convex problem on cylinders",
-                                         .choices = inners}},
+        std::tuple{OptionField<O, ConvexMethod>{.name = "inner",
+                                                .member = &O::inner,
+                                                .doc = "solver of the convex problem on cylinders",
+                                                .choices = convex_methods}},
         fixed_point_fields<O>());
   }
 };
@@ -59,21 +54,10 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   };
   cylinders.set_thresholds(r);
   while (!best.stopped()) {
-    const double accuracy = options.inner_accuracy * best.last_error();
     const std::int64_t before = best.iterations();
-    switch (options.inner) {
-      case Inner::gauss_seidel:
-        program.gauss_seidel(cylinders, static_cast<int>(options.local_iterations), accuracy,
-                             options.inner_iterations, r, u, due, follow);
-        break;
-      case Inner::projected_gradient:
-        program.projected_gradient(cylinders, accuracy, options.inner_iterations, r, u, due,
-                                   follow);
-        break;
-      case Inner::admm:
-        program.admm(cylinders, {}, accuracy, options.inner_iterations, r, u, due, follow);
-        break;
-    }
+    program.solve(options.inner, cylinders, static_cast<int>(options.local_iterations),
+                  options.inner_accuracy * best.last_error(), options.inner_iterations, r, u, due,
+                  follow);
     if (best.iterations() == before) break;  // nothing could be done
     cylinders.set_thresholds(r, options.relaxation);
     problem.velocity(r, u);

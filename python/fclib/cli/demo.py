@@ -54,7 +54,7 @@ def compare(folder: Path, as_json: bool) -> None:
     try:
         profile.run(store, folder / "profile", as_json=as_json, quiet=as_json)
     except ImportError as error:
-        say.print(f"No pictures: {error}")
+        say.print(f'No pictures: {error}; pip install "fclib[bench]"', highlight=False)
     say.print(f"The runs:      {store}  (fclib bench --status {store})", highlight=False)
 
 

@@ -11,8 +11,9 @@
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)
-//   8  homotopy: the path by its arclength, around its folds
-//   9  proximal point with an accurate inner solution, the last resort
+//   8  proximal point with an accurate inner solution, for some steps
+//   9  homotopy: the path by its arclength, around its folds
+//  10  proximal point to the end, the last resort
 //
 // 4 to 6 are for Coulomb's cone alone. Every stage starts from, and returns to, the best iterate so
 // far; each island is held to its share of the tolerance. What a stage may cost is counted in
@@ -83,6 +84,9 @@ constexpr std::int64_t newton_iterations = 200;
 /// be cheap where it does.
 constexpr double good_guess = 0.03;
 constexpr std::int64_t guess_iterations = 12;
+
+/// Of the proximal point before the paths with folds: half of what it solves takes fewer.
+constexpr std::int64_t proximal_trial = 200;
 
 /// Of a path with folds: those that are passed at all mostly take fewer.
 constexpr std::int64_t homotopy_factorisations = 1500;
@@ -256,6 +260,33 @@ class Island {
     }
   }
 
+  /// From the best iterate, while it may end for what the factorisations have cost so far: for a
+  /// loose tolerance it often does, where the interior points fail.
+  void sweep_on() {
+    constexpr std::int64_t interval = 10;
+    const double budget = static_cast<double>(system().factorisations()) *
+                          factorisation_cost(problem_, system()) / sweep_cost(problem_);
+    r_ = best_;
+    problem_.velocity(r_, u_);
+    double least = std::numeric_limits<double>::infinity();  // error since the last look
+    double marked = least;                                   // ... and before it
+    std::int64_t mark = 0;                                   // sweeps at the last look
+    for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
+      for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_.sweep(r_, u_);
+      problem_.velocity(r_, u_);
+      const double error = error_of(u_, r_);
+      if (take(interval, error, r_)) return;
+      least = std::min(least, error);
+      if (k < 2 * mark || k < 5 * interval) continue;
+      const double rate = std::log(marked / least) / static_cast<double>(k - mark);
+      const double left = std::log(least / tolerance_) / rate;
+      if (!(rate > 0) || left > 2 * (budget - static_cast<double>(k))) return;
+      marked = least;
+      least = std::numeric_limits<double>::infinity();
+      mark = k;
+    }
+  }
+
   void continue_by_newton() {
     if (!done() && error_ < options_.polish_below) {
       stage("proximal newton", [&] { return polish(best_); });
@@ -263,11 +294,13 @@ class Island {
     start_ = best_;
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       if (!done()) stage("interior point", [&] { interior_point({}); });
+      if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
       // where its path folds, another way along it may pass
       if (!done()) {
         stage("interior point, shorter steps",
               [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
       }
+      if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
       if (!done()) stage("associated", [&] { associated(); });
       // from nothing: where it converges, it does from there as well as from an iterate that
       // another method is stuck at; slower than the proximal point on rolling contacts
@@ -277,6 +310,11 @@ class Island {
       }
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
+    // where it converges from there, it does soon
+    if (!done()) {
+      stage("proximal point",
+            [&] { proximal({.kappa = 10, .max_factorisations = proximal_trial}, best_); });
+    }
     // another rounding is another path
     for (const double rounding : {0.3, 1.0}) {
       if (!done()) stage("homotopy", [&] { homotopy(rounding); });

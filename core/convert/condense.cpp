@@ -17,22 +17,18 @@ Condensation::Condensation(const GlobalProblem& problem)
   const auto store = [](const SparseColumns& a) {
     return converted(Matrix::from_eigen(a), Storage::csr);
   };
-  if (mass_.is_cholesky() || h.rows() == 0) {
-    // one triangular solve, and W = Y^T Y is symmetric to the last bit
-    const SparseColumns y = mass_.half_solve(h);
-    local_.W = store(SparseColumns(y.transpose() * y));
-    if (is_mixed(problem)) {
-      const SparseColumns z = mass_.half_solve(g);
-      local_.V = store(SparseColumns(y.transpose() * z));
-      local_.R = store(SparseColumns(z.transpose() * z));
-    }
-  } else {
-    local_.W = store(SparseColumns(h.transpose() * mass_.solve(h)));
-    if (is_mixed(problem)) {
-      const SparseColumns velocity = mass_.solve(g);
-      local_.V = store(SparseColumns(h.transpose() * velocity));
-      local_.R = store(SparseColumns(g.transpose() * velocity));
-    }
+  const Eigen::Index m = h.cols();
+  const Eigen::Index p = g.cols();
+  SparseColumns both(h.rows(), m + p);  // [H G]
+  both.reserve(h.nonZeros() + g.nonZeros());
+  both.leftCols(m) = h;
+  both.rightCols(p) = g;
+  const SparseColumns gram = mass_.gram(both);
+  local_.W = store(SparseColumns(SparseColumns(gram.leftCols(m)).topRows(m)));
+  if (is_mixed(problem)) {
+    const SparseColumns right = gram.rightCols(p);
+    local_.V = store(SparseColumns(right.topRows(m)));
+    local_.R = store(SparseColumns(right.bottomRows(p)));
   }
   if (is_mixed(problem)) {
     local_.s = problem.b;

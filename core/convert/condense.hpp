@@ -15,6 +15,7 @@ class Condensation {
   explicit Condensation(const GlobalProblem& problem);
 
   [[nodiscard]] const LocalProblem& local() const { return local_; }
+  [[nodiscard]] const Factorization& mass() const { return mass_; }
   /// Completes v = M^-1 (H r + G lambda + f) and u = H^T v + w from r and l.
   [[nodiscard]] Solution expand(const Solution& local) const;
 

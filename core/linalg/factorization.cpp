@@ -9,6 +9,12 @@ namespace fclib {
 
 namespace {
 
+/// Supernodes are planned only for what may be a mesh: this many rows, and entries in each.
+constexpr Eigen::Index large = 1000;
+constexpr Eigen::Index mesh_entries = 20;
+/// ... and used where an LU factorisation would take so many multiplications.
+constexpr double supernodal_flops = 1e8;
+
 bool is_symmetric(const SparseColumns& a) {
   const SparseColumns transposed = a.transpose();
   const SparseColumns difference = a - transposed;
@@ -28,6 +34,19 @@ bool is_symmetric(const SparseColumns& a) {
 Factorization::Factorization(const SparseColumns& a, const std::string& name, bool definite) {
   if (a.rows() == 0) return;
   if (definite && is_symmetric(a)) {
+    if (a.rows() >= large && a.nonZeros() >= mesh_entries * a.rows()) {
+      SparseColumns both = a;  // entries that are zero may be stored on one side alone
+      both += SparseColumns(a.transpose());
+      both *= 0.5;
+      Fronts plan(MultifrontalCholesky::symmetric_pattern(both));
+      if (plan.flops > supernodal_flops) {
+        supernodal_ = std::make_unique<MultifrontalCholesky>(std::move(plan), both);
+        if (!supernodal_->positive_definite()) {
+          throw Error(ErrorKind::unsuitable, name + " is not positive definite");
+        }
+        return;
+      }
+    }
     cholesky_ = std::make_unique<Cholesky>(a);
     if (cholesky_->info() != Eigen::Success) {
       throw Error(ErrorKind::unsuitable, name + " is not positive definite");
@@ -42,15 +61,40 @@ Factorization::Factorization(const SparseColumns& a, const std::string& name, bo
 }
 
 Vector Factorization::solve(ConstVectorRef b) const {
+  if (supernodal_) return supernodal_->solve(b);
   if (cholesky_) return cholesky_->solve(b);
   if (lu_) return lu_->solve(b);
   return b;
 }
 
 SparseColumns Factorization::solve(const SparseColumns& b) const {
+  if (supernodal_) {
+    SparseColumns result(b.rows(), b.cols());
+    for (Eigen::Index col = 0; col < b.cols(); ++col) {
+      result.col(col) = supernodal_->solve(Vector(b.col(col))).sparseView();
+    }
+    return result;
+  }
   if (cholesky_) return cholesky_->solve(b);
   if (lu_) return lu_->solve(b);
   return b;
+}
+
+SparseColumns Factorization::gram(const SparseColumns& b) const {
+  if (supernodal_) return supernodal_->gram(b);
+  if (lu_) return b.transpose() * solve(b);
+  const SparseColumns y = half_solve(b);
+  return y.transpose() * y;
+}
+
+Vector Factorization::gram_diagonal(const SparseColumns& b) const {
+  if (supernodal_) return supernodal_->gram_diagonal(b);
+  const SparseColumns x = lu_ ? lu_->solve(b) : half_solve(b);
+  Vector result(b.cols());
+  for (Eigen::Index col = 0; col < b.cols(); ++col) {
+    result[col] = lu_ ? b.col(col).dot(x.col(col)) : x.col(col).squaredNorm();
+  }
+  return result;
 }
 
 SparseColumns Factorization::half_solve(const SparseColumns& b) const {

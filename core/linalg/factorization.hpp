@@ -7,10 +7,12 @@
 #include <string>
 
 #include "linalg/matrix.hpp"
+#include "linalg/multifrontal_cholesky.hpp"
 
 namespace fclib {
 
-/// A sparse factorisation: Cholesky where the matrix is symmetric, LU where it is not.
+/// A sparse factorisation: Cholesky where the matrix is symmetric, by supernodes where it is worth
+/// it, and LU where it is not.
 ///
 /// Files hold mass matrices whose symmetry is lost to rounding or to a linearisation (1e-7
 /// relative in CubeH8); half of such a matrix would be another problem.
@@ -26,15 +28,20 @@ class Factorization {
   /// A^-1 B.
   [[nodiscard]] SparseColumns solve(const SparseColumns& b) const;
 
-  [[nodiscard]] bool is_cholesky() const { return cholesky_ != nullptr; }
-  /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y (Cholesky only). Costs the non-zeros it makes, not
-  /// n times the columns: bodies that do not touch stay apart.
-  [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;
+  /// B^T A^-1 B; symmetric to the last bit where A is.
+  [[nodiscard]] SparseColumns gram(const SparseColumns& b) const;
+  /// Its diagonal.
+  [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
 
  private:
   using Cholesky = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<Index>>;
   using LU = Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>>;
-  std::unique_ptr<Cholesky> cholesky_;
+  /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y, of the simplicial factors. Costs the non-zeros it
+  /// makes, not n times the columns: bodies that do not touch stay apart.
+  [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;
+
+  std::unique_ptr<Cholesky> cholesky_;  // of bodies, each with its own small block
+  std::unique_ptr<MultifrontalCholesky> supernodal_;  // of meshes
   std::unique_ptr<LU> lu_;
 };
 

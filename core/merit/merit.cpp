@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <optional>
 
 #include "cones/coulomb.hpp"
 #include "cones/rolling.hpp"
@@ -109,7 +110,7 @@ void judge_contacts(Index spacedim, const Friction& friction, const RealVector& 
 }
 
 Merit judge(const LocalProblem& problem, const Friction& friction, const Solution& solution,
-            ContactMerits& each) {
+            ContactMerits& each, const Factorization*) {
   Merit result;
   const RealVector q = problem.q.cast<Real>();
   const RealVector r = solution.r.cast<Real>();
@@ -140,9 +141,10 @@ Merit judge(const LocalProblem& problem, const Friction& friction, const Solutio
 }
 
 Merit judge(const GlobalProblem& problem, const Friction& friction, const Solution& solution,
-            ContactMerits& each) {
+            ContactMerits& each, const Factorization* known) {
   Merit result;
-  const Factorization mass(to_eigen(problem.M), "M");
+  std::optional<Factorization> made;
+  const Factorization& mass = known ? *known : made.emplace(to_eigen(problem.M), "M");
   const RealVector f = problem.f.cast<Real>();
   const RealVector w = problem.w.cast<Real>();
   const RealVector r = solution.r.cast<Real>();
@@ -181,12 +183,9 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
 
   const RealVector q = product_transposed(problem.H, free) + w;
   RealVector scale = RealVector::Zero(problem.mu.size());
-  const SparseColumns h = to_eigen(problem.H);
-  const SparseColumns y = mass.is_cholesky() ? mass.half_solve(h) : mass.solve(h);
-  for (Eigen::Index col = 0; col < y.cols(); ++col) {
-    const double diagonal =
-        mass.is_cholesky() ? y.col(col).squaredNorm() : h.col(col).dot(y.col(col));
-    scale[col / problem.spacedim] += Real(diagonal) / problem.spacedim;
+  const Vector diagonal = mass.gram_diagonal(to_eigen(problem.H));
+  for (Eigen::Index col = 0; col < diagonal.size(); ++col) {
+    scale[col / problem.spacedim] += Real(diagonal[col]) / problem.spacedim;
   }
   judge_contacts(problem.spacedim, friction, q, u, r, scale, result, each);
   return result;
@@ -194,16 +193,18 @@ Merit judge(const GlobalProblem& problem, const Friction& friction, const Soluti
 
 /// std::max drops a NaN; a solution that holds one must never look good.
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
+Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each,
+                  const Factorization* mass = nullptr) {
   validate(problem);
   validate(solution, problem);
-  return judge(problem, friction_of(problem), solution, each);
+  return judge(problem, friction_of(problem), solution, each, mass);
 }
 
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution) {
+Merit judge_valid(const P& problem, const Solution& solution,
+                  const Factorization* mass = nullptr) {
   ContactMerits each;
-  return judge_valid(problem, solution, each);
+  return judge_valid(problem, solution, each, mass);
 }
 
 template <class P>
@@ -226,6 +227,14 @@ Merit merit(const GlobalProblem& problem, const Solution& solution) {
 }
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
   return judge_valid(problem, solution);
+}
+
+Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass) {
+  return judge_valid(problem, solution, &mass);
+}
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
+            const Factorization& mass) {
+  return judge_valid(problem, solution, &mass);
 }
 
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {

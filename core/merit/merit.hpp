@@ -18,6 +18,8 @@
 
 namespace fclib {
 
+class Factorization;
+
 struct Merit {
   double error = 0;
   double natural = 0;
@@ -101,6 +103,11 @@ Merit merit(const LocalProblem& problem, const Solution& solution);
 Merit merit(const LocalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
+
+/// The same where M is factorised already.
+Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass);
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
+            const Factorization& mass);
 
 /// As merit(), and throws as it does.
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);

@@ -125,7 +125,7 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const LocalProblem& local = condensation.local();
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
-    return merit(problem, solution).error;
+    return merit(problem, solution, condensation.mass()).error;
   };
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};

@@ -16,7 +16,6 @@ TEST(Factorization, solves_symmetric_and_other_systems) {
   other.coeffRef(0, 1) += 1e-3;
   for (const SparseColumns& a : {symmetric, other}) {
     const Factorization factorization(a, "A");
-    EXPECT_EQ(factorization.is_cholesky(), a.isApprox(SparseColumns(a.transpose())));
     const Vector b = random.vector(20);
     EXPECT_LT((a * factorization.solve(b) - b).norm(), 1e-12);
     const SparseColumns many = random.sparse(20, 6, 0.2);
@@ -25,7 +24,7 @@ TEST(Factorization, solves_symmetric_and_other_systems) {
   }
 }
 
-TEST(Factorization, half_solve_gives_the_symmetric_product_and_keeps_it_sparse) {
+TEST(Factorization, gram_is_symmetric_and_keeps_bodies_apart) {
   testing::RandomData random(6);
   // two bodies that do not touch: a block-diagonal matrix
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(16, 16);
@@ -34,11 +33,78 @@ TEST(Factorization, half_solve_gives_the_symmetric_product_and_keeps_it_sparse) 
   Eigen::MatrixXd b = Eigen::MatrixXd::Zero(16, 4);
   b.topLeftCorner(8, 2) = random.dense(8, 2);
   b.bottomRightCorner(8, 2) = random.dense(8, 2);
-  const SparseColumns y = Factorization(a.sparseView(), "A").half_solve(b.sparseView());
-  const Eigen::MatrixXd product(SparseColumns(y.transpose() * y));
+  const Factorization factorization(a.sparseView(), "A");
+  const SparseColumns sparse = factorization.gram(b.sparseView());
+  const Eigen::MatrixXd product(sparse);
   EXPECT_LT((product - b.transpose() * a.inverse() * b).norm(), 1e-12);
   EXPECT_EQ(product, product.transpose());
-  EXPECT_LE(y.nonZeros(), 32);
+  EXPECT_EQ(sparse.nonZeros(), 8);
+  EXPECT_LT((factorization.gram_diagonal(b.sparseView()) - product.diagonal()).norm(), 1e-12);
+}
+
+/// The stiffness of a cube of bricks, three unknowns a node, and a bit on the diagonal.
+SparseColumns brick(Index side) {
+  const auto node = [&](Index x, Index y, Index z) { return (z * side + y) * side + x; };
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  const Index n = 3 * side * side * side;
+  for (Index k = 0; k < n; ++k) entries.emplace_back(k, k, 0.01);
+  for (Index z = 0; z + 1 < side; ++z) {
+    for (Index y = 0; y + 1 < side; ++y) {
+      for (Index x = 0; x + 1 < side; ++x) {
+        for (Index i = 0; i < 8; ++i) {
+          for (Index j = 0; j < 8; ++j) {
+            for (Index c = 0; c < 9; ++c) {
+              const Index row = 3 * node(x + i % 2, y + i / 2 % 2, z + i / 4) + c / 3;
+              const Index col = 3 * node(x + j % 2, y + j / 2 % 2, z + j / 4) + c % 3;
+              const double part = c / 3 == c % 3 ? 1.0 : 0.25;
+              entries.emplace_back(row, col, part * (i == j ? 7.0 : -1.0));
+            }
+          }
+        }
+      }
+    }
+  }
+  SparseColumns a(n, n);
+  a.setFromTriplets(entries.begin(), entries.end());
+  return a;
+}
+
+TEST(Factorization, of_meshes_is_by_supernodes) {
+  testing::RandomData random(7);
+  const SparseColumns one = brick(9);
+  const Index n = static_cast<Index>(one.rows());
+  std::vector<Eigen::Triplet<double, Index>> entries;  // two bricks that do not touch
+  for (Index col = 0; col < n; ++col) {
+    for (SparseColumns::InnerIterator at(one, col); at; ++at) {
+      entries.emplace_back(static_cast<Index>(at.row()), col, at.value());
+      entries.emplace_back(n + static_cast<Index>(at.row()), n + col, 2 * at.value());
+    }
+  }
+  SparseColumns a(2 * n, 2 * n);
+  a.setFromTriplets(entries.begin(), entries.end());
+  ASSERT_GT(Fronts(MultifrontalCholesky::symmetric_pattern(a)).flops, 1e8);  // so it is used
+  const Factorization factorization(a, "A");
+  const Vector b = random.vector(2 * n);
+  EXPECT_LT((a * factorization.solve(b) - b).norm(), 1e-10 * b.norm());
+
+  SparseColumns h(2 * n, 12);  // the first on one brick, the last on the other, some on both
+  for (Index col = 0; col < 12; ++col) {
+    for (Index k = 0; k < 5; ++k) {
+      if (col < 8) h.coeffRef((97 * k + 13 * col) % n, col) = random.vector(1)[0];
+      if (col > 4) h.coeffRef(n + (89 * k + 17 * col) % n, col) = random.vector(1)[0];
+    }
+  }
+  const SparseColumns sparse = factorization.gram(h);
+  const Eigen::MatrixXd gram(sparse);
+  const Eigen::MatrixXd expected(SparseColumns(h.transpose() * factorization.solve(h)));
+  EXPECT_LT((gram - expected).norm(), 1e-10 * expected.norm());
+  EXPECT_EQ(gram, gram.transpose());
+  EXPECT_EQ(gram(0, 11), 0);
+  EXPECT_LT((factorization.gram_diagonal(h) - gram.diagonal()).norm(), 1e-12 * gram.norm());
+
+  SparseColumns indefinite = a;
+  indefinite.coeffRef(n, n) = -1;
+  EXPECT_THROW(Factorization(indefinite, "M"), Error);
 }
 
 TEST(Factorization, says_what_cannot_be_factorised) {

@@ -1,0 +1,244 @@
+#include "linalg/fronts.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace fclib {
+
+namespace {
+
+/// Fronts are merged with their parent where the zeros that this stores cost less than their
+/// bookkeeping: always below this many scalars, and while few of the entries are zeros.
+constexpr double small_front = 24;
+constexpr double zero_share = 0.15;
+
+/// Scalars up to which a system is one dense front without more ado.
+constexpr Index dense_size = 96;
+
+std::vector<Index> minimum_degree(const BlockPattern& pattern) {
+  const Index n = pattern.nodes();
+  using Pattern = Eigen::SparseMatrix<double, Eigen::ColMajor, Index>;
+  std::vector<Index> outer(pattern.first.begin(), pattern.first.end());
+  const std::vector<double> ones(pattern.row.size(), 1.0);
+  const Eigen::Map<const Pattern> graph(n, n, static_cast<Index>(pattern.row.size()), outer.data(),
+                                        pattern.row.data(), ones.data());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, Index> order;
+  Eigen::AMDOrdering<Index> amd;
+  amd(Pattern(graph), order);
+  // order(k) is the node that is eliminated as k-th
+  return {order.indices().data(), order.indices().data() + n};
+}
+
+/// Parents in the elimination tree of the pattern under a numbering (Liu 1986).
+std::vector<Index> elimination_tree(const BlockPattern& pattern, const std::vector<Index>& order,
+                                    const std::vector<Index>& position) {
+  const auto n = order.size();
+  std::vector<Index> parent(n, -1);
+  std::vector<Index> ancestor(n, -1);
+  for (std::size_t col = 0; col < n; ++col) {
+    const auto node = static_cast<std::size_t>(order[col]);
+    for (auto k = pattern.first[node]; k < pattern.first[node + 1]; ++k) {
+      Index row = position[pattern.row[static_cast<std::size_t>(k)]];
+      while (row >= 0 && row < static_cast<Index>(col)) {
+        const Index next = ancestor[row];
+        ancestor[row] = static_cast<Index>(col);
+        if (next < 0) parent[row] = static_cast<Index>(col);
+        row = next;
+      }
+    }
+  }
+  return parent;
+}
+
+std::vector<Index> postorder(const std::vector<Index>& parent) {
+  const auto n = parent.size();
+  std::vector<Index> head(n, -1);
+  std::vector<Index> next(n, -1);
+  std::vector<Index> roots;
+  for (std::size_t k = n; k-- > 0;) {
+    if (parent[k] < 0) {
+      roots.push_back(static_cast<Index>(k));
+    } else {
+      next[k] = head[parent[k]];
+      head[parent[k]] = static_cast<Index>(k);
+    }
+  }
+  std::vector<Index> result;
+  result.reserve(n);
+  std::vector<Index> stack;
+  for (auto root = roots.rbegin(); root != roots.rend(); ++root) {
+    stack.push_back(*root);
+    while (!stack.empty()) {
+      const Index top = stack.back();
+      if (head[top] >= 0) {
+        const Index child = head[top];
+        head[top] = next[child];
+        stack.push_back(child);
+      } else {
+        result.push_back(top);
+        stack.pop_back();
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+Fronts::Fronts(const BlockPattern& pattern) : d(pattern.d) {
+  const Index n = pattern.nodes();
+  size = d * n;
+  position.resize(static_cast<std::size_t>(n));
+  std::vector<Index> order(static_cast<std::size_t>(n));
+  std::iota(order.begin(), order.end(), 0);
+
+  // pivot nodes and update nodes of each front, in the final numbering
+  std::vector<std::vector<Index>> structure;
+  std::vector<Index> pivots;
+  std::vector<Index> front_parent;
+  if (size <= dense_size) {
+    std::iota(position.begin(), position.end(), 0);
+    if (n > 0) {
+      structure.push_back(order);
+      pivots.push_back(n);
+      front_parent.push_back(-1);
+    }
+  } else {
+    order = minimum_degree(pattern);
+    const auto number = [&] {
+      for (std::size_t k = 0; k < order.size(); ++k) position[order[k]] = static_cast<Index>(k);
+    };
+    number();
+    std::vector<Index> parent = elimination_tree(pattern, order, position);
+    const std::vector<Index> post = postorder(parent);
+    std::vector<Index> reordered(order.size());
+    for (std::size_t k = 0; k < order.size(); ++k) reordered[k] = order[post[k]];
+    order = reordered;
+    number();
+    parent = elimination_tree(pattern, order, position);
+
+    // the structure of each column of L, and fronts built from the leaves up
+    const auto count = static_cast<std::size_t>(n);
+    std::vector<std::vector<Index>> children(count);
+    for (std::size_t k = 0; k < count; ++k) {
+      if (parent[k] >= 0) children[parent[k]].push_back(static_cast<Index>(k));
+    }
+    std::vector<Index> front_of(count, -1);  // of the column, where it is the last pivot
+    std::vector<Index> mark(count, -1);
+    std::vector<double> zeros;
+    std::vector<char> merged;
+    for (std::size_t k = 0; k < count; ++k) {
+      const auto col = static_cast<Index>(k);
+      std::vector<Index> rows;
+      mark[k] = col;
+      const auto node = static_cast<std::size_t>(order[k]);
+      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
+        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
+        if (row > col && mark[row] != col) {
+          mark[row] = col;
+          rows.push_back(row);
+        }
+      }
+      for (const Index child : children[k]) {
+        const std::vector<Index>& below = structure[front_of[child]];
+        for (auto at = static_cast<std::size_t>(pivots[front_of[child]]); at < below.size(); ++at) {
+          if (mark[below[at]] != col) {
+            mark[below[at]] = col;
+            rows.push_back(below[at]);
+          }
+        }
+      }
+      std::sort(rows.begin(), rows.end());
+      // merge with the front of the child whose pivots end just before
+      const Index last = k > 0 && parent[k - 1] == col ? front_of[k - 1] : -1;
+      bool merge = false;
+      double empty = 0;
+      if (last >= 0) {
+        const double width = pivots[last];
+        const double child_rows = static_cast<double>(structure[last].size());
+        const double new_rows = width + 1 + static_cast<double>(rows.size());
+        empty = zeros[last] + 2 * width * (new_rows - child_rows);
+        const double all = new_rows * new_rows - std::pow(static_cast<double>(rows.size()), 2);
+        merge = empty == 0 || new_rows * d <= small_front || empty <= zero_share * all;
+      }
+      if (merge) {
+        structure[last].resize(static_cast<std::size_t>(pivots[last]));
+        structure[last].push_back(col);
+        structure[last].insert(structure[last].end(), rows.begin(), rows.end());
+        ++pivots[last];
+        zeros[last] = empty;
+        front_of[k] = last;
+      } else {
+        front_of[k] = static_cast<Index>(structure.size());
+        rows.insert(rows.begin(), col);
+        structure.push_back(std::move(rows));
+        pivots.push_back(1);
+        zeros.push_back(0);
+      }
+    }
+    front_parent.assign(structure.size(), -1);
+    for (std::size_t f = 0; f < structure.size(); ++f) {
+      const Index last_pivot = structure[f][static_cast<std::size_t>(pivots[f]) - 1];
+      if (parent[last_pivot] >= 0) front_parent[f] = front_of[parent[last_pivot]];
+    }
+  }
+
+  // fronts are numbered by their first pivot, which is a postorder
+  fronts.resize(structure.size());
+  std::vector<Index> where(static_cast<std::size_t>(n), -1);  // offset of a node in the front
+  std::vector<Index> node_front(static_cast<std::size_t>(n));
+  for (std::size_t f = 0; f < structure.size(); ++f) {
+    Front& front = fronts[f];
+    front.nodes = std::move(structure[f]);
+    front.pivots = d * pivots[f];
+    front.size = d * static_cast<Index>(front.nodes.size());
+    largest = std::max(largest, front.size);
+    for (Index k = 0; k < pivots[f]; ++k) node_front[front.nodes[k]] = static_cast<Index>(f);
+    const double k = front.pivots;
+    const double u = front.size - front.pivots;
+    flops += k * k * k / 3 + k * k * u + k * u * u;
+    memory += k * k + 2 * k * u;
+  }
+  for (std::size_t f = 0; f < fronts.size(); ++f) {
+    if (front_parent[f] < 0) continue;
+    Front& up = fronts[front_parent[f]];
+    up.children.push_back(static_cast<Index>(f));
+    for (std::size_t k = 0; k < up.nodes.size(); ++k)
+      where[up.nodes[k]] = d * static_cast<Index>(k);
+    Front& front = fronts[f];
+    for (auto k = static_cast<std::size_t>(pivots[f]); k < front.nodes.size(); ++k) {
+      front.to_parent.push_back(where[front.nodes[k]]);
+    }
+  }
+  for (std::size_t f = 0; f < fronts.size(); ++f) {
+    Front& front = fronts[f];
+    for (std::size_t k = 0; k < front.nodes.size(); ++k)
+      where[front.nodes[k]] = d * static_cast<Index>(k);
+    for (Index k = 0; k < pivots[f]; ++k) {
+      const Index col = front.nodes[k];
+      const auto node = static_cast<std::size_t>(order[col]);
+      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
+        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
+        // of this front are the entries whose lower index is one of its pivots
+        if (node_front[std::min(row, col)] == static_cast<Index>(f)) {
+          front.entries.push_back({e, where[row], where[col]});
+        }
+      }
+    }
+    // ... and those of later columns in the rows of its pivots
+    for (auto k = static_cast<std::size_t>(pivots[f]); k < front.nodes.size(); ++k) {
+      const Index col = front.nodes[k];
+      const auto node = static_cast<std::size_t>(order[col]);
+      for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
+        const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
+        if (row < col && node_front[row] == static_cast<Index>(f)) {
+          front.entries.push_back({e, where[row], where[col]});
+        }
+      }
+    }
+  }
+}
+
+}  // namespace fclib

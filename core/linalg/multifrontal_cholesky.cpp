@@ -1,0 +1,225 @@
+#include "linalg/multifrontal_cholesky.hpp"
+
+#include <algorithm>
+
+namespace fclib {
+
+BlockPattern MultifrontalCholesky::symmetric_pattern(const SparseColumns& a) {
+  BlockPattern pattern;
+  pattern.first.assign(1, 0);
+  pattern.row.reserve(static_cast<std::size_t>(a.nonZeros()));
+  for (Eigen::Index col = 0; col < a.cols(); ++col) {
+    for (SparseColumns::InnerIterator at(a, col); at; ++at) {
+      pattern.row.push_back(static_cast<Index>(at.row()));
+    }
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  return pattern;
+}
+
+MultifrontalCholesky::MultifrontalCholesky(Fronts plan, const SparseColumns& a)
+    : plan_(std::move(plan)), factors_(plan_.fronts.size()) {
+  positive_definite_ = factorise(a);
+}
+
+bool MultifrontalCholesky::factorise(const SparseColumns& a) {
+  Dense work(plan_.largest, plan_.largest);
+  std::vector<Dense> updates(factors_.size());  // lower triangles, until the parent has taken them
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const Front& front = plan_.fronts[f];
+    const Index k = front.pivots;
+    const Index u = front.size - k;
+    auto front_matrix = work.topLeftCorner(front.size, front.size);
+    front_matrix.setZero();
+    for (const Front::Entry& entry : front.entries) {
+      if (entry.row >= entry.col) front_matrix(entry.row, entry.col) += a.valuePtr()[entry.block];
+    }
+    for (const Index child : front.children) {
+      const std::vector<Index>& to = plan_.fronts[child].to_parent;
+      Dense& update = updates[child];
+      for (std::size_t col = 0; col < to.size(); ++col) {
+        const double* source = update.data() + static_cast<std::ptrdiff_t>(col * to.size());
+        double* target = &front_matrix(0, to[col]);
+        for (std::size_t row = col; row < to.size(); ++row) target[to[row]] += source[row];
+      }
+      update.resize(0, 0);
+    }
+    Factors& factors = factors_[f];
+    factors.diagonal = front_matrix.topLeftCorner(k, k);
+    const Eigen::LLT<Eigen::Ref<Dense>> pivots(factors.diagonal);
+    if (pivots.info() != Eigen::Success) return false;
+    if (u == 0) continue;
+    factors.lower = front_matrix.bottomLeftCorner(u, k);
+    factors.diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(
+        factors.lower);
+    updates[f] = front_matrix.bottomRightCorner(u, u);
+    updates[f].selfadjointView<Eigen::Lower>().rankUpdate(factors.lower, -1.0);
+  }
+  return true;
+}
+
+Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
+  Vector permuted(b.size());
+  for (Index node = 0; node < plan_.size; ++node) permuted[plan_.position[node]] = b[node];
+  Vector local(plan_.largest);
+  const auto gather = [&](const Front& front) {
+    for (std::size_t k = 0; k < front.nodes.size(); ++k) local[k] = permuted[front.nodes[k]];
+  };
+  const auto scatter = [&](const Front& front) {
+    for (std::size_t k = 0; k < front.nodes.size(); ++k) permuted[front.nodes[k]] = local[k];
+  };
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const Front& front = plan_.fronts[f];
+    const Index u = front.size - front.pivots;
+    gather(front);
+    auto top = local.head(front.pivots);
+    factors_[f].diagonal.triangularView<Eigen::Lower>().solveInPlace(top);
+    if (u > 0) local.segment(front.pivots, u).noalias() -= factors_[f].lower * top;
+    scatter(front);
+  }
+  for (std::size_t f = factors_.size(); f-- > 0;) {
+    const Front& front = plan_.fronts[f];
+    const Index u = front.size - front.pivots;
+    gather(front);
+    auto top = local.head(front.pivots);
+    if (u > 0) {
+      top.noalias() -= factors_[f].lower.transpose() * local.segment(front.pivots, u);
+    }
+    factors_[f].diagonal.triangularView<Eigen::Lower>().transpose().solveInPlace(top);
+    scatter(front);
+  }
+  Vector result(b.size());
+  for (Index node = 0; node < plan_.size; ++node) result[node] = permuted[plan_.position[node]];
+  return result;
+}
+
+std::vector<Index> MultifrontalCholesky::roots() const {
+  std::vector<Index> root(factors_.size());
+  for (std::size_t f = factors_.size(); f-- > 0;) {
+    if (plan_.fronts[f].to_parent.empty()) root[f] = static_cast<Index>(f);
+    for (const Index child : plan_.fronts[f].children) root[child] = root[f];
+  }
+  return root;
+}
+
+/// Y = L^-1 P B, front by front: visit(front, columns, rows of Y at its pivots), where only the
+/// columns of B that reach the front are there, in ascending order.
+template <class Visit>
+void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) const {
+  struct Part {  // of B, updated, at the rows below a front's pivots
+    std::vector<Index> columns;
+    Dense values;
+  };
+  const Eigen::SparseMatrix<double, Eigen::RowMajor, Index> rows = b;
+  std::vector<Index> node_of(static_cast<std::size_t>(plan_.size));  // in the old numbering
+  for (Index node = 0; node < plan_.size; ++node) node_of[plan_.position[node]] = node;
+  std::vector<Part> parts(factors_.size());
+  std::vector<Index> place(static_cast<std::size_t>(b.cols()));
+  Dense work;
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const Front& front = plan_.fronts[f];
+    const Index k = front.pivots;
+    const Index u = front.size - k;
+    std::vector<Index> columns;
+    for (Index p = 0; p < k; ++p) {
+      for (decltype(rows)::InnerIterator at(rows, node_of[front.nodes[p]]); at; ++at)
+        columns.push_back(static_cast<Index>(at.col()));
+    }
+    for (const Index child : front.children) {
+      columns.insert(columns.end(), parts[child].columns.begin(), parts[child].columns.end());
+    }
+    std::sort(columns.begin(), columns.end());
+    columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+    if (columns.empty()) continue;
+    for (std::size_t c = 0; c < columns.size(); ++c) place[columns[c]] = static_cast<Index>(c);
+    work.setZero(front.size, static_cast<Eigen::Index>(columns.size()));
+    for (Index p = 0; p < k; ++p) {
+      for (decltype(rows)::InnerIterator at(rows, node_of[front.nodes[p]]); at; ++at)
+        work(p, place[at.col()]) = at.value();
+    }
+    for (const Index child : front.children) {
+      const std::vector<Index>& to = plan_.fronts[child].to_parent;
+      Part& part = parts[child];
+      for (std::size_t c = 0; c < part.columns.size(); ++c) {
+        const double* source = part.values.data() + static_cast<std::ptrdiff_t>(c * to.size());
+        double* target = &work(0, place[part.columns[c]]);
+        for (std::size_t row = 0; row < to.size(); ++row) target[to[row]] += source[row];
+      }
+      part = {};
+    }
+    auto y = work.topRows(k);
+    factors_[f].diagonal.triangularView<Eigen::Lower>().solveInPlace(y);
+    if (u > 0) {
+      parts[f].values = work.bottomRows(u);
+      parts[f].values.noalias() -= factors_[f].lower * y;
+    }
+    visit(f, columns, y);
+    if (u > 0) parts[f].columns = std::move(columns);
+  }
+}
+
+SparseColumns MultifrontalCholesky::gram(const SparseColumns& b) const {
+  // Y^T Y of each tree of fronts, dense in the columns that reach it
+  const std::vector<Index> root = roots();
+  std::vector<std::vector<Index>> reaching(factors_.size());
+  std::vector<Index> front_of(static_cast<std::size_t>(plan_.size));
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    for (Index p = 0; p < plan_.fronts[f].pivots; ++p)
+      front_of[plan_.fronts[f].nodes[p]] = static_cast<Index>(f);
+  }
+  for (Eigen::Index col = 0; col < b.cols(); ++col) {
+    for (SparseColumns::InnerIterator at(b, col); at; ++at) {
+      auto& columns = reaching[root[front_of[plan_.position[at.row()]]]];
+      if (columns.empty() || columns.back() != col) columns.push_back(static_cast<Index>(col));
+    }
+  }
+
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  std::vector<Index> place(static_cast<std::size_t>(b.cols()));
+  Dense tree;
+  Dense part;
+  Index last = -1;  // the tree whose columns have their places
+  forward(b, [&](std::size_t f, const std::vector<Index>& columns, const auto& y) {
+    const std::vector<Index>& all = reaching[root[f]];
+    if (last != root[f]) {
+      last = root[f];
+      for (std::size_t c = 0; c < all.size(); ++c) place[all[c]] = static_cast<Index>(c);
+      tree.setZero(static_cast<Eigen::Index>(all.size()), static_cast<Eigen::Index>(all.size()));
+    }
+    if (columns.size() == all.size()) {
+      tree.selfadjointView<Eigen::Lower>().rankUpdate(y.transpose());
+    } else {
+      part.setZero(y.cols(), y.cols());
+      part.selfadjointView<Eigen::Lower>().rankUpdate(y.transpose());
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        for (std::size_t r = c; r < columns.size(); ++r) {
+          tree(place[columns[r]], place[columns[c]]) +=
+              part(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+        }
+      }
+    }
+    if (root[f] != static_cast<Index>(f)) return;
+    for (std::size_t c = 0; c < all.size(); ++c) {
+      for (std::size_t r = c; r < all.size(); ++r) {
+        const double value = tree(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+        entries.emplace_back(all[r], all[c], value);
+        if (r != c) entries.emplace_back(all[c], all[r], value);
+      }
+    }
+  });
+  SparseColumns result(b.cols(), b.cols());
+  result.setFromTriplets(entries.begin(), entries.end());
+  return result;
+}
+
+Vector MultifrontalCholesky::gram_diagonal(const SparseColumns& b) const {
+  Vector result = Vector::Zero(b.cols());
+  forward(b, [&](std::size_t, const std::vector<Index>& columns, const auto& y) {
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      result[columns[c]] += y.col(static_cast<Eigen::Index>(c)).squaredNorm();
+    }
+  });
+  return result;
+}
+
+}  // namespace fclib

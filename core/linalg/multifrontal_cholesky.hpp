@@ -1,0 +1,50 @@
+// Cholesky factorisation of a large sparse matrix, symmetric positive definite, on the fronts of
+// linalg/fronts.hpp, dense kernels by Eigen: for mass and stiffness matrices of meshes, whose
+// factors are dense enough that working entry by entry takes ten times as long.
+#pragma once
+
+#include <Eigen/Dense>
+#include <vector>
+
+#include "linalg/fronts.hpp"
+
+namespace fclib {
+
+class MultifrontalCholesky {
+ public:
+  /// `plan` is of symmetric_pattern(a).
+  MultifrontalCholesky(Fronts plan, const SparseColumns& a);
+
+  /// The pattern of a symmetric matrix, 1 x 1 blocks.
+  static BlockPattern symmetric_pattern(const SparseColumns& a);
+
+  /// Whether the matrix is positive definite; if not, there are no factors.
+  [[nodiscard]] bool positive_definite() const { return positive_definite_; }
+
+  /// A^-1 b.
+  [[nodiscard]] Vector solve(ConstVectorRef b) const;
+
+  /// B^T A^-1 B, symmetric to the last bit.
+  [[nodiscard]] SparseColumns gram(const SparseColumns& b) const;
+  /// Its diagonal.
+  [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
+
+ private:
+  using Dense = Eigen::MatrixXd;
+
+  struct Factors {   // of one front
+    Dense diagonal;  // L11
+    Dense lower;     // L21
+  };
+
+  bool factorise(const SparseColumns& a);
+  std::vector<Index> roots() const;
+  template <class Visit>
+  void forward(const SparseColumns& b, const Visit& visit) const;
+
+  Fronts plan_;
+  std::vector<Factors> factors_;
+  bool positive_definite_ = false;
+};
+
+}  // namespace fclib

@@ -24,7 +24,8 @@ constexpr Eigen::Index longest_column = 64;
 
 }  // namespace
 
-CoupledSystem::CoupledSystem(const Delassus& problem, Form form) : problem_(problem) {
+CoupledSystem::CoupledSystem(const Delassus& problem, Form form, int threads)
+    : problem_(problem), threads_(threads) {
   const auto d = static_cast<std::size_t>(problem.d());
   D_.assign(d * d * static_cast<std::size_t>(problem.nc()), 0.0);
   zero_ = Vector::Zero(problem.m());
@@ -85,7 +86,7 @@ void CoupledSystem::plan_contacts_of() {
   diagonal_.resize(count);
   for (Index a = 0; a < nc; ++a) diagonal_[a] = find(a, a);
   values_.assign(pattern.values(), 0.0);
-  lu_ = Multifrontal(pattern);
+  lu_ = Multifrontal(pattern, threads_);
 }
 
 bool CoupledSystem::plan_bodies() {
@@ -144,7 +145,7 @@ bool CoupledSystem::plan_bodies() {
       for (const Index row : rows) scatter_.push_back(find(row, col));
     }
   }
-  lu_ = Multifrontal(pattern);
+  lu_ = Multifrontal(pattern, threads_);
   return true;
 }
 

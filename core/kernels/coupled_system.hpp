@@ -23,7 +23,7 @@ class CoupledSystem {
   enum class Form { identity, general };  ///< of B
 
   /// Plans the factorisations; keeps a reference to the problem.
-  explicit CoupledSystem(const Delassus& problem, Form form = Form::identity);
+  explicit CoupledSystem(const Delassus& problem, Form form = Form::identity, int threads = 1);
 
   /// The blocks of D, each d x d by columns, one after another (d d nc): to be filled before
   /// factorise().
@@ -47,6 +47,8 @@ class CoupledSystem {
   /// Multiplications of one factorisation.
   [[nodiscard]] double flops() const { return lu_.flops(); }
   [[nodiscard]] bool on_bodies() const { return on_bodies_; }
+  /// CPU time of factorisations on other threads than the caller's [s].
+  [[nodiscard]] double others_cpu() const { return lu_.others_cpu(); }
 
  private:
   template <int D>
@@ -60,6 +62,7 @@ class CoupledSystem {
   bool plan_bodies();
 
   const Delassus& problem_;
+  int threads_;
   Multifrontal lu_;
   std::vector<double> D_;
   std::vector<double> B_;  // empty: the identity

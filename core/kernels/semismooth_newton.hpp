@@ -58,14 +58,17 @@ class SemismoothNewton {
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<D>;
 
-  explicit SemismoothNewton(const Delassus& problem)
-      : problem_(problem), system_(problem, CoupledSystem::Form::general), contacts_(problem) {
+  explicit SemismoothNewton(const Delassus& problem, int threads = 1)
+      : problem_(problem),
+        system_(problem, CoupledSystem::Form::general, threads),
+        contacts_(problem) {
     const auto m = problem.m();
     for (Vector* v : {&f_, &r_, &u_, &dr_, &du_, &trial_r_, &trial_u_, &gradient_, &rho_, &base_})
       v->setZero(m);
     spectral_norm_.resize(problem.nc());
   }
 
+  [[nodiscard]] const CoupledSystem& system() const { return system_; }
   [[nodiscard]] std::int64_t factorisations() const { return system_.factorisations(); }
 
   /// Improves r. `report(error)` is told of each iterate, and ends it by returning true. r ends as

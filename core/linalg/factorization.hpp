@@ -40,7 +40,7 @@ class Factorization {
   /// makes, not n times the columns: bodies that do not touch stay apart.
   [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;
 
-  std::unique_ptr<Cholesky> cholesky_;  // of bodies, each with its own small block
+  std::unique_ptr<Cholesky> cholesky_;                // of bodies, each with its own small block
   std::unique_ptr<MultifrontalCholesky> supernodal_;  // of meshes
   std::unique_ptr<LU> lu_;
 };

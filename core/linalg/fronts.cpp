@@ -3,7 +3,9 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <numeric>
+#include <utility>
 
 namespace fclib {
 
@@ -239,6 +241,21 @@ Fronts::Fronts(const BlockPattern& pattern) : d(pattern.d) {
       }
     }
   }
+}
+
+std::shared_ptr<const Fronts> planned(const BlockPattern& pattern) {
+  constexpr std::size_t kept = 4;  // a solve may have systems on contacts, on bodies, of an island
+  if (pattern.d * pattern.nodes() <= dense_size) return std::make_shared<Fronts>(pattern);
+  thread_local std::deque<std::pair<BlockPattern, std::shared_ptr<const Fronts>>> known;
+  const auto at = std::find_if(known.begin(), known.end(),
+                               [&](const auto& entry) { return entry.first == pattern; });
+  if (at != known.end()) {
+    std::rotate(known.begin(), at, at + 1);
+  } else {
+    known.emplace_front(pattern, std::make_shared<Fronts>(pattern));
+    if (known.size() > kept) known.pop_back();
+  }
+  return known.front().second;
 }
 
 }  // namespace fclib

@@ -1,9 +1,10 @@
-// The plan of a multifrontal factorisation of a matrix whose pattern is symmetric (Duff & Reid, "The
-// multifrontal solution of indefinite sparse symmetric linear systems", 1983): an approximate
+// The plan of a multifrontal factorisation of a matrix whose pattern is symmetric (Duff & Reid,
+// "The multifrontal solution of indefinite sparse symmetric linear systems", 1983): an approximate
 // minimum degree ordering of the blocks, and supernodes with relaxed amalgamation. Nothing numeric.
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "linalg/matrix.hpp"
@@ -18,6 +19,7 @@ struct BlockPattern {
   std::vector<Index> row;
 
   [[nodiscard]] Index nodes() const { return static_cast<Index>(first.size()) - 1; }
+  [[nodiscard]] bool operator==(const BlockPattern&) const = default;
   [[nodiscard]] std::size_t values() const {
     return static_cast<std::size_t>(d) * static_cast<std::size_t>(d) * row.size();
   }
@@ -49,5 +51,9 @@ struct Fronts {
   std::vector<Index> position;  ///< of each node in the new numbering
   std::vector<Front> fronts;    ///< children before parents
 };
+
+/// The plan for this pattern: the one made before, where this thread had the same pattern among its
+/// last few. Successive steps of a simulation often have.
+std::shared_ptr<const Fronts> planned(const BlockPattern& pattern);
 
 }  // namespace fclib

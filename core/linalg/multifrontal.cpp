@@ -2,21 +2,99 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
+
+#include "linalg/threads.hpp"
 
 namespace fclib {
 
-Multifrontal::Multifrontal(const BlockPattern& pattern)
-    : plan_(pattern), factors_(plan_.fronts.size()) {
+namespace {
+
+/// Threads are started where a factorisation takes this many multiplications, and share a front
+/// that updates so many rows.
+constexpr double worth_threads = 3e7;
+constexpr Index wide = 192;
+/// ... or the rows left of its pivots, a panel at a time.
+constexpr Index few = 768;
+
+}  // namespace
+
+Multifrontal::Multifrontal(const BlockPattern& pattern, int threads)
+    : plan_(planned(pattern)), factors_(plan_->fronts.size()) {
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    factors_[f].exchanged.resize(static_cast<std::size_t>(plan_.fronts[f].pivots));
+    factors_[f].exchanged.resize(static_cast<std::size_t>(plan_->fronts[f].pivots));
   }
-  work_.resize(plan_.largest, plan_.largest);
-  permuted_.resize(plan_.size);
-  local_.resize(plan_.largest);
+  share_out(plan_->flops > worth_threads ? threads : 1);
+  work_.resize(std::max<std::size_t>(1, shares_.size()));
+  permuted_.resize(plan_->size);
+  local_.resize(plan_->largest);
 }
 
-bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged,
-                                    double tiny) {
+/// Subtrees of fronts, none of which has much more than its thread's share of the work.
+void Multifrontal::share_out(int threads) {
+  const std::size_t count = factors_.size();
+  top_.clear();
+  shares_.clear();
+  if (threads <= 1) {
+    top_.resize(count);
+    std::iota(top_.begin(), top_.end(), std::size_t{0});
+    return;
+  }
+  std::vector<double> below(count);  // operations of the subtree
+  std::vector<char> open(count, 0);  // above the subtrees
+  std::vector<std::size_t> parent(count, count);
+  for (std::size_t f = 0; f < count; ++f) {
+    const Front& front = plan_->fronts[f];
+    const double k = front.pivots;
+    const double u = front.size - front.pivots;
+    below[f] += k * k * k / 3 + k * k * u + k * u * u + 1000;
+    for (const Index child : front.children) {
+      below[f] += below[child];
+      parent[child] = f;
+    }
+  }
+  const double most = plan_->flops / (2.0 * threads);
+  for (std::size_t f = 0; f < count; ++f) open[f] = below[f] > most;
+  std::vector<std::size_t> roots;
+  for (std::size_t f = 0; f < count; ++f) {
+    if (open[f]) {
+      top_.push_back(f);
+    } else if (parent[f] == count || open[parent[f]]) {
+      roots.push_back(f);
+    }
+  }
+  std::stable_sort(roots.begin(), roots.end(),
+                   [&](std::size_t a, std::size_t b) { return below[a] > below[b]; });
+  std::vector<double> load(static_cast<std::size_t>(threads), 0.0);
+  std::vector<Index> owner(count, -1);
+  for (const std::size_t root : roots) {
+    const auto least = std::min_element(load.begin(), load.end());
+    *least += below[root];
+    owner[root] = static_cast<Index>(least - load.begin());
+  }
+  shares_.resize(static_cast<std::size_t>(threads));
+  for (std::size_t f = count; f-- > 0;) {
+    if (open[f]) continue;
+    if (owner[f] < 0) owner[f] = owner[parent[f]];
+  }
+  for (std::size_t f = 0; f < count; ++f) {
+    if (!open[f]) shares_[owner[f]].push_back(f);
+  }
+}
+
+/// Calls f(first, count) for the parts of 0..n on the threads.
+template <class F>
+void Multifrontal::split(Index n, int threads, const F& f) {
+  if (threads <= 1 || n < wide) return f(Index{0}, n);
+  const Index part = (n + threads - 1) / threads;
+  others_cpu_ += on_threads(threads, [&](int k) {
+    const Index first = std::min(n, k * part);
+    if (first < n) f(first, std::min(part, n - first));
+  });
+}
+
+bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
+                                    int threads) {
   // right-looking by panels; the trailing update is a matrix product
   constexpr Index panel = 24;
   const auto n = static_cast<Index>(a.rows());
@@ -47,64 +125,93 @@ bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exc
     }
     if (end == n) break;
     const Index rest = n - end;
-    a.block(start, start, width, width)
-        .triangularView<Eigen::UnitLower>()
-        .solveInPlace(a.block(start, end, width, rest));
-    a.block(end, end, rest, rest).noalias() -=
-        a.block(end, start, rest, width) * a.block(start, end, width, rest);
+    split(rest, rest < few ? 1 : threads, [&](Index first, Index count) {
+      auto right = a.block(start, end + first, width, count);
+      a.block(start, start, width, width).triangularView<Eigen::UnitLower>().solveInPlace(right);
+      a.block(end, end + first, rest, count).noalias() -= a.block(end, start, rest, width) * right;
+    });
   }
   return true;
 }
 
 bool Multifrontal::factorise(const std::vector<double>& values) {
-  const int d = plan_.d;
-  const std::size_t block_size = static_cast<std::size_t>(d) * static_cast<std::size_t>(d);
   const Eigen::Map<const Vector> all(values.data(), static_cast<Eigen::Index>(values.size()));
   if (!all.allFinite()) return false;
   const double largest = values.empty() ? 0 : all.lpNorm<Eigen::Infinity>();
   const double tiny = 1e-18 * largest;
-  for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_.fronts[f];
-    Factors& factors = factors_[f];
-    auto a = work_.topLeftCorner(front.size, front.size);
-    a.setZero();
-    for (const Front::Entry& entry : front.entries) {
-      const double* block = values.data() + block_size * static_cast<std::size_t>(entry.block);
-      for (int c = 0; c < d; ++c) {
-        for (int r = 0; r < d; ++r) a(entry.row + r, entry.col + c) += block[d * c + r];
-      }
+  std::vector<char> failed(shares_.size(), 0);
+  const auto work_on = [&](std::size_t k) {
+    for (const std::size_t f : shares_[k]) {
+      if (!factorise_front(f, values, tiny, work_[k], 1)) failed[k] = 1;
+      if (failed[k]) return;
     }
-    for (const Index child : front.children) {
-      const std::vector<Index>& to_parent = plan_.fronts[child].to_parent;
-      Factors& from = factors_[child];
-      const auto blocks = static_cast<Index>(to_parent.size());
-      for (Index cb = 0; cb < blocks; ++cb) {
-        for (int c = 0; c < d; ++c) {
-          const double* source = from.update.data() + std::ptrdiff_t{d * cb + c} * d * blocks;
-          double* target = &a(0, to_parent[cb] + c);
-          for (Index rb = 0; rb < blocks; ++rb) {
-            for (int r = 0; r < d; ++r) target[to_parent[rb] + r] += source[d * rb + r];
-          }
+  };
+  if (!shares_.empty()) {
+    others_cpu_ += on_threads(static_cast<int>(shares_.size()),
+                              [&](int k) { work_on(static_cast<std::size_t>(k)); });
+  }
+  if (std::find(failed.begin(), failed.end(), 1) != failed.end()) return false;
+  const int threads = std::max(1, static_cast<int>(shares_.size()));
+  for (const std::size_t f : top_) {
+    if (!factorise_front(f, values, tiny, work_[0], threads)) return false;
+  }
+  return true;
+}
+
+bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& values, double tiny,
+                                   Dense& work, int threads) {
+  const int d = plan_->d;
+  const std::size_t block_size = static_cast<std::size_t>(d) * static_cast<std::size_t>(d);
+  const Front& front = plan_->fronts[f];
+  Factors& factors = factors_[f];
+  if (work.rows() < front.size) work.resize(plan_->largest, plan_->largest);
+  auto a = work.topLeftCorner(front.size, front.size);
+  a.setZero();
+  for (const Front::Entry& entry : front.entries) {
+    const double* block = values.data() + block_size * static_cast<std::size_t>(entry.block);
+    for (int c = 0; c < d; ++c) {
+      for (int r = 0; r < d; ++r) a(entry.row + r, entry.col + c) += block[d * c + r];
+    }
+  }
+  for (const Index child : front.children) {
+    const std::vector<Index>& to_parent = plan_->fronts[child].to_parent;
+    Factors& from = factors_[child];
+    const auto blocks = static_cast<Index>(to_parent.size());
+    for (Index cb = 0; cb < blocks; ++cb) {
+      for (int c = 0; c < d; ++c) {
+        const double* source = from.update.data() + std::ptrdiff_t{d * cb + c} * d * blocks;
+        double* target = &a(0, to_parent[cb] + c);
+        for (Index rb = 0; rb < blocks; ++rb) {
+          for (int r = 0; r < d; ++r) target[to_parent[rb] + r] += source[d * rb + r];
         }
       }
-      from.update.resize(0, 0);
     }
-    const Index k = front.pivots;
-    const Index u = front.size - k;
-    factors.diagonal = a.topLeftCorner(k, k);
-    if (!factorise_pivots(factors.diagonal, factors.exchanged, tiny)) return false;
-    if (u == 0) continue;
-    factors.upper = a.topRightCorner(k, u);
-    for (Index row = 0; row < k; ++row) {
-      const Index other = factors.exchanged[static_cast<std::size_t>(row)];
-      if (other != row) factors.upper.row(row).swap(factors.upper.row(other));
-    }
-    factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(factors.upper);
-    factors.lower = a.bottomLeftCorner(u, k);
-    factors.diagonal.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(factors.lower);
-    factors.update = a.bottomRightCorner(u, u);
-    factors.update.noalias() -= factors.lower * factors.upper;
+    from.update.resize(0, 0);
   }
+  const Index k = front.pivots;
+  const Index u = front.size - k;
+  factors.diagonal = a.topLeftCorner(k, k);
+  if (!factorise_pivots(factors.diagonal, factors.exchanged, tiny, threads)) return false;
+  if (u == 0) return true;
+  factors.upper = a.topRightCorner(k, u);
+  for (Index row = 0; row < k; ++row) {
+    const Index other = factors.exchanged[static_cast<std::size_t>(row)];
+    if (other != row) factors.upper.row(row).swap(factors.upper.row(other));
+  }
+  split(u, threads, [&](Index first, Index count) {
+    auto part = factors.upper.middleCols(first, count);
+    factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(part);
+  });
+  factors.lower = a.bottomLeftCorner(u, k);
+  split(u, threads, [&](Index first, Index count) {
+    auto part = factors.lower.middleRows(first, count);
+    factors.diagonal.triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(part);
+  });
+  factors.update = a.bottomRightCorner(u, u);
+  split(u, threads, [&](Index first, Index count) {
+    factors.update.middleCols(first, count).noalias() -=
+        factors.lower * factors.upper.middleCols(first, count);
+  });
   return true;
 }
 
@@ -120,8 +227,8 @@ int Multifrontal::determinant_sign() const {
 }
 
 void Multifrontal::solve(Vector& b) const {
-  const int d = plan_.d;
-  const std::vector<Index>& position = plan_.position;
+  const int d = plan_->d;
+  const std::vector<Index>& position = plan_->position;
   const Index n = static_cast<Index>(position.size());
   for (Index node = 0; node < n; ++node) {
     for (int c = 0; c < d; ++c) permuted_[d * position[node] + c] = b[d * node + c];
@@ -139,7 +246,7 @@ void Multifrontal::solve(Vector& b) const {
     }
   };
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = plan_->fronts[f];
     const Factors& factors = factors_[f];
     const Index u = front.size - front.pivots;
     gather(front);
@@ -153,7 +260,7 @@ void Multifrontal::solve(Vector& b) const {
     scatter(front);
   }
   for (std::size_t f = factors_.size(); f-- > 0;) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = plan_->fronts[f];
     const Factors& factors = factors_[f];
     const Index u = front.size - front.pivots;
     gather(front);

@@ -5,9 +5,13 @@
 // inside the pivot block of a front only, so that the pattern is fixed; pivots that vanish are
 // replaced by a small one, which iterative refinement by the caller makes good. A small system is
 // one front: a dense LU.
+//
+// Threads take subtrees of fronts, then parts of the products of the fronts above; the result is
+// the same to the last bit for any number of them.
 #pragma once
 
 #include <Eigen/Dense>
+#include <memory>
 #include <vector>
 
 #include "linalg/fronts.hpp"
@@ -17,17 +21,21 @@ namespace fclib {
 class Multifrontal {
  public:
   Multifrontal() = default;
-  /// Orders and plans; nothing numeric. The pattern is not kept.
-  explicit Multifrontal(const BlockPattern& pattern);
+  /// Orders and plans, or takes the plan of a system with the same pattern that this thread had
+  /// shortly before; nothing numeric.
+  explicit Multifrontal(const BlockPattern& pattern, int threads = 1);
 
   /// Multiplications of one factorisation, and numbers that it keeps.
-  [[nodiscard]] double flops() const { return plan_.flops; }
-  [[nodiscard]] double memory() const { return plan_.memory; }
-  [[nodiscard]] Index size() const { return plan_.size; }
+  [[nodiscard]] double flops() const { return plan_->flops; }
+  [[nodiscard]] double memory() const { return plan_->memory; }
+  [[nodiscard]] Index size() const { return plan_->size; }
 
   /// Factorises the matrix with these values (BlockPattern::values() of them). False where an entry
   /// is not finite.
   bool factorise(const std::vector<double>& values);
+
+  /// CPU time of all factorisations on other threads than the caller's [s].
+  [[nodiscard]] double others_cpu() const { return others_cpu_; }
 
   /// Of the determinant of the matrix factorised last: 1 or -1.
   [[nodiscard]] int determinant_sign() const;
@@ -45,11 +53,20 @@ class Multifrontal {
     Dense update;                  // until the parent has taken it
   };
 
-  static bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny);
+  bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
+                        int threads);
+  bool factorise_front(std::size_t f, const std::vector<double>& values, double tiny, Dense& work,
+                       int threads);
+  void share_out(int threads);
+  template <class F>
+  void split(Index n, int threads, const F& f);
 
-  Fronts plan_;
+  std::shared_ptr<const Fronts> plan_ = std::make_shared<Fronts>();
   std::vector<Factors> factors_;
-  Dense work_;
+  std::vector<std::vector<std::size_t>> shares_;  // fronts of each thread, children first
+  std::vector<std::size_t> top_;                  // those above them, which all threads work on
+  std::vector<Dense> work_;                       // of each thread
+  double others_cpu_ = 0;
   mutable Vector permuted_;
   mutable Vector local_;
 };

@@ -201,8 +201,7 @@ Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& eac
 }
 
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution,
-                  const Factorization* mass = nullptr) {
+Merit judge_valid(const P& problem, const Solution& solution, const Factorization* mass = nullptr) {
   ContactMerits each;
   return judge_valid(problem, solution, each, mass);
 }

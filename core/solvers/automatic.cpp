@@ -34,6 +34,7 @@
 #include "kernels/no_solution.hpp"
 #include "kernels/proximal_point.hpp"
 #include "kernels/semismooth_newton.hpp"
+#include "linalg/threads.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::automatic {
@@ -45,6 +46,7 @@ struct Options {
   std::int64_t island_sweeps = 100;
   double polish_below = 1e-6;
   std::int64_t last_resort = 4000;
+  std::int64_t threads = 1;
 
   static constexpr auto fields() {
     using O = Options;
@@ -70,6 +72,13 @@ struct Options {
                                      .doc = "that the accurate proximal point method may take on "
                                             "an island",
                                      .lowest = 0},
+        OptionField<O, std::int64_t>{.name = "threads",
+                                     .member = &O::threads,
+                                     .unit = "threads",
+                                     .doc = "that share a large factorisation; the result is the "
+                                            "same for any number",
+                                     .lowest = 1,
+                                     .highest = 256},
     };
   }
 };
@@ -79,6 +88,9 @@ constexpr Index few_contacts = 10;
 
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
+
+/// ... whose factorisations may cost so many times those of the other methods.
+constexpr double dearer = 100;
 
 /// Newton's method from a guess, where the error is less, needs few iterations, or fails: it must
 /// be cheap where it does.
@@ -120,6 +132,10 @@ class Tracker {
   }
   [[nodiscard]] Vector& certificate() { return certificate_; }
 
+  /// CPU time of other threads than the caller's [s].
+  void add_cpu(double seconds) { others_cpu_ += seconds; }
+  [[nodiscard]] double others_cpu() const { return others_cpu_; }
+
   /// The squared error of all contacts but those worked on now.
   void set_others(double squared) { others_ = squared; }
 
@@ -157,6 +173,7 @@ class Tracker {
  private:
   Monitor monitor_;
   double others_ = 0;
+  double others_cpu_ = 0;
   std::int64_t iterations_ = 0;
   bool reported_ = false;
   std::optional<Status> stopped_;
@@ -217,13 +234,17 @@ class Island {
   void stage(std::string_view name, const F& run) {
     tracker_.stage(name, [&] {
       const auto before = system_ ? system_->factorisations() : 0;
+      const double cpu = system_ ? system_->others_cpu() : 0;
       run();
+      if (system_) tracker_.add_cpu(system_->others_cpu() - cpu);
       return std::pair((system_ ? system_->factorisations() : 0) - before, error_ <= tolerance_);
     });
   }
 
   CoupledSystem& system() {
-    if (!system_) system_.emplace(problem_);
+    if (!system_) {
+      system_.emplace(problem_, CoupledSystem::Form::identity, static_cast<int>(options_.threads));
+    }
     return *system_;
   }
 
@@ -445,13 +466,18 @@ class Island {
   void semismooth_newton(std::string_view name, const NewtonRules& rules, Vector r,
                          std::int64_t left) {
     tracker_.stage(name, [&] {
-      SemismoothNewton<Function> newton(problem_);
+      SemismoothNewton<Function> newton(problem_, static_cast<int>(options_.threads));
+      // always on the contacts: hopeless where each is there many times, as collision detection
+      // may have them
+      if (newton.system().flops() > dearer * system().flops())
+        return std::pair(std::int64_t{0}, false);
       double least = std::numeric_limits<double>::infinity();
       newton.solve(rules, r, [&](double error) {
         least = std::min(least, error);
         return tracker_.report(1, error) || error <= tolerance_ || --left == 0;
       });
       take(0, least, r);
+      tracker_.add_cpu(newton.system().others_cpu());
       return std::pair(newton.factorisations(), done());
     });
   }
@@ -557,9 +583,12 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
   Tracker tracker(settings);
+  const double start = thread_cpu_time();
   const auto outcome = [&] {
-    return Outcome{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
+    Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
                    std::move(tracker.stages()), std::move(tracker.certificate())};
+    if (options.threads > 1) result.cpu_s = thread_cpu_time() - start + tracker.others_cpu();
+    return result;
   };
   bool separating = true;
   for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;

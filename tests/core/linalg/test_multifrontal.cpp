@@ -145,5 +145,37 @@ TEST(Multifrontal, FillsLittleOnAChain) {
   EXPECT_LE(Multifrontal(pattern).memory(), 30.0 * nodes * 9);
 }
 
+TEST(Multifrontal, any_number_of_threads_gives_the_same_bits) {
+  testing::RandomData random(11);
+  const BlockPattern pattern = random_pattern(random, 800, 3, 0.009);
+  const std::vector<double> values = random_values(random, pattern, 20.0);
+  Vector expected;
+  for (const int threads : {1, 2, 3, 7}) {
+    Multifrontal lu(pattern, threads);
+    ASSERT_GT(lu.flops(), 1e8);  // so that threads are used
+    Vector x = Vector::LinSpaced(lu.size(), -1, 1);
+    for (int again = 0; again < 2; ++again) ASSERT_TRUE(lu.factorise(values));
+    lu.solve(x);
+    EXPECT_EQ(lu.others_cpu() > 0, threads > 1);
+    if (threads == 1) {
+      expected = x;
+      Vector residual = -Vector::LinSpaced(lu.size(), -1, 1);
+      residual += dense(pattern, values) * x;
+      EXPECT_LT(residual.norm(), 1e-10);
+    } else {
+      EXPECT_EQ(x, expected) << threads;
+    }
+  }
+}
+
+TEST(Fronts, are_planned_once_for_a_pattern) {
+  testing::RandomData random(12);
+  const BlockPattern pattern = random_pattern(random, 60, 3, 0.05);
+  const BlockPattern other = random_pattern(random, 60, 3, 0.05);
+  const auto first = planned(pattern);
+  EXPECT_NE(planned(other), first);
+  EXPECT_EQ(planned(pattern), first);
+}
+
 }  // namespace
 }  // namespace fclib

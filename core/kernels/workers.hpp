@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "kernels/cpu_time.hpp"
+#include "linalg/cpu_time.hpp"
 
 namespace fclib {
 

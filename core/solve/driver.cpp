@@ -6,7 +6,7 @@
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
-#include "kernels/cpu_time.hpp"
+#include "linalg/cpu_time.hpp"
 
 namespace fclib {
 

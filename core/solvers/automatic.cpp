@@ -583,11 +583,11 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
   Tracker tracker(settings);
-  const double start = thread_cpu_time();
+  const double start = cpu_time();
   const auto outcome = [&] {
     Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
                    std::move(tracker.stages()), std::move(tracker.certificate())};
-    if (options.threads > 1) result.cpu_s = thread_cpu_time() - start + tracker.others_cpu();
+    if (options.threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
     return result;
   };
   bool separating = true;

@@ -7,7 +7,7 @@
 //      (before the sweeps of an island too: a few steps of Newton from a guess that is good)
 //   3  proximal Newton ("polish"), where the error is small already
 //   4  interior point with the shift in the Newton system, polished as it comes near; where its
-//      path folds, again with shorter steps
+//      path folds, sweeps for what it has cost, and again with shorter steps
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)

@@ -35,7 +35,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("2", "all families that came after RT-0444"),
-    "hard": ("1", "what most solvers fail on; chosen by the bench"),
+    "hard": ("2", "what most solvers fail on; chosen by the bench"),
     "tiny": ("2", "one problem of each kind; comes with the package"),
 }
 EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")

@@ -103,6 +103,10 @@ constexpr std::int64_t proximal_trial = 200;
 /// Of a path with folds: those that are passed at all mostly take fewer.
 constexpr std::int64_t homotopy_factorisations = 1500;
 
+/// From an iterate that is nearly a solution, the way to one may lead over errors that are far
+/// larger.
+constexpr double endless = std::numeric_limits<double>::infinity();
+
 /// A proof that there is no solution must hold for reactions this many times the usual size.
 constexpr double safe_bound = 1e4;
 
@@ -344,8 +348,9 @@ class Island {
     std::int64_t left = options_.last_resort;
     for (std::int64_t limit = 400; !done() && left > 0; limit *= 2) {
       limit = std::min(limit, left);
-      stage("proximal point",
-            [&] { proximal({.kappa = 10, .max_factorisations = limit}, start_); });
+      stage("proximal point", [&] {
+        proximal({.kappa = 10, .patience = endless, .max_factorisations = limit}, start_);
+      });
       left -= limit;
       start_ = best_;
     }
@@ -458,7 +463,9 @@ class Island {
                    return done();
                  });
     if (!done()) {
-      proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 200}, last);
+      proximal(
+          {.kappa = 100, .easy = 10, .hard = 0.2, .patience = endless, .max_factorisations = 200},
+          last);
     }
   }
 
@@ -504,7 +511,7 @@ class Island {
                               .kappa_max = 1e12,
                               .easy = 100,
                               .hard = 0.1,
-                              .patience = std::numeric_limits<double>::infinity(),
+                              .patience = endless,
                               .max_factorisations = 60};
     method.solve(rules, 1e-10, r, [&](double) {
       // the steps tend to the ray, free of the part of r that stays

@@ -34,7 +34,7 @@
 #include "kernels/no_solution.hpp"
 #include "kernels/proximal_point.hpp"
 #include "kernels/semismooth_newton.hpp"
-#include "linalg/threads.hpp"
+#include "linalg/cpu_time.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::automatic {

@@ -169,6 +169,38 @@ TEST(Multifrontal, any_number_of_threads_gives_the_same_bits) {
   }
 }
 
+/// Cliques that hang on a separator, each a front with many rows below its pivots.
+BlockPattern cliques_on_a_separator(Index cliques, Index clique, Index separator) {
+  BlockPattern pattern;
+  pattern.d = 3;
+  pattern.first.push_back(0);
+  const Index nodes = cliques * clique + separator;
+  for (Index col = 0; col < nodes; ++col) {
+    for (Index row = 0; row < nodes; ++row) {
+      const bool both = row < cliques * clique && col < cliques * clique;
+      if (!both || row / clique == col / clique) pattern.row.push_back(row);
+    }
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  return pattern;
+}
+
+TEST(Multifrontal, threads_that_share_a_front_give_the_same_bits) {
+  testing::RandomData random(13);
+  const BlockPattern pattern = cliques_on_a_separator(2, 67, 153);
+  const std::vector<double> values = random_values(random, pattern, 20.0);
+  Vector expected;
+  for (const int threads : {1, 2, 3, 4, 5}) {
+    Multifrontal lu(pattern, threads);
+    ASSERT_GT(lu.flops(), 3e7);  // so that threads are used
+    ASSERT_TRUE(lu.factorise(values));
+    Vector x = Vector::LinSpaced(lu.size(), -1, 1);
+    lu.solve(x);
+    if (threads == 1) expected = x;
+    EXPECT_EQ(x, expected) << threads;
+  }
+}
+
 TEST(Fronts, are_planned_once_for_a_pattern) {
   testing::RandomData random(12);
   const BlockPattern pattern = random_pattern(random, 60, 3, 0.05);

@@ -450,7 +450,7 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
 
 @pytest.fixture(scope="module")
 def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A site of 40,000 runs, 1,000 problems by 40 solvers; the benchmark makes one of 200,000."""
+    """A site of 200,000 runs, 5,000 problems by 40 solvers, as the benchmark makes it."""
     benchmark = Path(__file__).parents[2] / "benchmarks" / "report_size.py"
     spec = importlib.util.spec_from_file_location("report_size", benchmark)
     assert spec is not None
@@ -458,10 +458,10 @@ def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(made)
     folder = tmp_path_factory.mktemp("large")
-    made.fill(folder / "runs.sqlite", 1000, 40)
+    made.fill(folder / "runs.sqlite", 5000, 40)
     with Campaigns([folder / "runs.sqlite"]) as campaigns:
         counts = build_site(campaigns, folder / "site", views=0)
-    assert counts["runs"] == 40_000
+    assert counts["runs"] == 200_000
     return folder / "site"
 
 
@@ -469,14 +469,14 @@ def test_a_large_campaign_is_browsed(browser: Any, large: Path) -> None:
     go = Opener(browser, large)
     page = go("#/catalogue?sort=nc:down&page=3")
     assert page.locator("main tbody tr").count() == 50
-    assert "101–150 of 1000" in page.inner_text("main")
+    assert "101–150 of 5000" in page.inner_text("main")
     page.get_by_role("link", name="Next page").click()
     page.wait_for_function("location.hash.includes('page=4')")
-    assert "151–200 of 1000" in page.inner_text("main")
+    assert "151–200 of 5000" in page.inner_text("main")
     # a filter starts from the first page, and the data of a page come when it is asked for
     page.get_by_label("filter").fill("nc<=10")
     page.wait_for_function("location.hash.includes('q=nc') && !location.hash.includes('page')")
-    assert "13 of 1000 problems" in page.locator("main > div > [role=status]").inner_text()
+    assert "59 of 5000 problems" in page.locator("main > div > [role=status]").inner_text()
     assert page.evaluate("Object.keys(Fclib.values).sort()") == ["catalogue", "site"]
     assert page.evaluate("typeof Plotly") == "undefined"
     page.click("main tbody a >> nth=0")

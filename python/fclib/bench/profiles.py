@@ -67,7 +67,7 @@ class Costs:
 
     instances: tuple[Instance, ...]
     solvers: tuple[str, ...]
-    values: Array  # (instances, solvers), inf where it failed
+    values: Array  # (instances, solvers), inf where it failed; of `gather` nan where it did not run
     metric: str
     left_out: int = 0  # instances that some solver has not run
 
@@ -101,6 +101,20 @@ class Costs:
         there = contacts > 0
         chosen = tuple(i for i, keep in zip(self.instances, there, strict=True) if keep)
         return replace(self, instances=chosen, values=self.values[there] / contacts[there, None])
+
+    def shared(self, solvers: Sequence[str] | None = None) -> Costs:
+        """Of some solvers, all by default, on the instances that all of these have run."""
+        names = self.solvers if solvers is None else tuple(solvers)
+        values = self.values[:, [self.solvers.index(name) for name in names]]
+        ran = ~np.isnan(values)
+        kept = np.flatnonzero(ran.all(axis=1))
+        return replace(
+            self,
+            instances=tuple(self.instances[k] for k in kept),
+            solvers=names,
+            values=values[kept],
+            left_out=int(ran.any(axis=1).sum()) - kept.size,
+        )
 
     def of(self, chosen: Iterable[int]) -> Costs:
         """Some of the instances."""
@@ -174,39 +188,57 @@ def costs(rows: Sequence[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
     Raises:
         ProfileError: the metric is unknown, or no instance was run by all solvers.
     """
+    found = gather(rows, metric).shared()
+    if not found.instances:
+        raise ProfileError("there is no problem that all of these solvers have run")
+    return found
+
+
+def gather(rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
+    """As `costs`, of all instances that one of the solvers has run; nan where another has not.
+
+    Raises:
+        ProfileError: the metric is unknown.
+    """
     if metric not in METRICS:
         raise ProfileError(f"there is no metric {metric}; there is: {', '.join(METRICS)}")
     floor = METRICS[metric][1]
-    repeats: dict[tuple[Instance, str], list[float]] = defaultdict(list)
+    instances: dict[tuple[str, float, float], Instance] = {}
+    numbers: dict[tuple[str, float, float], int] = {}
+    solvers: dict[str, int] = {}
+    lines, columns, spent = [], [], []
     for row in rows:
+        column = solvers.setdefault(row["solver"], len(solvers))
         if row["status"] == "unreadable":
             continue
-        instance = Instance(
-            hash=row["hash"],
-            problem=row["problem"],
-            family=row["family"],
-            nc=row["nc"],
-            tol=row["tol"],
-            limit=row["time_limit"],
-        )
+        key = row["hash"], row["tol"], row["time_limit"]
+        if key not in instances:
+            numbers[key] = len(instances)
+            instances[key] = Instance(
+                hash=row["hash"],
+                problem=row["problem"],
+                family=row["family"],
+                nc=row["nc"],
+                tol=row["tol"],
+                limit=row["time_limit"],
+            )
         value = row[metric]
+        lines.append(numbers[key])
+        columns.append(column)
         good = row["solved"] and value is not None
-        repeats[instance, row["solver"]].append(max(float(value), floor) if good else math.inf)
-    solvers = tuple(dict.fromkeys(row["solver"] for row in rows))
-    every = dict.fromkeys(instance for instance, _ in repeats)
-    whole = [i for i in every if all((i, solver) in repeats for solver in solvers)]
-    if not whole:
-        raise ProfileError("there is no problem that all of these solvers have run")
-    whole.sort(key=lambda i: (i.family, i.problem, -i.tol))
-    values = np.array([[_median(repeats[i, solver]) for solver in solvers] for i in whole])
-    return Costs(tuple(whole), solvers, values, metric, len(every) - len(whole))
-
-
-def _median(values: list[float]) -> float:
-    """The median; of an even number with a failure in the middle, the failure."""
-    ordered = sorted(values)
-    low, high = ordered[(len(ordered) - 1) // 2], ordered[len(ordered) // 2]
-    return high if math.isinf(high) else (low + high) / 2
+        spent.append(max(float(value), floor) if good else math.inf)
+    found = np.full((len(instances), len(solvers)), np.nan)
+    if spent:
+        # the repeats of a run beside each other, the quickest first
+        values, cells = np.array(spent), np.array(lines) * len(solvers) + np.array(columns)
+        order = np.lexsort((values, cells))
+        cells, first, count = np.unique(cells[order], return_index=True, return_counts=True)
+        # the median; of an even number with a failure in the middle, the failure
+        low, high = values[order[first + (count - 1) // 2]], values[order[first + count // 2]]
+        found.flat[cells] = (low + high) / 2
+    ordered = sorted(instances.values(), key=lambda i: (i.family, i.problem, -i.tol, i.limit))
+    rank = [numbers[i.hash, i.tol, i.limit] for i in ordered]
+    return Costs(tuple(ordered), tuple(solvers), found[rank], metric)
 
 
 # ---- profiles

@@ -13,7 +13,7 @@ import numpy as np
 
 from fclib.bench import STATUSES as STATUSES
 from fclib.bench import Store, profiles
-from fclib.bench.profiles import METRICS, Costs, Instance, ProfileError
+from fclib.bench.profiles import METRICS, Costs, Instance
 from fclib.report.error import ReportError
 from fclib.report.view import rounded
 
@@ -124,48 +124,32 @@ class Campaigns:
     # ---- one tolerance
 
     def bench(self, tol: float) -> Bench:
-        """All costs at a tolerance, those of `profiles.costs` for each solver on its own."""
+        """All costs at a tolerance."""
         rows = self.at(tol)
-        by_solver = defaultdict(list)
-        for row in rows:
-            by_solver[row["solver"]].append(row)
         costs: dict[str, list[list[float | None]]] = {}
-        instances: dict[Instance, int] = {}
-        for name in self.solvers:
-            if name in by_solver:
-                for instance in profiles.costs(by_solver[name]).instances:
-                    instances.setdefault(instance, len(instances))
-        order = sorted(instances, key=lambda i: (i.family, i.problem, i.limit))
-        instances = {instance: k for k, instance in enumerate(order)}
         for metric in METRICS:
-            columns = []
-            for name in self.solvers:
-                column: list[float | None] = [None] * len(order)
-                if name in by_solver:
-                    own = profiles.costs(by_solver[name], metric)
-                    for instance, value in zip(own.instances, own.values[:, 0], strict=True):
-                        column[instances[instance]] = rounded(float(value), DIGITS)
-                columns.append(column)
-            costs[metric] = columns
-        return Bench(tol, tuple(order), costs, self._statuses(by_solver, instances))
+            found = profiles.gather(rows, metric)
+            columns = dict(zip(found.solvers, found.values.T, strict=True))
+            none = np.full(len(found.instances), np.nan)
+            costs[metric] = rounded([columns.get(name, none) for name in self.solvers], DIGITS)
+        return Bench(tol, found.instances, costs, self._statuses(rows, found.instances))
 
     def _statuses(
-        self, by_solver: Mapping[str, list[dict[str, Any]]], instances: Mapping[Instance, int]
+        self, rows: Sequence[Mapping[str, Any]], instances: Sequence[Instance]
     ) -> tuple[str, ...]:
-        place = {(i.hash, i.limit): k for i, k in instances.items()}
+        places = {(i.hash, i.limit): k for k, i in enumerate(instances)}
         code = dict(zip(STATUSES, CODES, strict=False))
-        found = []
-        for name in self.solvers:
-            seen: dict[int, list[str]] = defaultdict(list)
-            for row in by_solver.get(name, ()):
-                seen[place[row["hash"], row["time_limit"]]].append(row["status"])
-            found.append(
-                "".join(
-                    code[Counter(seen[k]).most_common(1)[0][0]] if k in seen else NOT_RUN
-                    for k in range(len(instances))
-                )
+        seen: dict[str, list[str]] = {name: [""] * len(instances) for name in self.solvers}
+        for row in rows:
+            seen[row["solver"]][places[row["hash"], row["time_limit"]]] += code[row["status"]]
+        # of several repeats the most frequent
+        return tuple(
+            "".join(
+                Counter(own).most_common(1)[0][0] if len(own) > 1 else own or NOT_RUN
+                for own in seen[name]
             )
-        return tuple(found)
+            for name in self.solvers
+        )
 
     def fair(self, tol: float, metric: str = "cpu_s") -> Costs | None:
         """The costs of solvers that have run nearly the same instances; None where there are none.
@@ -173,17 +157,14 @@ class Campaigns:
         Solvers that have run the fewest are left out, until at most `LEFT_OUT` of the instances
         are left out for the others.
         """
-        rows = self.at(tol)
-        counts = Counter(name for name, _ in {(row["solver"], row["hash"]) for row in rows})
-        names = [name for name in self.solvers if name in counts]
-        names.sort(key=lambda name: -counts[name])
+        every = profiles.gather(self.at(tol), metric)
+        counts = dict(zip(every.solvers, (~np.isnan(every.values)).sum(axis=0), strict=True))
+        names = sorted((n for n in self.solvers if n in counts), key=lambda name: -counts[name])
         while names:
-            try:
-                found = profiles.costs([row for row in rows if row["solver"] in names], metric)
-                if found.left_out <= LEFT_OUT * (found.left_out + len(found.instances)):
-                    return found
-            except ProfileError:
-                pass
+            found = every.shared(names)
+            count = len(found.instances)
+            if count and found.left_out <= LEFT_OUT * (found.left_out + count):
+                return found
             names.pop()
         return None
 

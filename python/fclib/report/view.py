@@ -28,17 +28,19 @@ END = re.compile("</script", re.IGNORECASE)
 
 def rounded(values: Any, digits: int = DIGITS) -> Any:
     """Nested lists of numbers with so many significant digits; what is not finite is None."""
+    if isinstance(values, float):
+        if not math.isfinite(values):
+            return None
+        short = float(f"{values:.{digits}g}")
+        return int(short) if short.is_integer() and abs(short) < 1e15 else short
+    if values is None or isinstance(values, (str, int)):
+        return values
     if isinstance(values, np.ndarray):
         values = values.tolist()
     if isinstance(values, (list, tuple)):
         return [rounded(value, digits) for value in values]
     if isinstance(values, Mapping):
         return {key: rounded(value, digits) for key, value in values.items()}
-    if isinstance(values, float):
-        if not math.isfinite(values):
-            return None
-        short = float(f"{values:.{digits}g}")
-        return int(short) if short.is_integer() and abs(short) < 1e15 else short
     return values
 
 

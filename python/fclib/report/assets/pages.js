@@ -112,6 +112,7 @@
 
   // ---- profiles
   Fclib.pages.profiles = async (page, rest, params, keep) => {
+    Fclib.plotly();
     const s = site(), cat = await catalogue();
     const labels = s.solvers.map((v) => v.label);
     const fair = (t) => ((s.headlines[t] || {}).solvers || labels).map((name) => labels.indexOf(name));
@@ -154,10 +155,9 @@
       if (!order.length || !instances.length) { box.replaceChildren(h("p", { class: "panel" }, order.length ? "There is no instance that all of these solvers have run." : "Choose some solvers.")); return; }
       const performance = state.kind === "performance";
       const shown = performance ? Fclib.ratios(values) : state.kind === "contact" ? values.map((own) => own.map((v, i) => { const nc = cat.read.nc(bench.problems[instances[i]]); return v === null || !nc ? null : v / nc; })) : values;
-      const finite = shown.flatMap((own) => own.filter((v) => v !== null));
       let low = Infinity, high = -Infinity;
-      for (const v of finite) { if (v < low) low = v; if (v > high) high = v; }
-      if (!finite.length) { box.replaceChildren(h("p", { class: "panel" }, "None of these solvers solves any of these instances.")); return; }
+      for (const own of shown) for (const v of own) if (v !== null) { if (v < low) low = v; if (v > high) high = v; }
+      if (low === Infinity) { box.replaceChildren(h("p", { class: "panel" }, "None of these solvers solves any of these instances.")); return; }
       if (performance) { low = 1; high = Math.max(2, Math.min(1e4, high)); if (state.axis === "linear") high = Math.min(high, 20); }
       if (high <= low) high = low * 2;
       const series = order.map((k, i) => ({ name: labels[k], style: k, ...Fclib.shares(shown[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));

@@ -68,7 +68,9 @@
      options: series [{name, x, y, style}] of steps, xlog, ylog, xrange, yrange, xlabel, ylabel, xname, ypercent, and those of a plot */
   Fclib.lines = (options) => {
     const { series, xlog, ylog, xrange: [low, high] } = options;
-    let x = [...new Set(series.flatMap((s) => s.x))].filter((v) => v >= low && v <= high).sort((a, b) => a - b);
+    const changes = new Set();
+    for (const s of series) for (const v of s.x) if (v >= low && v <= high && changes.size <= FEWEST) changes.add(v);
+    let x = [...changes].sort((a, b) => a - b);
     if (x.length > FEWEST) x = [...Array(FEWEST)].map((_, k) => { const t = k / (FEWEST - 1); return xlog ? low * (high / low) ** t : low + (high - low) * t; });
     else if (x[x.length - 1] < high && !options.ends) x.push(high);
     const curves = series.map((s) => ({ ...s, y: x.map((v) => Fclib.at(s, v)) }));

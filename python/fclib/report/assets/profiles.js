@@ -17,7 +17,7 @@
   };
   /* the share of all instances within each value: steps {x, y} */
   Fclib.shares = (values, from) => {
-    const sorted = values.filter((v) => v !== null).sort((a, b) => a - b), x = [from], y = [0], total = values.length || 1;
+    const sorted = Float64Array.from(values.filter((v) => v !== null)).sort(), x = [from], y = [0], total = values.length || 1;
     sorted.forEach((v, k) => {
       if (v <= x[x.length - 1]) y[y.length - 1] = (k + 1) / total;
       else { x.push(v); y.push((k + 1) / total); }

@@ -108,3 +108,11 @@ def read_data(site: Path, name: str) -> Any:
     start = f'Fclib.put("{name}",'
     assert text.startswith(start)
     return json.loads(text[len(start) : text.rindex(");")])
+
+
+def periodic_step() -> Any:
+    """Polyhedra that fall and touch across the boundary of a periodic cell, of period 13."""
+    from fclib import scenes, simulate
+
+    scene = scenes.get("PeriodicBox")(polyhedra=24, period=13.0).scene(seed=0)
+    return next(s for s in simulate.simulate(scene, 110) if s.problem.nc > 85)

@@ -25,7 +25,14 @@ from fclib.report.libraries import as_script
 from fclib.report.network import network_of
 from fclib.report.recipes import recipes
 from fclib.report.view import hulls_of
-from helpers_report import LABELS, TOLERANCES, make_collection, make_store, read_data
+from helpers_report import (
+    LABELS,
+    TOLERANCES,
+    make_collection,
+    make_store,
+    periodic_step,
+    read_data,
+)
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -326,6 +333,41 @@ def test_positions_are_those_of_the_simulation() -> None:
     # the state is that after the step, of 2.5 ms
     np.testing.assert_allclose(apart, expected, atol=5e-2)
     assert np.median(np.abs(apart - expected)) < 1e-3
+
+
+def test_contacts_across_a_periodic_boundary_are_near_both_bodies() -> None:
+    step = periodic_step()
+    network = network_of(step.problem)
+    assert network.placed
+    assert network.shifts is not None
+    assert network.cell is not None
+    np.testing.assert_allclose(np.diff(network.cell, axis=0), [[13.0, 13.0]])
+    crossing = network.shifts.any(axis=1)
+    assert 3 < crossing.sum() < step.problem.nc
+    np.testing.assert_array_equal(np.remainder(network.shifts[:, :2], 13.0), 0.0)
+    # a polyhedron has a radius of 3, and the gap that a step closes may lie beyond it
+    first, second = network.pairs.T
+    assert np.linalg.norm(network.points - network.bodies[first], axis=1).max() < 3.5
+    both = second >= 0
+    ends = (network.points - network.shifts)[both]
+    assert np.linalg.norm(ends - network.bodies[second[both]], axis=1).max() < 3.5
+    # two bodies are apart as they are in the simulation, but for whole periods
+    true = step.position.reshape(-1, 7)[np.asarray(step.dofs)[::6] // 6, :3]
+    apart = network.bodies[first[both]] - network.bodies[second[both]]
+    wrong = apart - (true[first[both]] - true[second[both]])
+    wrong[:, :2] -= 13.0 * np.round(wrong[:, :2] / 13.0)
+    # a floor that gaps are above of is not quite plane
+    np.testing.assert_allclose(wrong, 0.0, atol=1e-4)
+    # a hull is as large as its body, and has the image of a contact for its corner
+    corners = np.concatenate([network.bodies, network.points, network.points - network.shifts])
+    faces = np.array(hulls_of(network))
+    assert faces.max() >= len(network.bodies) + len(network.points)
+    record = view_of(step.problem)["network"]
+    corners = np.array(record["bodies"] + record["points"] + record["images"])
+    assert np.ptp(corners[faces], axis=1).max() < 7.0
+    # where the file says nothing of a period, the points do not close
+    bare = step.problem.replace(info=fclib.ProblemInfo())
+    assert network_of(bare).shifts is None
 
 
 def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:

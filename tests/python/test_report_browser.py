@@ -14,7 +14,7 @@ import pytest
 import fclib
 from fclib.bench import profiles
 from fclib.report import Campaigns, build_site, view_of, write_view
-from helpers_report import LABELS, make_collection, make_store, read_data
+from helpers_report import LABELS, make_collection, make_store, periodic_step, read_data
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
@@ -446,6 +446,26 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
         for context in go.contexts:
             context.close()
         assert not go.wrong
+
+
+def test_a_periodic_cell_is_outlined(browser: Any, tmp_path: Path) -> None:
+    step = periodic_step()
+    record = view_of(step.problem, step.result.solution)
+    write_view(record, tmp_path / "page.html")
+    go = Opener(browser, tmp_path / "page.html")
+    page = go("")
+    scene = draw(page, ".scene .plot")
+    # no line is longer than the cell, and a contact across its boundary is there twice
+    longest = """plot => Math.max(...plot.data.filter(t => t.mode === "lines").flatMap(t =>
+        t.x.map((x, k) => x === null || !k ? 0 : Math.abs(x - (t.x[k - 1] ?? x)))))"""
+    assert scene.evaluate(longest) == pytest.approx(13.0)
+    count = "plot => plot.data.filter(t => t.name).reduce((sum, t) => sum + t.x.length, 0)"
+    assert scene.evaluate(count) == step.problem.nc + len(record["network"]["images"])
+    page.get_by_role("checkbox", name="cell").uncheck()
+    page.wait_for_function(f"plot => ({longest})(plot) < 6", arg=scene.element_handle())
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
 
 
 @pytest.fixture(scope="module")

@@ -13,10 +13,14 @@ lies on the side it is pushed to, as a convex body does). Two bodies in contact 
 x_a + l_a = x_b + l_b, which gives the positions of all bodies that hang together, by least squares.
 Groups without a contact between them are set down beside each other, at their heights over
 the ground, and the network is said to be `placed`. Otherwise it is laid out as a graph.
+
+In a periodic cell x_a + l_a = x_b + l_b + s, with s of whole periods, which the file tells. Where
+contacts make a tree, s may be 0; at the others the positions leave gaps that round to their s.
 """
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -47,6 +51,9 @@ class Network:
     frames: Array | None  # (contacts, 3, 3) columns N, T1, T2, pushing the first body
     radii: Array  # (bodies) of balls, 0 for another shape
     note: str = ""
+    # (contacts, 3) from the place at the second body to that at the first; 0 but across a boundary
+    shifts: Array | None = None
+    cell: Array | None = None  # (2, 2) lowest and highest x, y of a periodic cell
 
 
 @dataclass
@@ -81,10 +88,19 @@ def network_of(problem: Any) -> Network:
     pairs = numbers.reshape(pairs.shape) - (touched.size - kept.size)
     bodies = [bodies[number] for number in kept]
     if d >= 3:
-        found = _place(problem.nc, d, H, bodies, pairs)
+        found = _place(problem.nc, d, H, bodies, pairs, _period_of(problem))
         if found is not None:
             return found
     return _lay_out(len(bodies), pairs, "as a graph: H is not that of free rigid bodies in space")
+
+
+def _period_of(problem: Any) -> Array | None:
+    """The periods (3) along x, y and z of the cell that a problem was simulated in."""
+    try:
+        x, y = json.loads(problem.info.description.splitlines()[-1])["period"]
+        return np.array([float(x), float(y), np.inf])
+    except (IndexError, KeyError, TypeError, ValueError):
+        return None  # it says nothing of where it was simulated, or there was none
 
 
 # ---- bodies
@@ -139,7 +155,9 @@ def _is_free(H: Any, masses: Array, d: int, first: int) -> bool:
 # ---- positions
 
 
-def _place(nc: int, d: int, H: Any, bodies: list[_Body], pairs: Indices) -> Network | None:
+def _place(
+    nc: int, d: int, H: Any, bodies: list[_Body], pairs: Indices, period: Array | None
+) -> Network | None:
     rows = sp.csr_array(H)
     frames = np.zeros((nc, 3, 3))
     known = np.zeros(nc, bool)
@@ -164,15 +182,33 @@ def _place(nc: int, d: int, H: Any, bodies: list[_Body], pairs: Indices) -> Netw
         return None
     sizes = [np.linalg.norm(lever) for body in bodies for lever in body.levers.values()]
     scale = float(np.sqrt(np.mean(np.square(sizes)))) or 1.0
-    centres, misfit = _solve(bodies, pairs, frames, scale)
+    shifts = np.zeros((nc, 3))
+    if period is not None:
+        shifts = _shifts(bodies, pairs, _along_a_tree(bodies, pairs), period)
+    centres, misfit = _solve(bodies, pairs, frames, shifts, scale)
     if misfit > MISFIT:
         return None
+    label = _groups(pairs, len(bodies))
+    cell = None
+    if period is not None and shifts.any():
+        # the cell is about the middle of those that its boundary joins
+        inside = label == label[pairs[np.flatnonzero(shifts.any(axis=1))[0], 0]]
+        middle = centres[inside].mean(axis=0)
+        centres[inside] -= _whole(centres[inside] - middle, period)
+        shifts = _shifts(bodies, pairs, centres, period)
+        cell = np.array([middle - 0.5 * period, middle + 0.5 * period])[:, :2]
     points = np.zeros((nc, 3))
     for contact in range(nc):
-        sides = [int(b) for b in pairs[contact] if b >= 0 and bodies[b].free]
-        ends = [centres[b] + bodies[b].levers[contact] for b in sides]
+        sides = [(k, int(b)) for k, b in enumerate(pairs[contact]) if b >= 0 and bodies[b].free]
+        ends = [centres[b] + bodies[b].levers[contact] + k * shifts[contact] for k, b in sides]
         points[contact] = np.mean(ends, axis=0)
-    groups = _set_down(bodies, pairs, centres, points)
+    groups = int(label.max()) + 1
+    if groups > 1:
+        moves = _set_down(label, pairs, centres, points)
+        centres += moves[label]
+        points += moves[label[pairs[:, 0]]]
+        if cell is not None:
+            cell += moves[label[inside.argmax()], :2]
     radii = np.zeros(len(bodies))
     for number, body in enumerate(bodies):
         own = np.flatnonzero((pairs == number).any(axis=1))
@@ -181,9 +217,49 @@ def _place(nc: int, d: int, H: Any, bodies: list[_Body], pairs: Indices) -> Netw
         elif body.size == 6:
             radii[number] = _ball(body, own, frames)
     note = "positions recovered from H"
+    if cell is not None:
+        note += "; a contact across the boundary of the periodic cell is drawn on both sides"
     if groups > 1:
         note += f"; its {groups} groups that do not touch stand beside each other as it fits"
-    return Network(True, centres, points, pairs, frames, radii, note)
+    found = Network(True, centres, points, pairs, frames, radii, note)
+    if cell is not None:
+        found.shifts, found.cell = shifts, cell
+    return found
+
+
+def _along_a_tree(bodies: list[_Body], pairs: Indices) -> Array:
+    """Centres (bodies, 3) by one contact for each body but the first of its group."""
+    contacts = [k for k, pair in enumerate(pairs) if all(b >= 0 and bodies[b].free for b in pair)]
+    between = {frozenset(pairs[k].tolist()): k for k in contacts}
+    centres = np.zeros((len(bodies), 3))
+    graph = _graph(pairs[contacts], len(bodies))
+    seen = np.zeros(len(bodies), bool)
+    for start in range(len(bodies)):
+        if seen[start]:
+            continue
+        order, parents = scipy.sparse.csgraph.breadth_first_order(graph, start, directed=False)
+        seen[order] = True
+        for body in order[1:].tolist():
+            parent = int(parents[body])
+            k = between[frozenset((body, parent))]
+            centres[body] = centres[parent] + bodies[parent].levers[k] - bodies[body].levers[k]
+    return centres
+
+
+def _shifts(bodies: list[_Body], pairs: Indices, centres: Array, period: Array) -> Array:
+    """Whole periods (contacts, 3) that are between the places of each contact at its bodies."""
+    found = np.zeros((len(pairs), 3))
+    for contact, (a, b) in enumerate(pairs.tolist()):
+        if min(a, b) >= 0 and bodies[a].free and bodies[b].free:
+            ends = [centres[n] + bodies[n].levers[contact] for n in (a, b)]
+            found[contact] = _whole(ends[0] - ends[1], period)
+    return found
+
+
+def _whole(x: Array, period: Array) -> Array:
+    """The whole periods in x (..., 3), to the nearest; none where a period is infinite."""
+    count = np.round(x / period)
+    return np.where(count == 0, 0.0, count * np.where(np.isinf(period), 0.0, period))
 
 
 def _levers(moments: dict[Any, Array], frames: dict[Any, Array]) -> dict[int, Array]:
@@ -214,7 +290,9 @@ def _cross(x: Array) -> Array:
     return np.array([[0.0, -x[2], x[1]], [x[2], 0.0, -x[0]], [-x[1], x[0], 0.0]])
 
 
-def _solve(bodies: list[_Body], pairs: Indices, frames: Array, scale: float) -> tuple[Array, float]:
+def _solve(
+    bodies: list[_Body], pairs: Indices, frames: Array, shifts: Array, scale: float
+) -> tuple[Array, float]:
     """Centres (bodies, 3) by least squares, and how far shared points are apart, over the scale."""
     i: list[int] = []
     j: list[int] = []
@@ -233,7 +311,7 @@ def _solve(bodies: list[_Body], pairs: Indices, frames: Array, scale: float) -> 
                 i += [row, row]
                 j += [3 * one + k, 3 * other + k]
                 x += [1.0, -1.0]
-                right.append(float(lb[k] - la[k]))
+                right.append(float(lb[k] - la[k] + shifts[contact, k]))
                 shared += 1
         elif b < 0:
             normal = frames[contact][:, 0]
@@ -255,15 +333,21 @@ def _solve(bodies: list[_Body], pairs: Indices, frames: Array, scale: float) -> 
     return solved[:first_plane].reshape(-1, 3).copy(), misfit
 
 
-def _set_down(bodies: list[_Body], pairs: Indices, centres: Array, points: Array) -> int:
-    """Move groups that do not touch beside each other, in place; how many they are."""
+def _graph(pairs: Indices, count: int) -> Any:
+    """Which bodies touch (count x count)."""
     joined = pairs[(pairs >= 0).all(axis=1)]
-    count = len(bodies)
-    ones = np.ones(len(joined))
-    graph = sp.csr_array((ones, (joined[:, 0], joined[:, 1])), shape=(count, count))
-    groups, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    if groups == 1:
-        return 1
+    return sp.csr_array((np.ones(len(joined)), (joined[:, 0], joined[:, 1])), shape=(count, count))
+
+
+def _groups(pairs: Indices, count: int) -> Indices:
+    """The number (count) of the group of each body, groups being those that hang together."""
+    _, label = scipy.sparse.csgraph.connected_components(_graph(pairs, count), directed=False)
+    return np.asarray(label)
+
+
+def _set_down(label: Indices, pairs: Indices, centres: Array, points: Array) -> Array:
+    """By how much (groups, 3) to move groups, so that they stand beside each other."""
+    groups = int(label.max()) + 1
     at = label[pairs[:, 0]]
     boxes = []
     for group in range(groups):
@@ -278,15 +362,14 @@ def _set_down(bodies: list[_Body], pairs: Indices, centres: Array, points: Array
     )
     row_end = 1.1 * float(np.sqrt((widths**2).sum()))
     x = y = height = 0.0
+    moves = np.zeros((groups, 3))
     for group in np.argsort(-widths, kind="stable"):
         if x > 0 and x + widths[group] > row_end:
             x, y, height = 0.0, y + height, 0.0
-        shift = np.array([x + widths[group] / 2, y + widths[group] / 2]) - boxes[group][0]
-        centres[label == group, :2] += shift
-        points[at == group, :2] += shift
+        moves[group, :2] = (x + widths[group] / 2, y + widths[group] / 2) - boxes[group][0]
         x += widths[group]
         height = max(height, widths[group])
-    return int(groups)
+    return moves
 
 
 def _ball(body: _Body, own: Indices, frames: Array) -> float:

@@ -85,6 +85,11 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
         "radii": rounded(network.radii),
         "faces": hulls_of(network),
     }
+    if network.shifts is not None and network.cell is not None:
+        crossing = np.flatnonzero(network.shifts.any(axis=1))
+        record["network"]["cell"] = rounded(network.cell)
+        record["network"]["crossing"] = crossing.tolist()
+        record["network"]["images"] = rounded((network.points - network.shifts)[crossing])
     if network.frames is not None:
         record["network"]["normals"] = rounded(network.frames[:, :, 0])
     if solution is not None:
@@ -96,14 +101,20 @@ def hulls_of(network: Network) -> list[list[int]]:
     """Triangles of the hulls of each body's centre and contact points, but for balls.
 
     Returns:
-        (triangles, 3) numbers of corners: first the bodies' centres, then the contact points.
+        (triangles, 3) numbers of corners: first the bodies' centres, then the contact points, then
+        the images at their second bodies of those that have one.
     """
     count = len(network.bodies)
     corners = np.concatenate([network.bodies, network.points])
+    # (contacts, 2) the corner of each contact at each of its bodies
+    ends = np.repeat(count + np.arange(len(network.points))[:, None], 2, axis=1)
+    if network.shifts is not None:
+        crossing = np.flatnonzero(network.shifts.any(axis=1))
+        ends[crossing, 1] = len(corners) + np.arange(crossing.size)
+        corners = np.concatenate([corners, (network.points - network.shifts)[crossing]])
     found: list[list[int]] = []
     for body in np.flatnonzero(network.radii == 0) if network.placed else ():
-        own = np.flatnonzero((network.pairs == body).any(axis=1)) + count
-        chosen = np.concatenate([[body], own])
+        chosen = np.concatenate([[body], ends[network.pairs == body]])
         if chosen.size == 3:
             found.append(chosen.tolist())
         if chosen.size < 4:

@@ -187,6 +187,7 @@ def describe(
         "seed": scene.seed,
         "ignore": list(scene.ignore),
         "planar": scene.planar,
+        **({"period": list(scene.period)} if scene.period else {}),
         "time_step": scheme.h,
         "restitution": scheme.restitution,
         "law": scheme.law,

@@ -18,12 +18,14 @@
   };
 
   Fclib.scene = (view, name) => {
-    const { placed, note, bodies, points, pairs, radii, faces, normals } = view.network, solved = Boolean(view.reactions);
+    const { placed, note, bodies, points, pairs, radii, faces, normals, cell, crossing = [], images = [] } = view.network, solved = Boolean(view.reactions);
+    // where a contact is at its second body: elsewhere than at its first, across the boundary of a periodic cell
+    const image = new Map(crossing.map((k, i) => [k, images[i]])), end = (k, side) => side && image.get(k) || points[k];
     const sizes = solved ? view.reactions.map(length) : [], largest = Math.max(1e-300, ...sizes);
     const reach = (list) => [Math.min, Math.max].map((most) => [0, 1, 2].map((k) => list.reduce((found, p) => most(found, p[k]), list[0][k])));
-    const all = [...bodies, ...points, ...bodies.flatMap((b, k) => radii[k] ? [plus(b, [1, 1, 1], radii[k]), plus(b, [1, 1, 1], -radii[k])] : [])];
+    const all = [...bodies, ...points, ...images, ...bodies.flatMap((b, k) => radii[k] ? [plus(b, [1, 1, 1], radii[k]), plus(b, [1, 1, 1], -radii[k])] : [])];
     const radius = Math.max(1e-12, length(plus(...reach(all), -1)) / 2), gap = radius / Math.cbrt(bodies.length || points.length);
-    const shown = { bodies: true, contacts: true, normals: !solved && placed, reactions: solved };
+    const shown = { bodies: true, cell: true, contacts: true, normals: !solved && placed, reactions: solved };
     let scale = 1;
     // a reaction is drawn on the side that it presses down
     const arrows = () => points.map((p, k) => [p, plus(p, view.forces[k], (view.forces[k][2] > 0 ? -1.4 : 1.4) * gap * scale / largest)]).filter((_, k) => sizes[k] > 0);
@@ -31,18 +33,22 @@
     const says = points.map((_, k) => `contact ${k}${bodies.length ? `: ${body(pairs[k][0])} and ${body(pairs[k][1])}` : ""}<br>μ = ${number(view.mu[k])}` +
       (solved ? `, ${STATUS[view.status[k]]}<br>r_N = ${number(view.reactions[k][0])}, ‖r_T‖ = ${number(length(view.reactions[k].slice(1)))}` : ""));
     const dot = Math.min(4.5, Math.max(2.2, 60 / Math.sqrt(points.length)));
-    const markers = (name, chosen, size, more) => ({ type: "scatter3d", mode: "markers", name, ...axes(chosen.map((k) => points[k])), text: chosen.map((k) => says[k]), hovertemplate: "%{text}<extra></extra>", marker: { size, ...more } });
+    const markers = (name, chosen, size, more) => ({ type: "scatter3d", mode: "markers", name, ...axes(chosen.flatMap((k) => image.has(k) ? [points[k], image.get(k)] : [points[k]])), text: chosen.flatMap((k) => image.has(k) ? [says[k], says[k]] : [says[k]]), hovertemplate: "%{text}<extra></extra>", marker: { size, ...more } });
 
     const traces = {
       bodies: () => {
-        const vertices = [...bodies, ...points], mesh = [...faces];
+        const vertices = [...bodies, ...points, ...images], mesh = [...faces];
         bodies.forEach((centre, b) => { if (radii[b]) ball(centre, radii[b], vertices, mesh); });
-        const ties = pairs.flatMap((pair, k) => pair.filter((b) => b >= 0 && !radii[b]).map((b) => [bodies[b], points[k]]));
+        const ties = pairs.flatMap((pair, k) => pair.flatMap((b, side) => b >= 0 && !radii[b] ? [[bodies[b], end(k, side)]] : []));
         return [
           { type: "mesh3d", ...axes(vertices), i: mesh.map((f) => f[0]), j: mesh.map((f) => f[1]), k: mesh.map((f) => f[2]), color: colour("body"), opacity: 0.35, hoverinfo: "skip", flatshading: true, lighting: { ambient: 0.7, diffuse: 0.6, specular: 0.1 } },
           { type: "scatter3d", mode: "lines", ...lines(ties), line: { color: colour("body"), width: 1.5 }, opacity: 0.6, hoverinfo: "skip" },
           { type: "scatter3d", mode: "markers", ...axes(bodies), text: bodies.map((_, b) => body(b)), hovertemplate: "%{text}<extra></extra>", marker: { size: 0.7 * dot, color: colour("body") } },
         ];
+      },
+      cell: () => {
+        const corners = (z) => [[0, 0], [1, 0], [1, 1], [0, 1]].map(([i, j]) => [cell[i][0], cell[j][1], z]), [bottom, top] = reach(all).map((p) => corners(p[2]));
+        return [{ type: "scatter3d", mode: "lines", ...lines([bottom, top].flatMap((ring) => ring.map((p, k) => [p, ring[(k + 1) % 4]])).concat(bottom.map((p, k) => [p, top[k]]))), line: { color: colour("soft"), width: 2 }, hoverinfo: "skip" }];
       },
       contacts: () => solved ? STATUS.map((status, s) => markers(status, points.flatMap((_, k) => Number(view.status[k]) === s ? [k] : []), dot, { color: colour(status) })) : [markers("contact", points.map((_, k) => k), dot, { color: colour("normal") })],
       normals: () => [{ type: "scatter3d", mode: "lines", ...lines(points.map((p, k) => [p, plus(p, normals[k], 0.35 * gap)])), line: { color: colour("normal"), width: 2 }, hoverinfo: "skip" }],
@@ -58,8 +64,9 @@
     };
 
     // ---- the eye
-    const pad = 0.06 * radius, [low, high] = reach([...all, ...view.forces ? arrows().map(([, tip]) => tip) : []]), spans = low.map((x, k) => high[k] - x + 2 * pad), span = Math.max(...spans);
-    const ratios = spans.map((x) => Math.max(0.02, x / span)), far = (Fclib.isNarrow() ? 1.6 : 1.1) * length(ratios);
+    const corners = cell ? cell.map(([x, y]) => [x, y, points[0][2]]) : [];
+    const pad = 0.06 * radius, [low, high] = reach([...all, ...corners, ...view.forces ? arrows().map(([, tip]) => tip) : []]), spans = low.map((x, k) => high[k] - x + 2 * pad), span = Math.max(...spans);
+    const ratios = spans.map((x) => Math.max(0.02, x / span)), far = Math.max((Fclib.isNarrow() ? 1.6 : 1.1) * length(ratios), 1.6 * ratios[2]);
     const eye = (turn, tilt, distance) => ({ x: distance * Math.cos(tilt) * Math.sin(turn), y: -distance * Math.cos(tilt) * Math.cos(turn), z: distance * Math.sin(tilt) });
     const start = { eye: eye(0.6, placed ? 0.25 : 0.4, far), center: { x: 0, y: 0, z: -0.08 }, up: { x: 0, y: 0, z: 1 } };
     const look = (box, camera) => Plotly.relayout(box, { "scene.camera": camera });
@@ -72,7 +79,7 @@
 
     // ---- controls
     const redraw = () => figure.plot.dataset.drawn && figure.plot.draw();
-    const groups = Object.keys(traces).filter((key) => ({ bodies: bodies.length > 0, contacts: true, normals: Boolean(normals), reactions: solved })[key]);
+    const groups = Object.keys(traces).filter((key) => ({ bodies: bodies.length > 0, cell: Boolean(cell), contacts: true, normals: Boolean(normals), reactions: solved })[key]);
     const button = (text, key, label) => h("button", { type: "button", "aria-label": label, onclick: () => keys[key](figure.plot) }, text);
     const above = h("div", { class: "controls" },
       groups.map((key) => h("label", { class: "check" }, h("input", { type: "checkbox", checked: shown[key], onchange: (e) => { shown[key] = e.target.checked; redraw(); } }), key)),

@@ -52,11 +52,16 @@ bool same(const Solution& a, const Solution& b) {
   return equal;
 }
 
+constexpr std::int64_t most_entries = 1 << 20;  // of a solution that is written into a file
+
 constexpr const char* attributed[] = {"solution", "info"};  // groups
 
 void write_into(const std::string& path) {
   Problem outline;
   if (!accepted(path, [&] { outline = read_outline(path); })) return;
+  // an outline has the sizes that a file claims, without the data: no solution of gigabytes for it
+  if (std::visit([](const auto& p) { return length_of_solution(p); }, outline) > most_entries)
+    return;
   const Solution solution = std::visit([](const auto& p) { return small_solution(p); }, outline);
   if (accepted(path, [&] { write_solution(path, solution); })) {
     require(same(read_solution(path).value(), solution), "a solution is read as it was written");

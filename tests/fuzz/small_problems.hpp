@@ -75,6 +75,14 @@ void for_each_small_problem(Visitor&& visit) {
   });
 }
 
+/// The entries that the vectors of a solution have together.
+template <class P>
+std::int64_t length_of_solution(const P& problem) {
+  std::int64_t length = 0;
+  for_each_field<Solution>([&](const auto& field) { length += problem.size(field.rows); });
+  return length;
+}
+
 /// A solution, or a guess, of the right sizes.
 template <class P>
 Solution small_solution(const P& problem) {

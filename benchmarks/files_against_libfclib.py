@@ -5,8 +5,10 @@
 Each problem (with its solution and guesses) is written by both libraries, and each library reads
 both files: the same numbers, bit by bit, or the run fails. 3.1 never compresses. Times are CPU
 times of a read through the C interface with the file in the system's cache, the least of many that
-the libraries take by turns in one process. Needs a C compiler, our C library (--ours, by default
-build/libfclib.so.0) and that of 3.1 (--theirs, by default the system's, Debian's libfclib0).
+the libraries take by turns in one process. The last line says what our bytes are, and what LZMA,
+which HDF5 has no filter for, would make of the numbers. Needs h5py, a C compiler, our C library
+(--ours, by default build/libfclib.so.0) and that of 3.1 (--theirs, by default the system's,
+Debian's libfclib0).
 """
 
 from __future__ import annotations
@@ -14,12 +16,16 @@ from __future__ import annotations
 import argparse
 import csv
 import ctypes
+import lzma
 import shutil
 import statistics
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+import h5py
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAM = Path(__file__).with_suffix(".c")
@@ -32,7 +38,13 @@ COLUMNS = (
     "ours_own",
     "ours_of_3_1",
     "ours_same",
+    "entries",
+    "indices",
+    "entries_lzma",
+    "indices_lzma",
 )
+# for numbers of 8 bytes
+LZMA = [{"id": lzma.FILTER_LZMA2, "preset": 9 | lzma.PRESET_EXTREME, "lc": 0, "lp": 3, "pb": 3}]
 
 
 def system_library() -> Path | None:
@@ -48,6 +60,29 @@ def system_library() -> Path | None:
         return None
     # 3.1 has no such function
     return None if hasattr(ctypes.CDLL(str(path)), "fclib_last_error") else path
+
+
+def parts(path: Path) -> dict[str, float]:
+    """The bytes of an FCLIB file that are entries and indices, as they are and packed by LZMA."""
+    found = dict.fromkeys(COLUMNS[-4:], 0.0)
+
+    def add(_: str, data: h5py.Group | h5py.Dataset) -> None:
+        if not isinstance(data, h5py.Dataset) or data.dtype.kind not in "if":
+            return
+        name = "entries" if data.dtype.kind == "f" else "indices"
+        values = data[()]
+        stored = data.id.get_storage_size()
+        shuffled = np.atleast_1d(values).view(np.uint8).reshape(-1, values.itemsize).T
+        packed = [
+            len(lzma.compress(each.tobytes(), lzma.FORMAT_RAW, filters=LZMA))
+            for each in (values, shuffled)
+        ]
+        found[name] += stored
+        found[f"{name}_lzma"] += min(stored, *packed)
+
+    with h5py.File(path) as file:
+        file.visititems(add)
+    return found
 
 
 def figures(
@@ -77,6 +112,7 @@ def figures(
         "ours_own": ours_own / own,
         "ours_of_3_1": ours_of_theirs / own,
         "ours_same": ours_own / theirs_of_ours,
+        **parts(ours),
     }
 
 
@@ -134,6 +170,12 @@ def main() -> None:
     total = sum(of("bytes_ours")), sum(of("bytes_3_1"))
     print(f"total of {len(rows)} files: {total[0]:.0f} of {total[1]:.0f} bytes, ", end="")
     print(f"{total[0] / total[1]:.1%}")
+    share = {name: sum(of(name)) / total[1] for name in COLUMNS[-4:]}
+    rest = total[0] / total[1] - share["entries"] - share["indices"]
+    print(f"of it headers and texts {rest:.1%}", end="")
+    for name in ("entries", "indices"):
+        print(f", {name} {share[name]:.1%} (by LZMA {share[f'{name}_lzma']:.1%})", end="")
+    print()
     if options.csv:
         with options.csv.open("w", newline="") as stream:
             writer = csv.writer(stream)

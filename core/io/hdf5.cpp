@@ -106,8 +106,10 @@ struct Group {
     return (path == "/" ? "/" : path + "/") + std::string(name);
   }
   [[nodiscard]] bool has(const std::string& name) const {
-    return H5Lexists(id, name.c_str(), H5P_DEFAULT) > 0 &&
-           H5Oexists_by_name(id, name.c_str(), H5P_DEFAULT) > 0;
+    const htri_t linked = H5Lexists(id, name.c_str(), H5P_DEFAULT);
+    // what cannot be looked up is not what is not there
+    if (linked < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+    return linked > 0 && H5Oexists_by_name(id, name.c_str(), H5P_DEFAULT) > 0;
   }
 };
 
@@ -392,8 +394,9 @@ ProblemInfo read_info(const Group& parent, const std::string& otherwise) {
   std::optional<Handle> handle;
   if (parent.has("info")) handle.emplace(open_group(parent, "info"));
   for_each_field<ProblemInfo>([&](const auto& field) {
-    const Group group{handle ? handle->id() : -1, parent.child("info")};
-    info.*field.member = read_text_if_there(group, std::string(field.name), otherwise);
+    info.*field.member = handle ? read_text_if_there({handle->id(), parent.child("info")},
+                                                     std::string(field.name), otherwise)
+                                : otherwise;
   });
   return info;
 }

@@ -532,6 +532,21 @@ def test_a_dataset_beyond_the_end_of_the_file(corpus: Path, tmp_path: Path) -> N
         fclib.read(path)
 
 
+def test_what_cannot_be_looked_up_is_not_missing(corpus: Path, tmp_path: Path) -> None:
+    """The names in the root are damaged: a solution is not said to be absent, nor written."""
+    path = tmp_path / "names.hdf5"
+    data = bytearray((corpus / "good.hdf5").read_bytes())
+    free_list = data.index(b"HEAP") + 16
+    data[free_list : free_list + 8] = (2**40).to_bytes(8, "little")
+    path.write_bytes(data)
+    for reads in (fclib.read, fclib.read_solution, fclib.read_guesses):
+        with pytest.raises(fclib.FileError, match=r": /\w+: cannot be looked up"):
+            reads(path)
+    with pytest.raises(fclib.FileError, match="cannot be looked up"):
+        fclib.write_solution(path, fclib.Solution(r=np.zeros(18)))
+    assert path.read_bytes() == data
+
+
 # ---- files that are not what they seem from their first byte on
 
 

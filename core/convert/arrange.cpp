@@ -3,7 +3,13 @@
 namespace fclib {
 
 Matrix arranged(const Matrix& a, const Places& rows, const Places& cols) {
-  Matrix result{.storage = Storage::triplet, .rows = rows.count, .cols = cols.count};
+  Matrix result{.storage = Storage::triplet,
+                .rows = rows.count,
+                .cols = cols.count,
+                .p = {},
+                .i = {},
+                .x = {},
+                .info = {}};
   result.i.reserve(a.nnz());
   result.p.reserve(a.nnz());
   result.x.reserve(a.nnz());

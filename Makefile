@@ -109,7 +109,7 @@ $(VENV)/.build-tools: $(VENV)/.system pyproject.toml
 
 # --no-build-isolation keeps one build folder, so that only what changed is compiled again
 $(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
-	@echo "== building and installing fclib into $(VENV) (two minutes the first time)"
+	@echo "== building and installing fclib into $(VENV) (eight minutes of CPU time the first time)"
 	@$(BIN)/pip install --no-build-isolation \
 	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
 	  '.[analysis,collection,bench,report,solvers]'

@@ -9,7 +9,10 @@
 //   (I + D W) dr = (I + delta D0)^-1 (S N g - D0 R),   D = (I + delta D0)^-1 D0
 //
 // Mehrotra's predictor and corrector choose g. Without the term (`associated`) this is the convex
-// problem of an associated flow rule.
+// problem of an associated flow rule. Where a packing is jammed, the velocities that the path has
+// on its way to zero are of the size of tau, and the term's kink makes the path fold; `rounding`
+// leaves velocities of that size to the associated rule: sqrt(||y_T||^2 + w^2) - w, w = rounding
+// tau.
 //
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
 // mechanics using interior point algorithm" (2023), for the convex part, to
@@ -30,6 +33,7 @@ namespace fclib {
 
 struct InteriorPointRules {
   bool associated = false;
+  double rounding = 0;        ///< of the term's kink, in tau
   double step_cap = 0.95;     ///< highest share of the step to the boundary
   double delta = 1e-6;        ///< regularisation at first
   bool delta_follows = true;  ///< delta <= 1e4 tau
@@ -74,7 +78,7 @@ class InteriorPoint {
     double least = std::numeric_limits<double>::infinity();
     int least_at = 0;
     for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
-      evaluate(rules.associated);
+      evaluate(rules);
       physical_ = r_ * (size_q_ / omega_);
       velocity_ = u_ * size_q_;
       const double error =
@@ -159,9 +163,13 @@ class InteriorPoint {
     return (x[0] - t) * (x[0] + t);
   }
 
-  void evaluate(bool associated) {
+  /// ||y_T||, rounded.
+  [[nodiscard]] double sliding(double norm) const { return std::hypot(norm, width_) - width_; }
+
+  void evaluate(const InteriorPointRules& rules) {
     problem_.W.multiply_add(r_ / omega_, q_, u_);
     tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
+    width_ = rules.rounding * tau_;
     residual_ = 0;
     for (Index a = 0; a < problem_.nc(); ++a) {
       const double mu = problem_.friction.mu[a];
@@ -170,7 +178,7 @@ class InteriorPoint {
       if (mu > 0) {
         residual -= y;
         residual[0] += y[0] - mu * y[0];
-        if (!associated) residual[0] += mu * y.template tail<T>().norm();
+        if (!rules.associated) residual[0] += mu * sliding(y.template tail<T>().norm());
         residual_ = std::max(residual_, residual.template lpNorm<Eigen::Infinity>());
       } else {
         residual[0] -= y[0];
@@ -226,8 +234,10 @@ class InteriorPoint {
         s.inverse /= beta * beta;
         if (!associated) {
           const double norm = y.template tail<T>().norm();
-          if (norm > 0)
-            s.P.template block<1, T>(0, 1) = mu * y.template tail<T>().transpose() / norm;
+          if (norm > 0) {
+            s.P.template block<1, T>(0, 1) =
+                mu * y.template tail<T>().transpose() / std::hypot(norm, width_);
+          }
         }
         n2.row(0) /= mu;
         n2.col(0) /= mu;
@@ -287,7 +297,8 @@ class InteriorPoint {
       if (!(norm > 0)) continue;
       const ContactVector<T> dy = step * affine_y_.template segment<T>(D * a + 1);
       residual_vector_[D * a] +=
-          problem_.friction.mu[a] * ((y + dy).norm() - norm - y.dot(dy) / norm);
+          problem_.friction.mu[a] *
+          (sliding((y + dy).norm()) - sliding(norm) - y.dot(dy) / std::hypot(norm, width_));
     }
   }
 
@@ -363,6 +374,7 @@ class InteriorPoint {
   double omega_ = 1;
   double size_q_ = 1;
   double tau_ = 1;
+  double width_ = 0;  // of the rounding
   double residual_ = 0;
   int iterations_ = 0;
   std::vector<Scaling> scaling_;

@@ -7,7 +7,8 @@
 //      (before the sweeps of an island too: a few steps of Newton from a guess that is good)
 //   3  proximal Newton ("polish"), where the error is small already
 //   4  interior point with the shift in the Newton system, polished as it comes near; where its
-//      path folds, sweeps for what it has cost, and again with shorter steps
+//      path folds, sweeps for what it has cost, again with shorter steps, and with the shift's
+//      kink rounded
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)
@@ -326,6 +327,11 @@ class Island {
               [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
       }
       if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
+      if (!done()) {
+        stage("interior point, rounded", [&] {
+          interior_point({.rounding = 3, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100});
+        });
+      }
       if (!done()) stage("associated", [&] { associated(); });
       // from nothing: where it converges, it does from there as well as from an iterate that
       // another method is stuck at; slower than the proximal point on rolling contacts

@@ -304,3 +304,13 @@ def test_a_folded_path(push: float, mu: float) -> None:
     result = fclib.solve(problem, solver="homotopy", tol=1e-8)
     assert result.converged, result
     assert judge(problem, result.solution).error <= 1.01e-8
+
+
+@pytest.mark.parametrize(("seed", "push"), [(3, 1.0), (4, 0.0)])
+def test_a_jammed_packing(seed: int, push: float) -> None:
+    """The path folds where nearly all rests: rounding the shift's kink unfolds it."""
+    problem = Packing().of_size(100, push, seed)
+    assert not fclib.solve(problem, solver="nsip").converged
+    result = fclib.solve(problem, solver="nsip", rounding=3)
+    assert result.converged, result
+    assert judge(problem, result.solution).error <= 1.01e-8

@@ -8,6 +8,7 @@ like any other: conversions, limits, history and the judgement are the same.
 
 from __future__ import annotations
 
+import difflib
 import functools
 import inspect
 import math
@@ -272,5 +273,7 @@ def find_solver(name: str) -> _core.SolverInfo:
             return found
     if name in _registered:  # by an entry point
         return _registered[name]
-    known = ", ".join(info.name for info in solvers())
-    raise _core.OptionError(f"solver '{name}': unknown; there is: {known}")
+    known = [info.name for info in solvers()]
+    close = difflib.get_close_matches(name, known, 1)
+    meant = f"did you mean {close[0]}? " if close else ""
+    raise _core.OptionError(f"solver '{name}': unknown; {meant}there is: {', '.join(known)}")

@@ -360,8 +360,10 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "word"),
     [
-        ({"solvers": []}, "there is none"),
-        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss"),
+        ({"solvers": []}, "no list of solvers"),
+        ({"solvers": "auto"}, "no list of solvers"),
+        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss.*did you mean nsgs"),
+        ({"solvers": [{"name": "nsgs", "options": "relaxation=1"}]}, r"\.options: is no table"),
         ({"solvers": ["nsgs relaxation=-1"]}, "relaxation"),
         ({"solvers": ["nsgs", "nsgs"]}, "two that are called 'nsgs'"),
         ({"solvers": [{"options": {}}]}, "no name"),
@@ -369,7 +371,16 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         ({"problems": [{"family": "x"}]}, "neither files"),
         ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
         ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),
-        ({"tolerance": 1e-8}, "tolerance: is not known"),
+        ({"problems": ["a"]}, r"write \[\[problems\]\]"),
+        ({"problems": "a"}, r"write \[\[problems\]\]"),
+        ({"problems": [{"planted": {"count": 1, "contacts": "3"}}]}, r"planted\.contacts: '3'"),
+        ({"problems": [{"simulate": "Chain"}]}, r"problems\[0\]\.simulate: is no table"),
+        (
+            {"problems": [{"simulate": {"family": "Chain", "steps": "3"}}]},
+            r"simulate\.steps: '3' is no list",
+        ),
+        ({"tolerance": 1e-8}, "tolerance: is not known here; did you mean tolerances"),
+        ({"seed": "a"}, "seed: 'a'"),
         ({"tolerances": [-1]}, "positive"),
         ({"time_limit": "long"}, "time_limit.*long"),
         ({"repeats": 0}, "repeats"),
@@ -379,6 +390,26 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
 def test_a_campaign_that_is_not_understood(changes: dict[str, Any], word: str) -> None:
     with pytest.raises(bench.CampaignError, match=word):
         campaign(**changes)
+
+
+def test_a_file_with_a_wrong_list_of_problems(tmp_path: Path) -> None:
+    (tmp_path / "wrong.toml").write_text('solvers = ["auto"]\nproblems = "data"\n')
+    with pytest.raises(bench.CampaignError, match=r"wrong\.toml: problems: write"):
+        bench.Campaign.read(tmp_path / "wrong.toml")
+
+
+def test_scenes_that_are_not_understood() -> None:
+    pytest.importorskip("mujoco")
+    for recipe, word in (
+        ({"family": "Boxes"}, "simulate Boxes: no family"),
+        (
+            {"family": "BoxesStack", "parameters": {"bocses": 3}},
+            "no parameter bocses; it has boxes",
+        ),
+    ):
+        chosen = campaign(problems=[{"simulate": {"steps": [1], **recipe}}])
+        with pytest.raises(fclib.OptionError, match=word):
+            chosen.plan()
 
 
 def test_solvers_that_may_be_missing() -> None:

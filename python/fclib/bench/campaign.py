@@ -6,6 +6,7 @@ jobs of it.
 
 from __future__ import annotations
 
+import difflib
 import hashlib
 import importlib
 import importlib.metadata
@@ -121,7 +122,7 @@ class Campaign:
             groups = [
                 {key: value for key, value in row.items() if key not in changes}
                 | ({"sample": sample} if sample else {})
-                for row in entries.get("problems", ())
+                for row in _tables(entries)
             ]
             return cls.of({"name": file.stem, **entries, "problems": groups, **changes}, base, text)
         except CampaignError as error:
@@ -141,10 +142,11 @@ class Campaign:
             load_modules(list(modules))
         except fclib.SolverError as error:
             raise CampaignError(f"modules: {error}") from None
-        choices, missing = _solvers(entries.get("solvers", ()), modules)
-        rows = entries.get("problems", ())
-        if not isinstance(rows, Sequence) or not rows:
-            raise CampaignError("problems: there is no [[problems]]")
+        choices, missing = _solvers(entries.get("solvers"), modules)
+        rows = _tables(entries)
+        seed = entries.get("seed", 0)
+        if not isinstance(seed, int):
+            raise CampaignError(f"seed: {seed!r} is not a whole number")
         return cls(
             name=str(entries.get("name", "campaign")),
             title=str(entries.get("title", "")),
@@ -152,7 +154,7 @@ class Campaign:
             groups=tuple(_group(row, entries, k) for k, row in enumerate(rows)),
             repeats=_count(entries, "repeats", 1),
             threads=_count(entries, "threads", 1),
-            seed=int(entries.get("seed", 0)),
+            seed=seed,
             history=bool(entries.get("history", False)),
             modules=modules,
             base=base,
@@ -236,14 +238,29 @@ def toml() -> Any:
     return importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
 
 
+def _tables(entries: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    rows = entries.get("problems", [])
+    if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
+        raise CampaignError("problems: write [[problems]], and files = [...] below it")
+    if not rows:
+        raise CampaignError("problems: there is no [[problems]]")
+    return rows
+
+
 def _only(entries: object, known: set[str], where: str) -> None:
     if not isinstance(entries, Mapping):
-        raise CampaignError(f"{where or 'the file'}: is no table")
+        raise CampaignError(f"{where.rstrip('.') or 'the file'}: is no table")
     for name in entries:
         if name not in known:
             raise CampaignError(
-                f"{where}{name}: is not known here; there is: {', '.join(sorted(known))}"
+                f"{where}{name}: is not known here; {_there_is(name, sorted(known))}"
             )
+
+
+def _there_is(word: str, known: Sequence[str]) -> str:
+    """What may have been meant by a word, and all that there is."""
+    close = difflib.get_close_matches(word, known, 1)
+    return f"{f'did you mean {close[0]}? ' if close else ''}there is: {', '.join(known)}"
 
 
 def _texts(entries: Mapping[str, Any], name: str) -> list[str]:
@@ -261,11 +278,24 @@ def _positive(value: object, where: str) -> float:
     return number
 
 
-def _count(entries: Mapping[str, Any], name: str, default: int) -> int:
+def _count(entries: Mapping[str, Any], name: str, default: int, where: str = "") -> int:
     value = entries.get(name, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 1:
-        raise CampaignError(f"{name}: {value!r} is not a number of times, 1 or more")
+        raise CampaignError(f"{where}{name}: {value!r} is not a whole number, 1 or more")
     return value
+
+
+def _made(recipe: Mapping[str, Any], where: str) -> None:
+    steps = recipe.get("steps", [])
+    if not isinstance(steps, list) or not all(isinstance(k, int) and k >= 0 for k in steps):
+        raise CampaignError(f"{where}steps: {steps!r} is no list of whole numbers, 0 or more")
+    for name in ("count", "contacts", "spacedim"):
+        if name in recipe:
+            _count(recipe, name, 1, where)
+    if not isinstance(recipe.get("seed", 0), int):
+        raise CampaignError(f"{where}seed: {recipe['seed']!r} is not a whole number")
+    if not isinstance(recipe.get("parameters", {}), Mapping):
+        raise CampaignError(f"{where}parameters: is no table")
 
 
 def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
@@ -279,6 +309,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
             needed = known - {"seed", "parameters", "spacedim"}
             if absent := sorted(needed - set(row[kind])):
                 raise CampaignError(f"{where}{kind}: has no {absent[0]}")
+            _made(row[kind], f"{where}{kind}.")
     values = {name: row.get(name, entries.get(name)) for name in ("tolerances", *NUMBERS)}
     tolerances = values["tolerances"] or [1e-8]
     if not isinstance(tolerances, list):
@@ -303,8 +334,8 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
 def _solvers(
     rows: object, modules: Sequence[str]
 ) -> tuple[tuple[SolverChoice, ...], tuple[str, ...]]:
-    if not isinstance(rows, Sequence) or isinstance(rows, str) or not rows:
-        raise CampaignError("solvers: there is none")
+    if not isinstance(rows, list) or not rows:
+        raise CampaignError('solvers: is no list of solvers, as in solvers = ["auto", "nsgs"]')
     choices: dict[str, SolverChoice] = {}
     missing = []
     for number, row in enumerate(rows):
@@ -314,6 +345,8 @@ def _solvers(
         if "name" not in entries:
             raise CampaignError(f"{where[:-1]}: has no name")
         name, options = str(entries["name"]), entries.get("options", {})
+        if not isinstance(options, Mapping):
+            raise CampaignError(f"{where}options: is no table, as in options = {{ name = value }}")
         try:
             info = fclib.find_solver(name)
             info.check_options(options)

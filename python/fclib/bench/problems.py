@@ -6,6 +6,7 @@ once; the same recipe gives the same problems, bit for bit.
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 import os
@@ -154,9 +155,14 @@ def simulated(
         from fclib import scenes, simulate
 
         try:
-            scene = scenes.get(family)(**parameters).scene(seed)
+            kind = scenes.get(family)
+            known = [item.name for item in dataclasses.fields(kind)]
+            if unknown := [name for name in parameters if name not in known]:
+                raise ValueError(f"has no parameter {unknown[0]}; it has {', '.join(known)}")
+            scene = kind(**parameters).scene(seed)
         except (KeyError, TypeError, ValueError) as error:
-            raise fclib.OptionError(f"simulate {family}: {error}") from None
+            # the text of a KeyError is in quotes otherwise
+            raise fclib.OptionError(f"simulate {family}: {error.args[0]}") from None
         for step in simulate.simulate(scene, max(wanted) + 1):
             if step.index in wanted and step.problem.nc:
                 local = step.problem.condense().replace(info=step.problem.info)

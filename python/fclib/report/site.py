@@ -25,6 +25,7 @@ from typing import Any
 
 import fclib
 from fclib import scenes
+from fclib.bench.job import MERITS
 from fclib.bench.profiles import METRICS, PENALTY, SHIFT
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
@@ -267,6 +268,7 @@ class _Writer:
             "version": fclib.__version__,
             "metrics": {name: label for name, (label, _) in METRICS.items()},
             "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
+            "merits": [[name, inspect.getdoc(getattr(fclib.Merit, name))] for name in MERITS],
             "charges": {"penalty": PENALTY, "shift": SHIFT},
             "tolerances": [],
             "headlines": [],

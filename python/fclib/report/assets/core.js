@@ -44,6 +44,11 @@ Fclib.set = (element, attributes) => {
   }
 };
 
+// names and what they are, where it is known
+Fclib.facts = (pairs) => Fclib.h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [Fclib.h("dt", {}, name), Fclib.h("dd", {}, v)]));
+// `names` of code in a text
+Fclib.prose = (text) => text.split("`").map((part, k) => k % 2 ? Fclib.h("code", {}, part) : part);
+
 // ---- addresses: a page, what it is of, its state
 Fclib.to = (page, rest = [], params = {}) => {
   const query = new URLSearchParams(Object.entries(params).filter(([, v]) => v !== undefined && v !== null && v !== "" && v !== false)).toString();

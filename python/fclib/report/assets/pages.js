@@ -1,7 +1,7 @@
 // the pages
 "use strict";
 (() => {
-  const { h, number, load, link, to } = Fclib;
+  const { h, number, load, link, to, facts, prose } = Fclib;
   const site = () => Fclib.values.site;
 
   // ---- the catalogue: columns as they are stored, rows when they are asked for
@@ -18,6 +18,8 @@
     return stored;
   };
   const problemHref = (id) => to("problem", id.split("/"));
+  // where there is little room, a name breaks after a part of it
+  const problemLink = (id) => h("a", { href: problemHref(id) }, id.split("/").map((part, k) => k ? ["/", h("wbr"), part] : part));
   const familyHref = (set, name) => to("family", set ? [set, name] : [name]);
   const solverLink = (label) => label ? link("solver", [label], {}, label) : "–";
 
@@ -26,6 +28,9 @@
     options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text))));
   const tolerances = () => site().tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]);
   const lastTolerance = () => site().tolerances.length - 1;
+  const families = () => [["", "all"], ...[...new Set(site().families.map((f) => f.name))].map((name) => [name, name])];
+  const styleOf = (label) => site().solvers.findIndex((solver) => solver.label === label);
+  const range = ([a, b]) => a === b ? number(a) : `${number(a)} to ${number(b)}`;
   const search = (label, value, oninput, hint) => h("label", {}, label, h("input", { type: "search", value: value || "", placeholder: hint, oninput: (e) => oninput(e.target.value) }));
   /* the state of a table, in the address */
   const remembered = (params, keep) => {
@@ -43,12 +48,11 @@
     const code = h("code", {}, text);
     return h("div", { class: "copy" }, h("pre", { tabindex: 0 }, code), button);
   };
-  const facts = (pairs) => h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [h("dt", {}, name), h("dd", {}, v)]));
   const shown = (v) => typeof v === "boolean" ? v ? "yes" : "no" : number(v);
   const status = (name) => h("span", { class: name === "converged" ? "good" : "bad" }, name);
 
-  const summaryColumns = (order) => [
-    { key: "solver", label: "solver", head: true, cell: (r) => r.solver === "virtual best" ? h("em", {}, r.solver) : [order && Fclib.swatch(order.indexOf(r.solver)), " ", solverLink(r.solver)] },
+  const summaryColumns = (coloured) => [
+    { key: "solver", label: "solver", head: true, cell: (r) => r.solver === "virtual best" ? h("em", { title: "the fastest of all on each instance" }, r.solver) : [coloured && Fclib.swatch(styleOf(r.solver)), " ", solverLink(r.solver)] },
     { key: "method", label: "method", value: (r) => (site().solvers.find((s) => s.label === r.solver) || {}).family || "" },
     { key: "solved", label: "solved", title: "instances whose recomputed error meets the tolerance" },
     { key: "of", label: "of" },
@@ -76,38 +80,39 @@
       s.headlines.forEach((head, t) => {
         if (!head) return;
         const mean = head.curves.map((curve) => curve.reduce((a, b) => a + b, 0));
-        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: s.solvers.findIndex((v) => v.label === name), mean: mean[k] })).sort((a, b) => b.mean - a.mean);
+        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: styleOf(name), mean: mean[k] })).sort((a, b) => b.mean - a.mean);
         charts.append(h("section", {}, h("h3", {}, `Tolerance ${Fclib.tolerance(s.tolerances[t])}`),
           Fclib.lines({
-            name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
+            half: true, name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
             ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
             note: `${head.instances} instances${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
           }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
       });
       page.append(charts, h("h2", {}, "Solvers"));
-      const labels = s.solvers.map((v) => v.label);
       const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "" };
       const rows = () => ((s.headlines[state.tol] || { tables: {} }).tables[state.family]) || [];
-      const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run", columns: summaryColumns(labels), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
+      const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run; the virtual best is the fastest of all on each", columns: summaryColumns(true), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
       const change = (key) => (value) => { state[key] = key === "tol" ? Number(value) : value; keep({ [key]: value }); table.update(rows()); };
       page.append(h("div", { class: "controls" }, select("tolerance", tolerances(), state.tol, change("tol")),
-        select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family"))), table);
+        select("family", families(), state.family, change("family"))), table);
       page.append(h("h2", {}, "How the runs ended"), Fclib.table({
         caption: "Statuses of all runs", rows: Object.entries(o.statuses).map(([name, v]) => ({ name, ...v })),
         columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", value: (r) => r.count / o.runs, format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],
       }), h("h2", {}, "Where and what"), facts([["machine", `${o.node || "?"}, ${o.cpu || "?"}`], ["campaigns", o.campaigns.map((c) => `${c.name}: ${c.done} of ${c.planned} runs${c.ended ? "" : ", not ended"}`).join("; ")]]));
     }
-    page.append(h("h2", {}, "Families"), familyCards());
+    page.append(h("h2", {}, "Families"), familyCards(s.families));
   };
 
-  const familyCards = () => h("div", { class: "cards" }, site().families.map((f) => h("article", { class: "panel" },
+  const familyCards = (list) => h("div", { class: "cards" }, list.map((f) => h("article", { class: "panel" },
     f.scene && h("img", { src: f.scene, alt: f.description || f.name, loading: "lazy" }),
     h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
     h("p", { class: "small" }, f.description || ""),
-    h("p", { class: "small soft" }, `${f.problems} problems, ${f.ranges.nc ? f.ranges.nc.join(" to ") : "?"} contacts, ${f.formulations.join(", ")}`))));
+    h("p", { class: "small soft" }, `${f.problems} problems, ${f.ranges.nc ? range(f.ranges.nc) : "?"} contacts, ${f.formulations.join(", ")}`))));
 
   Fclib.pages.families = async (page) => {
-    page.append(h("h1", {}, "Families"), h("p", {}, `${site().problems} problems.`), familyCards());
+    const { families: all, problems } = site(), sets = [...new Set(all.map((f) => f.set))];
+    page.append(h("h1", {}, "Families"), h("p", {}, `${problems} problems in ${all.length} families${sets.length > 1 ? ` of ${sets.length} sets` : ""}.`),
+      ...sets.flatMap((set) => [sets.length > 1 && h("h2", {}, set || "Of no set"), familyCards(all.filter((f) => f.set === set))]).filter(Boolean));
   };
 
   // ---- profiles
@@ -137,7 +142,7 @@
     page.append(h("h1", {}, "Profiles"), h("div", { class: "controls" },
       select("profile", [["performance", "performance: ratio to the best"], ["data", "data: cost"], ["contact", "data: cost per contact"]], state.kind, change("kind")),
       select("measure", Object.entries(s.metrics), state.metric, change("metric")), select("tolerance", tolerances(), state.tol, change("tol")),
-      select("family", [["", "all"], ...[...new Set(s.families.map((f) => f.name))].map((f) => [f, f])], state.family, change("family")),
+      select("family", families(), state.family, change("family")),
       select("axis", [["log", "logarithmic"], ["linear", "linear"]], state.axis, change("axis"))),
     chips, h("div", { class: "tools" }, choose("those with enough runs", () => fair(state.tol)), choose("all", () => labels.map((_, k) => k)), choose("none", () => [])),
     box, h("h2", {}, "How they ended"), statuses, h("h2", {}, "Two solvers, problem by problem"), pair);
@@ -242,7 +247,7 @@
     const columns = cat.columns.filter((c) => !c.hidden).map((c) => ({
       key: c.key, label: c.label, title: c.doc, head: c.key === "id", format: format[c.key],
       type: c.words || ["id", "family", "formulation", "status", "best_solver", "view"].includes(c.key) ? "text" : "number",
-      cell: c.key === "id" ? (row) => h("a", { href: problemHref(row.id) }, row.id)
+      cell: c.key === "id" ? (row) => problemLink(row.id)
         : c.key === "family" ? (row) => h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family)
           : c.key === "best_solver" ? (row) => solverLink(row.best_solver) : c.key === "status" ? (row) => row.status ? status(row.status) : "–" : undefined,
     }));
@@ -271,9 +276,9 @@
     if (!f) throw new Fclib.NotHere(`There is no family ${rest.join("/")}.`);
     page.append(h("h1", {}, f.title || f.name),
       h("div", { class: "two" }, f.scene ? h("figure", {}, h("img", { src: f.scene, alt: f.description || f.name })) : null,
-        h("div", {}, h("p", {}, f.description || ""), (f.text || []).map((text) => h("p", { class: "small" }, text)),
+        h("div", {}, h("p", {}, f.description || ""), (f.text || []).map((text) => h("p", { class: "small" }, prose(text))),
           facts([["name", f.set ? `${f.set}/${f.name}` : f.name], ["problems", link("catalogue", [], { family: f.name }, String(f.problems))], ["application", f.application], ["friction", f.friction], ["original by", f.authors], ["formulations", f.formulations.join(", ")],
-            ...Object.entries(f.ranges).map(([key, [a, b]]) => [{ nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key], a === b ? number(a) : `${number(a)} to ${number(b)}`])]))));
+            ...Object.entries(f.ranges).map(([key, ends]) => [{ nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key], range(ends)])]))));
     if (f.distribution) page.append(h("h2", {}, "Distribution"), h("figure", {}, h("img", { src: f.distribution, alt: `Histograms of contacts, degrees of freedom and density: ${f.problems} problems` }), h("figcaption", {}, "The numbers are in the ", link("catalogue", [], { family: f.name }, "catalogue"), ".")));
     if (s.headlines.some((head) => head && head.tables[f.name])) {
       const t = Number(params.get("tol") ?? lastTolerance()), head = s.headlines[t];
@@ -305,10 +310,11 @@
     const half = Math.ceil(labelled.length / 2);
     page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
     if (view) {
-      if (view.network) page.append(h("h2", {}, "Contact network"), Fclib.scene(view, id));
-      if (view.spectrum && view.spectrum.rank > 1) page.append(h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, id));
-      page.append(h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), Fclib.texts(view) || "");
-      if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({ caption: "Recomputed from the file", rows: Object.entries(view.merit), columns: [{ key: 0, label: "part", head: true }, { key: 1, label: "value", type: "number" }] }));
+      page.append(...Fclib.pictures(view, id));
+      if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({
+        caption: "Recomputed from the file", rows: s.merits.filter(([name]) => name in view.merit),
+        columns: [{ key: 0, label: "part", head: true }, { key: "value", label: "value", type: "number", value: ([name]) => view.merit[name] }, { key: 1, label: "what it is", wrap: true }],
+      }));
     } else page.append(h("p", { class: "soft" }, "This site has no picture of this problem: ", h("code", {}, "fclib view FILE"), " draws it."));
     if (runs) {
       const several = new Set(runs.map((r) => r.form)).size > 1;
@@ -328,14 +334,14 @@
           const series = own.map((r) => {
             let least = Infinity;
             const points = r.history.filter((p) => p[1] > 0 && p[at] > 0).map((p) => [p[at], least = Math.min(least, p[1])]);
-            return { name: r.solver, style: s.solvers.findIndex((v) => v.label === r.solver), x: points.map((p) => p[0]), y: points.map((p) => p[1]) };
+            return { name: r.solver, style: styleOf(r.solver), x: points.map((p) => p[0]), y: points.map((p) => p[1]) };
           }).filter((one) => one.x.length);
           const xs = series.flatMap((one) => one.x), ys = series.flatMap((one) => one.y);
           if (!xs.length) { box.replaceChildren(); return; }
           let [low, high] = [Math.min(...xs), Math.max(...xs)];
           if (low === high) high = 2 * low;
           box.replaceChildren(Fclib.lines({
-            name: `convergence-${id.replaceAll("/", "-")}`, title: `Convergence on ${id}, tolerance ${state.tol}`, series, xlog: true, ylog: true, xrange: [low, high], yrange: [Math.min(...ys) / 2, Math.max(...ys) * 2],
+            name: `convergence-${id}`, title: `Convergence on ${id}, tolerance ${state.tol}`, series, xlog: true, ylog: true, xrange: [low, high], yrange: [Math.min(...ys) / 2, Math.max(...ys) * 2],
             xname: at ? "time [s]" : "iteration", xlabel: at ? "time [s]" : "iteration", ylabel: "least error so far", note: "The error that the solver sees, of the reduced problem; a solver that reports once has no curve.",
           }));
         };
@@ -369,15 +375,15 @@
       const { best, worst } = head.extremes[solver.label];
       const list = (caption, entries) => Fclib.table({
         caption, rows: entries, columns: [
-          { key: 0, label: "problem", type: "text", head: true, cell: (e) => h("a", { href: problemHref(cat.read.id(e[0])) }, cat.read.id(e[0])) },
+          { key: 0, label: "problem", type: "text", head: true, cell: (e) => problemLink(cat.read.id(e[0])) },
           { key: 1, label: "CPU [s]", type: "number", format: (v) => v === null ? h("span", { class: "bad" }, "failed") : number(v) },
-          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", cell: (e) => solverLink(e[3]) }],
+          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", wrap: true, cell: (e) => solverLink(e[3]) }],
       });
       page.append(h("div", { class: "two" }, best.length ? list("Where it is best", best) : h("p", {}, "It is nowhere the fastest."), worst.length ? list("Where it is worst", worst) : h("p", {}, "It is the fastest everywhere.")));
     });
     if (solver.known) page.append(h("h2", {}, "Options"), solver.known.length ? Fclib.table({
       caption: "Set by name=value", rows: solver.known, page: 60,
-      columns: [{ key: 0, label: "option", head: true }, { key: 1, label: "type", wrap: true }, { key: 2, label: "default", type: "text" }, { key: 3, label: "unit" }, { key: 4, label: "meaning", wrap: true }],
+      columns: [{ key: 0, label: "option", head: true }, { key: 1, label: "type", wrap: true }, { key: 2, label: "default", type: "text" }, { key: 3, label: "unit" }, { key: 4, label: "meaning", wrap: true, cell: (r) => prose(r[4]) }],
     }) : h("p", {}, "It has none."));
     page.append(h("h2", {}, "Use it"), copyable(`fclib solve --solver ${solver.name} FILE`), copyable(`result = fclib.solve(problem, solver="${solver.name}", tol=1e-8)`));
   };

@@ -22,7 +22,7 @@
   /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it knows,
      keys: {key: act(box)}, href(point), table() -> element, above, note, still: no tools and no table */
   Fclib.plot = (options) => {
-    const { name, title } = options;
+    const { title } = options, name = options.name.replaceAll("/", "-");
     const box = h("div", { class: "plot", tabindex: 0, role: "img", "aria-label": `${title}. ${options.says || ""} A table follows.`, style: `height: ${options.height || 400}px` });
     const heard = h("p", { class: "unseen", role: "status" });
     box.say = (text) => { heard.textContent = text; };
@@ -75,8 +75,10 @@
     else if (x[x.length - 1] < high && !options.ends) x.push(high);
     const curves = series.map((s) => ({ ...s, y: x.map((v) => Fclib.at(s, v)) }));
     const log = (range, on) => on ? range.map(Math.log10) : range;
-    const rows = Math.ceil(series.length / Math.max(1, Math.floor((Math.min(innerWidth, 864) - 60) / 150)));
-    const few = series.length < 15;
+    // the legend: as many columns as the longest name leaves room for
+    const width = options.half && innerWidth > 960 ? Math.min(innerWidth, 1200) / 2 : Math.min(innerWidth, 864);
+    const columns = Math.max(1, Math.min(series.length, Math.floor((width - 90) / (50 + 6.5 * Math.max(...series.map((s) => s.name.length))))));
+    const rows = Math.ceil(series.length / columns), few = series.length < 15;
     let place = -1;
     const read = (step) => (box) => {
       place = Math.min(x.length - 1, Math.max(0, place < 0 ? Math.floor(x.length / 2) : place + step));
@@ -94,7 +96,7 @@
           hovertemplate: few ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}` : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
         })),
         layout: {
-          hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1,
+          hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1, legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction" },
           xaxis: { type: xlog ? "log" : "linear", range: log([low, high], xlog), title: { text: options.xlabel }, unifiedhovertitle: { text: `${options.xname} = %{x:.3~g}` } },
           yaxis: { type: ylog ? "log" : "linear", range: log(options.yrange, ylog), title: { text: options.ylabel }, tickformat: options.ypercent ? ".0%" : undefined },
         },
@@ -141,7 +143,7 @@
 
   /* the eigenvalues of W, the largest first */
   Fclib.spectrum = ({ values, size, rank, conditioning }, name) => Fclib.lines({
-    name: `spectrum-${name.replaceAll("/", "-")}`, title: `Eigenvalues of W of ${name}`, series: [{ name: "eigenvalue", x: values.map((_, k) => k + 1), y: values, style: 0 }], ends: true,
+    name: `spectrum-${name}`, title: `Eigenvalues of W of ${name}`, series: [{ name: "eigenvalue", x: values.map((_, k) => k + 1), y: values, style: 0 }], ends: true,
     ylog: true, xrange: [0, Math.max(size, 2)], yrange: [values[values.length - 1] / 2, values[0] * 2], xname: "number", xlabel: "number, the largest first", ylabel: "eigenvalue",
     note: `Rank ${rank} of ${size}${rank < size ? `: ${size - rank} eigenvalues are rounding` : ""}; the largest over the smallest of the others is ${number(conditioning)}.`,
   });

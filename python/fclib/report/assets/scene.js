@@ -91,7 +91,7 @@
       ...solved ? [{ key: "status", label: "status", value: ({ k }) => STATUS[view.status[k]] }, { key: "rn", label: "r_N", type: "number", value: ({ k }) => view.reactions[k][0] },
         { key: "rt", label: "‖r_T‖", type: "number", value: ({ k }) => length(view.reactions[k].slice(1)) }] : []];
     const figure = Fclib.plot({
-      name: `contacts-${name.replaceAll("/", "-")}`, title: `Contact network: ${bodies.length} bodies, ${points.length} contacts`, says: "Arrows turn, plus and minus zoom, 0 resets.", keys, above,
+      name: `contacts-${name}`, title: `Contact network: ${bodies.length} bodies, ${points.length} contacts`, says: "Arrows turn, plus and minus zoom, 0 resets.", keys, above,
       height: Math.round(Math.min(0.7 * innerHeight, 560)),
       draw: () => ({
         data: groups.filter((key) => shown[key]).flatMap((key) => traces[key]()),
@@ -103,7 +103,7 @@
           },
         },
       }),
-      table: () => Fclib.table({ caption: "Contacts", name: `contacts-${name.replaceAll("/", "-")}`, columns, rows: points.map((_, k) => ({ k })), page: 25, largest: true }),
+      table: () => Fclib.table({ caption: "Contacts", name: `contacts-${name}`, columns, rows: points.map((_, k) => ({ k })), page: 25, largest: true }),
       note: [solved && h("ul", { class: "legend" }, STATUS.map((status, s) => h("li", {}, h("span", { class: "key", style: `background: var(--${status})` }), `${status} (${[...view.status].filter((one) => Number(one) === s).length})`))),
         placed ? `To scale, in metres: ${note}.` : `Not to scale, laid out ${note}.`, placed && bodies.length > 0 && " A body is drawn as the hull of its centre and its contacts, or as a ball where these say so.",
         solved && (view.forces ? " An arrow is the reaction on that side of a contact which it presses down." : " The size of a disc is that of the reaction.")],
@@ -111,4 +111,11 @@
     figure.classList.add("scene");
     return figure;
   };
+
+  /* all that is drawn of a problem */
+  Fclib.pictures = (view, name) => [
+    ...view.network ? [h("h2", {}, "Contact network"), Fclib.scene(view, name)] : [h("p", {}, "No contact in this problem.")],
+    view.network && !view.reactions && h("p", { class: "soft" }, "The file holds no solution; fclib solve --write stores one."),
+    ...view.spectrum && view.spectrum.rank > 1 ? [h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, name)] : [],
+    h("h2", {}, "Patterns"), Fclib.patterns(view.patterns), Fclib.texts(view)].filter(Boolean);
 })();

@@ -15,8 +15,7 @@
     const own = ++turn, { page, rest, params } = parse();
     const draw = Fclib.pages[page];
     const nav = document.querySelector("nav");
-    nav.querySelectorAll("a").forEach((a) => a.toggleAttribute("aria-current", a.dataset.page === (ABOVE[page] || page)));
-    nav.querySelectorAll("a[aria-current]").forEach((a) => a.setAttribute("aria-current", "page"));
+    nav.querySelectorAll("a").forEach((a) => a.dataset.page === (ABOVE[page] || page) ? a.setAttribute("aria-current", "page") : a.removeAttribute("aria-current"));
     const target = h("div", { class: "fade" });
     // what a page keeps in its address, without a new entry in the history
     const keep = (changes) => {

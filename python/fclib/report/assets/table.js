@@ -20,7 +20,7 @@
       h("thead", {}, h("tr", {}, columns.map((c) => h("th", { title: c.title }, c.label)))));
     const box = h("div", { class: columns.length < 4 && !columns.some((c) => c.wrap) && "narrow" }, table);
     const many = rows.length > page, wide = columns.length > 12;
-    const csv = { extend: "csvHtml5", text: "↓ CSV", filename: name || caption, title: null, bom: false, footer: false, fieldBoundary: '"',
+    const csv = { extend: "csvHtml5", text: "↓ CSV", filename: (name || caption).replaceAll("/", "-"), title: null, bom: false, footer: false, fieldBoundary: '"',
       exportOptions: { orthogonal: "raw", stripHtml: false, decodeEntities: false, format: { header: (text, k) => typeof columns[k].key === "string" ? columns[k].key : columns[k].label } } };
     const buttons = [csv, ...wide ? [{ extend: "colvis", text: "columns", background: false, collectionLayout: "three-column" }] : []];
     const api = new DataTable(table, {

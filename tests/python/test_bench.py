@@ -146,6 +146,28 @@ def test_history_on_request(tmp_path: Path) -> None:
 # ---- interrupted at any point
 
 
+def test_what_is_interrupted_is_not_said_to_run(tmp_path: Path) -> None:
+    path = tmp_path / "store.sqlite"
+
+    def stop(progress: bench.Progress) -> None:
+        if progress.done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bench.conduct(campaign(), path, show=stop)
+    (shown,) = [
+        json.loads(line) for line in run_cli("--status", path, "--json").stdout.splitlines()
+    ]
+    assert shown["state"] == "interrupted"
+    # of one that was killed its process tells, and not how long it has been silent
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE campaigns SET ended = NULL, seen = 0, pid = ?", (os.getpid(),))
+    assert '"running"' in run_cli("--status", path, "--json").stdout
+    with sqlite3.connect(path) as db:
+        db.execute("UPDATE campaigns SET seen = 1e12, pid = 4194305")
+    assert '"interrupted"' in run_cli("--status", path, "--json").stdout
+
+
 TABLE = """
 name = "killed"
 solvers = ["nsgs", "auto"]

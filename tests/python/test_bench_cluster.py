@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import shutil
 import signal
+import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -122,9 +124,43 @@ def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
         pass
 
 
+jobqueue = pytest.mark.skipif(
+    importlib.util.find_spec("dask_jobqueue") is None, reason="dask_jobqueue is not installed"
+)
+
+
+@jobqueue
+def test_slurm_that_is_not_here_or_refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(fclib.Error, match="sbatch: No such file"), cluster.on_slurm({}):
+        pass
+    sbatch = tmp_path / "sbatch"
+    sbatch.write_text("#!/bin/sh\necho 'sbatch: error: no partition called long' >&2\nexit 1\n")
+    sbatch.chmod(0o755)
+    with (
+        pytest.raises(fclib.Error, match="slurm: sbatch refuses the job: no partition called long"),
+        cluster.on_slurm({"queue": "long"}),
+    ):
+        pass
+
+
+@jobqueue
+@pytest.mark.skipif(
+    shutil.which("sinfo") is None
+    or subprocess.run(["sinfo"], capture_output=True, check=False).returncode != 0,
+    reason="no Slurm answers",
+)
+def test_slurm_gives_the_same_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # where the jobs leave what they say
+    chosen = campaign(tmp_path, solvers=["nsgs"])
+    bench.conduct(chosen, tmp_path / "local.sqlite")
+    with cluster.on_slurm({"workers": "2", "memory": "1GB"}) as runner:
+        bench.conduct(chosen, tmp_path / "slurm.sqlite", runner=runner)
+    assert rows(tmp_path / "slurm.sqlite") == rows(tmp_path / "local.sqlite")
+
+
+@jobqueue
 def test_the_script_for_slurm() -> None:
-    if importlib.util.find_spec("dask_jobqueue") is None:
-        pytest.skip("dask_jobqueue is not installed")
     before = signal.getsignal(signal.SIGINT)
     made, workers = cluster.slurm_cluster(
         {

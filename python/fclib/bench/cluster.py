@@ -14,6 +14,7 @@ import dataclasses
 import importlib
 import os
 import signal
+import subprocess
 import tempfile
 import threading
 from collections.abc import Iterator, Mapping
@@ -181,6 +182,23 @@ def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
     return cluster, workers
 
 
+def _ask_sbatch(script: str) -> None:
+    """Whether Slurm would take the job: later its refusal would reach nobody."""
+    with tempfile.NamedTemporaryFile("w", prefix="fclib-", suffix=".sh") as file:
+        file.write(script)
+        file.flush()
+        command = ["sbatch", "--test-only", file.name]
+        try:
+            asked = subprocess.run(command, capture_output=True, text=True, check=False)
+        except OSError as error:
+            raise fclib.Error(
+                f"slurm: sbatch: {error.strerror}; --slurm needs a machine that submits to Slurm"
+            ) from None
+    if asked.returncode:
+        words = " ".join(asked.stderr.replace("sbatch: ", "").replace("error: ", "").split())
+        raise fclib.Error(f"slurm: sbatch refuses the job: {words}")
+
+
 @contextmanager
 def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]:
     """A cluster of Slurm jobs, submitted for this campaign.
@@ -192,7 +210,9 @@ def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]
 
     cluster, workers = slurm_cluster(options)
     try:
-        cluster.scale(workers)
+        _ask_sbatch(cluster.job_script())
+        # workers that die are asked for again
+        cluster.adapt(minimum=workers, maximum=workers)
         with Client(cluster) as client:
             yield runner(client, send)
     except (OSError, RuntimeError) as error:

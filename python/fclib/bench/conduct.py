@@ -91,17 +91,19 @@ def conduct(
 
         beat = time.monotonic()
         run = runner or (lambda waiting: pool.run(waiting, jobs))
-        done = run(fresh())
-        with closing(done):  # type: ignore[type-var]
-            for job, record in done:
-                if opened.add(job, record, number):
-                    progress.statuses[record.status] += 1
-                else:
-                    progress.skipped += 1
-                progress.last = job
-                show(progress)
-                if time.monotonic() - beat > BEAT:
-                    opened.alive(number)
-                    beat = time.monotonic()
-        opened.alive(number, ended=True)
+        try:
+            with closing(run(fresh())) as done:  # type: ignore[type-var]
+                for job, record in done:
+                    if opened.add(job, record, number):
+                        progress.statuses[record.status] += 1
+                    else:
+                        progress.skipped += 1
+                    progress.last = job
+                    show(progress)
+                    if time.monotonic() - beat > BEAT:
+                        opened.alive(number)
+                        beat = time.monotonic()
+        finally:
+            # also where it is interrupted, so that nobody waits for it
+            opened.alive(number, ended=True)
         return progress

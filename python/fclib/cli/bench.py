@@ -16,12 +16,13 @@ from typer.core import TyperGroup
 
 import fclib
 from fclib import bench
+from fclib.bench import machine
 from fclib.bench.campaign import parse_solver
 from fclib.bench.store import Status
 from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
 from fclib.collections import library
 
-SILENT = 30.0  # [s] after which a campaign that gives no sign of life is taken for dead
+SILENT = 30.0  # [s] after which a campaign elsewhere that gives no sign of life is taken for dead
 
 
 class WithDefault(TyperGroup):
@@ -116,7 +117,7 @@ def run(
     ] = None,
     slurm: Annotated[
         list[str] | None,
-        typer.Option(help="Run on Slurm: workers=8 queue=short cores=16 memory=64GB ..."),
+        typer.Option(help='Run on Slurm: "workers=8 queue=short cores=16 memory=64GB ...".'),
     ] = None,
     send: Annotated[
         bool, typer.Option("--send", help="Send the problems: no folder is shared.")
@@ -172,7 +173,7 @@ def run(
                 from fclib.bench import cluster
 
                 runner = stack.enter_context(
-                    cluster.on_slurm(parse_options(slurm), send)
+                    cluster.on_slurm(parse_options(" ".join(slurm).split()), send)
                     if slurm
                     else cluster.on_scheduler(scheduler or "", send)
                 )
@@ -200,10 +201,16 @@ def run(
         out.print(f"fclib profile {path}", highlight=False)
 
 
+def is_alive(status: Status) -> bool:
+    """Whether the process of a campaign is there; one run may take longer than it is silent."""
+    if status.node == machine.facts()["node"]:
+        return Path(f"/proc/{status.pid}").exists()
+    return time.time() - status.seen < SILENT
+
+
 def describe(status: Status) -> dict[str, Any]:
     """The record of a campaign."""
-    now = time.time()
-    running = status.ended is None and now - status.seen < SILENT
+    running = status.ended is None and is_alive(status)
     finished = status.ended is not None and status.done >= status.planned
     state = "running" if running else "finished" if finished else "interrupted"
     left = (status.planned - status.done) / status.rate if running and status.rate > 0 else None

@@ -37,7 +37,7 @@ void touch(RawMatrix& a) {
   for (std::size_t k = 0; k < a.p.size(); ++k) sum += a.p[k];
   for (std::size_t k = 0; k < a.i.size(); ++k) sum += a.i[k];
   for (std::size_t k = 0; k < a.x.size(); ++k) sum += a.x[k];
-  static volatile double used = 0;
+  [[maybe_unused]] static volatile double used = 0;
   used = sum;
 }
 

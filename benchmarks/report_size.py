@@ -76,7 +76,8 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
     marks = {
         "overview": ("#/overview", "main table tbody tr"),
         "its profile": ("#/overview", "main .plot[data-drawn]"),
-        "profiles": ("#/profiles", "main .plot[data-drawn]"),
+        "profiles": ("#/profiles", "main table tbody tr"),
+        "its curves": ("#/profiles", "main .plot[data-drawn]"),
         "catalogue": ("#/catalogue", "main table tbody tr"),
         "problem": ("#/problem/Family1/00001", "main table tbody tr"),
     }

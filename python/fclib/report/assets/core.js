@@ -22,7 +22,7 @@ Fclib.load = async (name) => {
   if (!(name in Fclib.values)) await Fclib.script(`data/${name}.js`);
   return Fclib.values[name];
 };
-// the library that draws is large: pages without pictures do not load it, one that begins with one asks for it first
+// the library that draws is large: pages without pictures do not wait for it
 Fclib.plotly = async () => {
   if (!window.Plotly) await Fclib.script("assets/plotly.js");
   return window.Plotly;

@@ -117,7 +117,6 @@
 
   // ---- profiles
   Fclib.pages.profiles = async (page, rest, params, keep) => {
-    Fclib.plotly();
     const s = site(), cat = await catalogue();
     const labels = s.solvers.map((v) => v.label);
     const fair = (t) => ((s.headlines[t] || {}).solvers || labels).map((name) => labels.indexOf(name));

@@ -25,7 +25,7 @@ class RandomData {
 
   Eigen::MatrixXd dense(Eigen::Index rows, Eigen::Index cols) {
     Eigen::MatrixXd result(rows, cols);
-    for (Eigen::Index col = 0; col < cols; ++col) result.col(col) = vector(rows);
+    for (auto& value : result.reshaped()) value = uniform(-1, 1);
     return result;
   }
 

@@ -1,6 +1,7 @@
 """What all tests share: the folder of real problems, and the settings of Hypothesis."""
 
 import os
+import signal
 import sys
 from pathlib import Path
 
@@ -14,6 +15,10 @@ pytest.register_assert_rewrite("helpers")
 # the same examples every time, and no deadline: machines differ
 hypothesis.settings.register_profile("fclib", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("fclib")
+
+# a shell's job in the background ignores Ctrl-C, and so would all that it starts
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

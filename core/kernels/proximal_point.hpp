@@ -3,11 +3,14 @@
 //
 //   p = disk_map(r_k - rho (W p + q)),   rho_a = kappa d / tr(W_aa)
 //
-// then r_{k+1} = p. Each Newton step is one CoupledSystem with D = rho disk_map'. A large kappa
-// makes a step nearly exact, and W, singular as it may be, is regularised by r - r_k all the same.
+// and put it into the cones: r_{k+1}. Each Newton step is one CoupledSystem with D = rho disk_map'.
+// A large kappa makes a step nearly exact, and W, singular as it may be, is regularised by r - r_k
+// all the same.
 //
 // The residual of the inner problem enters the error multiplied by W: it is solved until that is a
-// fraction of the error itself.
+// fraction of the error itself. The residual does not fall below rho times the rounding of u. What
+// of it W sees, the next Newton step takes out of p again: p has a velocity as exact as its
+// rounding, and the map of p, which would be in the cones as it is, has not.
 #pragma once
 
 #include <algorithm>
@@ -108,32 +111,57 @@ class ProximalPoint {
     return std::sqrt(natural_map_squared<Cone>(u, r, problem_.friction)) / problem_.scale;
   }
 
-  /// F = p - disk_map(r_k - rho u(p)); `image` is the map.
-  double residual(double kappa, const Vector& p, const Vector& u, Vector& f, Vector& image) const {
-    image.resize(p.size());
+  /// The argument z of the map, of contact a.
+  [[nodiscard]] Vec argument(double kappa, const Vector& u, Index a) const {
+    return r_.template segment<D>(D * a) -
+           kappa * inverse_size_[a] * u.template segment<D>(D * a);
+  }
+
+  /// F = p - disk_map(r_k - rho u(p)).
+  double residual(double kappa, const Vector& p, const Vector& u, Vector& f) const {
+    f.resize(p.size());
     for (Index a = 0; a < problem_.nc(); ++a) {
-      const Vec z =
-          r_.template segment<D>(D * a) - kappa * inverse_size_[a] * u.template segment<D>(D * a);
-      image.template segment<D>(D * a) = disk_map(Cone(problem_.friction, a), z);
+      f.template segment<D>(D * a) =
+          p.template segment<D>(D * a) -
+          disk_map(Cone(problem_.friction, a), argument(kappa, u, a));
     }
-    f = p - image;
     return f.norm();
+  }
+
+  /// p in the cones: open, sticking or sliding as the map has each contact, but with p's own values.
+  void put_into_cones(double kappa, const Vector& p, const Vector& u, Vector& result) const {
+    result.resize(p.size());
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const Cone cone(problem_.friction, a);
+      const Vec z = argument(kappa, u, a);
+      Vec inside = p.template segment<D>(D * a);
+      if (!(z[0] > 0) || !(inside[0] > 0)) inside.setZero();
+      for (int g = 0; g < Cone::groups; ++g) {
+        const int at = 1 + g * Cone::group_size;
+        auto part = inside.template segment<Cone::group_size>(at);
+        const double norm = part.norm();
+        const double radius = cone.coefficient(g) * inside[0];
+        const bool slides =
+            z.template segment<Cone::group_size>(at).norm() > cone.coefficient(g) * z[0];
+        if (norm > radius || (slides && norm > 0)) part *= radius / norm;
+      }
+      result.template segment<D>(D * a) = inside;
+    }
   }
 
   /// One proximal step; leaves it in next_, next_u_, next_error_. Newton steps taken, 0 on failure.
   int inner(double kappa, std::int64_t stop_at) {
     p_ = r_;
     up_ = u_;
-    double norm = residual(kappa, p_, up_, f_, image_);
+    double norm = residual(kappa, p_, up_, f_);
     const double first = norm;
     int rises = 0;
     for (int step = 1; step <= max_steps && system_.factorisations() < stop_at; ++step) {
       std::vector<double>& blocks = system_.blocks();
       for (Index a = 0; a < problem_.nc(); ++a) {
-        const double rho = kappa * inverse_size_[a];
-        const Vec z = r_.template segment<D>(D * a) - rho * up_.template segment<D>(D * a);
         Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
-            rho * disk_map_slope(Cone(problem_.friction, a), z);
+            kappa * inverse_size_[a] *
+            disk_map_slope(Cone(problem_.friction, a), argument(kappa, up_, a));
       }
       if (!system_.factorise()) return 0;
       step_ = -f_;
@@ -144,7 +172,7 @@ class ProximalPoint {
       for (int halving = 0;; ++halving) {
         trial_ = p_ + length * step_;
         problem_.velocity(trial_, trial_u_);
-        trial_norm = residual(kappa, trial_, trial_u_, f_, image_);
+        trial_norm = residual(kappa, trial_, trial_u_, f_);
         if (trial_norm < norm || halving == max_halvings) break;
         length *= 0.5;
       }
@@ -153,13 +181,11 @@ class ProximalPoint {
       up_ = trial_u_;
       norm = trial_norm;
       if (norm > 1e-2 * first && first > 0) continue;
-      problem_.velocity(image_, next_u_);
-      next_error_ = error_of(next_u_, image_);
+      put_into_cones(kappa, p_, up_, next_);
+      problem_.velocity(next_, next_u_);
+      next_error_ = error_of(next_u_, next_);
       const double gap = (next_u_ - up_).norm() / problem_.scale;
-      if (gap <= 0.1 * next_error_ || gap <= 1e-15 || norm <= 1e-15 * p_.norm()) {
-        next_ = image_;
-        return step;
-      }
+      if (gap <= 0.1 * next_error_ || gap <= 1e-15 || norm <= 1e-15 * p_.norm()) return step;
     }
     return 0;
   }
@@ -169,7 +195,7 @@ class ProximalPoint {
   Vector inverse_size_;  // d / tr(W_aa)
   double error_ = 0;
   double next_error_ = 0;
-  Vector r_, u_, p_, up_, f_, image_, step_, trial_, trial_u_, next_, next_u_;
+  Vector r_, u_, p_, up_, f_, step_, trial_, trial_u_, next_, next_u_;
 };
 
 }  // namespace fclib

@@ -137,7 +137,7 @@ constexpr auto fixed_point_fields() {
       OptionField<O, double>{.name = "relaxation",
                              .member = &O::relaxation,
                              .unit = "1",
-                             .doc = "share of the new shift or threshold in the next",
+                             .doc = "share of the new shift or threshold in the next, at first",
                              .lowest = 0.01,
                              .highest = 1},
   };

@@ -10,11 +10,13 @@
 // Differs from the papers in:
 // - the inner problem is solved to a share of the current error of Coulomb's law, from the last
 //   solution, and never to more than that;
+// - where 50 steps bring no lower error, the relaxation is halved, to an eighth at least;
 // - rolling friction has a threshold of its own.
 
 #include <cstdint>
 
 #include "kernels/convex_program.hpp"
+#include "kernels/relaxation.hpp"
 #include "kernels/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 #include "solve/shared_options.hpp"
@@ -53,13 +55,14 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     return best.report(count, reaction, velocity);
   };
   cylinders.set_thresholds(r);
+  Relaxation relaxation(options.relaxation);
   while (!best.stopped()) {
     const std::int64_t before = best.iterations();
     program.solve(options.inner, cylinders, static_cast<int>(options.local_iterations),
                   options.inner_accuracy * best.last_error(), options.inner_iterations, r, u, due,
                   follow);
     if (best.iterations() == before) break;  // nothing could be done
-    cylinders.set_thresholds(r, options.relaxation);
+    cylinders.set_thresholds(r, relaxation.next(best.last_error()));
     problem.velocity(r, u);
   }
   return best.outcome(r);

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import planted_local
+from fclib.scenes.mass_ratios import RATIOS, MassRatios
+from helpers import judge, planted_local
 
 OWN = [solver for solver in fclib.solvers() if solver.origin == "fclib"]
 NEWTON = [solver.name for solver in OWN if solver.family == "newton"]
@@ -59,3 +60,12 @@ def test_the_relaxation_says_what_it_is() -> None:
     assert result.status == "inaccurate"
     # it is the projection of -q on the cone
     np.testing.assert_allclose(result.solution.r, [1.6, -0.8, 0], atol=1e-5)
+
+
+def test_heavy_bodies_on_light_ones() -> None:
+    """Large reactions, a large proximal parameter: the rounding of u must not come back by it."""
+    problem = MassRatios().problem(RATIOS.index(1e6))
+    for case in (problem, problem.condense()):
+        result = fclib.solve(case, "ppa-nsn", 1e-8)
+        assert result.converged, result
+        assert judge(case, result.solution).error <= 1.01e-8

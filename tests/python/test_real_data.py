@@ -133,6 +133,13 @@ def test_2d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None
     assert solved >= 0.8 * len(paths)
 
 
+@pytest.mark.parametrize("solver", ["aclm", "tresca"])
+def test_fixed_points_do_not_circle(solver: str, real_data: Path) -> None:
+    """With a constant relaxation of one both are above 1e-4 after a minute."""
+    problem = fclib.read(real_data / "local3d" / "RockPile_tob1.hdf5")
+    assert fclib.solve(problem, solver, 1e-4, max_iterations=200_000).converged
+
+
 def test_condensation_agrees_with_that_of_the_index(real_data: Path) -> None:
     pairs = 0
     for path in files("global3d"):

@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 import fclib
-from fclib import bench
+from fclib import bench, cli
 from fclib.bench.campaign import parse_solver
 from fclib.bench.job import MERITS, Job
 from helpers import planted_global, planted_local
@@ -310,6 +311,35 @@ def elsewhere(source: Path, target: Path, node: str) -> None:
     with database:
         database.execute("UPDATE machines SET node = ?1, hash = ?1", (node,))
     database.close()
+
+
+def test_what_cannot_begin_leaves_no_store(small: Path, tmp_path: Path) -> None:
+    path = tmp_path / "new.sqlite"
+    arguments = ("--problems", tmp_path / "none.hdf5", "--solver", "auto", "--store")
+    done = run_cli(*arguments, path)
+    assert done.returncode != 0
+    assert "none.hdf5" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+    runs = len(bench.Store(small).results())
+    assert run_cli(*arguments, small).returncode != 0
+    assert len(bench.Store(small).results()) == runs > 0
+
+
+def test_interrupted_before_there_is_a_store(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fclib.bench.cluster.on_scheduler", interrupted)
+    fclib.write(tmp_path / "one.hdf5", planted_local(0).problem)
+    store = tmp_path / "new.sqlite"
+    command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
+    command += ["--scheduler", "tcp://localhost:1", "--store", store]
+    result = CliRunner().invoke(cli.app, list(map(str, command)))
+    assert result.exit_code == 1
+    assert "interrupted" in result.stderr
+    assert not store.exists()
 
 
 def test_merge(small: Path, tmp_path: Path) -> None:

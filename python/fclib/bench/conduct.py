@@ -72,8 +72,14 @@ def conduct(
     if not processes.supported():
         raise fclib.Error("fclib bench needs Linux: its limits are kept by way of /proc")
     Path(store).parent.mkdir(parents=True, exist_ok=True)
+    new = not Path(store).exists()
     with Store(store) as opened:
-        plan = campaign.plan(opened, tell)
+        try:
+            plan = campaign.plan(opened, tell)
+        except (fclib.Error, ImportError):
+            if new:
+                opened.discard()
+            raise
         there = opened.keys()
         left = [job for job in plan if job.key not in there]
         progress = Progress(planned=len(plan), skipped=len(plan) - len(left))

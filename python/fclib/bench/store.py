@@ -175,6 +175,13 @@ class Store:
         """Close the file."""
         self.db.close()
 
+    def discard(self) -> None:
+        """Close the file, and remove it where no campaign was ever begun in it."""
+        begun = self.db.execute("SELECT 1 FROM campaigns LIMIT 1").fetchone()
+        self.close()
+        if not begun:
+            self.path.unlink(missing_ok=True)
+
     @contextmanager
     def transaction(self) -> Iterator[None]:
         """All or nothing of what is done in it."""

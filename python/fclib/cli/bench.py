@@ -166,26 +166,27 @@ def run(
         tell(f"left out: {word}")
 
     path = store or Path(f"{chosen.name}.sqlite")
-    with ExitStack() as stack:
-        runner = None
-        if scheduler or slurm:
-            try:
-                from fclib.bench import cluster
+    try:
+        with ExitStack() as stack:
+            runner = None
+            if scheduler or slurm:
+                try:
+                    from fclib.bench import cluster
 
-                runner = stack.enter_context(
-                    cluster.on_slurm(parse_options(" ".join(slurm).split()), send)
-                    if slurm
-                    else cluster.on_scheduler(scheduler or "", send)
-                )
-            except ImportError as error:
-                fail(f'{error}; pip install "fclib[bench]"')
-        show = stack.enter_context(live(chosen.name, as_json))
-        try:
+                    runner = stack.enter_context(
+                        cluster.on_slurm(parse_options(" ".join(slurm).split()), send)
+                        if slurm
+                        else cluster.on_scheduler(scheduler or "", send)
+                    )
+                except ImportError as error:
+                    fail(f'{error}; pip install "fclib[bench]"')
+            show = stack.enter_context(live(chosen.name, as_json))
             progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show, tell=tell)
-        except KeyboardInterrupt:
-            fail(f"interrupted; the same command goes on with {path}")
-        except ImportError as error:
-            fail(str(error))
+    except KeyboardInterrupt:
+        there = path.exists()
+        fail(f"interrupted; the same command goes on with {path}" if there else "interrupted")
+    except ImportError as error:
+        fail(str(error))
     record = {
         "campaign": chosen.name,
         "store": str(path),

@@ -113,22 +113,21 @@ class ProximalPoint {
 
   /// The argument z of the map, of contact a.
   [[nodiscard]] Vec argument(double kappa, const Vector& u, Index a) const {
-    return r_.template segment<D>(D * a) -
-           kappa * inverse_size_[a] * u.template segment<D>(D * a);
+    return r_.template segment<D>(D * a) - kappa * inverse_size_[a] * u.template segment<D>(D * a);
   }
 
   /// F = p - disk_map(r_k - rho u(p)).
   double residual(double kappa, const Vector& p, const Vector& u, Vector& f) const {
     f.resize(p.size());
     for (Index a = 0; a < problem_.nc(); ++a) {
-      f.template segment<D>(D * a) =
-          p.template segment<D>(D * a) -
-          disk_map(Cone(problem_.friction, a), argument(kappa, u, a));
+      f.template segment<D>(D * a) = p.template segment<D>(D * a) -
+                                     disk_map(Cone(problem_.friction, a), argument(kappa, u, a));
     }
     return f.norm();
   }
 
-  /// p in the cones: open, sticking or sliding as the map has each contact, but with p's own values.
+  /// p in the cones: open, sticking or sliding as the map has each contact, but with p's own
+  /// values.
   void put_into_cones(double kappa, const Vector& p, const Vector& u, Vector& result) const {
     result.resize(p.size());
     for (Index a = 0; a < problem_.nc(); ++a) {

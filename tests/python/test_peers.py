@@ -7,6 +7,7 @@ import itertools
 import json
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -453,3 +454,22 @@ def test_siconos_solves_the_same_problem(tmp_path: Path, kind: str) -> None:
     np.testing.assert_allclose(r, ours, atol=1e-8)
     assert fclib.merit(case.problem, fclib.Solution(r=r)).error < 1e-8
     assert judge(case.problem, fclib.Solution(r=r)).error < 1e-8
+
+
+def test_problems_of_scenes_that_siconos_simulates(tmp_path: Path) -> None:
+    siconos("print(1)", needs="siconos.mechanics.collision.bullet, scipy, h5py")
+    benchmark = Path(__file__).parents[2] / "benchmarks" / "siconos_scenes.py"
+    command: list[str | Path] = [sys.executable, benchmark, tmp_path, "--scenes", "towers-4-0.4"]
+    subprocess.run([*command, "--steps", "40", "--every", "20"], check=True, capture_output=True)
+    files = sorted(tmp_path.glob("towers-4-0.4-*.hdf5"))
+    assert len(files) == 2
+    for path in files:
+        problem = fclib.read(path)
+        assert isinstance(problem, fclib.LocalProblem)
+        assert problem.nc >= 3 * 4 * 4  # each cube on four corners
+        w = dense(problem.W)
+        assert np.linalg.eigvalsh(w + w.T).min() > -1e-12 * np.abs(w).max()
+        assert fclib.solve(problem).converged
+    wrong = subprocess.run([*command[:-1], "towers"], capture_output=True, text=True)
+    assert wrong.returncode == 2
+    assert "KIND-BODIES-MU" in wrong.stderr

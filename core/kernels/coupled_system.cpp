@@ -35,7 +35,9 @@ CoupledSystem::CoupledSystem(const Delassus& problem, Form form, int threads)
   } else if (problem.primal != nullptr) {
     on_bodies_ = plan_bodies();
   }
-  if (on_bodies_) {
+  if (on_bodies_ && bodies_are_fewer(problem)) {
+    values_.resize(fixed_.size());
+  } else if (on_bodies_) {
     Multifrontal bodies = std::move(lu_);
     plan_contacts();
     if (bodies.flops() < lu_.flops()) {

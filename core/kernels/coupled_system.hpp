@@ -22,6 +22,12 @@ class CoupledSystem {
  public:
   enum class Form { identity, general };  ///< of B
 
+  /// Whether the bodies have at most half as many coordinates as the contacts: no need then to
+  /// plan what the contacts would take.
+  [[nodiscard]] static bool bodies_are_fewer(const Delassus& problem) {
+    return problem.primal != nullptr && 2 * problem.primal->M.rows() <= problem.m();
+  }
+
   /// Plans the factorisations; keeps a reference to the problem.
   explicit CoupledSystem(const Delassus& problem, Form form = Form::identity, int threads = 1);
 

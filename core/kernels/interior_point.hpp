@@ -33,6 +33,7 @@ namespace fclib {
 
 struct InteriorPointRules {
   bool associated = false;
+  double tau = 1;             ///< at first
   double rounding = 0;        ///< of the term's kink, in tau
   double step_cap = 0.95;     ///< highest share of the step to the boundary
   double delta = 1e-6;        ///< regularisation at first
@@ -68,12 +69,13 @@ class InteriorPoint {
   [[nodiscard]] double speed() const { return u_.norm() / problem_.q.norm() * size_q_; }
   [[nodiscard]] int iterations() const { return iterations_; }
 
-  /// Iterates; `report(error, r)` is told of each iterate, and ends it by returning true.
+  /// Iterates from near a guess; `report(error, r)` is told of each iterate, and ends it by
+  /// returning true.
   template <class Report>
-  void solve(const InteriorPointRules& rules, const Report& report) {
+  void solve(const InteriorPointRules& rules, const Vector& guess, const Report& report) {
     const Index nc = problem_.nc();
     const double count = static_cast<double>(nc);
-    start();
+    start(rules, guess);
     double delta = rules.delta;
     double least = std::numeric_limits<double>::infinity();
     int least_at = 0;
@@ -139,22 +141,50 @@ class InteriorPoint {
   }
 
  private:
-  void start() {
-    const Index nc = problem_.nc();
+  /// x - y as the guess has it, and x o y = tau e: centred, and the nearer to the guess, the
+  /// smaller tau is.
+  void start(const InteriorPointRules& rules, const Vector& guess) {
     const auto m = problem_.m();
-    x_ = Vector::Zero(m);
-    y_ = Vector::Zero(m);
-    r_ = Vector::Zero(m);
-    for (Index a = 0; a < nc; ++a) {
-      const double mu = problem_.friction.mu[a];
-      r_[D * a] = 1;
-      x_[D * a] = mu > 0 ? mu : 1.0;
-      y_[D * a] = mu > 0 ? 1.0 / mu : 1.0;
-    }
     q_ = problem_.q / size_q_;
-    for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_})
+    for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_, &x_, &y_})
       v->setZero(m);
-    scaling_.resize(static_cast<std::size_t>(nc));
+    scaling_.resize(static_cast<std::size_t>(problem_.nc()));
+    r_ = guess * (omega_ / size_q_);
+    problem_.W.multiply_add(r_ / omega_, q_, u_);
+    // x of x - y = z and x y = tau, without cancellation
+    const auto root = [&](double z) {
+      const double length = std::sqrt(z * z + 4 * rules.tau);
+      return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
+    };
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      const double mu = problem_.friction.mu[a];
+      const auto r = r_.template segment<D>(D * a);
+      const auto u = u_.template segment<D>(D * a);
+      Vec x = Vec::Zero();
+      Vec y = Vec::Zero();
+      if (mu > 0) {
+        const double shift = rules.associated ? 0.0 : u.template tail<T>().norm();
+        Vec z = r - u;
+        z[0] = mu * r[0] - (u[0] / mu + shift);
+        const double norm = z.template tail<T>().norm();
+        const double high = root(z[0] + norm);  // the spectral values of x
+        const double low = root(z[0] - norm);
+        x[0] = 0.5 * (high + low);
+        y[0] = 0.5 * rules.tau * (1 / high + 1 / low);
+        if (norm > 0) {
+          const ContactVector<T> along = z.template tail<T>() / norm;
+          x.template tail<T>() = 0.5 * (high - low) * along;
+          y.template tail<T>() = 0.5 * rules.tau * (1 / high - 1 / low) * along;
+        }
+      } else {
+        x[0] = root(r[0] - u[0]);
+        y[0] = rules.tau / x[0];
+      }
+      x_.template segment<D>(D * a) = x;
+      y_.template segment<D>(D * a) = y;
+      if (mu > 0) x[0] /= mu;
+      r_.template segment<D>(D * a) = x;
+    }
   }
 
   /// The Lorentz cone's determinant, without cancellation.

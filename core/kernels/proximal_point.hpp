@@ -10,11 +10,14 @@
 // The residual of the inner problem enters the error multiplied by W: it is solved until that is a
 // fraction of the error itself. The residual does not fall below rho times the rounding of u. What
 // of it W sees, the next Newton step takes out of p again: p has a velocity as exact as its
-// rounding, and the map of p, which would be in the cones as it is, has not.
+// rounding, and the map of p, which would be in the cones as it is, has not. Where contacts are
+// more than the bodies' coordinates, a last velocity of 1e-12 between them may move r by a good
+// part of itself: kappa must be let grow that far.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "kernels/coupled_system.hpp"
 #include "kernels/disk_map.hpp"
@@ -32,7 +35,7 @@ struct ProximalRules {
   double sigma = 1;  ///< of by_error
   double nu = 1;
   double kappa = 100;  ///< at first
-  double kappa_max = 1e8;
+  double kappa_max = 1e12;
   double easy = 3;        ///< factor after at most 2 Newton steps; after at most 4, its share 2/3
   double hard = 0.5;      ///< factor on failure
   double patience = 1e3;  ///< the error may rise by this over the best before it is given up
@@ -179,7 +182,9 @@ class ProximalPoint {
       p_ = trial_;
       up_ = trial_u_;
       norm = trial_norm;
-      if (norm > 1e-2 * first && first > 0) continue;
+      // or as small as rounding, which rho multiplies, lets it be
+      const double rounding = 10 * std::numeric_limits<double>::epsilon() * kappa * p_.norm();
+      if (norm > std::max(1e-2 * first, rounding)) continue;
       put_into_cones(kappa, p_, up_, next_);
       problem_.velocity(next_, next_u_);
       next_error_ = error_of(next_u_, next_);

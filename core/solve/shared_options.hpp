@@ -11,6 +11,13 @@ namespace fclib {
 template <class O>
 constexpr auto interior_point_fields() {
   return std::tuple{
+      OptionField<O, double>{.name = "tau",
+                             .member = &O::tau,
+                             .unit = "1",
+                             .doc = "complementarity at first: the less, the nearer to the guess "
+                                    "it starts",
+                             .lowest = 1e-12,
+                             .highest = 1e6},
       OptionField<O, double>{.name = "step_cap",
                              .member = &O::step_cap,
                              .unit = "1",

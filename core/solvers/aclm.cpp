@@ -64,7 +64,7 @@ class ShiftedInteriorPoint {
     for (Index a = 0; a < problem_.nc(); ++a) shifted_.q[D * a] = problem_.q[D * a] + shift[a];
     InteriorPoint<D> method(shifted_, system_);
     method.solve({.associated = true, .max_iterations = limit, .patience = limit},
-                 [&](double, const Vector& reaction) {
+                 Vector::Zero(problem_.m()), [&](double, const Vector& reaction) {
                    r = reaction;
                    problem_.velocity(r, u);
                    return follow(r, u);

@@ -11,7 +11,7 @@
 // mechanics using interior point algorithm" (2023).
 //
 // Differs from the paper in: the system is regularised, and condensed to the contacts or the
-// bodies. It starts inside the cones: of a guess it only asks whether it obeys Coulomb's law.
+// bodies. It starts near the guess, well inside the cones.
 //
 // Ends `inaccurate` with the solution of the relaxation, to the tolerance, which is returned even
 // where an iterate before it was nearer to Coulomb's law.
@@ -48,7 +48,7 @@ Outcome iterate(const Delassus& problem, InteriorPointRules rules, const Setting
   rules.patience = std::numeric_limits<int>::max();  // of an error that it does not reduce
   std::optional<Status> stopped;
   bool solved = false;
-  method.solve(rules, [&](double error, const Vector& at) {
+  method.solve(rules, Vector(r), [&](double error, const Vector& at) {
     if (at.allFinite()) r = at;
     solved = method.tau() <= share * monitor.tolerance() &&
              method.residual() <= share * monitor.tolerance();

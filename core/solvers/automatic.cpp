@@ -4,11 +4,12 @@
 //   0  r = 0, where nothing approaches
 //   1  Gauss-Seidel sweeps on the whole, then on each island (contacts linked through W) left over
 //   2  conjugate gradients on W r = -q, before the sweeps of an island: all may stick and rest
-//      (before the sweeps of an island too: a few steps of Newton from a guess that is good)
+//      (before the sweeps of an island too, from a guess that is good: a few steps of Newton, or of
+//      the proximal point)
 //   3  proximal Newton ("polish"), where the error is small already
-//   4  interior point with the shift in the Newton system, polished as it comes near; where its
-//      path folds, sweeps for what it has cost, again with shorter steps, and with the shift's
-//      kink rounded
+//   4  interior point with the shift in the Newton system, from near what the sweeps have, polished
+//      as it comes near; where its path folds, sweeps for what it has cost, again from far away and
+//      with shorter steps, and with the shift's kink rounded
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
 //   7  a proof that there is no solution (kernels/no_solution.hpp)
@@ -45,7 +46,7 @@ namespace {
 struct Options {
   std::int64_t sweeps = 20;
   std::int64_t island_sweeps = 100;
-  double polish_below = 1e-6;
+  double polish_below = 1e-5;
   std::int64_t last_resort = 4000;
   std::int64_t threads = 1;
 
@@ -90,13 +91,22 @@ constexpr Index few_contacts = 10;
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
 
-/// ... whose factorisations may cost so many times those of the other methods.
+/// ... whose factorisations may cost so many times those of the other methods: hopeless where each
+/// contact is there many times, as collision detection may have them.
 constexpr double dearer = 100;
 
 /// Newton's method from a guess, where the error is less, needs few iterations, or fails: it must
 /// be cheap where it does.
 constexpr double good_guess = 0.03;
 constexpr std::int64_t guess_iterations = 12;
+
+/// The interior point starts at tau = far times the error of the sweeps, or least_tau: nearer to
+/// them it saves iterations where they are good, and loses some where they are not.
+constexpr double far = 4;
+constexpr double least_tau = 0.03;
+
+/// What the interior point reaches by itself.
+constexpr double interior_accuracy = 1e-7;
 
 /// Of the proximal point before the paths with folds: half of what it solves takes fewer.
 constexpr std::int64_t proximal_trial = 200;
@@ -209,8 +219,13 @@ class Island {
     tracker_.report(0, error_);
     if (!whole && problem_.nc() >= 20) stage("conjugate gradients", [&] { conjugate_gradients(); });
     if (!whole && guessed_ && problem_.nc() >= 5 && error_ < good_guess && !done()) {
-      semismooth_newton<AlartCurnier<Cone>>("newton from the guess", {.sweeps = 0, .patience = 3},
-                                            best_, guess_iterations);
+      // the contacts' statuses are nearly known: on few bodies the proximal point is cheaper
+      if (CoupledSystem::bodies_are_fewer(problem_)) {
+        stage("proximal newton", [&] { polish(best_, guess_iterations); });
+      } else {
+        semismooth_newton<AlartCurnier<Cone>>("newton from the guess", {.sweeps = 0, .patience = 3},
+                                              best_, guess_iterations);
+      }
     }
     if (!done()) stage("gauss-seidel", [&] { return sweep(sweeps, whole); });
     if (!whole && !done()) continue_by_newton();
@@ -318,26 +333,32 @@ class Island {
       stage("proximal newton", [&] { return polish(best_); });
     }
     start_ = best_;
+    const Vector swept = best_;
+    const Vector zero = Vector::Zero(problem_.m());
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      if (!done()) stage("interior point", [&] { interior_point({}); });
+      if (!done())
+        stage("interior point",
+              [&] { interior_point({.tau = std::clamp(far * error_, least_tau, 1.0)}, swept); });
       if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
-      // where its path folds, another way along it may pass
+      // where its path folds, another may pass
       if (!done()) {
-        stage("interior point, shorter steps",
-              [&] { interior_point({.step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}); });
+        stage("interior point, shorter steps", [&] {
+          interior_point({.tau = 10, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}, zero);
+        });
       }
       if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
       if (!done()) {
         stage("interior point, rounded", [&] {
-          interior_point({.rounding = 3, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100});
+          interior_point({.rounding = 1, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100},
+                         swept);
         });
       }
       if (!done()) stage("associated", [&] { associated(); });
       // from nothing: where it converges, it does from there as well as from an iterate that
       // another method is stuck at; slower than the proximal point on rolling contacts
       if (!done()) {
-        semismooth_newton<NaturalMap<Cone>>("semismooth newton", {}, Vector::Zero(problem_.m()),
-                                            newton_iterations);
+        semismooth_newton<NaturalMap<Cone>>("semismooth newton", {}, zero, newton_iterations,
+                                            dearer);
       }
     }
     if (!done()) stage("no solution?", [&] { prove_no_solution(); });
@@ -362,7 +383,8 @@ class Island {
     }
   }
 
-  /// On W r = -q, preconditioned by tr(W_aa); given up where r leaves the cones for good.
+  /// On W r = -q from the guess, or from nothing, preconditioned by tr(W_aa); given up where r
+  /// leaves the cones for good.
   void conjugate_gradients() {
     constexpr std::int64_t limit = 400;
     constexpr std::int64_t trial = 15;
@@ -378,8 +400,10 @@ class Island {
       }
     };
     const Vector zero = Vector::Zero(problem_.m());
-    Vector r = zero;
-    Vector residual = -problem_.q;
+    Vector r = guessed_ ? best_ : zero;
+    Vector residual;
+    problem_.velocity(r, residual);
+    residual = -residual;
     Vector z(problem_.m());
     Vector product(problem_.m());
     precondition(residual, z);
@@ -409,6 +433,8 @@ class Island {
         Vector u(problem_.m());
         problem_.velocity(inside, u);
         if (take(k % trial, error_of(u, inside), inside)) return;
+        // what is left is that r is not in the cones
+        if (size <= 0.01 * tolerance_ * problem_.scale) return;
       }
       precondition(residual, z);
       const double next = residual.dot(z);
@@ -436,16 +462,18 @@ class Island {
     take(0, error, r);
   }
 
-  void polish(const Vector& r) {
-    proximal({.kappa = 100, .easy = 10, .hard = 0.2, .max_factorisations = 12}, r);
+  void polish(const Vector& r, std::int64_t factorisations = 24) {
+    proximal({.kappa = 1000, .easy = 10, .hard = 0.2, .max_factorisations = factorisations}, r);
   }
 
-  void interior_point(const InteriorPointRules& rules) {
+  void interior_point(const InteriorPointRules& rules, const Vector& guess) {
     InteriorPoint<D> method(problem_, system());
     double next_polish = options_.polish_below;
-    method.solve(rules, [&](double error, const Vector& r) {
+    // the last steps to a loose tolerance are its own
+    const double near = tolerance_ > interior_accuracy ? 30 * tolerance_ : 0;
+    method.solve(rules, guess, [&](double error, const Vector& r) {
       if (take(1, error, r)) return true;
-      if (error < next_polish) {
+      if (error > near && error < next_polish) {
         polish(r);
         next_polish = error / 30;
       }
@@ -475,14 +503,13 @@ class Island {
     }
   }
 
+  /// Always on the contacts.
   template <class Function>
   void semismooth_newton(std::string_view name, const NewtonRules& rules, Vector r,
-                         std::int64_t left) {
+                         std::int64_t left, double most = std::numeric_limits<double>::infinity()) {
     tracker_.stage(name, [&] {
       SemismoothNewton<Function> newton(problem_, static_cast<int>(options_.threads));
-      // always on the contacts: hopeless where each is there many times, as collision detection
-      // may have them
-      if (newton.system().flops() > dearer * system().flops())
+      if (std::isfinite(most) && newton.system().flops() > most * system().flops())
         return std::pair(std::int64_t{0}, false);
       double least = std::numeric_limits<double>::infinity();
       newton.solve(rules, r, [&](double error) {
@@ -545,20 +572,21 @@ class Island {
     InteriorPoint<D> method(problem_, system());
     double next_polish = options_.polish_below;
     bool near = false;
-    method.solve({.associated = true}, [&](double error, const Vector& r) {
-      if (take(1, error, r)) return true;
-      if (!near && method.tau() < 1e-4) {
-        near = true;
-        start_ = r;
-      }
-      if (method.tau() < 1e-4 && method.speed() > 0.05) return true;
-      if (method.tau() < 1e-6 && method.speed() > 1e-3) return true;
-      if (error < next_polish) {
-        polish(r);
-        next_polish = error / 30;
-      }
-      return done();
-    });
+    method.solve({.associated = true}, Vector::Zero(problem_.m()),
+                 [&](double error, const Vector& r) {
+                   if (take(1, error, r)) return true;
+                   if (!near && method.tau() < 1e-4) {
+                     near = true;
+                     start_ = r;
+                   }
+                   if (method.tau() < 1e-4 && method.speed() > 0.05) return true;
+                   if (method.tau() < 1e-6 && method.speed() > 1e-3) return true;
+                   if (error < next_polish) {
+                     polish(r);
+                     next_polish = error / 30;
+                   }
+                   return done();
+                 });
   }
 
   const Delassus& problem_;

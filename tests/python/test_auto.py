@@ -207,6 +207,47 @@ def test_a_warm_start_saves_work() -> None:
     assert warm.iterations <= cold.iterations // 3
 
 
+def at_rest(reaction: Array, seed: int = 0, n: int = 60) -> fclib.GlobalProblem:
+    """Contacts on n coordinates, hyperstatic, that these reactions hold at rest."""
+    rng = np.random.default_rng(seed)
+    m = len(reaction)
+    H = np.zeros((n, m))
+    for a in range(0, m, 3):
+        rows = rng.choice(n, 6, replace=False)
+        H[np.ix_(rows, np.arange(a, a + 3))] = rng.standard_normal((6, 3))
+    return fclib.GlobalProblem(
+        M=np.eye(n), H=H, f=-H @ reaction, w=np.zeros(m), mu=np.full(m // 3, 0.7)
+    )
+
+
+def test_what_rests_takes_its_reactions_from_the_guess() -> None:
+    rng = np.random.default_rng(0)
+    load = np.tile([1.0, 0.1, 0.1], 60) * (1 + rng.uniform(0, 1, 180))
+    before = fclib.solve(at_rest(load))
+    nearby = at_rest(load * (1 + 0.01 * rng.uniform(-1, 1, 180)))
+    warm = fclib.solve(nearby, guess=before.solution)
+    assert before.converged
+    assert warm.converged
+    assert [stage.name for stage in warm.stages if stage.solved] == ["conjugate gradients"]
+    assert sum(stage.factorisations for stage in warm.stages) == 0
+    assert sum(stage.factorisations for stage in fclib.solve(nearby).stages) > 0
+
+
+def test_a_good_guess_on_few_bodies_is_mended_on_the_bodies() -> None:
+    problem = bodies(5, nc=40, hyperstatic=True)
+    guess = fclib.solve(problem).solution
+    rng = np.random.default_rng(0)
+    nearby = problem.replace(f=problem.f * (1 + 1e-3 * rng.uniform(-1, 1, len(problem.f))))
+    warm = fclib.solve(nearby, guess=guess)
+    cold = fclib.solve(nearby)
+    assert warm.converged
+    assert cold.converged
+    names = [stage.name for stage in warm.stages]
+    assert "newton from the guess" not in names
+    assert "proximal newton" in names
+    assert sum(s.factorisations for s in warm.stages) < sum(s.factorisations for s in cold.stages)
+
+
 def test_the_stages_add_up() -> None:
     case = planted_global(2, nc=30)
     trace: list[tuple[int, str]] = []
@@ -306,10 +347,10 @@ def test_a_folded_path(push: float, mu: float) -> None:
     assert judge(problem, result.solution).error <= 1.01e-8
 
 
-@pytest.mark.parametrize(("seed", "push"), [(3, 1.0), (4, 0.0)])
-def test_a_jammed_packing(seed: int, push: float) -> None:
+@pytest.mark.parametrize(("size", "seed", "push"), [(100, 14, 1.0), (200, 22, 0.0)])
+def test_a_jammed_packing(size: int, seed: int, push: float) -> None:
     """The path folds where nearly all rests: rounding the shift's kink unfolds it."""
-    problem = Packing().of_size(100, push, seed)
+    problem = Packing().of_size(size, push, seed)
     assert not fclib.solve(problem, solver="nsip").converged
     result = fclib.solve(problem, solver="nsip", rounding=3)
     assert result.converged, result

@@ -25,18 +25,18 @@ SHIPPED = ("tiny",)  # whose problems are there without a build
 
 # name, version, what it is; a set that a family names and that is not here has version 1
 KNOWN: dict[str, tuple[str, str]] = {
-    "rt444": ("3", "the four families of RT-0444"),
-    "granular": ("4", "grains that fall, flow and are pressed"),
-    "rolling": ("3", "grains with rolling friction"),
-    "masonry": ("3", "blocks laid without mortar"),
+    "rt444": ("4", "the four families of RT-0444"),
+    "granular": ("5", "grains that fall, flow and are pressed"),
+    "rolling": ("4", "grains with rolling friction"),
+    "masonry": ("4", "blocks laid without mortar"),
     "deformable": ("1", "elastic bodies, meshes of finite elements"),
-    "mixed": ("4", "mechanisms and robots, with bilateral constraints"),
-    "planar": ("3", "bodies in a plane"),
+    "mixed": ("5", "mechanisms and robots, with bilateral constraints"),
+    "planar": ("4", "bodies in a plane"),
     "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("4", "all families that came after RT-0444"),
-    "hard": ("4", "what most solvers fail on; chosen by the bench"),
-    "tiny": ("3", "one problem of each kind; comes with the package"),
+    "extended": ("5", "all families that came after RT-0444"),
+    "hard": ("5", "what most solvers fail on; chosen by the bench"),
+    "tiny": ("4", "one problem of each kind; comes with the package"),
 }
 EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")
 

@@ -115,4 +115,4 @@ def periodic_step() -> Any:
     from fclib import scenes, simulate
 
     scene = scenes.get("PeriodicBox")(polyhedra=24, period=13.0).scene(seed=0)
-    return next(s for s in simulate.simulate(scene, 110) if s.problem.nc > 85)
+    return next(s for s in simulate.simulate(scene, 130) if s.problem.nc > 85)

@@ -102,7 +102,8 @@ def test_semicircular_arch_stands_above_couplets_thickness(ratio: float, stands:
     last = last_of(scene, 50)
     moved = np.abs(places(last) - start).max()
     if stands:
-        assert moved < 1e-5
+        # by less than a tenth of a millimetre: its problems have solutions that move a little, too
+        assert moved < 1e-4
         assert np.abs(last.velocity).max() < 1e-6
     else:
         assert moved > 0.02
@@ -137,7 +138,7 @@ def hinges(family: Any, first: Step, last: Step) -> dict[tuple[int, int], str]:
     radius = np.hypot(laid[:, 0], laid[:, 2] - family.springing)
     # half a thickness from the middle line, where a stone has not slid on the next one
     away = np.abs(radius - family.radius)
-    np.testing.assert_allclose(away, 0.5 * family.thickness, rtol=0.1)
+    np.testing.assert_allclose(away, 0.5 * family.thickness, rtol=0.15)
     normal = np.reshape(last.result.solution.r, (-1, 3))[:, 0]
     found = {}
     for pair in np.unique(contacts.pair, axis=0).tolist():

@@ -25,8 +25,8 @@ def mujoco_of(step: Step) -> Any:
     return step.model.model
 
 
-def last_of(scene: scenes.Scene, steps: int) -> Step:
-    *_, last = simulate(scene, steps)
+def last_of(scene: scenes.Scene, steps: int, **settings: Any) -> Step:
+    *_, last = simulate(scene, steps, **settings)
     return last
 
 
@@ -99,11 +99,11 @@ def test_semicircular_arch_stands_above_couplets_thickness(ratio: float, stands:
     )
     scene = family.scene()
     start = places(next(iter(simulate(scene, 1))))
-    last = last_of(scene, 50)
+    # each step from nothing: from a guess it may be another solution, which moves a little
+    last = last_of(scene, 50, warm_start=False)
     moved = np.abs(places(last) - start).max()
     if stands:
-        # by less than a tenth of a millimetre: its problems have solutions that move a little, too
-        assert moved < 1e-4
+        assert moved < 1e-5
         assert np.abs(last.velocity).max() < 1e-6
     else:
         assert moved > 0.02
@@ -138,7 +138,7 @@ def hinges(family: Any, first: Step, last: Step) -> dict[tuple[int, int], str]:
     radius = np.hypot(laid[:, 0], laid[:, 2] - family.springing)
     # half a thickness from the middle line, where a stone has not slid on the next one
     away = np.abs(radius - family.radius)
-    np.testing.assert_allclose(away, 0.5 * family.thickness, rtol=0.15)
+    np.testing.assert_allclose(away, 0.5 * family.thickness, rtol=0.1)
     normal = np.reshape(last.result.solution.r, (-1, 3))[:, 0]
     found = {}
     for pair in np.unique(contacts.pair, axis=0).tolist():
@@ -159,7 +159,8 @@ def test_arch_cracks_into_hinges_where_its_supports_spread(
     spread: float, expected: dict[tuple[int, int], str]
 ) -> None:
     family: Any = scenes.get("Arch")(voussoirs=10, time_step=1e-2, spread=spread)
-    first, *_, last = simulate(family.scene(), 60)
+    # each step from nothing: a solution that moves a little shifts points off their corners
+    first, *_, last = simulate(family.scene(), 60, warm_start=False)
     if spread:
         np.testing.assert_allclose(last.position[-1], 59 * 1e-2 * spread, rtol=1e-2)
     assert len(np.unique(last.contacts.pair, axis=0)) == 11

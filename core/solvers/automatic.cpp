@@ -17,8 +17,8 @@
 //   9  homotopy: the path by its arclength, around its folds
 //  10  proximal point to the end, the last resort
 //
-// 4 to 6 are for Coulomb's cone alone. Every stage starts from, and returns to, the best iterate so
-// far; each island is held to its share of the tolerance. What a stage may cost is counted in
+// 4 to 6 are for Coulomb's cone alone. Every stage returns to the best iterate so far, and most
+// start from it; each island is held to its share of the tolerance. What a stage may cost is counted in
 // operations, not in time: the same problem takes the same path on every machine.
 
 #include <algorithm>

@@ -18,8 +18,8 @@
 //  10  proximal point to the end, the last resort
 //
 // 4 to 6 are for Coulomb's cone alone. Every stage returns to the best iterate so far, and most
-// start from it; each island is held to its share of the tolerance. What a stage may cost is counted in
-// operations, not in time: the same problem takes the same path on every machine.
+// start from it; each island is held to its share of the tolerance. What a stage may cost is
+// counted in operations, not in time: the same problem takes the same path on every machine.
 
 #include <algorithm>
 #include <chrono>

@@ -6,16 +6,15 @@
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
-#include <cmath>
-#include <ctime>
 #include <memory>
 #include <utility>
 
 #include "arrays.hpp"
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
-#include "kernels/natural_error.hpp"
+#include "linalg/cpu_time.hpp"
+#include "linalg/with_dimension.hpp"
 #include "problem.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace nb = nanobind;
@@ -25,31 +24,10 @@ namespace fclib::bindings {
 
 namespace {
 
-double cpu_time() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Calls visit with the dimension of a contact as a constant.
-template <class Visitor>
-auto with_dimension(int d, Visitor&& visit) {
-  if (d == 2) return visit(std::integral_constant<int, 2>{});
-  if (d == 3) return visit(std::integral_constant<int, 3>{});
-  return visit(std::integral_constant<int, 5>{});
-}
-
-double natural_error(const Delassus& problem, const Vector& r) {
+double natural_error(const ReducedProblem& problem, const Vector& r) {
   Vector u(problem.m());
   problem.velocity(r, u);
-  const double squared = with_dimension(problem.d(), [&]<int d>(std::integral_constant<int, d>) {
-    if constexpr (d != 2) {
-      if (problem.rolling()) return natural_map_squared<Rolling<d>>(u, r, problem.friction);
-    }
-    if constexpr (d != 5) return natural_map_squared<Coulomb<d>>(u, r, problem.friction);
-    return std::nan("");
-  });
-  return std::sqrt(squared) / problem.scale;
+  return with_cone(problem, [&]<class Cone>() { return relative_error<Cone>(problem, u, r); });
 }
 
 /// All d x d blocks, by rows; what is zero in a block is stored.
@@ -82,12 +60,11 @@ Matrix by_rows(const BlockMatrix& blocks) {
         }
       }
     });
-    return 0;
   });
   return a;
 }
 
-nb::object local_problem(const Delassus& reduced) {
+nb::object local_problem(const ReducedProblem& reduced) {
   const auto fill = [&]<class P>(P problem) {
     problem.spacedim = reduced.d();
     problem.W = by_rows(reduced.W);
@@ -102,7 +79,7 @@ nb::object local_problem(const Delassus& reduced) {
 /// What a solver in Python talks to while it works: fclib::Monitor, and the error of its iterates.
 class Watch {
  public:
-  Watch(const Delassus& problem, const Settings& settings)
+  Watch(const ReducedProblem& problem, const Settings& settings)
       : settings_(settings), monitor_(settings_), problem_(&problem) {}
   Watch(const Watch&) = delete;
 
@@ -158,14 +135,14 @@ class Watch {
   nb::object failure = nb::none();  ///< what the callback raised
 
  private:
-  [[nodiscard]] const Delassus& problem() const {
+  [[nodiscard]] const ReducedProblem& problem() const {
     if (problem_ == nullptr) throw std::runtime_error("the solve of this monitor is over");
     return *problem_;
   }
 
   Settings settings_;
   Monitor monitor_;
-  const Delassus* problem_;
+  const ReducedProblem* problem_;
   bool started_ = false;
   std::optional<Status> reason_;
   std::optional<Status> claim_;
@@ -173,7 +150,7 @@ class Watch {
 
 /// Runs function(problem, r, monitor, options) -> r.
 Outcome run(const nb::object& function, const std::vector<OptionInfo>& infos,
-            const Delassus& reduced, const OptionValues& values, const Settings& settings,
+            const ReducedProblem& reduced, const OptionValues& values, const Settings& settings,
             Vector& r) {
   const nb::gil_scoped_acquire gil;
   const OptionValues options = parse_options(infos, values);
@@ -210,7 +187,8 @@ Solver python_solver(const std::string& name, const std::string& family, const s
       .max_iterations = max_iterations,
       .check_options = [options](const OptionValues& values) { parse_options(options, values); },
       .solve = [function, options](
-                   const Delassus& problem, const OptionValues& values, const Settings& settings,
+                   const ReducedProblem& problem, const OptionValues& values,
+                   const Settings& settings,
                    Vector& r) { return run(function, options, problem, values, settings, r); },
       .origin = origin};
 }

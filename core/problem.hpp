@@ -10,10 +10,10 @@
 #include <type_traits>
 #include <variant>
 
+#include "contact/friction.hpp"
 #include "error.hpp"
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/
-#include "friction.hpp"
 #include "solution.hpp"
 
 namespace fclib {

@@ -9,7 +9,7 @@ namespace fclib {
 
 namespace {
 
-/// Supernodes are planned only for what may be a mesh: this many rows, and entries in each.
+/// Supernodes are looked for only for what may be a mesh: this many rows, and entries in each.
 constexpr Eigen::Index large = 1000;
 constexpr Eigen::Index mesh_entries = 20;
 /// ... and used where an LU factorisation would take so many multiplications.
@@ -38,9 +38,9 @@ Factorization::Factorization(const SparseColumns& a, const std::string& name, bo
       SparseColumns both = a;  // entries that are zero may be stored on one side alone
       both += SparseColumns(a.transpose());
       both *= 0.5;
-      Fronts plan(MultifrontalCholesky::symmetric_pattern(both));
-      if (plan.flops > supernodal_flops) {
-        supernodal_ = std::make_unique<MultifrontalCholesky>(std::move(plan), both);
+      Fronts symbolic(MultifrontalCholesky::symmetric_pattern(both));
+      if (symbolic.flops > supernodal_flops) {
+        supernodal_ = std::make_unique<MultifrontalCholesky>(std::move(symbolic), both);
         if (!supernodal_->positive_definite()) {
           throw Error(ErrorKind::unsuitable, name + " is not positive definite");
         }

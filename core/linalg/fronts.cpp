@@ -243,7 +243,7 @@ Fronts::Fronts(const BlockPattern& pattern) : d(pattern.d) {
   }
 }
 
-std::shared_ptr<const Fronts> planned(const BlockPattern& pattern) {
+std::shared_ptr<const Fronts> analysed(const BlockPattern& pattern) {
   constexpr std::size_t kept = 4;  // a solve may have systems on contacts, on bodies, of an island
   if (pattern.d * pattern.nodes() <= dense_size) return std::make_shared<Fronts>(pattern);
   thread_local std::deque<std::pair<BlockPattern, std::shared_ptr<const Fronts>>> known;

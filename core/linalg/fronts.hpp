@@ -1,6 +1,7 @@
-// The plan of a multifrontal factorisation of a matrix whose pattern is symmetric (Duff & Reid,
-// "The multifrontal solution of indefinite sparse symmetric linear systems", 1983): an approximate
-// minimum degree ordering of the blocks, and supernodes with relaxed amalgamation. Nothing numeric.
+// The symbolic part of a multifrontal factorisation of a matrix whose pattern is symmetric (Duff &
+// Reid, "The multifrontal solution of indefinite sparse symmetric linear systems", 1983): an
+// approximate minimum degree ordering of the blocks, and supernodes with relaxed amalgamation.
+// Nothing numeric.
 #pragma once
 
 #include <cstdint>
@@ -52,8 +53,8 @@ struct Fronts {
   std::vector<Front> fronts;    ///< children before parents
 };
 
-/// The plan for this pattern: the one made before, where this thread had the same pattern among its
-/// last few. Successive steps of a simulation often have.
-std::shared_ptr<const Fronts> planned(const BlockPattern& pattern);
+/// The symbolic factorisation of this pattern: the one made before, where this thread had the same
+/// pattern among its last few. Successive steps of a simulation often have.
+std::shared_ptr<const Fronts> analysed(const BlockPattern& pattern);
 
 }  // namespace fclib

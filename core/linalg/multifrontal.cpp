@@ -2,9 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
-
-#include "linalg/threads.hpp"
 
 namespace fclib {
 
@@ -19,14 +18,14 @@ constexpr Index few = 768;
 }  // namespace
 
 Multifrontal::Multifrontal(const BlockPattern& pattern, int threads)
-    : plan_(planned(pattern)), factors_(plan_->fronts.size()) {
+    : symbolic_(analysed(pattern)), factors_(symbolic_->fronts.size()) {
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    factors_[f].exchanged.resize(static_cast<std::size_t>(plan_->fronts[f].pivots));
+    factors_[f].exchanged.resize(static_cast<std::size_t>(symbolic_->fronts[f].pivots));
   }
-  share_out(plan_->flops > worth_threads ? threads : 1);
+  share_out(symbolic_->flops > worth_threads ? threads : 1);
   work_.resize(std::max<std::size_t>(1, shares_.size()));
-  permuted_.resize(plan_->size);
-  local_.resize(plan_->largest);
+  permuted_.resize(symbolic_->size);
+  local_.resize(symbolic_->largest);
 }
 
 /// Subtrees of fronts, none of which has much more than its thread's share of the work.
@@ -39,11 +38,12 @@ void Multifrontal::share_out(int threads) {
     std::iota(top_.begin(), top_.end(), std::size_t{0});
     return;
   }
+  workers_ = std::make_unique<Workers>(threads);
   std::vector<double> below(count);  // operations of the subtree
   std::vector<char> open(count, 0);  // above the subtrees
   std::vector<std::size_t> parent(count, count);
   for (std::size_t f = 0; f < count; ++f) {
-    const Front& front = plan_->fronts[f];
+    const Front& front = symbolic_->fronts[f];
     const double k = front.pivots;
     const double u = front.size - front.pivots;
     below[f] += k * k * k / 3 + k * k * u + k * u * u + 1000;
@@ -52,7 +52,7 @@ void Multifrontal::share_out(int threads) {
       parent[child] = f;
     }
   }
-  const double most = plan_->flops / (2.0 * threads);
+  const double most = symbolic_->flops / (2.0 * threads);
   for (std::size_t f = 0; f < count; ++f) open[f] = below[f] > most;
   std::vector<std::size_t> roots;
   for (std::size_t f = 0; f < count; ++f) {
@@ -90,8 +90,8 @@ void Multifrontal::split(Index n, int threads, const F& f) {
   const Index parts = std::min<Index>(threads, n / (8 * tile));
   if (parts <= 1) return f(Index{0}, n);
   const Index part = n / parts / tile * tile;
-  others_cpu_ += on_threads(static_cast<int>(parts),
-                            [&](int k) { f(k * part, k + 1 < parts ? part : n - k * part); });
+  workers_->run_tasks(static_cast<int>(parts),
+                      [&](int k) { f(k * part, k + 1 < parts ? part : n - k * part); });
 }
 
 bool Multifrontal::factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
@@ -148,8 +148,8 @@ bool Multifrontal::factorise(const std::vector<double>& values) {
     }
   };
   if (!shares_.empty()) {
-    others_cpu_ += on_threads(static_cast<int>(shares_.size()),
-                              [&](int k) { work_on(static_cast<std::size_t>(k)); });
+    workers_->run_tasks(static_cast<int>(shares_.size()),
+                        [&](int k) { work_on(static_cast<std::size_t>(k)); });
   }
   if (std::find(failed.begin(), failed.end(), 1) != failed.end()) return false;
   const int threads = std::max(1, static_cast<int>(shares_.size()));
@@ -161,11 +161,11 @@ bool Multifrontal::factorise(const std::vector<double>& values) {
 
 bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& values, double tiny,
                                    Dense& work, int threads) {
-  const int d = plan_->d;
+  const int d = symbolic_->d;
   const std::size_t block_size = static_cast<std::size_t>(d) * static_cast<std::size_t>(d);
-  const Front& front = plan_->fronts[f];
+  const Front& front = symbolic_->fronts[f];
   Factors& factors = factors_[f];
-  if (work.rows() < front.size) work.resize(plan_->largest, plan_->largest);
+  if (work.rows() < front.size) work.resize(symbolic_->largest, symbolic_->largest);
   auto a = work.topLeftCorner(front.size, front.size);
   a.setZero();
   for (const Front::Entry& entry : front.entries) {
@@ -175,7 +175,7 @@ bool Multifrontal::factorise_front(std::size_t f, const std::vector<double>& val
     }
   }
   for (const Index child : front.children) {
-    const std::vector<Index>& to_parent = plan_->fronts[child].to_parent;
+    const std::vector<Index>& to_parent = symbolic_->fronts[child].to_parent;
     Factors& from = factors_[child];
     const auto blocks = static_cast<Index>(to_parent.size());
     for (Index cb = 0; cb < blocks; ++cb) {
@@ -228,8 +228,8 @@ int Multifrontal::determinant_sign() const {
 }
 
 void Multifrontal::solve(Vector& b) const {
-  const int d = plan_->d;
-  const std::vector<Index>& position = plan_->position;
+  const int d = symbolic_->d;
+  const std::vector<Index>& position = symbolic_->position;
   const Index n = static_cast<Index>(position.size());
   for (Index node = 0; node < n; ++node) {
     for (int c = 0; c < d; ++c) permuted_[d * position[node] + c] = b[d * node + c];
@@ -247,7 +247,7 @@ void Multifrontal::solve(Vector& b) const {
     }
   };
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_->fronts[f];
+    const Front& front = symbolic_->fronts[f];
     const Factors& factors = factors_[f];
     const Index u = front.size - front.pivots;
     gather(front);
@@ -261,7 +261,7 @@ void Multifrontal::solve(Vector& b) const {
     scatter(front);
   }
   for (std::size_t f = factors_.size(); f-- > 0;) {
-    const Front& front = plan_->fronts[f];
+    const Front& front = symbolic_->fronts[f];
     const Factors& factors = factors_[f];
     const Index u = front.size - front.pivots;
     gather(front);

@@ -15,27 +15,28 @@
 #include <vector>
 
 #include "linalg/fronts.hpp"
+#include "linalg/workers.hpp"
 
 namespace fclib {
 
 class Multifrontal {
  public:
   Multifrontal() = default;
-  /// Orders and plans, or takes the plan of a system with the same pattern that this thread had
-  /// shortly before; nothing numeric.
+  /// The symbolic factorisation alone, or that of a system with the same pattern that this thread
+  /// had shortly before.
   explicit Multifrontal(const BlockPattern& pattern, int threads = 1);
 
   /// Multiplications of one factorisation, and numbers that it keeps.
-  [[nodiscard]] double flops() const { return plan_->flops; }
-  [[nodiscard]] double memory() const { return plan_->memory; }
-  [[nodiscard]] Index size() const { return plan_->size; }
+  [[nodiscard]] double flops() const { return symbolic_->flops; }
+  [[nodiscard]] double memory() const { return symbolic_->memory; }
+  [[nodiscard]] Index size() const { return symbolic_->size; }
 
   /// Factorises the matrix with these values (BlockPattern::values() of them). False where an entry
   /// is not finite.
   bool factorise(const std::vector<double>& values);
 
   /// CPU time of all factorisations on other threads than the caller's [s].
-  [[nodiscard]] double others_cpu() const { return others_cpu_; }
+  [[nodiscard]] double others_cpu() const { return workers_ ? workers_->cpu_s() : 0; }
 
   /// Of the determinant of the matrix factorised last: 1 or -1.
   [[nodiscard]] int determinant_sign() const;
@@ -61,12 +62,12 @@ class Multifrontal {
   template <class F>
   void split(Index n, int threads, const F& f);
 
-  std::shared_ptr<const Fronts> plan_ = std::make_shared<Fronts>();
+  std::shared_ptr<const Fronts> symbolic_ = std::make_shared<Fronts>();
   std::vector<Factors> factors_;
+  std::unique_ptr<Workers> workers_;              // where there are several
   std::vector<std::vector<std::size_t>> shares_;  // fronts of each thread, children first
   std::vector<std::size_t> top_;                  // those above them, which all threads work on
   std::vector<Dense> work_;                       // of each thread
-  double others_cpu_ = 0;
   mutable Vector permuted_;
   mutable Vector local_;
 };

@@ -17,16 +17,16 @@ BlockPattern MultifrontalCholesky::symmetric_pattern(const SparseColumns& a) {
   return pattern;
 }
 
-MultifrontalCholesky::MultifrontalCholesky(Fronts plan, const SparseColumns& a)
-    : plan_(std::move(plan)), factors_(plan_.fronts.size()) {
+MultifrontalCholesky::MultifrontalCholesky(Fronts symbolic, const SparseColumns& a)
+    : symbolic_(std::move(symbolic)), factors_(symbolic_.fronts.size()) {
   positive_definite_ = factorise(a);
 }
 
 bool MultifrontalCholesky::factorise(const SparseColumns& a) {
-  Dense work(plan_.largest, plan_.largest);
+  Dense work(symbolic_.largest, symbolic_.largest);
   std::vector<Dense> updates(factors_.size());  // lower triangles, until the parent has taken them
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = symbolic_.fronts[f];
     const Index k = front.pivots;
     const Index u = front.size - k;
     auto front_matrix = work.topLeftCorner(front.size, front.size);
@@ -35,7 +35,7 @@ bool MultifrontalCholesky::factorise(const SparseColumns& a) {
       if (entry.row >= entry.col) front_matrix(entry.row, entry.col) += a.valuePtr()[entry.block];
     }
     for (const Index child : front.children) {
-      const std::vector<Index>& to = plan_.fronts[child].to_parent;
+      const std::vector<Index>& to = symbolic_.fronts[child].to_parent;
       Dense& update = updates[child];
       for (std::size_t col = 0; col < to.size(); ++col) {
         const double* source = update.data() + static_cast<std::ptrdiff_t>(col * to.size());
@@ -60,8 +60,8 @@ bool MultifrontalCholesky::factorise(const SparseColumns& a) {
 
 Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
   Vector permuted(b.size());
-  for (Index node = 0; node < plan_.size; ++node) permuted[plan_.position[node]] = b[node];
-  Vector local(plan_.largest);
+  for (Index node = 0; node < symbolic_.size; ++node) permuted[symbolic_.position[node]] = b[node];
+  Vector local(symbolic_.largest);
   const auto gather = [&](const Front& front) {
     for (std::size_t k = 0; k < front.nodes.size(); ++k) local[k] = permuted[front.nodes[k]];
   };
@@ -69,7 +69,7 @@ Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
     for (std::size_t k = 0; k < front.nodes.size(); ++k) permuted[front.nodes[k]] = local[k];
   };
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = symbolic_.fronts[f];
     const Index u = front.size - front.pivots;
     gather(front);
     auto top = local.head(front.pivots);
@@ -78,7 +78,7 @@ Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
     scatter(front);
   }
   for (std::size_t f = factors_.size(); f-- > 0;) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = symbolic_.fronts[f];
     const Index u = front.size - front.pivots;
     gather(front);
     auto top = local.head(front.pivots);
@@ -89,15 +89,16 @@ Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
     scatter(front);
   }
   Vector result(b.size());
-  for (Index node = 0; node < plan_.size; ++node) result[node] = permuted[plan_.position[node]];
+  for (Index node = 0; node < symbolic_.size; ++node)
+    result[node] = permuted[symbolic_.position[node]];
   return result;
 }
 
 std::vector<Index> MultifrontalCholesky::roots() const {
   std::vector<Index> root(factors_.size());
   for (std::size_t f = factors_.size(); f-- > 0;) {
-    if (plan_.fronts[f].to_parent.empty()) root[f] = static_cast<Index>(f);
-    for (const Index child : plan_.fronts[f].children) root[child] = root[f];
+    if (symbolic_.fronts[f].to_parent.empty()) root[f] = static_cast<Index>(f);
+    for (const Index child : symbolic_.fronts[f].children) root[child] = root[f];
   }
   return root;
 }
@@ -111,13 +112,13 @@ void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) c
     Dense values;
   };
   const Eigen::SparseMatrix<double, Eigen::RowMajor, Index> rows = b;
-  std::vector<Index> node_of(static_cast<std::size_t>(plan_.size));  // in the old numbering
-  for (Index node = 0; node < plan_.size; ++node) node_of[plan_.position[node]] = node;
+  std::vector<Index> node_of(static_cast<std::size_t>(symbolic_.size));  // in the old numbering
+  for (Index node = 0; node < symbolic_.size; ++node) node_of[symbolic_.position[node]] = node;
   std::vector<Part> parts(factors_.size());
   std::vector<Index> place(static_cast<std::size_t>(b.cols()));
   Dense work;
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = plan_.fronts[f];
+    const Front& front = symbolic_.fronts[f];
     const Index k = front.pivots;
     const Index u = front.size - k;
     std::vector<Index> columns;
@@ -138,7 +139,7 @@ void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) c
         work(p, place[at.col()]) = at.value();
     }
     for (const Index child : front.children) {
-      const std::vector<Index>& to = plan_.fronts[child].to_parent;
+      const std::vector<Index>& to = symbolic_.fronts[child].to_parent;
       Part& part = parts[child];
       for (std::size_t c = 0; c < part.columns.size(); ++c) {
         const double* source = part.values.data() + static_cast<std::ptrdiff_t>(c * to.size());
@@ -162,14 +163,14 @@ SparseColumns MultifrontalCholesky::gram(const SparseColumns& b) const {
   // Y^T Y of each tree of fronts, dense in the columns that reach it
   const std::vector<Index> root = roots();
   std::vector<std::vector<Index>> reaching(factors_.size());
-  std::vector<Index> front_of(static_cast<std::size_t>(plan_.size));
+  std::vector<Index> front_of(static_cast<std::size_t>(symbolic_.size));
   for (std::size_t f = 0; f < factors_.size(); ++f) {
-    for (Index p = 0; p < plan_.fronts[f].pivots; ++p)
-      front_of[plan_.fronts[f].nodes[p]] = static_cast<Index>(f);
+    for (Index p = 0; p < symbolic_.fronts[f].pivots; ++p)
+      front_of[symbolic_.fronts[f].nodes[p]] = static_cast<Index>(f);
   }
   for (Eigen::Index col = 0; col < b.cols(); ++col) {
     for (SparseColumns::InnerIterator at(b, col); at; ++at) {
-      auto& columns = reaching[root[front_of[plan_.position[at.row()]]]];
+      auto& columns = reaching[root[front_of[symbolic_.position[at.row()]]]];
       if (columns.empty() || columns.back() != col) columns.push_back(static_cast<Index>(col));
     }
   }

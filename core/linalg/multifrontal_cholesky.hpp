@@ -12,8 +12,8 @@ namespace fclib {
 
 class MultifrontalCholesky {
  public:
-  /// `plan` is of symmetric_pattern(a).
-  MultifrontalCholesky(Fronts plan, const SparseColumns& a);
+  /// `symbolic` is of symmetric_pattern(a).
+  MultifrontalCholesky(Fronts symbolic, const SparseColumns& a);
 
   /// The pattern of a symmetric matrix, 1 x 1 blocks.
   static BlockPattern symmetric_pattern(const SparseColumns& a);
@@ -42,7 +42,7 @@ class MultifrontalCholesky {
   template <class Visit>
   void forward(const SparseColumns& b, const Visit& visit) const;
 
-  Fronts plan_;
+  Fronts symbolic_;
   std::vector<Factors> factors_;
   bool positive_definite_ = false;
 };

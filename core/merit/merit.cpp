@@ -5,8 +5,8 @@
 #include <initializer_list>
 #include <optional>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
+#include "contact/coulomb.hpp"
+#include "contact/rolling.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {

@@ -13,7 +13,7 @@
 #include <tuple>
 #include <vector>
 
-#include "cones/cone.hpp"
+#include "contact/cone.hpp"
 #include "problem.hpp"
 
 namespace fclib {

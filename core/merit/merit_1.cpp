@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
+#include "contact/coulomb.hpp"
+#include "contact/rolling.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {

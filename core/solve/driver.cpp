@@ -31,11 +31,11 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
            const Request& request, const Solution& guess, const Judge& judge,
            const Primal* primal = nullptr) {
   const double norm_q = q.norm();
-  const Delassus reduced{.W = BlockMatrix(plain.W, plain.spacedim),
-                         .q = plain.q,
-                         .friction = friction,
-                         .scale = norm_q > 0 ? norm_q : 1.0,
-                         .primal = primal};
+  const ReducedProblem reduced{.W = BlockMatrix(plain.W, plain.spacedim),
+                               .q = plain.q,
+                               .friction = friction,
+                               .scale = norm_q > 0 ? norm_q : 1.0,
+                               .primal = primal};
   Result result;
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));

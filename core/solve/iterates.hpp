@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "function_ref.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib {
@@ -19,8 +20,8 @@ class Iterates {
   /// Takes note of an iterate, `error()` being its error, which is asked for every `most`-th
   /// iterate, more often at first. What the solver returns, if it is to stop. The monitor is told
   /// of every `most`-th iterate, of the last one, and of large problems whenever it wants to know.
-  template <class Error>
-  std::optional<Outcome> visit(std::int64_t iteration, const Vector& r, const Error& error) {
+  std::optional<Outcome> visit(std::int64_t iteration, const Vector& r,
+                               FunctionRef<double()> error) {
     const bool asked = r.size() > large && monitor_.due();
     if (iteration < next_ && iteration < monitor_.max_iterations() && !asked) return std::nullopt;
     next_ = iteration + 1 + std::min(iteration / most, most - 1);

@@ -15,8 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "cones/cone.hpp"
-#include "kernels/delassus.hpp"
+#include "contact/cone.hpp"
+#include "reduced/reduced_problem.hpp"
 #include "solve/options.hpp"
 
 namespace fclib {
@@ -57,7 +57,7 @@ constexpr std::string_view name_of(Status status) {
 /// A point of the convergence history.
 struct Progress {
   std::int64_t iteration = 0;
-  double error = 0;        ///< the solver's own, relative to Delassus::scale
+  double error = 0;        ///< the solver's own, relative to ReducedProblem::scale
   double time = 0;         ///< wall clock since the solver started [s]
   std::string_view stage;  ///< of a solver that chains others; empty for a plain one
 };
@@ -140,7 +140,7 @@ struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
   std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
-  Vector certificate = {};           ///< y (nc) of kernels/no_solution.hpp, where infeasible
+  Vector certificate = {};           ///< y (nc) of reduced/no_solution.hpp, where infeasible
   std::optional<double> cpu_s = {};  ///< [s] where it is not that of the calling thread
 };
 
@@ -157,7 +157,7 @@ struct Solver {
   /// Throws Error (option) at the first option that is unknown or has a wrong value.
   std::function<void(const OptionValues& options)> check_options;
   /// Solves from the guess in r (length m), and leaves its best iterate there.
-  std::function<Outcome(const Delassus& problem, const OptionValues& options,
+  std::function<Outcome(const ReducedProblem& problem, const OptionValues& options,
                         const Settings& settings, Vector& r)>
       solve;
   std::string origin = "fclib";  ///< the package that it comes from

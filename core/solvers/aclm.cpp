@@ -20,12 +20,13 @@
 #include <optional>
 
 #include "error.hpp"
-#include "kernels/convex_program.hpp"
-#include "kernels/interior_point.hpp"
-#include "kernels/relaxation.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/convex_program.hpp"
+#include "methods/interior_point.hpp"
+#include "methods/relaxation.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/de_saxce_shift.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
 
 namespace fclib::aclm {
 
@@ -55,7 +56,7 @@ struct Options : FixedPointOptions {
 template <int D>
 class ShiftedInteriorPoint {
  public:
-  explicit ShiftedInteriorPoint(const Delassus& problem)
+  explicit ShiftedInteriorPoint(const ReducedProblem& problem)
       : problem_(problem), shifted_(problem), system_(shifted_) {}
 
   /// `follow(r, u)` ends it by returning true.
@@ -72,13 +73,13 @@ class ShiftedInteriorPoint {
   }
 
  private:
-  const Delassus& problem_;
-  Delassus shifted_;
+  const ReducedProblem& problem_;
+  ReducedProblem shifted_;
   CoupledSystem system_;
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   constexpr int D = Cone::dim;
   constexpr bool rolling = Cone::groups > 1;
@@ -100,7 +101,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   const auto follow = [&](std::int64_t count, const Vector& reaction, const Vector& velocity) {
     return best.report(count, reaction, velocity);
   };
-  shift_of<Cone>(u, problem.friction, program.shift());
+  de_saxce_shift<Cone>(u, problem.friction, program.shift());
   Relaxation relaxation(options.relaxation);
   while (!best.stopped()) {
     const double accuracy = options.inner_accuracy * best.last_error();
@@ -124,13 +125,13 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     }
     if (best.iterations() == before) break;  // nothing could be done
     problem.velocity(r, u);
-    shift_of<Cone>(u, problem.friction, shift);
+    de_saxce_shift<Cone>(u, problem.friction, shift);
     program.shift() += relaxation.next(best.last_error()) * (shift - program.shift());
   }
   return best.outcome(r);
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

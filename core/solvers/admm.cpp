@@ -24,8 +24,10 @@
 #include <array>
 #include <cstdint>
 
-#include "kernels/alternating_directions.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/alternating_directions.hpp"
+#include "reduced/convex_sets.hpp"
+#include "reduced/de_saxce_shift.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 
 namespace fclib::admm {
@@ -96,14 +98,14 @@ struct Options {
 std::int64_t next_check(std::int64_t k) { return k + std::clamp<std::int64_t>(k / 4, 1, 10); }
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   const Cones<Cone> cones(problem.friction);
   BestIterate<Cone> best(problem, settings, r);
   Vector u(problem.m());
   Vector shift(problem.nc());
   problem.velocity(r, u);
-  shift_of<Cone>(u, problem.friction, shift);
+  de_saxce_shift<Cone>(u, problem.friction, shift);
   if (best.report(0, r, u)) return best.outcome(r);
 
   AlternatingDirections<Cone> step(problem,
@@ -122,7 +124,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     step.z_update(cones);
     step.w_update();
     step.velocity(u);
-    shift_of<Cone>(u, problem.friction, shift);
+    de_saxce_shift<Cone>(u, problem.friction, shift);
     if (k >= check || best.due(k - told)) {
       problem.velocity(step.z(), u);
       if (best.report(k - told, step.z(), u)) return best.outcome(r);
@@ -133,7 +135,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

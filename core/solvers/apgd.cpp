@@ -16,11 +16,13 @@
 // - steps are measured by tr(W_aa) / d of each contact, so that masses may differ;
 // - W x is kept with x, so that a step costs one product with W.
 
-#include "kernels/accelerated_gradient.hpp"
-#include "kernels/convex_residual.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/accelerated_gradient.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/convex_residual.hpp"
+#include "reduced/convex_sets.hpp"
+#include "reduced/de_saxce_shift.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
 
 namespace fclib::apgd {
 
@@ -61,7 +63,7 @@ struct Options {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   const Cones<Cone> cones(problem.friction);
   BestIterate<Cone> best(problem, settings, r);
@@ -77,7 +79,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   gradient.start(r, u);
   while (true) {
     if (options.shift == Shift::iterated) {
-      shift_of<Cone>(gradient.uy(), problem.friction, shift);
+      de_saxce_shift<Cone>(gradient.uy(), problem.friction, shift);
     }
     gradient.step(cones, shift);
     if (best.report(1, gradient.x(), gradient.u())) return best.outcome(r);
@@ -88,7 +90,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

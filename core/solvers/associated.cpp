@@ -3,7 +3,7 @@
 //   K* contains u,  u . r = 0,  r in K,  u = W r + q
 //
 // A contact that slides by u_T also opens by mu ||u_T||. The problem is convex, and the interior
-// point method (kernels/interior_point.hpp) solves it wherever it has a Slater point. Its reactions
+// point method (methods/interior_point.hpp) solves it wherever it has a Slater point. Its reactions
 // obey Coulomb's law only where nothing slides: the error, which is that of Coulomb's law, shows
 // what the relaxation costs.
 //
@@ -16,8 +16,9 @@
 // Ends `inaccurate` with the solution of the relaxation, to the tolerance, which is returned even
 // where an iterate before it was nearer to Coulomb's law.
 
-#include "kernels/interior_point.hpp"
-#include "solve/shared_options.hpp"
+#include "methods/interior_point.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/relative_error.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::associated {
@@ -32,13 +33,12 @@ struct Options : InteriorPointRules {
 constexpr double share = 0.1;
 
 template <int D>
-Outcome iterate(const Delassus& problem, InteriorPointRules rules, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, InteriorPointRules rules, const Settings& settings,
                 Vector& r) {
   Monitor monitor(settings);
   Vector u;
   problem.velocity(r, u);
-  const double first =
-      std::sqrt(natural_map_squared<Coulomb<D>>(u, r, problem.friction)) / problem.scale;
+  const double first = relative_error<Coulomb<D>>(problem, u, r);
   if (const auto stop = monitor.report(0, first)) return {*stop, 0};
 
   CoupledSystem system(problem);
@@ -58,7 +58,7 @@ Outcome iterate(const Delassus& problem, InteriorPointRules rules, const Setting
   return {stopped.value_or(solved ? Status::inaccurate : Status::stalled), method.iterations()};
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return problem.d() == 2 ? iterate<2>(problem, options, settings, r)

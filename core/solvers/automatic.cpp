@@ -9,10 +9,10 @@
 //   3  proximal Newton ("polish"), where the error is small already
 //   4  interior point with the shift in the Newton system, from near what the sweeps have, polished
 //      as it comes near; where its path folds, sweeps for what it has cost, again from far away and
-//      with shorter steps, and with the shift's kink rounded
+//      with shorter steps, and with the shift's kink smoothed
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
-//   7  a proof that there is no solution (kernels/no_solution.hpp)
+//   7  a proof that there is no solution (reduced/no_solution.hpp)
 //   8  proximal point with an accurate inner solution, for some steps
 //   9  homotopy: the path by its arclength, around its folds
 //  10  proximal point to the end, the last resort
@@ -27,16 +27,16 @@
 #include <optional>
 #include <utility>
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
-#include "kernels/gauss_seidel.hpp"
-#include "kernels/homotopy.hpp"
-#include "kernels/interior_point.hpp"
-#include "kernels/natural_error.hpp"
-#include "kernels/no_solution.hpp"
-#include "kernels/proximal_point.hpp"
-#include "kernels/semismooth_newton.hpp"
 #include "linalg/cpu_time.hpp"
+#include "methods/homotopy.hpp"
+#include "methods/interior_point.hpp"
+#include "methods/proximal_point.hpp"
+#include "methods/semismooth_newton.hpp"
+#include "reduced/gauss_seidel.hpp"
+#include "reduced/no_solution.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::automatic {
@@ -85,15 +85,31 @@ struct Options {
   }
 };
 
+/// The names of the stages, as results and histories have them.
+namespace stages {
+constexpr std::string_view gauss_seidel = "gauss-seidel";
+constexpr std::string_view conjugate_gradients = "conjugate gradients";
+constexpr std::string_view newton_from_guess = "newton from the guess";
+constexpr std::string_view proximal_newton = "proximal newton";
+constexpr std::string_view interior_point = "interior point";
+constexpr std::string_view interior_point_short = "interior point, shorter steps";
+constexpr std::string_view interior_point_smoothed = "interior point, smoothed";
+constexpr std::string_view associated = "associated";
+constexpr std::string_view semismooth_newton = "semismooth newton";
+constexpr std::string_view no_solution = "no solution?";
+constexpr std::string_view proximal_point = "proximal point";
+constexpr std::string_view homotopy = "homotopy";
+}  // namespace stages
+
 /// Up to here the error is evaluated often: a few sweeps may do, and cost no more than it.
 constexpr Index few_contacts = 10;
 
 /// Of the semismooth Newton method: what it solves, it nearly always solves within these.
 constexpr std::int64_t newton_iterations = 200;
 
-/// ... whose factorisations may cost so many times those of the other methods: hopeless where each
-/// contact is there many times, as collision detection may have them.
-constexpr double dearer = 100;
+/// ... and only where its factorisations take at most so many times the operations of the other
+/// methods': hopeless where each contact is there many times, as collision detection may have them.
+constexpr double most_newton_flops = 100;
 
 /// Newton's method from a guess, where the error is less, needs few iterations, or fails: it must
 /// be cheap where it does.
@@ -123,10 +139,10 @@ constexpr double safe_bound = 1e4;
 
 /// Operations, about: of a sweep, and of a factorisation with its solve and the rest of an
 /// iteration.
-double sweep_cost(const Delassus& problem) {
+double sweep_cost(const ReducedProblem& problem) {
   return 60.0 * static_cast<double>(problem.nc()) + static_cast<double>(problem.W.entries());
 }
-double factorisation_cost(const Delassus& problem, const CoupledSystem& system) {
+double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& system) {
   return 1500.0 * static_cast<double>(problem.nc()) + system.flops();
 }
 
@@ -201,7 +217,7 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
-  Island(const Delassus& problem, const Options& options, Tracker& tracker, double tolerance,
+  Island(const ReducedProblem& problem, const Options& options, Tracker& tracker, double tolerance,
          bool guessed)
       : problem_(problem),
         options_(options),
@@ -215,19 +231,20 @@ class Island {
     r_ = r;
     problem_.velocity(r_, u_);
     best_ = r_;
-    error_ = error_of(u_, r_);
+    error_ = relative_error<Cone>(problem_, u_, r_);
     tracker_.report(0, error_);
-    if (!whole && problem_.nc() >= 20) stage("conjugate gradients", [&] { conjugate_gradients(); });
+    if (!whole && problem_.nc() >= 20)
+      stage(stages::conjugate_gradients, [&] { conjugate_gradients(); });
     if (!whole && guessed_ && problem_.nc() >= 5 && error_ < good_guess && !done()) {
       // the contacts' statuses are nearly known: on few bodies the proximal point is cheaper
       if (CoupledSystem::bodies_are_fewer(problem_)) {
-        stage("proximal newton", [&] { polish(best_, guess_iterations); });
+        stage(stages::proximal_newton, [&] { polish(best_, guess_iterations); });
       } else {
-        semismooth_newton<AlartCurnier<Cone>>("newton from the guess", {.sweeps = 0, .patience = 3},
-                                              best_, guess_iterations);
+        semismooth_newton(stages::newton_from_guess, ContactFunctionKind::alart_curnier,
+                          {.sweeps = 0, .patience = 3}, best_, guess_iterations);
       }
     }
-    if (!done()) stage("gauss-seidel", [&] { return sweep(sweeps, whole); });
+    if (!done()) stage(stages::gauss_seidel, [&] { return sweep(sweeps, whole); });
     if (!whole && !done()) continue_by_newton();
     r = best_;
     return error_;
@@ -235,10 +252,6 @@ class Island {
 
  private:
   [[nodiscard]] bool done() const { return error_ <= tolerance_ || tracker_.stopped(); }
-
-  double error_of(const Vector& u, const Vector& r) const {
-    return std::sqrt(natural_map_squared<Cone>(u, r, problem_.friction)) / problem_.scale;
-  }
 
   /// Keeps r where it is the best so far. Whether to stop.
   bool take(std::int64_t iterations, double error, const Vector& r) {
@@ -281,10 +294,10 @@ class Island {
       const std::int64_t count = std::min({wanted, limit - k, tracker_.left()});
       for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
       k += count;
-      double error = error_of(u_, r_);
+      double error = relative_error<Cone>(problem_, u_, r_);
       if (error <= tolerance_) {
         problem_.velocity(r_, u_);
-        error = error_of(u_, r_);
+        error = relative_error<Cone>(problem_, u_, r_);
       }
       if (take(count, error, r_)) return;
       // on an island, only while the sweeps to go cost less than a dozen factorisations
@@ -315,7 +328,7 @@ class Island {
     for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
       for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_.sweep(r_, u_);
       problem_.velocity(r_, u_);
-      const double error = error_of(u_, r_);
+      const double error = relative_error<Cone>(problem_, u_, r_);
       if (take(interval, error, r_)) return;
       least = std::min(least, error);
       if (k < 2 * mark || k < 5 * interval) continue;
@@ -330,52 +343,52 @@ class Island {
 
   void continue_by_newton() {
     if (!done() && error_ < options_.polish_below) {
-      stage("proximal newton", [&] { return polish(best_); });
+      stage(stages::proximal_newton, [&] { return polish(best_); });
     }
     start_ = best_;
     const Vector swept = best_;
     const Vector zero = Vector::Zero(problem_.m());
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
       if (!done())
-        stage("interior point",
+        stage(stages::interior_point,
               [&] { interior_point({.tau = std::clamp(far * error_, least_tau, 1.0)}, swept); });
-      if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
+      if (!done()) stage(stages::gauss_seidel, [&] { sweep_on(); });
       // where its path folds, another may pass
       if (!done()) {
-        stage("interior point, shorter steps", [&] {
+        stage(stages::interior_point_short, [&] {
           interior_point({.tau = 10, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100}, zero);
         });
       }
-      if (!done()) stage("gauss-seidel", [&] { sweep_on(); });
+      if (!done()) stage(stages::gauss_seidel, [&] { sweep_on(); });
       if (!done()) {
-        stage("interior point, rounded", [&] {
-          interior_point({.rounding = 1, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100},
+        stage(stages::interior_point_smoothed, [&] {
+          interior_point({.smoothing = 1, .step_cap = 0.8, .delta = 1e-3, .max_iterations = 100},
                          swept);
         });
       }
-      if (!done()) stage("associated", [&] { associated(); });
+      if (!done()) stage(stages::associated, [&] { associated(); });
       // from nothing: where it converges, it does from there as well as from an iterate that
       // another method is stuck at; slower than the proximal point on rolling contacts
       if (!done()) {
-        semismooth_newton<NaturalMap<Cone>>("semismooth newton", {}, zero, newton_iterations,
-                                            dearer);
+        semismooth_newton(stages::semismooth_newton, ContactFunctionKind::natural_map, {}, zero,
+                          newton_iterations, most_newton_flops);
       }
     }
-    if (!done()) stage("no solution?", [&] { prove_no_solution(); });
+    if (!done()) stage(stages::no_solution, [&] { prove_no_solution(); });
     // where it converges from there, it does soon
     if (!done()) {
-      stage("proximal point",
+      stage(stages::proximal_point,
             [&] { proximal({.kappa = 10, .max_factorisations = proximal_trial}, best_); });
     }
-    // another rounding is another path
-    for (const double rounding : {0.3, 1.0}) {
-      if (!done()) stage("homotopy", [&] { homotopy(rounding); });
+    // another width of smoothing is another path
+    for (const double smoothing : {0.3, 1.0}) {
+      if (!done()) stage(stages::homotopy, [&] { homotopy(smoothing); });
     }
     // from the associated solution, then from the best iterate, which is another
     std::int64_t left = options_.last_resort;
     for (std::int64_t limit = 400; !done() && left > 0; limit *= 2) {
       limit = std::min(limit, left);
-      stage("proximal point", [&] {
+      stage(stages::proximal_point, [&] {
         proximal({.kappa = 10, .patience = endless, .max_factorisations = limit}, start_);
       });
       left -= limit;
@@ -432,7 +445,7 @@ class Island {
         project(inside);
         Vector u(problem_.m());
         problem_.velocity(inside, u);
-        if (take(k % trial, error_of(u, inside), inside)) return;
+        if (take(k % trial, relative_error<Cone>(problem_, u, inside), inside)) return;
         // what is left is that r is not in the cones
         if (size <= 0.01 * tolerance_ * problem_.scale) return;
       }
@@ -482,11 +495,11 @@ class Island {
   }
 
   /// Around the folds of the path.
-  void homotopy(double rounding) {
+  void homotopy(double smoothing) {
     Homotopy<Cone> method(problem_, system());
     double next_polish = 10 * options_.polish_below;
     Vector last = best_;
-    method.solve({.rounding = rounding, .max_factorisations = homotopy_factorisations},
+    method.solve({.smoothing = smoothing, .max_factorisations = homotopy_factorisations},
                  [&](double error, const Vector& r) {
                    if (take(1, error, r)) return true;
                    last = r;
@@ -504,11 +517,11 @@ class Island {
   }
 
   /// Always on the contacts.
-  template <class Function>
-  void semismooth_newton(std::string_view name, const NewtonRules& rules, Vector r,
-                         std::int64_t left, double most = std::numeric_limits<double>::infinity()) {
+  void semismooth_newton(std::string_view name, ContactFunctionKind function,
+                         const NewtonRules& rules, Vector r, std::int64_t left,
+                         double most = std::numeric_limits<double>::infinity()) {
     tracker_.stage(name, [&] {
-      SemismoothNewton<Function> newton(problem_, static_cast<int>(options_.threads));
+      SemismoothNewton<Cone> newton(problem_, function, static_cast<int>(options_.threads));
       if (std::isfinite(most) && newton.system().flops() > most * system().flops())
         return std::pair(std::int64_t{0}, false);
       double least = std::numeric_limits<double>::infinity();
@@ -525,15 +538,10 @@ class Island {
   /// The proximal point iterates of the frictionless problem, which is convex, go to infinity along
   /// a ray of proof where there is no solution (Pazy 1971), and converge where there is one.
   void prove_no_solution() {
-    Delassus frictionless = problem_;
+    ReducedProblem frictionless = problem_;
     frictionless.friction.mu.setZero();
     frictionless.friction.mu_r.setZero();
-    double trace = 0;
-    for (Index a = 0; a < problem_.nc(); ++a) {
-      trace += problem_.W.template diagonal_block<D>(a).trace();
-    }
-    const double mean = trace / static_cast<double>(problem_.m());
-    const double usual = mean > 0 ? problem_.q.norm() / mean : 0;
+    const double usual = problem_.q.norm() / mean_diagonal(problem_);
     CoupledSystem system(frictionless);
     ProximalPoint<Cone> method(frictionless, system);
     Vector r = Vector::Zero(problem_.m());
@@ -589,7 +597,7 @@ class Island {
                  });
   }
 
-  const Delassus& problem_;
+  const ReducedProblem& problem_;
   const Options& options_;
   Tracker& tracker_;
   double tolerance_;
@@ -602,9 +610,9 @@ class Island {
 };
 
 /// The part of a problem that these contacts are.
-Delassus restricted(const Delassus& problem, const std::vector<Index>& contacts) {
+ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index>& contacts) {
   const int d = problem.d();
-  Delassus part{
+  ReducedProblem part{
       .W = problem.W.restricted(contacts), .q = {}, .friction = {}, .scale = problem.scale};
   const auto count = static_cast<Eigen::Index>(contacts.size());
   part.q.resize(d * count);
@@ -619,7 +627,7 @@ Delassus restricted(const Delassus& problem, const std::vector<Index>& contacts)
 }
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
@@ -673,7 +681,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
     const double share =
         tolerance * std::sqrt(static_cast<double>(contacts.size()) / static_cast<double>(nc));
     if (squared[k] <= share * share) continue;
-    const Delassus part = restricted(problem, contacts);
+    const ReducedProblem part = restricted(problem, contacts);
     const auto size = static_cast<Eigen::Index>(contacts.size());
     Vector x(D * size);
     for (Eigen::Index j = 0; j < size; ++j)
@@ -696,15 +704,11 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   return outcome();
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

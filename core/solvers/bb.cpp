@@ -23,11 +23,13 @@
 #include <array>
 #include <cstdint>
 
-#include "kernels/convex_residual.hpp"
-#include "kernels/convex_sets.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/convex_residual.hpp"
+#include "reduced/convex_sets.hpp"
+#include "reduced/de_saxce_shift.hpp"
+#include "reduced/scale.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
 
 namespace fclib::bb {
 
@@ -83,7 +85,7 @@ double next_step(Step step, std::int64_t k, double pp, double pw, double ww) {
 }
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   constexpr int D = Cone::dim;
   using Vec = typename Cone::Vec;
@@ -108,7 +110,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   for (std::int64_t k = 1;; ++k) {
     if (options.shift == Shift::iterated) {
       last_shift.swap(shift);
-      shift_of<Cone>(u, problem.friction, shift);
+      de_saxce_shift<Cone>(u, problem.friction, shift);
       if (k == 1) last_shift = shift;
       // the objective of before, with the new shift
       double moved = 0;
@@ -153,7 +155,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

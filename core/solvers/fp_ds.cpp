@@ -10,7 +10,8 @@
 // Differs from the paper in: rho is relative to 1 / ||W||, the largest eigenvalue by the power
 // method, so that one value suits all units; each contact may have a step of its own (`metric`).
 
-#include "solve/projections.hpp"
+#include "methods/projection_loops.hpp"
+#include "reduced/with_cone.hpp"
 
 namespace fclib::fp_ds {
 
@@ -36,7 +37,7 @@ struct Options {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, Iterates& iterates,
+Outcome iterate(const ReducedProblem& problem, const Options& options, Iterates& iterates,
                 const Vector& start) {
   const VariationalInequality<Cone> vi(problem, options.metric);
   const double rho = options.rho / vi.largest_eigenvalue();
@@ -56,7 +57,12 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
 const Solver& solver() {
   static const Solver entry = projection_entry<Options>(
       "fp-ds", "Fixed-point projection with a constant step", "de Saxce & Feng 1998",
-      []<class Cone>(auto&... arguments) { return iterate<Cone>(arguments...); });
+      [](const ReducedProblem& problem, const Options& options, Iterates& iterates,
+         const Vector& start) {
+        return with_cone(problem, [&]<class Cone>() {
+          return iterate<Cone>(problem, options, iterates, start);
+        });
+      });
   return entry;
 }
 

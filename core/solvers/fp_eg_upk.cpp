@@ -15,9 +15,9 @@
 // algorithms 2 and 3 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
 // formulations and numerical comparisons" (2018).
 //
-// The loop, and what differs from the paper: solve/projections.hpp.
+// The loop, and what differs from the paper: methods/projection_loops.hpp.
 
-#include "solve/projections.hpp"
+#include "methods/projection_loops.hpp"
 
 namespace fclib::fp_eg_upk {
 
@@ -25,8 +25,9 @@ const Solver& solver() {
   static const Solver entry = projection_entry<ExtragradientOptions>(
       "fp-eg-upk", "Extragradient projection, step rule of Khobotov",
       "Korpelevich 1976; Khobotov 1987",
-      []<class Cone>(const auto& problem, const auto& options, auto& iterates, const auto& start) {
-        return extragradient<Cone>(StepRatio::khobotov, problem, options, iterates, start);
+      [](const ReducedProblem& problem, const auto& options, Iterates& iterates,
+         const Vector& start) {
+        return extragradient(StepRatio::khobotov, problem, options, iterates, start);
       });
   return entry;
 }

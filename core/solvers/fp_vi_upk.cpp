@@ -9,17 +9,18 @@
 // algorithms 1 and 3 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
 // formulations and numerical comparisons" (2018).
 //
-// The loop, and what differs from the paper: solve/projections.hpp.
+// The loop, and what differs from the paper: methods/projection_loops.hpp.
 
-#include "solve/projections.hpp"
+#include "methods/projection_loops.hpp"
 
 namespace fclib::fp_vi_upk {
 
 const Solver& solver() {
   static const Solver entry = projection_entry<StepOptions>(
       "fp-vi-upk", "Fixed-point projection, step rule of Khobotov", "Khobotov 1987",
-      []<class Cone>(const auto& problem, const auto& options, auto& iterates, const auto& start) {
-        return fixed_point<Cone>(StepRatio::khobotov, problem, options, iterates, start);
+      [](const ReducedProblem& problem, const auto& options, Iterates& iterates,
+         const Vector& start) {
+        return fixed_point(StepRatio::khobotov, problem, options, iterates, start);
       });
   return entry;
 }

@@ -1,13 +1,13 @@
 // Homotopy: the central path of Coulomb's law, from a convex problem, by its arclength.
 //
-// kernels/homotopy.hpp has the path and its sources. Slow, and sure: where an interior point stops
+// methods/homotopy.hpp has the path and its sources. Slow, and sure: where an interior point stops
 // at a fold of its path, this goes around it. The last digits come from the proximal Newton method.
 
-#include "kernels/homotopy.hpp"
+#include "methods/homotopy.hpp"
 
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
-#include "kernels/proximal_point.hpp"
+#include "methods/proximal_point.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::homotopy {
@@ -21,8 +21,8 @@ struct Options : HomotopyRules {
     using O = Options;
     return std::tuple{
         OptionField<O, double>{
-            .name = "rounding",
-            .member = &O::rounding,
+            .name = "smoothing",
+            .member = &O::smoothing,
             .unit = "1",
             .doc = "of the kink of de Saxce's term, over the velocity on the path of "
                    "a contact that sticks",
@@ -55,11 +55,12 @@ struct Options : HomotopyRules {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, Options options, const Settings& settings, Vector& r) {
+Outcome iterate(const ReducedProblem& problem, Options options, const Settings& settings,
+                Vector& r) {
   Monitor monitor(settings);
   Vector u;
   problem.velocity(r, u);
-  double best = std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  double best = relative_error<Cone>(problem, u, r);
   if (const auto stop = monitor.report(0, best)) return {*stop, 0};
 
   CoupledSystem system(problem);
@@ -94,15 +95,11 @@ Outcome iterate(const Delassus& problem, Options options, const Settings& settin
   return {stopped.value_or(Status::stalled), iterations};
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
-  if (problem.rolling()) {
-    return problem.d() == 3 ? iterate<Rolling<3>>(problem, options, settings, r)
-                            : iterate<Rolling<5>>(problem, options, settings, r);
-  }
-  return problem.d() == 2 ? iterate<Coulomb<2>>(problem, options, settings, r)
-                          : iterate<Coulomb<3>>(problem, options, settings, r);
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, options, settings, r); });
 }
 
 }  // namespace

@@ -21,7 +21,8 @@
 
 #include <utility>
 
-#include "solve/projections.hpp"
+#include "methods/projection_loops.hpp"
+#include "reduced/with_cone.hpp"
 
 namespace fclib::hyperplane {
 
@@ -105,7 +106,7 @@ void project_on_both(const VariationalInequality<Cone>& vi, const Vector& from, 
 }
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, Iterates& iterates,
+Outcome iterate(const ReducedProblem& problem, const Options& options, Iterates& iterates,
                 const Vector& start) {
   constexpr double least = 1e-100;  // of rho
   constexpr double most = 1e100;
@@ -165,7 +166,12 @@ Outcome iterate(const Delassus& problem, const Options& options, Iterates& itera
 const Solver& solver() {
   static const Solver entry = projection_entry<Options>(
       "hyperplane", "Hyperplane projection", "Konnov 1993; Solodov & Svaiter 1999",
-      []<class Cone>(auto&... arguments) { return iterate<Cone>(arguments...); });
+      [](const ReducedProblem& problem, const Options& options, Iterates& iterates,
+         const Vector& start) {
+        return with_cone(problem, [&]<class Cone>() {
+          return iterate<Cone>(problem, options, iterates, start);
+        });
+      });
   return entry;
 }
 

@@ -12,17 +12,17 @@
 // reaction does not change cost nothing, and the natural map costs no product with W; settled
 // contacts may be left alone for some sweeps (`freeze`), as in the paper's implementation, but for
 // a fixed number of sweeps and not at random. With `threads` above 1 it sweeps colour by colour
-// (kernels/colouring.hpp), u^a by the row of W: another order of the contacts than the given one.
+// (linalg/colouring.hpp), u^a by the row of W: another order of the contacts than the given one.
 
 #include <array>
 #include <cstdint>
 #include <random>
 
-#include "kernels/schedule.hpp"
-#include "kernels/sweeps.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/sweeps.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
+#include "solve/schedule.hpp"
 
 namespace fclib::nsgs {
 
@@ -81,24 +81,16 @@ struct Options : SweepOptions {
 constexpr std::int64_t refresh_interval = 1000;
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
-  using Vec = typename Cone::Vec;
   BestIterate<Cone> best(problem, settings, r);
   Vector u(problem.m());
   problem.velocity(r, u);
   if (best.report(0, r, u)) return best.outcome(r);
 
   Sweeps<Cone> contacts(problem, options.threads);
-  const auto solve_local = options.local_step<Cone>();
-  const auto step = [&](ContactProblem<Cone>& contact, const Vec& b, Vec& next) {
-    const Vec old = next;
-    solve_local(contact, b, next);
-    if (options.relaxation != 1.0) {
-      next = contact.projected.cone().project(options.relaxation * next +
-                                              (1.0 - options.relaxation) * old);
-    }
-  };
+  LocalStep<Cone> step = options.local_step<Cone>();
+  step.relaxation = options.relaxation;
   std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
   if (options.shuffle == Shuffle::once) contacts.shuffle(random);
   // contacts that are settled sleep for a while: the sweep at which each wakes
@@ -130,7 +122,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

@@ -4,7 +4,7 @@
 //   x = (mu r_N, r_T),  y = (u^_N / mu, u_T),  x o y = tau e,  tau -> 0
 //   u = W r + q,  u^ = u + [mu ||u_T||, 0, 0]
 //
-// Nesterov & Todd's scaling, Mehrotra's predictor and corrector (kernels/interior_point.hpp).
+// Nesterov & Todd's scaling, Mehrotra's predictor and corrector (methods/interior_point.hpp).
 //
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
 // mechanics using interior point algorithm" (2023).
@@ -18,10 +18,10 @@
 //
 // The problem is not convex: the path may fold, and the method then ends `stalled`.
 
-#include "kernels/gauss_seidel.hpp"
-#include "kernels/interior_point.hpp"
+#include "methods/interior_point.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/gauss_seidel.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::nsip {
@@ -44,10 +44,10 @@ struct Options : InteriorPointRules {
                                 .doc = "in which the error must halve",
                                 .lowest = 1,
                                 .highest = 1e6},
-            OptionField<O, double>{.name = "rounding",
-                                   .member = &O::rounding,
+            OptionField<O, double>{.name = "smoothing",
+                                   .member = &O::smoothing,
                                    .unit = "1",
-                                   .doc = "width of the rounded kink of de Saxce's term, "
+                                   .doc = "width of the smoothed kink of de Saxce's term, "
                                           "over the mean complementarity gap",
                                    .lowest = 0},
             OptionField<O, std::int64_t>{.name = "sweeps",
@@ -61,7 +61,7 @@ struct Options : InteriorPointRules {
 };
 
 template <int D>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   BestIterate<Coulomb<D>> best(problem, settings, r);
   Vector u(problem.m());
@@ -87,7 +87,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   return best.outcome(r);
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return problem.d() == 2 ? iterate<2>(problem, options, settings, r)

@@ -3,8 +3,8 @@
 //   F(u, r) = r - [max(z_N, 0), P(z_T)],   z = r - rho u,   P on the disk of radius mu max(z_N, 0)
 //   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
 //
-// t = 1, or from a line search on 1/2 ||F||^2 (kernels/semismooth_newton.hpp; F in
-// kernels/contact_functions.hpp).
+// t = 1, or from a line search on 1/2 ||F||^2 (methods/semismooth_newton.hpp; F in
+// contact/contact_functions.hpp).
 //
 // Alart & Curnier, "A mixed formulation for frictional contact problems prone to Newton like
 // solution methods" (1991); section 5.1 of Acary, Bremond, Huber, "On solving contact problems with
@@ -19,7 +19,7 @@
 // Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
 // factorised on the contacts, however few the bodies are.
 
-#include "solve/newton.hpp"
+#include "methods/newton_loop.hpp"
 
 namespace fclib::nsn_ac {
 
@@ -29,9 +29,10 @@ struct Options : NewtonOptions {
   static constexpr auto fields() { return fields_of<Options>(); }
 };
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
-  return run_newton_on<AlartCurnier>(problem, parse_options<Options>(values), settings, r);
+  return run_newton(problem, ContactFunctionKind::alart_curnier, parse_options<Options>(values),
+                    settings, r);
 }
 
 }  // namespace

@@ -4,8 +4,8 @@
 //   F(u, r) = x + y - (x o x + y o y)^(1/2),   x = (mu r_N, r_T),   y = rho (u^_N / mu, u_T)
 //   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
 //
-// t = 1, or from a line search on 1/2 ||F||^2 (kernels/semismooth_newton.hpp; F in
-// kernels/contact_functions.hpp).
+// t = 1, or from a line search on 1/2 ||F||^2 (methods/semismooth_newton.hpp; F in
+// contact/contact_functions.hpp).
 //
 // Fukushima, Luo & Tseng, "Smoothing functions for second-order-cone complementarity problems"
 // (2001); Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations
@@ -20,7 +20,7 @@
 // Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
 // factorised on the contacts, however few the bodies are.
 
-#include "solve/newton.hpp"
+#include "methods/newton_loop.hpp"
 
 namespace fclib::nsn_fb {
 
@@ -30,12 +30,10 @@ struct Options : NewtonOptions {
   static constexpr auto fields() { return fields_of<Options>(); }
 };
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
-  const auto options = parse_options<Options>(values);
-  return problem.d() == 2
-             ? run_newton<FischerBurmeister<Coulomb<2>>>(problem, options, settings, r)
-             : run_newton<FischerBurmeister<Coulomb<3>>>(problem, options, settings, r);
+  return run_newton(problem, ContactFunctionKind::fischer_burmeister,
+                    parse_options<Options>(values), settings, r);
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 //   F(u, r) = r - P_K(r - rho u^),   u^ = u + [mu ||u_T||, 0, 0]
 //   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
 //
-// t = 1, or from a line search on 1/2 ||F||^2 (kernels/semismooth_newton.hpp; F in
-// kernels/contact_functions.hpp).
+// t = 1, or from a line search on 1/2 ||F||^2 (methods/semismooth_newton.hpp; F in
+// contact/contact_functions.hpp).
 //
 // De Saxce & Feng, "The bipotential method" (1998); Acary, Bremond, Huber, "On solving contact
 // problems with Coulomb friction: formulations and numerical comparisons" (2018).
@@ -18,7 +18,7 @@
 // Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
 // factorised on the contacts, however few the bodies are.
 
-#include "solve/newton.hpp"
+#include "methods/newton_loop.hpp"
 
 namespace fclib::nsn_nm {
 
@@ -28,9 +28,10 @@ struct Options : NewtonOptions {
   static constexpr auto fields() { return fields_of<Options>(); }
 };
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
-  return run_newton_on<NaturalMap>(problem, parse_options<Options>(values), settings, r);
+  return run_newton(problem, ContactFunctionKind::natural_map, parse_options<Options>(values),
+                    settings, r);
 }
 
 }  // namespace

@@ -17,8 +17,8 @@
 #include <array>
 #include <cstdint>
 
-#include "kernels/convex_program.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/convex_program.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 
 namespace fclib::panagiotopoulos {
@@ -57,7 +57,7 @@ struct Options {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   using Set = Cylinders<Cone>;
   Set normal(problem.friction);
@@ -91,7 +91,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   return best.outcome(r);
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

@@ -19,10 +19,11 @@
 #include <cmath>
 #include <vector>
 
-#include "kernels/contact_problem.hpp"
-#include "kernels/natural_error.hpp"
-#include "kernels/with_cone.hpp"
-#include "solve/shared_options.hpp"
+#include "contact/local_solver.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsgs {
@@ -69,29 +70,26 @@ class Iteration {
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<D>;
 
-  Iteration(const Delassus& problem, const Vector& r) : problem_(problem), r_(r), anchor_(r) {
+  Iteration(const ReducedProblem& problem, const Vector& r)
+      : problem_(problem), size_(mean_diagonal(problem)), r_(r), anchor_(r) {
     problem.velocity(r_, u_);
     shifted_ = u_;
     for (Index a = 0; a < problem.nc(); ++a) {
       const Mat block = problem.W.template diagonal_block<D>(a);
-      size_ += block.trace() / D / static_cast<double>(problem.nc());
       contacts_.emplace_back(block, Cone(problem.friction, a));
     }
-    if (!(size_ > 0)) size_ = 1;
   }
 
   [[nodiscard]] double size() const { return size_; }
   [[nodiscard]] const Vector& r() const { return r_; }
 
   /// Of r.
-  [[nodiscard]] double error() const {
-    return std::sqrt(natural_map_squared<Cone>(u_, r_, problem_.friction)) / problem_.scale;
-  }
+  [[nodiscard]] double error() const { return relative_error<Cone>(problem_, u_, r_); }
 
   /// Of r in the inner problem.
   double inner_error() {
     shifted_ = u_ + alpha_ * (r_ - anchor_);
-    return std::sqrt(natural_map_squared<Cone>(shifted_, r_, problem_.friction)) / problem_.scale;
+    return relative_error<Cone>(problem_, shifted_, r_);
   }
 
   /// Gives the inner iterates up: r is r_k again.
@@ -111,6 +109,7 @@ class Iteration {
   }
 
   void sweep() {
+    const LocalStep<Cone> step;
     for (Index a = 0; a < problem_.nc(); ++a) {
       ContactProblem<Cone>& contact = contacts_[static_cast<std::size_t>(a)];
       const Vec old = r_.template segment<D>(D * a);
@@ -119,7 +118,7 @@ class Iteration {
       const Vec b =
           u_.template segment<D>(D * a) + alpha_ * (old - anchor) - contact.projected.block() * old;
       Vec next = old;
-      if (!contact.solve_exact(b, next)) contact.projected.solve(b, 1e-14, 10, next);
+      step(contact, b, next);
       const Vec delta = next - old;
       if ((delta.array() == 0).all()) continue;
       r_.template segment<D>(D * a) = next;
@@ -128,9 +127,9 @@ class Iteration {
   }
 
  private:
-  const Delassus& problem_;
+  const ReducedProblem& problem_;
+  double size_;  // the mean of tr(W_aa) / d
   std::vector<ContactProblem<Cone>> contacts_;
-  double size_ = 0;  // the mean of tr(W_aa) / d
   double alpha_ = 0;
   Vector r_, u_, anchor_, shifted_;
 };
@@ -139,7 +138,7 @@ class Iteration {
 constexpr std::int64_t interval = 5;
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   Monitor monitor(settings);
   Iteration<Cone> at(problem, r);
@@ -180,7 +179,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

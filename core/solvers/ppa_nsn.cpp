@@ -9,7 +9,7 @@
 //
 // Differs from the papers in: alpha is relative to tr(W_aa) / d of each contact; it doubles where
 // Newton fails and comes back afterwards; inner problems are solved by Newton's method on the
-// function of Alart & Curnier in the variable r - rho u (kernels/proximal_point.hpp), until their
+// function of Alart & Curnier in the variable r - rho u (methods/proximal_point.hpp), until their
 // residual is a fraction of the error; and, by default, alpha follows the steps that Newton takes
 // rather than the error. It is not a monotone operator: no step is proved to approach the solution.
 //
@@ -17,9 +17,10 @@
 
 #include <array>
 
-#include "kernels/proximal_point.hpp"
-#include "kernels/with_cone.hpp"
-#include "solve/shared_options.hpp"
+#include "methods/proximal_point.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::ppa_nsn {
@@ -65,12 +66,12 @@ struct Options : ProximalOptions {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   Monitor monitor(settings);
   Vector u;
   problem.velocity(r, u);
-  const double error = std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  const double error = relative_error<Cone>(problem, u, r);
   if (const auto stop = monitor.report(0, error)) return {*stop, 0};
 
   CoupledSystem system(problem);
@@ -84,7 +85,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   return {stopped.value_or(Status::stalled), iterations};
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

@@ -17,11 +17,11 @@
 
 #include <cstdint>
 
-#include "kernels/schedule.hpp"
-#include "kernels/sweeps.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/sweeps.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
+#include "solve/schedule.hpp"
 
 namespace fclib::psor {
 
@@ -44,7 +44,7 @@ struct Options : SweepOptions {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   BestIterate<Cone> best(problem, settings, r);
   Vector u(problem.m());
@@ -69,7 +69,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   }
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

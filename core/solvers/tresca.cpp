@@ -15,11 +15,11 @@
 
 #include <cstdint>
 
-#include "kernels/convex_program.hpp"
-#include "kernels/relaxation.hpp"
-#include "kernels/with_cone.hpp"
+#include "methods/convex_program.hpp"
+#include "methods/relaxation.hpp"
+#include "methods/shared_options.hpp"
+#include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
-#include "solve/shared_options.hpp"
 
 namespace fclib::tresca {
 
@@ -42,7 +42,7 @@ struct Options : FixedPointOptions {
 };
 
 template <class Cone>
-Outcome iterate(const Delassus& problem, const Options& options, const Settings& settings,
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
   Cylinders<Cone> cylinders(problem.friction);
   ConvexProgram<Cylinders<Cone>> program(problem);
@@ -68,7 +68,7 @@ Outcome iterate(const Delassus& problem, const Options& options, const Settings&
   return best.outcome(r);
 }
 
-Outcome solve(const Delassus& problem, const OptionValues& values, const Settings& settings,
+Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
   const auto options = parse_options<Options>(values);
   return with_cone(problem,

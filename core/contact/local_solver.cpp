@@ -1,0 +1,75 @@
+#include "contact/local_solver.hpp"
+
+#include <algorithm>
+
+#include "contact/newton_contact.hpp"
+
+namespace fclib {
+
+template <class Cone>
+bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
+                      const typename Cone::Vec& b, typename Cone::Vec& r) {
+  constexpr int size = Cone::group_size;
+  typename Cone::Vec next = r;
+  typename Cone::Vec u = a * r + b;
+  if (!(a(0, 0) > 0)) return false;
+  next[0] = std::max(0.0, r[0] - u[0] / a(0, 0));
+  u += a.col(0) * (next[0] - r[0]);
+  for (int g = 0; g < Cone::groups; ++g) {
+    const int at = 1 + g * size;
+    // the norm of the block: a step of one over it never overshoots
+    const double norm = a.template block<size, size>(at, at).cwiseAbs().rowwise().sum().maxCoeff();
+    if (!(norm > 0)) return false;
+    auto part = next.template segment<size>(at);
+    part -= u.template segment<size>(at) / norm;
+    const double radius = cone.coefficient(g) * next[0];
+    const double length = part.norm();
+    if (length > radius) part *= radius / length;
+    u += a.template middleCols<size>(at) * (part - r.template segment<size>(at));
+  }
+  r = next;
+  return true;
+}
+
+template <class Cone>
+void LocalStep<Cone>::other(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const {
+  const Vec old = next;
+  if (!solved(contact, b, next)) contact.projected.solve(b, accuracy, iterations, next);
+  if (relaxation != 1) {
+    next = contact.projected.cone().project(relaxation * next + (1.0 - relaxation) * old);
+  }
+}
+
+template <class Cone>
+bool LocalStep<Cone>::solved(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const {
+  const auto& block = contact.projected.block();
+  const Cone& cone = contact.projected.cone();
+  switch (solver) {
+    case LocalSolver::exact:
+      return contact.solve_exact(b, next);
+    case LocalSolver::projection:
+      return false;
+    case LocalSolver::diagonal:
+      return project_diagonal(block, cone, b, next);
+    case LocalSolver::fischer_burmeister:
+      if constexpr (Cone::groups == 1) {
+        return newton_fischer_burmeister(block, cone, b, accuracy, iterations, next);
+      }
+      [[fallthrough]];
+    case LocalSolver::alart_curnier:
+      return newton_alart_curnier(block, cone, b, accuracy, iterations, next);
+    case LocalSolver::hybrid:
+      return newton_alart_curnier(block, cone, b, accuracy, iterations, next) ||
+             contact.solve_exact(b, next);
+  }
+  return false;
+}
+
+#define FCLIB_INSTANTIATE(Cone)                                                      \
+  template bool project_diagonal<Cone>(const ContactMatrix<Cone::dim>&, const Cone&, \
+                                       const Cone::Vec&, Cone::Vec&);                \
+  template struct LocalStep<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
+
+}  // namespace fclib

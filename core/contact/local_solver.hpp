@@ -1,0 +1,65 @@
+// What Gauss-Seidel does with the problem of one contact: the choice of local solvers.
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "contact/cones.hpp"
+#include "contact/contact_problem.hpp"
+
+namespace fclib {
+
+enum class LocalSolver {
+  exact,
+  projection,
+  diagonal,
+  alart_curnier,
+  fischer_burmeister,
+  hybrid,
+};
+inline constexpr std::array<std::string_view, 6> local_solvers{
+    "exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister", "hybrid"};
+inline constexpr std::string_view local_solvers_doc =
+    "one-contact solver: exact (enumeration of statuses), projection (P_K with local iterations), "
+    "diagonal (one projection, the block replaced by its diagonal), alart-curnier or "
+    "fischer-burmeister (damped Newton), hybrid (alart-curnier, then exact); where one has no "
+    "solution the projection steps in; rolling contacts have no exact solver, and "
+    "alart-curnier for fischer-burmeister";
+
+/// One projection with the block of a contact replaced by its diagonal, normal part first: each
+/// part is projected with the velocities that the parts before it leave. False, with r untouched,
+/// where the diagonal is not positive.
+template <class Cone>
+bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
+                      const typename Cone::Vec& b, typename Cone::Vec& r);
+
+/// The step of a sweep on one contact.
+template <class Cone>
+struct LocalStep {
+  using Vec = typename Cone::Vec;
+
+  LocalSolver solver = LocalSolver::exact;
+  double accuracy = 1e-14;  ///< of the iterations, relative
+  int iterations = 10;      ///< at most, of projections or of Newton
+  double relaxation = 1;    ///< omega in r <- P_K(omega r_local + (1 - omega) r)
+
+  /// Replaces next, r^a on entry, by a solution of the contact's problem, or an improvement. Never
+  /// fails.
+  void operator()(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const {
+    const bool exact = solver == LocalSolver::exact && relaxation == 1;
+    if (!exact || !contact.solve_exact(b, next)) other(contact, b, next);
+  }
+
+ private:
+  void other(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const;
+  bool solved(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const;
+};
+
+#define FCLIB_DECLARE(Cone)                                                                 \
+  extern template bool project_diagonal<Cone>(const ContactMatrix<Cone::dim>&, const Cone&, \
+                                              const Cone::Vec&, Cone::Vec&);                \
+  extern template struct LocalStep<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
+
+}  // namespace fclib

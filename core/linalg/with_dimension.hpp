@@ -1,0 +1,16 @@
+// From the size of blocks to a constant of the compiler.
+#pragma once
+
+#include <type_traits>
+
+namespace fclib {
+
+/// Calls f with the block size d (2, 3 or 5) as std::integral_constant.
+template <class F>
+auto with_dimension(int d, F&& f) {
+  if (d == 2) return f(std::integral_constant<int, 2>{});
+  if (d == 3) return f(std::integral_constant<int, 3>{});
+  return f(std::integral_constant<int, 5>{});
+}
+
+}  // namespace fclib

@@ -1,0 +1,48 @@
+// Threads that do the same job at once, each its own share of it. The one mechanism for threads of
+// the core.
+#pragma once
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "function_ref.hpp"
+
+namespace fclib {
+
+class Workers {
+ public:
+  /// `count` of them, the calling thread being number 0. Fewer where the system gives no more.
+  explicit Workers(int count);
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+  ~Workers();
+
+  [[nodiscard]] int count() const { return static_cast<int>(threads_.size()) + 1; }
+
+  /// Calls job(k) as each worker k, and returns when all have ended. A job must not throw; it may
+  /// `wait` for the others, the same number of times on each worker.
+  void run(FunctionRef<void(int)> job);
+
+  /// Calls task(k) for k < count, one after another on each worker: worker w has w, w + count(),
+  /// ... What the first of them throws is thrown here when all have ended.
+  void run_tasks(int count, FunctionRef<void(int)> task);
+
+  /// Returns when all workers have come here.
+  void wait();
+
+  /// CPU time of the threads that it started [s].
+  [[nodiscard]] double cpu_s() const;
+
+ private:
+  void serve(int k);
+
+  std::atomic<bool> complete_ = false;  // all threads are there
+  std::atomic<unsigned> phase_ = 0;
+  std::atomic<int> arrived_ = 0;
+  const FunctionRef<void(int)>* job_ = nullptr;
+  std::vector<double> cpu_;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace fclib

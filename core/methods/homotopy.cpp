@@ -1,0 +1,265 @@
+#include "methods/homotopy.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+
+namespace fclib {
+
+template <class Cone>
+Homotopy<Cone>::Homotopy(const ReducedProblem& problem, CoupledSystem& system)
+    : problem_(problem), system_(system) {
+  omega_ = mean_diagonal(problem);
+  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
+  if (!(size_q_ > 0)) size_q_ = 1.0;
+  q_ = problem.q / size_q_;
+}
+
+template <class Cone>
+void Homotopy<Cone>::solve(const HomotopyRules& rules, Report report) {
+  const auto stop_at = system_.factorisations() + rules.max_factorisations;
+  rules_ = rules;
+  start();
+  double step = 0.3;  // of the arclength
+  if (!linearise(r_, lambda_)) return;
+  orient(true);
+  while (system_.factorisations() < stop_at) {
+    step = std::min(step, rules.stride / longest(r_, tangent_));
+    int corrections = 0;
+    for (;; step *= 0.5) {
+      if (!(step > least_step) || system_.factorisations() >= stop_at) return;
+      next_ = r_ + step * tangent_;
+      next_lambda_ = lambda_ + step * tangent_lambda_;
+      corrections = correct(step);
+      // det J and zeta change their signs together; where the angle says otherwise, the step
+      // skipped a turn
+      if (corrections > 0 && cosine() * sign_ * sign_at_start_ > rules_.cosine) break;
+    }
+    r_.swap(next_);
+    lambda_ = next_lambda_;
+    orient(false);
+    if (lambda_ > 0.5) return;  // only by a step that left the path
+    if (corrections == 1) {
+      step *= 2;
+    } else if (corrections == 2) {
+      step *= 1.3;
+    } else if (corrections > 3) {
+      step *= 0.6;
+    }
+    if (tell(report) || t() < rules.end) return;
+  }
+}
+
+template <class Cone>
+bool Homotopy<Cone>::tell(Report report) {
+  physical_ = r_ * (size_q_ / omega_);
+  problem_.velocity(physical_, velocity_);
+  return report(relative_error<Cone>(problem_, velocity_, physical_), physical_);
+}
+
+template <class Cone>
+void Homotopy<Cone>::start() {
+  const auto m = problem_.m();
+  r_ = Vector::Zero(m);
+  for (Index a = 0; a < problem_.nc(); ++a) r_[D * a] = 1;
+  for (Vector* v : {&c_, &residual_, &slope_, &next_, &tangent_, &across_, &along_}) v->setZero(m);
+  lambda_ = 0;
+  tangent_lambda_ = -1;
+  folds_ = 0;
+  // F(r, 0) without c
+  evaluate(r_, lambda_);
+  c_ = residual_;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Cone cone(problem_.friction, a);
+    for (int group = 0; group < Cone::groups; ++group) {
+      if (cone.coefficient(group) > 0) continue;
+      c_.template segment<T>(D * a + 1 + T * group).setZero();
+    }
+  }
+}
+
+template <class Cone>
+bool Homotopy<Cone>::inside(const Vector& r) const {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Cone cone(problem_.friction, a);
+    if (!(r[D * a] > 0)) return false;
+    for (int group = 0; group < Cone::groups; ++group) {
+      const double mu = cone.coefficient(group);
+      if (mu > 0 && !(r.template segment<T>(D * a + 1 + T * group).norm() < mu * r[D * a]))
+        return false;
+    }
+  }
+  return true;
+}
+
+template <class Cone>
+void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
+  const double t = std::exp(lambda);
+  const double s = 1 - t;
+  const double e = rules_.smoothing;
+  problem_.W.multiply_add(r / omega_, q_, residual_);
+  std::vector<double>& blocks = system_.blocks();
+  negative_ = false;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Cone cone(problem_.friction, a);
+    const auto at = D * a;
+    Vec g = Vec::Zero();
+    Vec dg = Vec::Zero();  // dg / dlambda
+    Mat B = Mat::Zero();   // -t dg / dr
+    bool any = false;
+    for (int group = 0; group < Cone::groups; ++group) {
+      const double mu = cone.coefficient(group);
+      const int k = 1 + T * group;
+      if (!(mu > 0)) {
+        B.template block<T, T>(k, k).setIdentity();
+        continue;
+      }
+      any = true;
+      const Disc y = r.template segment<T>(at + k);
+      const double x = mu * r[at];
+      const double norm = y.norm();
+      const double det = (x - norm) * (x + norm);
+      const double w = det / x;
+      const double h = std::sqrt(norm * norm + e * e * w * w);
+      const double n = h - e * w;
+      const double dn_dw = e * (e * w / h - 1);
+      const double numerator = x - s * n;
+      g[0] += mu * numerator / det;
+      g.template segment<T>(k) -= y / det;
+      dg[0] += mu * t * n / det;
+      const double over = numerator / det;
+      const double dn_dx = dn_dw * (1 + norm * norm / (x * x));
+      B(0, 0) -= t * mu * mu * ((1 - s * dn_dx) - 2 * x * over) / det;
+      B.template block<1, T>(0, k) =
+          (-t * mu * (2 * over - s * (1 / h - 2 * dn_dw / x)) / det) * y.transpose();
+      B.template block<T, 1>(k, 0) = (-t * mu * 2 * x / (det * det)) * y;
+      B.template block<T, T>(k, k) = (2 * t / (det * det)) * y * y.transpose();
+      for (int i = 0; i < T; ++i) B(k + i, k + i) += t / det;
+    }
+    if (!any) {
+      g[0] = 1 / r[at];
+      B(0, 0) = t / (r[at] * r[at]);
+    }
+    const Vec forcing = t * (g + c_.template segment<D>(at));
+    residual_.template segment<D>(at) -= forcing;
+    slope_.template segment<D>(at) = -(forcing + t * dg);
+    if (B.determinant() < 0) negative_ = !negative_;
+    Mat inverse = B.inverse();
+    for (int group = 0; group < Cone::groups; ++group) {
+      if (!(cone.coefficient(group) > 0)) {
+        const int k = 1 + T * group;
+        inverse.template middleRows<T>(k).setZero();
+        inverse.template middleCols<T>(k).setZero();
+      }
+    }
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = inverse / omega_;
+  }
+}
+
+template <class Cone>
+bool Homotopy<Cone>::linearise(const Vector& r, double lambda) {
+  evaluate(r, lambda);
+  if (!system_.factorise()) return false;
+  sign_ = system_.determinant_sign() * (negative_ ? -1 : 1);
+  const std::vector<double>& blocks = system_.blocks();
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Eigen::Map<const Mat> block(blocks.data() + std::ptrdiff_t{D * D} * a);
+    across_.template segment<D>(D * a) = -omega_ * (block * residual_.template segment<D>(D * a));
+    along_.template segment<D>(D * a) = -omega_ * (block * slope_.template segment<D>(D * a));
+  }
+  system_.solve(across_);
+  system_.solve(along_);
+  return across_.allFinite() && along_.allFinite();
+}
+
+template <class Cone>
+double Homotopy<Cone>::product(const Vector& base, Index a, const Vector& x,
+                               const Vector& y) const {
+  const Cone cone(problem_.friction, a);
+  const auto at = D * a;
+  const double r = base[at];
+  double sum = 0;
+  bool any = false;
+  for (int group = 0; group < Cone::groups; ++group) {
+    const double mu = cone.coefficient(group);
+    if (!(mu > 0)) continue;
+    any = true;
+    const auto k = at + 1 + T * group;
+    const Disc p = base.template segment<T>(k);
+    const Disc u = x.template segment<T>(k);
+    const Disc v = y.template segment<T>(k);
+    const double norm = p.norm();
+    const double det = (mu * r - norm) * (mu * r + norm);
+    const double first = mu * mu * r * x[at] - p.dot(u);
+    const double second = mu * mu * r * y[at] - p.dot(v);
+    sum += 2 * first * second / (det * det) - (mu * mu * x[at] * y[at] - u.dot(v)) / det;
+  }
+  return any ? sum : x[at] * y[at] / (r * r);
+}
+
+template <class Cone>
+double Homotopy<Cone>::product(const Vector& x, const Vector& y) const {
+  double sum = 0;
+  for (Index a = 0; a < problem_.nc(); ++a) sum += product(r_, a, x, y);
+  return sum / static_cast<double>(problem_.nc());
+}
+
+template <class Cone>
+double Homotopy<Cone>::longest(const Vector& base, const Vector& x) const {
+  double largest = 0;
+  for (Index a = 0; a < problem_.nc(); ++a) largest = std::max(largest, product(base, a, x, x));
+  return std::sqrt(largest);
+}
+
+template <class Cone>
+double Homotopy<Cone>::cosine() const {
+  double aa = 1, bb = tangent_lambda_ * tangent_lambda_, ab = tangent_lambda_;
+  const double nc = static_cast<double>(problem_.nc());
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    aa += product(next_, a, along_, along_) / nc;
+    bb += product(next_, a, tangent_, tangent_) / nc;
+    ab += product(next_, a, along_, tangent_) / nc;
+  }
+  return -ab / std::sqrt(aa * bb);
+}
+
+template <class Cone>
+void Homotopy<Cone>::orient(bool first) {
+  const double norm = std::sqrt(product(along_, along_) + 1);
+  if (first) sign_at_start_ = sign_;
+  const double sign = -sign_ * sign_at_start_;
+  if (!first && sign * tangent_lambda_ < 0) ++folds_;
+  tangent_ = (sign / norm) * along_;
+  tangent_lambda_ = sign / norm;
+}
+
+template <class Cone>
+int Homotopy<Cone>::correct(double step) {
+  constexpr int most = 5;
+  // a step of this length may be off by a good part of itself, and no more
+  const double reach = 0.7 * step * std::max(longest(r_, tangent_), 1.0);
+  double last = 0;
+  for (int k = 1; k <= most; ++k) {
+    if (!inside(next_) || next_lambda_ < -60) return 0;
+    if (!linearise(next_, next_lambda_)) return 0;
+    const double dl = -product(tangent_, across_) / (tangent_lambda_ + product(tangent_, along_));
+    across_ += dl * along_;
+    const double size = std::max(longest(next_, across_), std::abs(dl));
+    if (!std::isfinite(size)) return 0;
+    if (size > (k == 1 ? std::max(reach, 0.2) : std::max(0.5 * last, rules_.accuracy))) return 0;
+    next_ += across_;
+    next_lambda_ += dl;
+    last = size;
+    if (size < rules_.accuracy) return inside(next_) ? k : 0;
+  }
+  return 0;
+}
+
+#define FCLIB_INSTANTIATE(Cone) template class Homotopy<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
+
+}  // namespace fclib

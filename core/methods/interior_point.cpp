@@ -1,0 +1,343 @@
+#include "methods/interior_point.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+
+namespace fclib {
+
+template <int D>
+InteriorPoint<D>::InteriorPoint(const ReducedProblem& problem, CoupledSystem& system)
+    : problem_(problem), system_(system) {
+  omega_ = mean_diagonal(problem);
+  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
+  if (!(size_q_ > 0)) size_q_ = 1.0;
+}
+
+template <int D>
+void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& guess,
+                             FunctionRef<bool(double error, const Vector& r)> report) {
+  const Index nc = problem_.nc();
+  const double count = static_cast<double>(nc);
+  start(rules, guess);
+  double delta = rules.delta;
+  double least = std::numeric_limits<double>::infinity();
+  int least_at = 0;
+  for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
+    evaluate(rules);
+    physical_ = r_ * (size_q_ / omega_);
+    velocity_ = u_ * size_q_;
+    const double error = relative_error<Cone>(problem_, velocity_, physical_);
+    if (report(error, physical_)) return;
+    if (error < 0.5 * least) {
+      least = error;
+      least_at = iterations_;
+    }
+    if (iterations_ - least_at > rules.patience) return;
+    if (!(tau_ > 1e-15)) return;
+    if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
+    delta = std::clamp(delta, 1e-8, 1.0);
+
+    assemble(delta, rules.associated);
+    if (!system_.factorise()) return;
+    // predictor
+    for (Index a = 0; a < nc; ++a) {
+      g_.template segment<D>(D * a) = -lambda_.template segment<D>(D * a);
+    }
+    if (!direction(delta)) return;
+    const double affine_step = std::min(1.0, longest());
+    const double affine_gap = (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
+    double sigma = std::clamp(std::pow(affine_gap / tau_, 3), 1e-6, 1.0);
+    if (residual_ > rules.balance * tau_) {
+      sigma = 1;
+    } else if (residual_ > 0.1 * rules.balance * tau_) {
+      sigma = std::max(sigma, 0.3);
+    }
+    affine_x_ = dx_;
+    affine_y_ = dy_;
+    const double cap = std::clamp(1 - tau_, std::min(0.9, rules.step_cap), rules.step_cap);
+    double step = 0;
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
+      correct(sigma, attempt == 0);
+      if (attempt == 0 && !rules.associated) correct_shift(affine_step);
+      if (!direction(delta)) return;
+      step = std::min(1.0, cap * longest());
+      if (step >= 0.3) break;
+    }
+    x_ += step * dx_;
+    y_ += step * dy_;
+    r_ += step * dr_;
+    for (Index a = 0; a < nc; ++a) {  // x follows from r, to the last digit
+      const double mu = problem_.friction.mu[a];
+      x_.template segment<D>(D * a) = r_.template segment<D>(D * a);
+      if (mu > 0) x_[D * a] *= mu;
+    }
+    if (step < 0.1) {
+      delta *= 10;
+    } else if (step > 0.5) {
+      delta *= 0.1;
+    }
+    if (step < 1e-6) return;
+  }
+}
+
+template <int D>
+void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& guess) {
+  const auto m = problem_.m();
+  q_ = problem_.q / size_q_;
+  for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_, &x_, &y_})
+    v->setZero(m);
+  scaling_.resize(static_cast<std::size_t>(problem_.nc()));
+  r_ = guess * (omega_ / size_q_);
+  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  // x of x - y = z and x y = tau, without cancellation
+  const auto root = [&](double z) {
+    const double length = std::sqrt(z * z + 4 * rules.tau);
+    return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
+  };
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const double mu = problem_.friction.mu[a];
+    const auto r = r_.template segment<D>(D * a);
+    const auto u = u_.template segment<D>(D * a);
+    Vec x = Vec::Zero();
+    Vec y = Vec::Zero();
+    if (mu > 0) {
+      const double shift = rules.associated ? 0.0 : u.template tail<T>().norm();
+      Vec z = r - u;
+      z[0] = mu * r[0] - (u[0] / mu + shift);
+      const double norm = z.template tail<T>().norm();
+      const double high = root(z[0] + norm);  // the spectral values of x
+      const double low = root(z[0] - norm);
+      x[0] = 0.5 * (high + low);
+      y[0] = 0.5 * rules.tau * (1 / high + 1 / low);
+      if (norm > 0) {
+        const ContactVector<T> along = z.template tail<T>() / norm;
+        x.template tail<T>() = 0.5 * (high - low) * along;
+        y.template tail<T>() = 0.5 * rules.tau * (1 / high - 1 / low) * along;
+      }
+    } else {
+      x[0] = root(r[0] - u[0]);
+      y[0] = rules.tau / x[0];
+    }
+    x_.template segment<D>(D * a) = x;
+    y_.template segment<D>(D * a) = y;
+    if (mu > 0) x[0] /= mu;
+    r_.template segment<D>(D * a) = x;
+  }
+}
+
+template <int D>
+double InteriorPoint<D>::det(const Vec& x) {
+  const double t = x.template tail<T>().norm();
+  return (x[0] - t) * (x[0] + t);
+}
+
+template <int D>
+void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
+  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
+  width_ = rules.smoothing * tau_;
+  residual_ = 0;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const double mu = problem_.friction.mu[a];
+    const Vec y = y_.template segment<D>(D * a);
+    Vec residual = u_.template segment<D>(D * a);
+    if (mu > 0) {
+      residual -= y;
+      residual[0] += y[0] - mu * y[0];
+      if (!rules.associated) residual[0] += mu * sliding(y.template tail<T>().norm());
+      residual_ = std::max(residual_, residual.template lpNorm<Eigen::Infinity>());
+    } else {
+      residual[0] -= y[0];
+      residual.template tail<T>().setZero();
+      residual_ = std::max(residual_, std::abs(residual[0]));
+    }
+    residual_vector_.template segment<D>(D * a) = residual;
+  }
+}
+
+template <int D>
+auto InteriorPoint<D>::scaled_target(Index a) const -> Vec {
+  const double mu = problem_.friction.mu[a];
+  Vec v = scaling_[static_cast<std::size_t>(a)].N * g_.template segment<D>(D * a);
+  if (mu > 0) v[0] /= mu;
+  return v;
+}
+
+template <int D>
+void InteriorPoint<D>::assemble(double delta, bool associated) {
+  std::vector<double>& blocks = system_.blocks();
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const double mu = problem_.friction.mu[a];
+    Scaling& s = scaling_[static_cast<std::size_t>(a)];
+    const Vec x = x_.template segment<D>(D * a);
+    const Vec y = y_.template segment<D>(D * a);
+    Mat d0 = Mat::Zero();
+    s.P.setIdentity();
+    s.N.setZero();
+    if (mu > 0) {
+      const double det_x = std::max(det(x), std::numeric_limits<double>::min());
+      const double det_y = std::max(det(y), std::numeric_limits<double>::min());
+      Vec w = x / std::sqrt(det_x);
+      const Vec yb = y / std::sqrt(det_y);
+      const double gamma = std::sqrt(0.5 * (1 + w.dot(yb)));
+      w[0] += yb[0];
+      w.template tail<T>() -= yb.template tail<T>();
+      w /= 2 * gamma;
+      const double beta = std::sqrt(std::sqrt(det_x / det_y));
+      const auto w1 = w.template tail<T>();
+      s.N(0, 0) = w[0];
+      s.N.template block<1, T>(0, 1) = w1.transpose();
+      s.N.template block<T, 1>(1, 0) = w1;
+      s.N.template block<T, T>(1, 1).setIdentity();
+      s.N.template block<T, T>(1, 1) += w1 * w1.transpose() / (1 + w[0]);
+      s.N *= beta;
+      Mat n2 = 2 * w * w.transpose();
+      n2(0, 0) -= 1;
+      for (int k = 1; k < D; ++k) n2(k, k) += 1;
+      n2 *= beta * beta;
+      s.inverse = s.N;
+      s.inverse.template block<1, T>(0, 1) *= -1;
+      s.inverse.template block<T, 1>(1, 0) *= -1;
+      s.inverse /= beta * beta;
+      if (!associated) {
+        const double norm = y.template tail<T>().norm();
+        if (norm > 0) {
+          s.P.template block<1, T>(0, 1) =
+              mu * y.template tail<T>().transpose() / std::hypot(norm, width_);
+        }
+      }
+      n2.row(0) /= mu;
+      n2.col(0) /= mu;
+      d0 = n2 * s.P;
+      lambda_.template segment<D>(D * a) = s.N * y;
+    } else {
+      s.N(0, 0) = std::sqrt(x[0] / y[0]);
+      s.inverse.setZero();
+      s.inverse(0, 0) = 1 / s.N(0, 0);
+      d0(0, 0) = x[0] / y[0];
+      lambda_[D * a] = s.N(0, 0) * y[0];
+    }
+    s.D0 = d0;
+    const Mat regular = Mat::Identity() + delta * d0;
+    s.regular = regular.inverse();
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = s.regular * d0 / omega_;
+  }
+}
+
+template <int D>
+void InteriorPoint<D>::correct(double sigma, bool second_order) {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const double mu = problem_.friction.mu[a];
+    const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+    const Vec lambda = lambda_.template segment<D>(D * a);
+    if (!(mu > 0)) {
+      double target = sigma * tau_;
+      if (second_order) target -= affine_x_[D * a] * affine_y_[D * a];
+      g_[D * a] = -lambda[0] + target / lambda[0];
+      continue;
+    }
+    Vec target = Vec::Zero();
+    target[0] = sigma * tau_;
+    if (second_order) {
+      const Vec p = s.inverse * affine_x_.template segment<D>(D * a);
+      const Vec q = s.N * affine_y_.template segment<D>(D * a);
+      target[0] -= p.dot(q);
+      target.template tail<T>() -= p[0] * q.template tail<T>() + q[0] * p.template tail<T>();
+    }
+    const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
+    Vec solution;
+    solution[0] =
+        (lambda[0] * target[0] - lambda.template tail<T>().dot(target.template tail<T>())) /
+        determinant;
+    solution.template tail<T>() =
+        (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
+    g_.template segment<D>(D * a) = solution - lambda;
+  }
+}
+
+template <int D>
+void InteriorPoint<D>::correct_shift(double step) {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const auto y = y_.template segment<T>(D * a + 1);
+    const double norm = y.norm();
+    if (!(norm > 0)) continue;
+    const ContactVector<T> dy = step * affine_y_.template segment<T>(D * a + 1);
+    residual_vector_[D * a] += problem_.friction.mu[a] * (sliding((y + dy).norm()) - sliding(norm) -
+                                                          y.dot(dy) / std::hypot(norm, width_));
+  }
+}
+
+template <int D>
+bool InteriorPoint<D>::direction(double delta) {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+    dr_.template segment<D>(D * a) =
+        s.regular * (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
+  }
+  system_.solve(dr_);
+  if (!dr_.allFinite()) return false;
+  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_);  // W dr + R
+  rhs_ += delta * dr_;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const double mu = problem_.friction.mu[a];
+    const Scaling& s = scaling_[static_cast<std::size_t>(a)];
+    Vec dx = dr_.template segment<D>(D * a);
+    Vec dy = s.P * rhs_.template segment<D>(D * a);
+    if (mu > 0) {
+      dx[0] *= mu;
+      dy[0] /= mu;
+    } else {
+      dx.template tail<T>().setZero();
+      dy.template tail<T>().setZero();
+    }
+    dx_.template segment<D>(D * a) = dx;
+    dy_.template segment<D>(D * a) = dy;
+  }
+  return true;
+}
+
+template <int D>
+double InteriorPoint<D>::longest(const Vec& x, const Vec& d) {
+  // the least positive root of det(x + t d) = 0
+  const double a = det(d);
+  const double b = x[0] * d[0] - x.template tail<T>().dot(d.template tail<T>());
+  const double c = std::max(det(x), 0.0);
+  double root = std::numeric_limits<double>::infinity();
+  const double discriminant = b * b - a * c;
+  if (discriminant >= 0) {
+    const double s = std::sqrt(discriminant);
+    if (b < 0) {
+      root = c / (s - b);
+    } else if (a < 0) {
+      root = -(b + s) / a;
+    }
+  }
+  if (d[0] < 0) root = std::min(root, -x[0] / d[0]);
+  return root;
+}
+
+template <int D>
+double InteriorPoint<D>::longest() const {
+  double step = std::numeric_limits<double>::infinity();
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    if (problem_.friction.mu[a] > 0) {
+      step = std::min({step, longest(x_.template segment<D>(D * a), dx_.template segment<D>(D * a)),
+                       longest(y_.template segment<D>(D * a), dy_.template segment<D>(D * a))});
+    } else {
+      if (dx_[D * a] < 0) step = std::min(step, -x_[D * a] / dx_[D * a]);
+      if (dy_[D * a] < 0) step = std::min(step, -y_[D * a] / dy_[D * a]);
+    }
+  }
+  return step;
+}
+
+template class InteriorPoint<2>;
+template class InteriorPoint<3>;
+
+}  // namespace fclib

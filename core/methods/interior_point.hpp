@@ -1,0 +1,118 @@
+// An interior-point method for Coulomb's law, with de Saxce's term inside the Newton system.
+//
+//   x = (mu r_N, r_T),  y = (u^_N / mu, u^_T),  both in the Lorentz cone,  x o y = tau e
+//   R = u + mu ||y_T|| e_N - u^ = 0,  u = W r + q
+//
+// Nesterov & Todd's scaling N (N^2 y = x, lambda = N y) turns Newton's step into one CoupledSystem:
+// with S = diag(1/mu, 1, 1), P = I + mu e_N (y_T / ||y_T||)^T, D0 = S N^2 S P, and delta > 0,
+//
+//   (I + D W) dr = (I + delta D0)^-1 (S N g - D0 R),   D = (I + delta D0)^-1 D0
+//
+// Mehrotra's predictor and corrector choose g. Without the term (`associated`) this is the convex
+// problem of an associated flow rule. Where a packing is jammed, the velocities that the path has
+// on its way to zero are of the size of tau, and the term's kink makes the path fold; `smoothing`
+// leaves velocities of that size to the associated rule: sqrt(||y_T||^2 + w^2) - w, w = smoothing
+// tau.
+//
+// Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
+// mechanics using interior point algorithm" (2023), for the convex part, to
+// which the shift in the Newton system is added.
+//
+// All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
+#pragma once
+
+#include <cmath>
+#include <vector>
+
+#include "contact/coulomb.hpp"
+#include "function_ref.hpp"
+#include "systems/coupled_system.hpp"
+
+namespace fclib {
+
+struct InteriorPointRules {
+  bool associated = false;
+  double tau = 1;             ///< at first
+  double smoothing = 0;       ///< width of the smoothed kink of de Saxce's term, in tau
+  double step_cap = 0.95;     ///< highest share of the step to the boundary
+  double delta = 1e-6;        ///< regularisation at first
+  bool delta_follows = true;  ///< delta <= 1e4 tau
+  double balance = 1e4;       ///< tau is held where ||R|| exceeds it this many times
+  int max_iterations = 60;
+  int patience = 15;  ///< iterations in which the error must halve
+};
+
+template <int D>
+class InteriorPoint {
+ public:
+  using Cone = Coulomb<D>;
+  using Vec = ContactVector<D>;
+  using Mat = ContactMatrix<D>;
+  static constexpr int T = D - 1;
+
+  InteriorPoint(const ReducedProblem& problem, CoupledSystem& system);
+
+  [[nodiscard]] double tau() const { return tau_; }
+  /// ||R||_inf / ||q||_inf and ||u|| / ||q|| of the last iterate.
+  [[nodiscard]] double residual() const { return residual_; }
+  [[nodiscard]] double speed() const { return u_.norm() / problem_.q.norm() * size_q_; }
+  [[nodiscard]] int iterations() const { return iterations_; }
+
+  /// Iterates from near a guess; `report(error, r)` is told of each iterate, and ends it by
+  /// returning true.
+  void solve(const InteriorPointRules& rules, const Vector& guess,
+             FunctionRef<bool(double error, const Vector& r)> report);
+
+ private:
+  /// x - y as the guess has it, and x o y = tau e: centred, and the nearer to the guess, the
+  /// smaller tau is.
+  void start(const InteriorPointRules& rules, const Vector& guess);
+
+  /// The Lorentz cone's determinant, without cancellation.
+  static double det(const Vec& x);
+
+  /// ||y_T||, smoothed at its kink.
+  [[nodiscard]] double sliding(double norm) const { return std::hypot(norm, width_) - width_; }
+
+  void evaluate(const InteriorPointRules& rules);
+
+  /// S N g of a contact.
+  [[nodiscard]] Vec scaled_target(Index a) const;
+
+  void assemble(double delta, bool associated);
+
+  /// lambda \ g for the corrector: g <- -lambda + lambda \ (sigma tau e - second order).
+  void correct(double sigma, bool second_order);
+
+  /// The shift mu ||y_T|| is convex: what the linearisation misses over the predictor's step is
+  /// added to R.
+  void correct_shift(double step);
+
+  bool direction(double delta);
+
+  /// The step along d at which x leaves the Lorentz cone.
+  static double longest(const Vec& x, const Vec& d);
+
+  [[nodiscard]] double longest() const;
+
+  struct Scaling {
+    Mat N, inverse, P, D0, regular;
+  };
+
+  const ReducedProblem& problem_;
+  CoupledSystem& system_;
+  double omega_ = 1;
+  double size_q_ = 1;
+  double tau_ = 1;
+  double width_ = 0;  // of the smoothing
+  double residual_ = 0;
+  int iterations_ = 0;
+  std::vector<Scaling> scaling_;
+  Vector q_, x_, y_, r_, u_, g_, lambda_, dx_, dy_, dr_, rhs_, residual_vector_;
+  Vector affine_x_, affine_y_, physical_, velocity_;
+};
+
+extern template class InteriorPoint<2>;
+extern template class InteriorPoint<3>;
+
+}  // namespace fclib

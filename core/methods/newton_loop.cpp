@@ -1,0 +1,28 @@
+#include "methods/newton_loop.hpp"
+
+#include "reduced/relative_error.hpp"
+#include "reduced/with_cone.hpp"
+
+namespace fclib {
+
+Outcome run_newton(const ReducedProblem& problem, ContactFunctionKind function,
+                   const NewtonRules& rules, const Settings& settings, Vector& r) {
+  return with_cone(problem, [&]<class Cone>() -> Outcome {
+    Monitor monitor(settings);
+    Vector u;
+    problem.velocity(r, u);
+    if (const auto stop = monitor.report(0, relative_error<Cone>(problem, u, r))) return {*stop, 0};
+
+    SemismoothNewton<Cone> newton(problem, function);
+    std::int64_t iterations = 0;
+    std::optional<Status> stopped;
+    const NewtonEnd end = newton.solve(rules, r, [&](double error) {
+      stopped = monitor.report(++iterations, error);
+      return stopped.has_value();
+    });
+    const Status otherwise = end == NewtonEnd::not_finite ? Status::diverged : Status::stalled;
+    return {stopped.value_or(otherwise), iterations};
+  });
+}
+
+}  // namespace fclib

@@ -1,0 +1,149 @@
+#include "methods/proximal_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "contact/alart_curnier.hpp"
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+
+namespace fclib {
+
+template <class Cone>
+ProximalPoint<Cone>::ProximalPoint(const ReducedProblem& problem, CoupledSystem& system)
+    : problem_(problem), system_(system), inverse_size_(mean_diagonals(problem)) {
+  const double mean = mean_diagonal(problem);
+  for (auto& size : inverse_size_) size = 1.0 / (size > 0 ? size : mean);
+}
+
+template <class Cone>
+double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, Vector& r,
+                                  FunctionRef<bool(double)> report) {
+  const auto stop_at = system_.factorisations() + rules.max_factorisations;
+  double kappa = rules.kappa;
+  int cautious = 0;  // steps since a failure
+  r_ = r;
+  problem_.velocity(r_, u_);
+  error_ = relative_error<Cone>(problem_, u_, r_);
+  double best = error_;
+  double share = 1;  // of what the law says, after failures
+  while (best > tolerance && system_.factorisations() < stop_at) {
+    if (rules.law == ProximalRules::Law::by_error) {
+      kappa = std::min(share / (rules.sigma * std::pow(error_, rules.nu)), rules.kappa_max);
+    }
+    const int steps = inner(kappa, stop_at);
+    if (steps == 0) {  // failed
+      kappa *= rules.hard;
+      share *= rules.hard;
+      cautious = 3;
+      if (kappa < 1e-6) break;
+      continue;
+    }
+    r_ = next_;
+    u_ = next_u_;
+    error_ = next_error_;
+    if (error_ < best) {
+      best = error_;
+      r = r_;
+    }
+    if (report(error_) || error_ > rules.patience * best) break;
+    double growth = steps <= 2 ? rules.easy : steps <= 4 ? rules.easy * 2 / 3 : 1.0;
+    if (steps >= 9) growth = 0.5;
+    if (cautious > 0) {
+      growth = std::min(growth, 1.5);
+      --cautious;
+    }
+    share = std::min(1.0, share * growth);
+    kappa = std::min(kappa * growth, rules.kappa_max);
+  }
+  return best;
+}
+
+template <class Cone>
+auto ProximalPoint<Cone>::argument(double kappa, const Vector& u, Index a) const -> Vec {
+  return r_.template segment<D>(D * a) - kappa * inverse_size_[a] * u.template segment<D>(D * a);
+}
+
+template <class Cone>
+double ProximalPoint<Cone>::residual(double kappa, const Vector& p, const Vector& u,
+                                     Vector& f) const {
+  f.resize(p.size());
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    f.template segment<D>(D * a) =
+        p.template segment<D>(D * a) -
+        alart_curnier_projection(Cone(problem_.friction, a), argument(kappa, u, a));
+  }
+  return f.norm();
+}
+
+template <class Cone>
+void ProximalPoint<Cone>::put_into_cones(double kappa, const Vector& p, const Vector& u,
+                                         Vector& result) const {
+  result.resize(p.size());
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Cone cone(problem_.friction, a);
+    const Vec z = argument(kappa, u, a);
+    Vec inside = p.template segment<D>(D * a);
+    if (!(z[0] > 0) || !(inside[0] > 0)) inside.setZero();
+    for (int g = 0; g < Cone::groups; ++g) {
+      const int at = 1 + g * Cone::group_size;
+      auto part = inside.template segment<Cone::group_size>(at);
+      const double norm = part.norm();
+      const double radius = cone.coefficient(g) * inside[0];
+      const bool slides =
+          z.template segment<Cone::group_size>(at).norm() > cone.coefficient(g) * z[0];
+      if (norm > radius || (slides && norm > 0)) part *= radius / norm;
+    }
+    result.template segment<D>(D * a) = inside;
+  }
+}
+
+template <class Cone>
+int ProximalPoint<Cone>::inner(double kappa, std::int64_t stop_at) {
+  p_ = r_;
+  up_ = u_;
+  double norm = residual(kappa, p_, up_, f_);
+  const double first = norm;
+  int rises = 0;
+  for (int step = 1; step <= max_steps && system_.factorisations() < stop_at; ++step) {
+    std::vector<double>& blocks = system_.blocks();
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
+          kappa * inverse_size_[a] *
+          alart_curnier_jacobian(Cone(problem_.friction, a), argument(kappa, up_, a));
+    }
+    if (!system_.factorise()) return 0;
+    step_ = -f_;
+    system_.solve(step_);
+    if (!step_.allFinite()) return 0;
+    double length = 1;
+    double trial_norm = 0;
+    for (int halving = 0;; ++halving) {
+      trial_ = p_ + length * step_;
+      problem_.velocity(trial_, trial_u_);
+      trial_norm = residual(kappa, trial_, trial_u_, f_);
+      if (trial_norm < norm || halving == max_halvings) break;
+      length *= 0.5;
+    }
+    if (!(trial_norm < 10 * norm) || (trial_norm >= norm && ++rises == 2)) return 0;
+    p_ = trial_;
+    up_ = trial_u_;
+    norm = trial_norm;
+    // or as small as rounding, which rho multiplies, lets it be
+    const double rounding = 10 * std::numeric_limits<double>::epsilon() * kappa * p_.norm();
+    if (norm > std::max(1e-2 * first, rounding)) continue;
+    put_into_cones(kappa, p_, up_, next_);
+    problem_.velocity(next_, next_u_);
+    next_error_ = relative_error<Cone>(problem_, next_u_, next_);
+    const double gap = (next_u_ - up_).norm() / problem_.scale;
+    if (gap <= 0.1 * next_error_ || gap <= 1e-15 || norm <= 1e-15 * p_.norm()) return step;
+  }
+  return 0;
+}
+
+#define FCLIB_INSTANTIATE(Cone) template class ProximalPoint<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
+
+}  // namespace fclib

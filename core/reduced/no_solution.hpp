@@ -1,0 +1,32 @@
+// A proof that a problem has no solution.
+//
+// u^ is in K* exactly where u_N >= 0, so that a solution needs r in K with (W r + q)_N >= 0 at
+// every contact. By Farkas' lemma there is none where some y >= 0 has
+//
+//   -W^T E y in K*   and   y . q_N < 0,      E y: the vector whose normal parts are y.
+//
+// Where W is symmetric and positive semidefinite that means W E y = 0: normal reactions that move
+// nothing, at contacts that would have to move. The rays along which the frictionless problem
+// diverges are such y.
+//
+// In floating point -W^T E y is in K* up to a distance e, and the proof holds for all reactions
+// with
+// ||r|| < -y . q_N / e. A heavy body needs large reactions, so that a small e alone is none: e must
+// be the rounding of terms that cancel, at each contact.
+#pragma once
+
+#include "contact/cones.hpp"
+#include "reduced/reduced_problem.hpp"
+
+namespace fclib {
+
+/// The bound on ||r|| below which y proves that there is no solution; 0 where y proves nothing.
+template <class Cone>
+double no_solution_bound(const ReducedProblem& problem, const Vector& y);
+
+#define FCLIB_DECLARE(Cone) \
+  extern template double no_solution_bound<Cone>(const ReducedProblem&, const Vector&);
+FCLIB_FOR_EACH_CONE(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
+
+}  // namespace fclib

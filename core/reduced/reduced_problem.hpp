@@ -1,0 +1,32 @@
+// The problem in the form that solvers take: u = W r + q and the friction law of each contact.
+#pragma once
+
+#include "contact/friction.hpp"
+#include "linalg/block_matrix.hpp"
+
+namespace fclib {
+
+/// The factors of W = H^T M^-1 H, for solvers that work on the bodies where that is cheaper.
+struct Primal {
+  SparseColumns M;  ///< (n x n)
+  SparseColumns H;  ///< (n x m)
+};
+
+/// W (m x m) by blocks, q (m), friction (nc).
+struct ReducedProblem {
+  BlockMatrix W;
+  Vector q;
+  Friction friction;
+  double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
+  const Primal* primal = nullptr;  ///< where the problem is known by its bodies
+
+  [[nodiscard]] int d() const { return W.block_size(); }
+  [[nodiscard]] Index nc() const { return W.block_count(); }
+  [[nodiscard]] Eigen::Index m() const { return q.size(); }
+  [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
+
+  /// u = W r + q.
+  void velocity(const Vector& r, Vector& u) const { W.multiply_add(r, q, u); }
+};
+
+}  // namespace fclib

@@ -1,0 +1,89 @@
+// The one linear system that Newton and interior-point methods solve here,
+//
+//   (B + D W) x = h,   D and B block-diagonal, d x d, possibly singular or not symmetric.
+//
+// B is the identity unless asked for. On the contacts the system is factorised as it stands, each
+// block row scaled. Where B is the identity and the problem is known by its bodies,
+// W = H^T M^-1 H, the same x comes from
+//
+//   (M + H D H^T) y = H h,   x = h - D H^T y
+//
+// whichever factorisation takes fewer operations. One step of iterative refinement with W follows.
+#pragma once
+
+#include <memory>
+
+#include "linalg/multifrontal.hpp"
+#include "reduced/reduced_problem.hpp"
+
+namespace fclib {
+
+class CoupledSystem {
+ public:
+  enum class Form { identity, general };  ///< of B
+
+  /// Whether the bodies have at most half as many coordinates as the contacts: no need then
+  /// for the symbolic factorisation on the contacts.
+  [[nodiscard]] static bool bodies_are_fewer(const ReducedProblem& problem) {
+    return problem.primal != nullptr && 2 * problem.primal->M.rows() <= problem.m();
+  }
+
+  /// Makes the symbolic factorisations; keeps a reference to the problem.
+  explicit CoupledSystem(const ReducedProblem& problem, Form form = Form::identity,
+                         int threads = 1);
+
+  /// The blocks of D, each d x d by columns, one after another (d d nc): to be filled before
+  /// factorise().
+  [[nodiscard]] std::vector<double>& blocks() { return D_; }
+
+  /// Those of B where it is general, likewise; zero at first.
+  [[nodiscard]] std::vector<double>& own_blocks() { return B_; }
+
+  /// False where the blocks are not finite.
+  bool factorise();
+
+  /// x <- (B + D W)^-1 x.
+  void solve(Vector& x);
+  /// The same without refinement, for iterations that mend it themselves.
+  void solve_plain(Vector& x) { solve_once(x); }
+
+  /// Of det(B + D W): 1 or -1, after factorise().
+  [[nodiscard]] int determinant_sign() const { return lu_.determinant_sign(); }
+
+  [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
+  /// Multiplications of one factorisation.
+  [[nodiscard]] double flops() const { return lu_.flops(); }
+  [[nodiscard]] bool on_bodies() const { return on_bodies_; }
+  /// CPU time of factorisations on other threads than the caller's [s].
+  [[nodiscard]] double others_cpu() const { return lu_.others_cpu(); }
+
+ private:
+  template <int D>
+  void fill_contacts();
+  void fill_bodies();
+  void apply(const std::vector<double>& blocks, const Vector& x, Vector& y) const;
+  void solve_once(Vector& x);
+  // the symbolic factorisations; false where the bodies will not do
+  void analyse_contacts();
+  template <int D>
+  void analyse_contacts_of();
+  bool analyse_bodies();
+
+  const ReducedProblem& problem_;
+  int threads_;
+  Multifrontal lu_;
+  std::vector<double> D_;
+  std::vector<double> B_;  // empty: the identity
+  std::vector<double> values_;
+  Vector row_scale_;                    // of each contact
+  std::vector<std::int64_t> place_;     // of each block of W in the values, in W's order
+  std::vector<std::int64_t> diagonal_;  // of each diagonal block
+  bool on_bodies_ = false;
+  std::vector<double> fixed_;          // M in the pattern of the bodies
+  std::vector<std::int64_t> scatter_;  // of each contact's H D H^T
+  std::int64_t factorisations_ = 0;
+  Vector rhs_, residual_, product_, body_;
+  Vector zero_;
+};
+
+}  // namespace fclib

@@ -1,0 +1,93 @@
+#include "contact/exact_contact.hpp"
+#include "contact/local_solver.hpp"
+#include "contact/rolling.hpp"
+
+#include <gtest/gtest.h>
+
+#include "random_data.hpp"
+
+namespace fclib {
+namespace {
+
+template <int D>
+ContactMatrix<D> random_block(testing::RandomData& random) {
+  const ContactMatrix<D> root = random.dense(D, D);
+  return root * root.transpose() + 0.2 * ContactMatrix<D>::Identity();
+}
+
+template <class Cone>
+double error_of(const ContactMatrix<Cone::dim>& a, const typename Cone::Vec& b,
+                const typename Cone::Vec& r, const Cone& cone) {
+  return natural_map(cone, typename Cone::Vec(a * r + b), r).norm() / b.norm();
+}
+
+template <int D>
+void expect_solutions(std::uint64_t seed) {
+  testing::RandomData random(seed);
+  int alart_curnier = 0;
+  int fischer_burmeister = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const Coulomb<D> cone(random.uniform(0.1, 0.9));
+    const ContactMatrix<D> a = random_block<D>(random);
+    const ContactVector<D> b = random.vector(D);
+    ContactVector<D> r = ContactVector<D>::Zero();
+    if (newton_alart_curnier(a, cone, b, 1e-14, 50, r)) {
+      ++alart_curnier;
+      EXPECT_LT(error_of(a, b, r, cone), 1e-10) << "sample " << k;
+    } else {
+      EXPECT_EQ(r.norm(), 0);
+    }
+    r.setZero();
+    if (newton_fischer_burmeister(a, cone, b, 1e-14, 50, r)) {
+      ++fischer_burmeister;
+      EXPECT_LT(error_of(a, b, r, cone), 1e-9) << "sample " << k;
+    } else {
+      EXPECT_EQ(r.norm(), 0);
+    }
+  }
+  EXPECT_GT(alart_curnier, 900);
+  EXPECT_GT(fischer_burmeister, 900);
+}
+
+TEST(NewtonContact, a_solution_satisfies_the_law_in_the_plane) { expect_solutions<2>(21); }
+TEST(NewtonContact, a_solution_satisfies_the_law_in_space) { expect_solutions<3>(22); }
+
+TEST(NewtonContact, alart_curnier_solves_rolling_contacts) {
+  testing::RandomData random(23);
+  int solved = 0;
+  for (int k = 0; k < 1000; ++k) {
+    const Rolling<5> cone(random.uniform(0.1, 0.9), random.uniform(0.01, 0.3));
+    const ContactMatrix<5> a = random_block<5>(random);
+    const ContactVector<5> b = random.vector(5);
+    ContactVector<5> r = ContactVector<5>::Zero();
+    if (!newton_alart_curnier(a, cone, b, 1e-14, 50, r)) continue;
+    ++solved;
+    EXPECT_LT(error_of(a, b, r, cone), 1e-10) << "sample " << k;
+  }
+  EXPECT_GT(solved, 800);
+}
+
+TEST(NewtonContact, a_block_of_zeros_is_refused) {
+  const ContactMatrix<3> zero = ContactMatrix<3>::Zero();
+  const Coulomb<3> cone(0.5);
+  ContactVector<3> r(1, 0, 0);
+  EXPECT_FALSE(newton_alart_curnier(zero, cone, {-1, 0, 0}, 1e-14, 50, r));
+  EXPECT_FALSE(newton_fischer_burmeister(zero, cone, {-1, 0, 0}, 1e-14, 50, r));
+  EXPECT_FALSE(project_diagonal(zero, cone, {-1, 0, 0}, r));
+  EXPECT_EQ(r, (ContactVector<3>(1, 0, 0)));
+}
+
+TEST(LocalStep, one_diagonal_projection_is_exact_for_a_multiple_of_the_identity) {
+  testing::RandomData random(24);
+  for (int k = 0; k < 200; ++k) {
+    const Coulomb<3> cone(random.uniform(0, 1));
+    const ContactMatrix<3> a = random.uniform(0.1, 10) * ContactMatrix<3>::Identity();
+    const ContactVector<3> b = random.vector(3);
+    ContactVector<3> r = random.vector(3);
+    ASSERT_TRUE(project_diagonal(a, cone, b, r));
+    EXPECT_LT(error_of(a, b, r, cone), 1e-13) << "sample " << k;
+  }
+}
+
+}  // namespace
+}  // namespace fclib

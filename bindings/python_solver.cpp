@@ -185,7 +185,6 @@ Solver python_solver(const std::string& name, const std::string& family, const s
       .rolling_dimensions = rolling_dimensions,
       .options = options,
       .max_iterations = max_iterations,
-      .check_options = [options](const OptionValues& values) { parse_options(options, values); },
       .solve = [function, options](
                    const ReducedProblem& problem, const OptionValues& values,
                    const Settings& settings,

@@ -10,7 +10,7 @@
 #include <type_traits>
 #include <variant>
 
-#include "contact/friction.hpp"
+#include "friction.hpp"
 #include "error.hpp"
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/

@@ -28,23 +28,23 @@ typename Cone::Vec alart_curnier_projection(const Cone& cone, const typename Con
 template <class Cone>
 ContactMatrix<Cone::dim> alart_curnier_jacobian(const Cone& cone, const typename Cone::Vec& z) {
   constexpr int size = Cone::group_size;
-  ContactMatrix<Cone::dim> slope = ContactMatrix<Cone::dim>::Zero();
-  if (!(z[0] > 0)) return slope;
-  slope(0, 0) = 1;
+  ContactMatrix<Cone::dim> jacobian = ContactMatrix<Cone::dim>::Zero();
+  if (!(z[0] > 0)) return jacobian;
+  jacobian(0, 0) = 1;
   for (int g = 0; g < Cone::groups; ++g) {
     const int at = 1 + g * size;
     const auto part = z.template segment<size>(at);
     const double norm = part.norm();
     const double mu = cone.coefficient(g);
-    auto block = slope.template block<size, size>(at, at);
+    auto block = jacobian.template block<size, size>(at, at);
     block.setIdentity();
     if (norm <= mu * z[0]) continue;
     const Eigen::Matrix<double, size, 1> direction = part / norm;
     block -= direction * direction.transpose();
     block *= mu * z[0] / norm;
-    slope.template block<size, 1>(at, 0) = mu * direction;
+    jacobian.template block<size, 1>(at, 0) = mu * direction;
   }
-  return slope;
+  return jacobian;
 }
 
 }  // namespace fclib

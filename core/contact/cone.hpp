@@ -10,7 +10,7 @@
 
 #include <Eigen/Core>
 
-#include "contact/friction.hpp"
+#include "friction.hpp"
 
 namespace fclib {
 

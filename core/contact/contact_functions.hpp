@@ -81,11 +81,11 @@ struct DiskFunction {
       }
       // the projection of `part` on the disk: mu base part / ||part||
       const Part direction = part / norm;
-      Eigen::Matrix<double, S, S> slope = Eigen::Matrix<double, S, S>::Identity();
-      slope -= direction * direction.transpose();
-      slope *= mu * base / norm;
-      own -= slope;
-      other = slope * rho.template segment<S>(at).asDiagonal();
+      Eigen::Matrix<double, S, S> jacobian = Eigen::Matrix<double, S, S>::Identity();
+      jacobian -= direction * direction.transpose();
+      jacobian *= mu * base / norm;
+      own -= jacobian;
+      other = jacobian * rho.template segment<S>(at).asDiagonal();
       B.template block<S, 1>(at, 0) = -mu * direction;
       if (predicted) A.template block<S, 1>(at, 0) = mu * rho[0] * direction;
     }
@@ -101,15 +101,15 @@ using JeanMoreau = DiskFunction<Cone, false>;
 template <class Cone>
 ContactMatrix<Cone::dim> modified_jacobian(const Cone& cone, const typename Cone::Vec& u) {
   constexpr int S = Cone::group_size;
-  ContactMatrix<Cone::dim> slope = ContactMatrix<Cone::dim>::Identity();
+  ContactMatrix<Cone::dim> jacobian = ContactMatrix<Cone::dim>::Identity();
   for (int g = 0; g < Cone::groups; ++g) {
     const auto part = u.template segment<S>(1 + g * S);
     const double norm = part.norm();
     if (norm > 0) {
-      slope.template block<1, S>(0, 1 + g * S) = (cone.coefficient(g) / norm) * part.transpose();
+      jacobian.template block<1, S>(0, 1 + g * S) = (cone.coefficient(g) / norm) * part.transpose();
     }
   }
-  return slope;
+  return jacobian;
 }
 
 /// An element of the generalised Jacobian of P_K at z.
@@ -134,20 +134,20 @@ ContactMatrix<Cone::dim> projection_jacobian(const Cone& cone, const typename Co
     }
   }
   normal /= weight;
-  Mat slope = Mat::Identity();
-  slope.row(0) = normal.transpose();
+  Mat jacobian = Mat::Identity();
+  jacobian.row(0) = normal.transpose();
   for (int g = 0; g < Cone::groups; ++g) {
     const int at = 1 + g * S;
     const double mu = cone.coefficient(g);
     const double norm = z.template segment<S>(at).norm();
     if (!(norm > mu * p[0])) continue;
     const Eigen::Matrix<double, S, 1> direction = z.template segment<S>(at) / norm;
-    auto own = slope.template block<S, S>(at, at);
+    auto own = jacobian.template block<S, S>(at, at);
     own -= direction * direction.transpose();
     own *= mu * p[0] / norm;
-    slope.template middleRows<S>(at) += (mu * direction) * normal.transpose();
+    jacobian.template middleRows<S>(at) += (mu * direction) * normal.transpose();
   }
-  return slope;
+  return jacobian;
 }
 
 template <class ConeType>
@@ -164,9 +164,9 @@ struct NaturalMap {
   static void jacobian(const Cone& cone, const Vec& rho, const Vec& u, const Vec& r, Mat& A,
                        Mat& B) {
     const Vec z = r - rho[0] * cone.modified(u);
-    const Mat slope = projection_jacobian(cone, z);
-    B = Mat::Identity() - slope;
-    A = rho[0] * slope * modified_jacobian(cone, u);
+    const Mat jacobian = projection_jacobian(cone, z);
+    B = Mat::Identity() - jacobian;
+    A = rho[0] * jacobian * modified_jacobian(cone, u);
   }
 };
 
@@ -207,8 +207,8 @@ struct FischerBurmeister {
     const Vec x = primal(cone, r);
     const Vec y = dual(cone, rho[0], u);
     const Root root(x, y);
-    root.slope(x, B);
-    root.slope(y, A);
+    root.jacobian(x, B);
+    root.jacobian(y, A);
     B.col(0) *= mu;
     // y = rho S u^
     Mat scaled = modified_jacobian(cone, u);
@@ -233,7 +233,7 @@ struct FischerBurmeister {
     return y;
   }
 
-  /// (x o x + y o y)^(1/2) by its spectral values, and the slopes of x + y less it.
+  /// (x o x + y o y)^(1/2) by its spectral values, and the Jacobians of x + y less it.
   struct Root {
     Root(const Vec& x, const Vec& y) {
       Vec square;
@@ -249,7 +249,7 @@ struct FischerBurmeister {
     }
 
     /// I - L(root)^-1 L(x), L(a) b = a o b; a limit of it where L(root) is singular.
-    void slope(const Vec& x, Mat& result) const {
+    void jacobian(const Vec& x, Mat& result) const {
       if (!(high > 0)) {
         result = (1 - std::sqrt(0.5)) * Mat::Identity();
         return;

@@ -1,8 +1,8 @@
 // The problem of one contact by damped nonsmooth Newton methods: given A = W_aa and b = u - A r,
 // find the zero of a function whose zeros r obey the contact law together with u = A r + b.
 //
-//   Alart-Curnier:      Phi(r) = r - map(r - R u), the disk map with steps R from the diagonal of A
-//   Fischer-Burmeister: Phi(r) = x + y - (x o x + y o y)^(1/2) in the Jordan algebra of the
+//   Alart-Curnier:      Phi(r) = r - map(r - R u), the projection with steps R from the diagonal of
+//   A Fischer-Burmeister: Phi(r) = x + y - (x o x + y o y)^(1/2) in the Jordan algebra of the
 //                       second-order cone, with x = (mu r_N, r_T), y = s (u^_N / mu, u_T)
 //
 // Alart & Curnier, "A mixed formulation for frictional contact problems prone to Newton like
@@ -24,20 +24,21 @@ namespace fclib {
 
 namespace detail {
 
-/// Damped Newton on `function(r, slope)`, which returns Phi and, where slope is not null, fills in
-/// an element of its generalised Jacobian. Phi is zero to rounding at accuracy times `size`.
+/// Damped Newton on `function(r, jacobian)`, which returns Phi and, where jacobian is not null,
+/// fills in an element of its generalised Jacobian. Phi is zero to rounding at accuracy times
+/// `size`.
 template <int D, class Function>
 bool damped_newton(const Function& function, double size, double accuracy, int max_iterations,
                    ContactVector<D>& r) {
   constexpr int max_halvings = 12;
-  constexpr double sufficient = 1e-4;  // of the decrease that the slope promises
+  constexpr double sufficient = 1e-4;  // of the decrease that the model promises
   constexpr double rounding = 1e-12;   // Phi that no step reduces is taken for zero below this
   ContactVector<D> x = r;
-  ContactMatrix<D> slope;
-  ContactVector<D> phi = function(x, &slope);
+  ContactMatrix<D> jacobian;
+  ContactVector<D> phi = function(x, &jacobian);
   double norm = phi.norm();
   for (int k = 0; k < max_iterations && norm > accuracy * size; ++k) {
-    const ContactVector<D> step = -(slope.inverse() * phi);
+    const ContactVector<D> step = -(jacobian.inverse() * phi);
     double length = 1;
     bool falls = false;
     for (int halving = 0; halving < max_halvings && !falls; ++halving, length *= 0.5) {
@@ -47,7 +48,7 @@ bool damped_newton(const Function& function, double size, double accuracy, int m
       if (falls) x = trial;
     }
     if (!falls) break;
-    phi = function(x, &slope);
+    phi = function(x, &jacobian);
     norm = phi.norm();
   }
   if (!(norm <= std::max(accuracy, rounding) * size)) return false;
@@ -78,9 +79,9 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   }
   if (!(steps.minCoeff() > 0) || !steps.allFinite()) return false;
   const Mat free = Mat::Identity() - steps.asDiagonal() * a;  // d (r - R u) / d r
-  const auto function = [&](const Vec& x, Mat* slope) -> Vec {
+  const auto function = [&](const Vec& x, Mat* jacobian) -> Vec {
     const Vec z = x - steps.cwiseProduct(a * x + b);
-    if (slope != nullptr) *slope = Mat::Identity() - alart_curnier_jacobian(cone, z) * free;
+    if (jacobian != nullptr) *jacobian = Mat::Identity() - alart_curnier_jacobian(cone, z) * free;
     return x - alart_curnier_projection(cone, z);
   };
   const double size = r.norm() + steps.cwiseProduct(b).norm();
@@ -126,7 +127,7 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
       result.template tail<T>() = (0.5 * (high - low) / tangent) * s.template tail<T>();
     return result;
   };
-  const auto function = [&](const Vec& reaction, Mat* slope) -> Vec {
+  const auto function = [&](const Vec& reaction, Mat* jacobian) -> Vec {
     Vec x = reaction;
     x[0] *= mu;
     Vec y = scale * (a * reaction + b);
@@ -136,20 +137,21 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
     const Mat product_y = arrow(y);
     const Vec squares = product_x * x + product_y * y;
     const Vec phi = x + y - root(squares);
-    if (slope != nullptr) {
+    if (jacobian != nullptr) {
       // smoothed by what is negligible beside Phi, so that the root has an inverse
       Vec smooth = squares;
       smooth[0] += 1e-8 * phi.squaredNorm() + 1e-30 * squares[0];
       const Mat inverse = arrow(root(smooth)).inverse();
-      Mat x_slope = Mat::Identity();
-      x_slope(0, 0) = mu;
-      Mat y_slope = scale * a;
-      y_slope.row(0) /= mu;
+      Mat x_jacobian = Mat::Identity();
+      x_jacobian(0, 0) = mu;
+      Mat y_jacobian = scale * a;
+      y_jacobian.row(0) /= mu;
       if (sliding > 0) {
-        y_slope.row(0) +=
+        y_jacobian.row(0) +=
             (y.template tail<T>() / sliding).transpose() * (scale * a.template bottomRows<T>());
       }
-      *slope = x_slope - inverse * product_x * x_slope + y_slope - inverse * product_y * y_slope;
+      *jacobian = x_jacobian - inverse * product_x * x_jacobian + y_jacobian -
+                  inverse * product_y * y_jacobian;
     }
     return phi;
   };

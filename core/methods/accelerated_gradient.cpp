@@ -28,22 +28,22 @@ template <class Cone>
 template <class Set>
 void AcceleratedGradient<Cone>::step(const Set& set, const Vector& shift) {
   for (int attempt = 0; attempt < 60; ++attempt) {
-    double slope_change = 0;
+    double gradient_change = 0;
     double length = 0;
     uphill_ = 0;
     for (Index a = 0; a < problem_.nc(); ++a) {
-      Vec slope = uy_.template segment<D>(D * a);
-      slope[0] += shift[a];
+      Vec gradient = uy_.template segment<D>(D * a);
+      gradient[0] += shift[a];
       const Vec y = y_.template segment<D>(D * a);
-      const Vec next = set.project(a, y - (t_ / weight_[a]) * slope, y);
+      const Vec next = set.project(a, y - (t_ / weight_[a]) * gradient, y);
       next_.template segment<D>(D * a) = next;
       length += weight_[a] * (next - y).squaredNorm();
-      uphill_ += slope.dot(next - x_.template segment<D>(D * a));
+      uphill_ += gradient.dot(next - x_.template segment<D>(D * a));
     }
     problem_.velocity(next_, next_u_);
-    slope_change = (next_ - y_).dot(next_u_ - uy_);
-    if (!(t_ * slope_change > length)) break;
-    t_ = std::clamp(0.95 * length / slope_change, 0.1 * t_, rules_.reduction * t_);
+    gradient_change = (next_ - y_).dot(next_u_ - uy_);
+    if (!(t_ * gradient_change > length)) break;
+    t_ = std::clamp(0.95 * length / gradient_change, 0.1 * t_, rules_.reduction * t_);
   }
   const double grown = 0.5 * (1 + std::sqrt(1 + 4 * theta_ * theta_));
   double beta = (theta_ - 1) / grown;

@@ -39,7 +39,7 @@ class AcceleratedGradient {
 
   [[nodiscard]] const Vector& x() const { return x_; }
   [[nodiscard]] const Vector& u() const { return u_; }    ///< W x + q
-  [[nodiscard]] const Vector& uy() const { return uy_; }  ///< W y + q, where the slope is taken
+  [[nodiscard]] const Vector& uy() const { return uy_; }  ///< W y + q, where the gradient is taken
 
   template <class Set>
   void step(const Set& set, const Vector& shift);

@@ -74,7 +74,7 @@ class AlternatingDirections {
   /// The penalty at which both residuals, each relative to its size, would be the same.
   [[nodiscard]] double balanced() const;
 
-  /// rho weight^(1/2) w, and the slope of the quadratic at x, in the metric where weights are 1.
+  /// rho weight^(1/2) w, and the gradient of the quadratic at x, in the metric where weights are 1.
   void duals();
   void remember();
 

@@ -65,7 +65,8 @@ void Homotopy<Cone>::start() {
   const auto m = problem_.m();
   r_ = Vector::Zero(m);
   for (Index a = 0; a < problem_.nc(); ++a) r_[D * a] = 1;
-  for (Vector* v : {&c_, &residual_, &slope_, &next_, &tangent_, &across_, &along_}) v->setZero(m);
+  for (Vector* v : {&c_, &residual_, &derivative_, &next_, &tangent_, &across_, &along_})
+    v->setZero(m);
   lambda_ = 0;
   tangent_lambda_ = -1;
   folds_ = 0;
@@ -145,7 +146,7 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
     }
     const Vec forcing = t * (g + c_.template segment<D>(at));
     residual_.template segment<D>(at) -= forcing;
-    slope_.template segment<D>(at) = -(forcing + t * dg);
+    derivative_.template segment<D>(at) = -(forcing + t * dg);
     if (B.determinant() < 0) negative_ = !negative_;
     Mat inverse = B.inverse();
     for (int group = 0; group < Cone::groups; ++group) {
@@ -168,7 +169,7 @@ bool Homotopy<Cone>::linearise(const Vector& r, double lambda) {
   for (Index a = 0; a < problem_.nc(); ++a) {
     const Eigen::Map<const Mat> block(blocks.data() + std::ptrdiff_t{D * D} * a);
     across_.template segment<D>(D * a) = -omega_ * (block * residual_.template segment<D>(D * a));
-    along_.template segment<D>(D * a) = -omega_ * (block * slope_.template segment<D>(D * a));
+    along_.template segment<D>(D * a) = -omega_ * (block * derivative_.template segment<D>(D * a));
   }
   system_.solve(across_);
   system_.solve(along_);

@@ -97,7 +97,7 @@ class Homotopy {
   double size_q_ = 1;
   Vector q_, c_, r_;
   double lambda_ = 0;  // log t
-  Vector residual_, slope_;
+  Vector residual_, derivative_;
   Vector tangent_, across_, along_;
   double tangent_lambda_ = -1;
   Vector next_;

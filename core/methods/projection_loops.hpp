@@ -112,7 +112,6 @@ Solver projection_entry(
       .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 1'000'000,
-      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
       .solve =
           [loop = std::move(loop)](const ReducedProblem& problem, const OptionValues& values,
                                    const Settings& settings, Vector& r) {

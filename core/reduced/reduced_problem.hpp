@@ -1,7 +1,7 @@
 // The problem in the form that solvers take: u = W r + q and the friction law of each contact.
 #pragma once
 
-#include "contact/friction.hpp"
+#include "friction.hpp"
 #include "linalg/block_matrix.hpp"
 
 namespace fclib {

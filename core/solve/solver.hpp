@@ -15,7 +15,6 @@
 #include <string>
 #include <vector>
 
-#include "contact/cone.hpp"
 #include "reduced/reduced_problem.hpp"
 #include "solve/options.hpp"
 
@@ -154,13 +153,14 @@ struct Solver {
   std::vector<int> rolling_dimensions;  ///< ... of rolling problems
   std::vector<OptionInfo> options;
   std::int64_t max_iterations = 0;  ///< where the caller sets none
-  /// Throws Error (option) at the first option that is unknown or has a wrong value.
-  std::function<void(const OptionValues& options)> check_options;
   /// Solves from the guess in r (length m), and leaves its best iterate there.
   std::function<Outcome(const ReducedProblem& problem, const OptionValues& options,
                         const Settings& settings, Vector& r)>
       solve;
   std::string origin = "fclib";  ///< the package that it comes from
+
+  /// Throws Error (option) at the first option that is unknown or has a wrong value.
+  void check_options(const OptionValues& values) const { parse_options(options, values); }
 };
 
 /// All solvers, by name; generated from the files in solvers/.

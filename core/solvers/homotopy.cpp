@@ -114,7 +114,6 @@ const Solver& solver() {
       .rolling_dimensions = {3, 5},
       .options = describe_options<Options>(),
       .max_iterations = 100000,
-      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
       .solve = solve,
   };
   return entry;

@@ -107,7 +107,6 @@ const Solver& solver() {
       .rolling_dimensions = {},
       .options = describe_options<Options>(),
       .max_iterations = 1000,
-      .check_options = [](const OptionValues& values) { parse_options<Options>(values); },
       .solve = solve,
   };
   return entry;

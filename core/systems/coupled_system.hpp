@@ -44,7 +44,7 @@ class CoupledSystem {
 
   /// x <- (B + D W)^-1 x.
   void solve(Vector& x);
-  /// The same without refinement, for iterations that mend it themselves.
+  /// The same without refinement, for iterations that correct it themselves.
   void solve_plain(Vector& x) { solve_once(x); }
 
   /// Of det(B + D W): 1 or -1, after factorise().

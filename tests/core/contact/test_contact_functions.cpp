@@ -7,9 +7,9 @@
 namespace fclib {
 namespace {
 
-/// The slopes beside central differences, at points away from the kinks by chance.
+/// The generalised Jacobian beside central differences, at points away from the kinks by chance.
 template <class Function>
-void check_slopes(const typename Function::Cone& cone, testing::RandomData& random) {
+void check_jacobians(const typename Function::Cone& cone, testing::RandomData& random) {
   using Vec = typename Function::Vec;
   using Mat = typename Function::Mat;
   constexpr double h = 1e-6;
@@ -32,17 +32,17 @@ void check_slopes(const typename Function::Cone& cone, testing::RandomData& rand
 TEST(ContactFunctions, SlopesAreTheDerivatives) {
   testing::RandomData random(11);
   for (const double mu : {0.0, 0.3, 2.0}) {
-    check_slopes<AlartCurnier<Coulomb<2>>>(Coulomb<2>(mu), random);
-    check_slopes<AlartCurnier<Coulomb<3>>>(Coulomb<3>(mu), random);
-    check_slopes<AlartCurnier<Rolling<5>>>(Rolling<5>(mu, 0.1), random);
-    check_slopes<JeanMoreau<Coulomb<2>>>(Coulomb<2>(mu), random);
-    check_slopes<JeanMoreau<Coulomb<3>>>(Coulomb<3>(mu), random);
-    check_slopes<JeanMoreau<Rolling<3>>>(Rolling<3>(mu, 0.1), random);
-    check_slopes<NaturalMap<Coulomb<2>>>(Coulomb<2>(mu), random);
-    check_slopes<NaturalMap<Coulomb<3>>>(Coulomb<3>(mu), random);
-    check_slopes<NaturalMap<Rolling<5>>>(Rolling<5>(mu, 0.1), random);
-    check_slopes<FischerBurmeister<Coulomb<2>>>(Coulomb<2>(mu), random);
-    check_slopes<FischerBurmeister<Coulomb<3>>>(Coulomb<3>(mu), random);
+    check_jacobians<AlartCurnier<Coulomb<2>>>(Coulomb<2>(mu), random);
+    check_jacobians<AlartCurnier<Coulomb<3>>>(Coulomb<3>(mu), random);
+    check_jacobians<AlartCurnier<Rolling<5>>>(Rolling<5>(mu, 0.1), random);
+    check_jacobians<JeanMoreau<Coulomb<2>>>(Coulomb<2>(mu), random);
+    check_jacobians<JeanMoreau<Coulomb<3>>>(Coulomb<3>(mu), random);
+    check_jacobians<JeanMoreau<Rolling<3>>>(Rolling<3>(mu, 0.1), random);
+    check_jacobians<NaturalMap<Coulomb<2>>>(Coulomb<2>(mu), random);
+    check_jacobians<NaturalMap<Coulomb<3>>>(Coulomb<3>(mu), random);
+    check_jacobians<NaturalMap<Rolling<5>>>(Rolling<5>(mu, 0.1), random);
+    check_jacobians<FischerBurmeister<Coulomb<2>>>(Coulomb<2>(mu), random);
+    check_jacobians<FischerBurmeister<Coulomb<3>>>(Coulomb<3>(mu), random);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "contact/exact_contact.hpp"
 #include "contact/local_solver.hpp"
+#include "contact/newton_contact.hpp"
 #include "contact/rolling.hpp"
 
 #include <gtest/gtest.h>

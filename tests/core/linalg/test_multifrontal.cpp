@@ -205,9 +205,9 @@ TEST(Fronts, are_planned_once_for_a_pattern) {
   testing::RandomData random(12);
   const BlockPattern pattern = random_pattern(random, 60, 3, 0.05);
   const BlockPattern other = random_pattern(random, 60, 3, 0.05);
-  const auto first = planned(pattern);
-  EXPECT_NE(planned(other), first);
-  EXPECT_EQ(planned(pattern), first);
+  const auto first = analysed(pattern);
+  EXPECT_NE(analysed(other), first);
+  EXPECT_EQ(analysed(pattern), first);
 }
 
 }  // namespace

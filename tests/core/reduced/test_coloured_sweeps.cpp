@@ -20,7 +20,7 @@ BlockMatrix random_matrix(std::uint64_t seed, double share) {
 
 template <int D>
 void expect_colouring(const BlockMatrix& W, std::size_t size) {
-  const Colouring colouring = colour_contacts<D>(W, size);
+  const Colouring colouring = colour_contacts(W, size);
   const auto nc = static_cast<std::size_t>(W.block_count());
   const std::set<Index> visited(colouring.order.begin(), colouring.order.end());
   ASSERT_EQ(colouring.order.size(), nc);
@@ -57,7 +57,7 @@ TEST(Colouring, clusters_of_a_colour_are_not_coupled) {
 
 TEST(Colouring, no_contact_has_no_colour) {
   const BlockMatrix W(Matrix::from_eigen(SparseColumns(0, 0)), 3);
-  const Colouring colouring = colour_contacts<3>(W);
+  const Colouring colouring = colour_contacts(W);
   EXPECT_EQ(colouring.colours.size(), 1U);
   EXPECT_EQ(colouring.clusters.size(), 1U);
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "error.hpp"
+
 namespace fclib {
 namespace {
 

@@ -22,7 +22,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "fields.hpp"
-#include "io/hdf5.hpp"
+#include "io/hdf5/hdf5.hpp"
 #include "merit/merit.hpp"
 #include "merit/merit_1.hpp"
 #include "python_solver.hpp"

@@ -12,7 +12,7 @@
 #include <mutex>
 #include <tuple>
 
-#include "io/hdf5.hpp"
+#include "io/hdf5/hdf5.hpp"
 #include "merit/merit.hpp"
 #include "merit/merit_1.hpp"
 #include "solve/driver.hpp"

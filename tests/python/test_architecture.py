@@ -22,7 +22,7 @@ LAYERS: list[set[str]] = [
     {"merit", "convert", "io"},
     {"solve"},
     {"solvers", "solver_table.cpp"},
-    {"capi.cpp"},
+    {"capi"},
 ]
 # and what it must not, not even by way of others
 FORBIDDEN = {

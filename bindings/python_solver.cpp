@@ -1,5 +1,3 @@
-#include "python_solver.hpp"
-
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -15,6 +13,7 @@
 #include "cones/coulomb.hpp"
 #include "cones/rolling.hpp"
 #include "kernels/natural_error.hpp"
+#include "module.hpp"
 #include "problem.hpp"
 #include "solve/solver.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
-#include "io/siconos_text.hpp"
+#include "io/siconos/siconos.hpp"
 #include "module.hpp"
 
 namespace fclib::bindings {

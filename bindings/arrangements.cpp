@@ -1,5 +1,3 @@
-#include "arrangements.hpp"
-
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -10,18 +8,13 @@
 #include "convert/islands.hpp"
 #include "convert/units.hpp"
 #include "fields.hpp"
+#include "module.hpp"
 
 namespace fclib::bindings {
 
 using namespace nb::literals;
 
 namespace {
-
-using Unlocked = nb::gil_scoped_release;
-
-std::string name_of_class(nb::handle type) {
-  return nb::cast<std::string>(nb::handle(type.attr("__name__")));
-}
 
 constexpr const char* order_type =
     "order: typing.Literal['normal-first', 'normal-last', "
@@ -68,7 +61,7 @@ void bind_islands(nb::module_& m) {
         nb::call_guard<Unlocked>(), merge_doc);
   };
   for_each_formulation([&]<class P>(std::type_identity<P> type) {
-    const std::string name = name_of_class(nb::type<P>());
+    const std::string name = class_name(P::kind);
     both(type, name,
          "The problem of each island. Raises ProblemError where the sizes are not those of the "
          "islands, or an entry links two of them.",
@@ -132,7 +125,7 @@ void bind_order(nb::handle type, const std::string& name) {
 template <class P>
 void bind_methods(nb::class_<Solution>& solution) {
   const nb::handle type = nb::type<P>();
-  const std::string name = name_of_class(type);
+  const std::string name = class_name(P::kind);
   if constexpr (!P::rolling) bind_order<P>(type, name);
   nb::cpp_function_def(
       [](const P& problem) {

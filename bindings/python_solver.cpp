@@ -1,5 +1,3 @@
-#include "python_solver.hpp"
-
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
@@ -12,6 +10,7 @@
 #include "arrays.hpp"
 #include "linalg/cpu_time.hpp"
 #include "linalg/with_dimension.hpp"
+#include "module.hpp"
 #include "problem.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/with_cone.hpp"
@@ -176,20 +175,19 @@ Solver python_solver(const std::string& name, const std::string& family, const s
                      const std::vector<int>& dimensions, const std::vector<int>& rolling_dimensions,
                      const std::vector<OptionInfo>& options, std::int64_t max_iterations,
                      const nb::object& function) {
-  return {
-      .name = name,
-      .family = family,
-      .title = title,
-      .citation = citation,
-      .dimensions = dimensions,
-      .rolling_dimensions = rolling_dimensions,
-      .options = options,
-      .max_iterations = max_iterations,
-      .solve = [function, options](
-                   const ReducedProblem& problem, const OptionValues& values,
-                   const Settings& settings,
-                   Vector& r) { return run(function, options, problem, values, settings, r); },
-      .origin = origin};
+  return {.name = name,
+          .family = family,
+          .title = title,
+          .citation = citation,
+          .dimensions = dimensions,
+          .rolling_dimensions = rolling_dimensions,
+          .options = options,
+          .max_iterations = max_iterations,
+          .solve = [function, options](
+                       const ReducedProblem& problem, const OptionValues& values,
+                       const Settings& settings,
+                       Vector& r) { return run(function, options, problem, values, settings, r); },
+          .origin = origin};
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <limits>
+#include <optional>
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -60,6 +61,37 @@ std::string field_path(const Field<Struct, Vector>& field) {
 
 /// The HDF5 group of a guess, the first of which is number 1.
 inline std::string guess_path(std::size_t number) { return "/guesses/" + std::to_string(number); }
+
+/// How many contacts the matrices say that there are. Throws Error (problem) where the sizes do not
+/// divide.
+template <class P>
+Index contact_count(const P& problem) {
+  const std::string group = "/" + group_name<P>() + "/";
+  if (problem.spacedim < 1) {
+    throw Error(ErrorKind::problem, "is " + std::to_string(problem.spacedim), group + "spacedim");
+  }
+  std::optional<Index> count;
+  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
+    if constexpr (std::is_same_v<Member, Matrix>) {
+      if (count || field.cols != Dim::m) return;
+      const Index m = (problem.*field.member).cols;
+      if (m < 0 || m % problem.spacedim != 0) {
+        throw Error(ErrorKind::problem,
+                    "has " + std::to_string(m) + " columns, which is no multiple of spacedim = " +
+                        std::to_string(problem.spacedim),
+                    group + std::string(field.name));
+      }
+      count = m / problem.spacedim;
+    }
+  });
+  return count.value_or(0);
+}
+
+/// Makes mu as long as there are contacts, zero; mu gives all other vectors their size.
+template <class P>
+void count_contacts(P& problem) {
+  problem.mu = Vector::Zero(contact_count(problem));
+}
 
 /// Whether the problem has bilateral constraints.
 template <class P>

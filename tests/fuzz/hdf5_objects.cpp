@@ -10,7 +10,7 @@
 #include <limits>
 
 #include "fuzz.hpp"
-#include "io/hdf5.hpp"
+#include "io/hdf5/hdf5.hpp"
 #include "io/replace_file.hpp"
 #include "read_all.hpp"
 #include "small_problems.hpp"

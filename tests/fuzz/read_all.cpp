@@ -1,7 +1,7 @@
 #include "read_all.hpp"
 
 #include "fuzz.hpp"
-#include "io/hdf5.hpp"
+#include "io/hdf5/hdf5.hpp"
 #include "io/replace_file.hpp"
 #include "small_problems.hpp"
 

@@ -1,5 +1,5 @@
 // Any bytes as a text of Siconos.
-#include "io/siconos_text.hpp"
+#include "io/siconos/siconos.hpp"
 
 #include "fuzz.hpp"
 #include "io/replace_file.hpp"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "io/hdf5.hpp"
+#include "io/hdf5/hdf5.hpp"
 
 namespace fclib {
 namespace {

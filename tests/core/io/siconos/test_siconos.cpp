@@ -1,4 +1,4 @@
-#include "io/siconos_text.hpp"
+#include "io/siconos/siconos.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

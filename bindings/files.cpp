@@ -1,0 +1,248 @@
+#include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <initializer_list>
+#include <string>
+
+#include "convert/complete.hpp"
+#include "io/hdf5/hdf5.hpp"
+#include "io/siconos/siconos.hpp"
+#include "module.hpp"
+
+namespace fclib::bindings {
+
+using namespace nb::literals;
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* path_type = "path: str | os.PathLike[str]";
+
+std::string signature(const std::string& name, const std::string& rest, const std::string& result) {
+  return "def " + name + "(" + path_type + rest + ") -> " + result;
+}
+
+const std::string guesses_type = "guesses: collections.abc.Sequence[Solution]";
+const std::string compression_type =
+    "compression: int = " + std::to_string(WriteOptions{}.compression);
+
+/// The options of a mode's name.
+WriteOptions options_of(const std::string& mode, std::initializer_list<std::string_view> modes,
+                        int compression) {
+  std::string known;
+  for (const auto name : modes) known += (known.empty() ? "" : ", ") + std::string(name);
+  if (std::find(modes.begin(), modes.end(), mode) == modes.end()) {
+    throw Error(ErrorKind::option, "there is no mode '" + mode + "'; there are: " + known, "mode");
+  }
+  return {.append = mode != "overwrite", .replace = mode == "replace", .compression = compression};
+}
+
+/// The problem that the solution and the guesses of a file belong to.
+Problem read_owner(const std::string& path) {
+  const Problem outline = read_outline(path);
+  return read_problem(path, std::visit([]<class P>(const P&) { return P::kind; }, outline));
+}
+
+/// Guesses with all that readers of libfclib 3.1 need.
+template <class P>
+std::vector<Solution> complete(const P& problem, const std::vector<Solution>& guesses) {
+  std::vector<Solution> result;
+  for (const auto& guess : guesses) {
+    validate(guess, problem, guess_path(result.size() + 1));
+    result.push_back(fclib::complete(problem, guess));
+  }
+  return result;
+}
+
+void bind_hdf5(nb::module_& m) {
+  m.def(
+      "read",
+      [](const fs::path& path, const std::optional<std::string>& kind) {
+        Problem problem = [&] {
+          const Unlocked unlocked;
+          return read_problem(path.string(), kind.value_or(""));
+        }();
+        return std::visit([](auto& p) { return nb::cast(std::move(p)); }, problem);
+      },
+      "path"_a, "kind"_a = nb::none(),
+      nb::sig(signature("read", ", kind: str | None = None", problem_union()).c_str()),
+      "The problem in an FCLIB file, validated. `kind` (\"local\", \"global\") chooses where the "
+      "file holds several.\n\nRaises FileError, or ProblemError, naming file and dataset.");
+  m.def(
+      "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
+      nb::sig(signature("read_solution", "", "Solution | None").c_str()),
+      nb::call_guard<Unlocked>(),
+      "The stored solution of a file, or None. It is that of the global problem where the file "
+      "holds several. Raises FileError.");
+  m.def(
+      "read_guesses", [](const fs::path& path) { return read_guesses(path.string()); }, "path"_a,
+      nb::sig(signature("read_guesses", "", "list[Solution]").c_str()), nb::call_guard<Unlocked>(),
+      "The stored guesses of a file, of the problem that a solution would belong to. Raises "
+      "FileError.");
+  m.def(
+      "contents",
+      [](const fs::path& path) {
+        Contents contents = read_contents(path.string());
+        if (contents.solution) contents.kinds.emplace_back("solution");
+        if (contents.guesses > 0) contents.kinds.emplace_back("guesses");
+        return contents.kinds;
+      },
+      "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
+      "What a file holds: the kinds of its problems, \"solution\" and \"guesses\". Raises "
+      "FileError.");
+  m.def(
+      "write_solution",
+      [](const fs::path& path, const Solution& solution, int compression) {
+        const Problem problem = read_owner(path.string());
+        const Solution whole =
+            std::visit([&](const auto& p) { return fclib::complete(p, solution); }, problem);
+        write_solution(path.string(), whole, {.replace = true, .compression = compression});
+      },
+      "path"_a, "solution"_a, nb::kw_only(), "compression"_a = WriteOptions{}.compression,
+      nb::sig(signature("write_solution", ", solution: Solution, *, " + compression_type, "None")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "Puts a solution into a file that has its problem, in place of the one it had, atomically. "
+      "It is that of the global problem where the file holds several.\n\n"
+      "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
+      "outside 0..9.");
+  m.def(
+      "read_attributes",
+      [](const fs::path& path, const std::string& group) {
+        return read_attributes(path.string(), group);
+      },
+      "path"_a, "group"_a,
+      nb::sig(signature("read_attributes", ", group: typing.Literal['solution', 'info']",
+                        "dict[str, float | str]")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "What a file says of its solution, or of its problem (\"info\"), beside the data: numbers "
+      "and texts by their names. Raises FileError.");
+  m.def(
+      "write_attributes",
+      [](const fs::path& path, const std::string& group, const Attributes& attributes) {
+        write_attributes(path.string(), group, attributes);
+      },
+      "path"_a, "group"_a, "attributes"_a,
+      nb::sig(signature("write_attributes",
+                        ", group: typing.Literal['solution', 'info'], attributes: "
+                        "collections.abc.Mapping[str, float | str]",
+                        "None")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "Gives the solution of a file, or its problem (\"info\"), attributes, in place of those of "
+      "the same names, atomically. They go where the solution, or the problem, is replaced.\n\n"
+      "Raises FileError where there is no solution in the file.");
+  m.def(
+      "write_guesses",
+      [](const fs::path& path, const std::vector<Solution>& guesses, const std::string& mode,
+         int compression) {
+        WriteOptions options = options_of(mode, {"replace", "add"}, compression);
+        options.append = mode == "add";
+        const Problem problem = read_owner(path.string());
+        const std::vector<Solution> whole =
+            std::visit([&](const auto& p) { return complete(p, guesses); }, problem);
+        write_guesses(path.string(), whole, options);
+      },
+      "path"_a, "guesses"_a, nb::kw_only(), "mode"_a = "replace",
+      "compression"_a = WriteOptions{}.compression,
+      nb::sig(signature("write_guesses",
+                        ", " + guesses_type +
+                            ", *, mode: typing.Literal['replace', 'add'] = "
+                            "'replace', " +
+                            compression_type,
+                        "None")
+                  .c_str()),
+      nb::call_guard<Unlocked>(),
+      "Puts guesses into a file that has their problem, atomically: in place of those it had "
+      "(\"replace\"), or after them (\"add\").\n\n"
+      "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
+      "or a compression outside 0..9.");
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    m.def(
+        "write",
+        [](const fs::path& path, const P& problem, const Solution* solution,
+           const std::vector<Solution>& guesses, const std::string& mode, int compression) {
+          const WriteOptions options =
+              options_of(mode, {"overwrite", "add", "replace"}, compression);
+          if (solution == nullptr && guesses.empty()) {
+            write_file(path.string(), &problem, nullptr, {}, options);
+            return;
+          }
+          validate(problem);
+          const bool solved = solution != nullptr;
+          const Solution whole = solved ? fclib::complete(problem, *solution) : Solution{};
+          write_file(path.string(), &problem, solved ? &whole : nullptr, complete(problem, guesses),
+                     options);
+        },
+        "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
+        "guesses"_a = std::vector<Solution>{}, nb::kw_only(), "mode"_a = "overwrite",
+        "compression"_a = WriteOptions{}.compression,
+        nb::sig(signature("write",
+                          ", problem: " + class_name(P::kind) +
+                              ", solution: Solution | None = None, " + guesses_type +
+                              " = (), *, mode: typing.Literal['overwrite', 'add', 'replace'] = "
+                              "'overwrite', " +
+                              compression_type,
+                          "None")
+                    .c_str()),
+        nb::call_guard<Unlocked>(),
+        "Writes an FCLIB file, atomically. What the solution and the guesses lack of v and u is "
+        "completed: readers of libfclib 3.1 need it.\n\n"
+        "A file that is there is replaced whole (\"overwrite\"); or it keeps what it holds, and "
+        "must not have such a problem (\"add\"), or gives up the problem of this kind, with its "
+        "solution and its guesses (\"replace\"). In a file of several problems solution and "
+        "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
+        "9.\n\n"
+        "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
+        "mode or a compression outside 0..9.");
+  });
+}
+
+void bind_siconos(nb::module_& m) {
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    m.def(
+        "write_siconos",
+        [](const fs::path& path, const P& problem) { write_siconos(path.string(), &problem); },
+        "path"_a, "problem"_a,
+        nb::sig(signature("write_siconos", ", problem: " + class_name(P::kind), "None").c_str()),
+        nb::call_guard<Unlocked>(),
+        "Writes a problem in Siconos' text format (\".dat\"), or replaces the old file whole, "
+        "atomically. Every number reads back equal. Matrices keep their storage; W by rows is "
+        "written in blocks, other matrices by rows are written by columns. The format has no "
+        "place for bilateral constraints, solutions and info.\n\n"
+        "Raises UnsuitableError where there are bilateral constraints, FileError, or ProblemError "
+        "where the data is not valid.");
+  });
+  m.def(
+      "read_siconos",
+      [](const fs::path& path, const std::optional<std::string>& kind) {
+        Problem problem = [&] {
+          const Unlocked unlocked;
+          return read_siconos(path.string(), kind.value_or(""));
+        }();
+        return std::visit([](auto& p) { return nb::cast(std::move(p)); }, problem);
+      },
+      "path"_a, "kind"_a = nb::none(),
+      nb::sig(signature("read_siconos", ", kind: str | None = None", problem_union()).c_str()),
+      "The problem in a text file of Siconos (\".dat\"), validated. What it holds is told from its "
+      "sizes, or by `kind` (\"local\", \"global\", \"local_rolling\", \"global_rolling\").\n\n"
+      "Raises FileError, naming file and line, ProblemError, or OptionError where there is no such "
+      "kind.");
+}
+
+}  // namespace
+
+void bind_files(nb::module_& m) {
+  bind_hdf5(m);
+  bind_siconos(m);
+}
+
+}  // namespace fclib::bindings

@@ -1,0 +1,62 @@
+#include <nanobind/stl/string.h>
+
+#include <string>
+
+#include "fields.hpp"
+#include "merit/merit.hpp"
+#include "merit/merit_1.hpp"
+#include "module.hpp"
+
+namespace fclib::bindings {
+
+using namespace nb::literals;
+
+void bind_merits(nb::module_& m) {
+  nb::class_<Merit> merit_class(m, "Merit", "How good a solution is, judged from the data alone.");
+  def_fields(merit_class);
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    m.def(
+        "merit_1", [](const P& p, const Solution& s) { return merit_1(p, s); }, "problem"_a,
+        "solution"_a, nb::call_guard<Unlocked>(),
+        "What libfclib calls MERIT_1, for comparisons with it.\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
+    m.def(
+        "contact_merits",
+        [](const P& p, const Solution& s) {
+          const ContactMerits merits = [&] {
+            const Unlocked unlocked;
+            return contact_merits(p, s);
+          }();
+          nb::list status;
+          for (const ContactStatus one : merits.status) {
+            status.append(one == ContactStatus::open    ? "open"
+                          : one == ContactStatus::stick ? "stick"
+                                                        : "slide");
+          }
+          const auto array = [](const Vector& values) {
+            return to_python(values, nb::handle()).attr("copy")();
+          };
+          nb::dict result;
+          result["status"] = nb::module_::import_("numpy").attr("array")(status, "dtype"_a = "U5");
+          result["u"] = array(merits.u);
+          result["natural"] = array(merits.natural);
+          result["cone"] = array(merits.cone);
+          result["dual_cone"] = array(merits.dual_cone);
+          return result;
+        },
+        "problem"_a, "solution"_a,
+        nb::sig(("def contact_merits(problem: " + class_name(P::kind) +
+                 ", solution: Solution) -> dict[str, numpy.typing.NDArray[typing.Any]]")
+                    .c_str()),
+        "The merit contact by contact: status (open, stick, slide), u (m,) recomputed, natural "
+        "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,).\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
+    m.def(
+        "merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
+        "solution"_a, nb::call_guard<Unlocked>(),
+        "The merit of a solution. A missing v is computed, a missing u is not judged.\n\n"
+        "Raises ProblemError where problem or solution are not valid.");
+  });
+}
+
+}  // namespace fclib::bindings

@@ -1,0 +1,39 @@
+// The parts of the Python module fclib._core, each bound in the file of its name.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+#include <string>
+#include <string_view>
+
+namespace fclib::bindings {
+
+namespace nb = nanobind;
+using Unlocked = nb::gil_scoped_release;
+
+/// "LocalProblem" for the kind "local".
+std::string class_name(std::string_view kind);
+/// "GlobalProblem | LocalProblem"
+std::string problem_union();
+
+// in this order: signatures name the classes that are bound before
+
+/// Error and what derives from it.
+void bind_errors(nb::module_& m);
+/// The problems of all formulations, Solution, ProblemInfo and MatrixInfo.
+void bind_problems(nb::module_& m);
+/// Methods of problems: condense or eliminate, with_storage.
+void bind_conversions(nb::module_& m);
+/// Islands and merge, component_order, and the methods of problems and solutions that go with them.
+void bind_arrangements(nb::module_& m);
+/// The registry, solve and what it returns.
+void bind_solvers(nb::module_& m);
+/// Monitor and python_solver: solvers written in Python, which the driver runs like those of the
+/// core. A part of bind_solvers().
+void bind_python_solvers(nb::module_& m);
+/// Merit, merit, merit_1 and contact_merits.
+void bind_merits(nb::module_& m);
+/// Files: HDF5 and the text of Siconos.
+void bind_files(nb::module_& m);
+
+}  // namespace fclib::bindings

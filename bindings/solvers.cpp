@@ -1,0 +1,177 @@
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/string_view.h>
+#include <nanobind/stl/variant.h>
+#include <nanobind/stl/vector.h>
+
+#include <algorithm>
+#include <string>
+
+#include "arrays.hpp"
+#include "module.hpp"
+#include "solve/driver.hpp"
+
+namespace fclib::bindings {
+
+using namespace nb::literals;
+
+namespace {
+
+/// The user's callback, which needs the GIL.
+std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
+  if (callback.is_none()) return {};
+  return [&callback](const Progress& progress) {
+    const nb::gil_scoped_acquire gil;
+    const nb::object answer =
+        callback(progress.iteration, progress.error, progress.time, std::string(progress.stage));
+    return answer.is_none() || nb::cast<bool>(answer);
+  };
+}
+
+/// Lets Ctrl-C through.
+bool poll_signals() {
+  const nb::gil_scoped_acquire gil;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+  return true;
+}
+
+template <class P>
+void bind_solve(nb::module_& m) {
+  m.def(
+      "solve",
+      [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
+         double time_limit, const OptionValues& options, const Solution* guess,
+         const nb::object& callback, bool history) {
+        Settings settings{.tolerance = tolerance,
+                          .max_iterations = max_iterations,
+                          .time_limit = time_limit,
+                          .callback = make_callback(callback),
+                          .poll = poll_signals,
+                          .history = history};
+        const Unlocked unlocked;
+        return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
+      },
+      "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
+      "guess"_a.none(), "callback"_a.none(), "history"_a);
+}
+
+nb::object history_of(const Result& result) {
+  if (!result.history) return nb::none();
+  nb::list points;
+  std::size_t longest = 1;
+  for (const HistoryPoint& point : *result.history) {
+    points.append(nb::make_tuple(point.iteration, point.error, point.time, point.stage));
+    longest = std::max(longest, point.stage.size());
+  }
+  nb::list type;
+  type.append(nb::make_tuple("iteration", "i8"));
+  type.append(nb::make_tuple("error", "f8"));
+  type.append(nb::make_tuple("time", "f8"));
+  type.append(nb::make_tuple("stage", "U" + std::to_string(longest)));
+  return nb::module_::import_("numpy").attr("array")(points, "dtype"_a = type);
+}
+
+}  // namespace
+
+void bind_solvers(nb::module_& m) {
+  nb::class_<OptionInfo>(m, "OptionInfo", "An option of a solver.")
+      .def(
+          "__init__",
+          [](OptionInfo* self, const std::string& name, const std::string& type,
+             const OptionValue& default_value, const std::string& unit, const std::string& doc,
+             const std::vector<std::string>& choices, double lowest, double highest) {
+            new (self) OptionInfo{name, type, default_value, unit, doc, choices, lowest, highest};
+          },
+          nb::kw_only(), "name"_a, "type"_a, "default"_a, "unit"_a, "doc"_a, "choices"_a,
+          "lowest"_a, "highest"_a)
+      .def_ro("name", &OptionInfo::name)
+      .def_ro("type", &OptionInfo::type, "bool, int, float or choice")
+      .def_ro("default", &OptionInfo::default_value)
+      .def_ro("unit", &OptionInfo::unit)
+      .def_ro("doc", &OptionInfo::doc)
+      .def_ro("choices", &OptionInfo::choices, "the values of a choice")
+      .def_ro("lowest", &OptionInfo::lowest)
+      .def_ro("highest", &OptionInfo::highest);
+  nb::class_<Solver>(m, "SolverInfo", "A solver of the registry.")
+      .def_ro("name", &Solver::name)
+      .def_ro("family", &Solver::family)
+      .def_ro("title", &Solver::title)
+      .def_ro("citation", &Solver::citation)
+      .def_ro("origin", &Solver::origin, "the package that it comes from")
+      .def_ro("dimensions", &Solver::dimensions, "the spacedims it takes")
+      .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
+              "the spacedims of rolling problems")
+      .def_ro("options", &Solver::options)
+      .def_ro("max_iterations", &Solver::max_iterations, "where the caller sets none")
+      .def(
+          "check_options",
+          [](const Solver& s, const OptionValues& options) { s.check_options(options); },
+          "options"_a,
+          "Raises OptionError at the first option that is unknown or has a wrong value.");
+  m.def(
+      "solvers",
+      [] {
+        nb::list result;
+        for (const Solver* solver : solvers())
+          result.append(nb::cast(solver, nb::rv_policy::reference));
+        return result;
+      },
+      nb::sig("def solvers() -> list[SolverInfo]"), "The solvers of the core, by name.");
+  m.def(
+      "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
+      nb::rv_policy::reference,
+      "The solver of this name in the core. Raises OptionError where there is none.");
+  bind_python_solvers(m);
+
+  nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
+      .def_prop_ro("name", [](const Stage& s) { return std::string(s.name); })
+      .def_ro("calls", &Stage::calls, "how often it was entered: once for each island in need")
+      .def_ro("solved", &Stage::solved, "of these, how many it brought to the tolerance")
+      .def_ro("iterations", &Stage::iterations)
+      .def_ro("factorisations", &Stage::factorisations)
+      .def_ro("time", &Stage::time, "[s] wall clock")
+      .def("__repr__", [](const Stage& s) {
+        return "<Stage " + std::string(s.name) + ": solved " + std::to_string(s.solved) + " of " +
+               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
+      });
+  nb::class_<Result>(m, "Result", "What fclib.solve returns.")
+      .def_ro("solution", &Result::solution)
+      .def_prop_ro(
+          "status", [](const Result& r) { return std::string(name_of(r.status)); },
+          "converged, iteration_limit, time_limit, diverged, inaccurate, stalled, interrupted or\n"
+          "infeasible")
+      .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
+      .def_ro("iterations", &Result::iterations)
+      .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
+      .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
+      .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
+      .def_ro("solver", &Result::solver)
+      .def_prop_ro(
+          "certificate",
+          [](nb::handle self) -> nb::object {
+            const auto& r = nb::cast<const Result&>(self);
+            return r.certificate.size() > 0 ? to_python(r.certificate, self) : nb::none();
+          },
+          nb::for_getter(
+              nb::sig("def certificate(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
+          "y >= 0 (nc) which proves that there is no solution where the status is infeasible: of\n"
+          "the local problem without bilateral constraints, -W^T E y is in K* and y . q_N < 0,\n"
+          "with E y the vector whose normal parts are y. Else None.")
+      .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
+      .def_prop_ro("history", history_of,
+                   nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
+                   "Where fclib.solve was asked for it: what the solver reported, a structured "
+                   "array with iteration, error, time [s] and stage.")
+      .def("__repr__", [](const Result& r) {
+        char text[160];
+        std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",
+                      r.solver.c_str(), std::string(name_of(r.status)).c_str(),
+                      static_cast<long long>(r.iterations), r.error, r.cpu_s);
+        return std::string(text);
+      });
+  for_each_formulation([&]<class P>(std::type_identity<P>) { bind_solve<P>(m); });
+}
+
+}  // namespace fclib::bindings

@@ -1,0 +1,67 @@
+// The functions of fclib.h that judge: validation and merits.
+#include <limits>
+
+#include "capi/errors.hpp"
+#include "capi/from_c.hpp"
+#include "merit/merit.hpp"
+#include "merit/merit_1.hpp"
+
+namespace fclib::c {
+
+namespace {
+
+template <class C>
+int validate_problem(const C* c) {
+  return guarded(0, [&] {
+    valid_problem(given(c, "problem"));
+    return 1;
+  });
+}
+
+template <class C>
+int validate_solution(const C* c, const fclib_solution* solution) {
+  return guarded(0, [&] {
+    const auto problem = problem_as_given(given(c, "problem"));
+    validate(solution_of(given(solution, "solution"), problem, Parts::some), problem);
+    return 1;
+  });
+}
+
+template <class C>
+double merit_of(const C* c, fclib_merit kind, const fclib_solution* solution) {
+  return guarded(std::numeric_limits<double>::quiet_NaN(), [&] {
+    const auto problem = valid_problem(given(c, "problem"));
+    const Solution candidate = solution_of(given(solution, "solution"), problem, Parts::some);
+    switch (kind) {
+      case MERIT_1:
+        return merit_1(problem, candidate);
+      case MERIT_2:
+        return merit(problem, candidate).error;
+    }
+    fail("merit", std::to_string(static_cast<int>(kind)) + " is no merit");
+  });
+}
+
+}  // namespace
+
+}  // namespace fclib::c
+
+using namespace fclib::c;
+
+extern "C" {
+
+#define FCLIB_FUNCTIONS_OF(kind)                                                                  \
+  int fclib_validate_##kind(const fclib_##kind* problem) { return validate_problem(problem); }    \
+  int fclib_validate_##kind##_solution(const fclib_##kind* problem,                               \
+                                       const fclib_solution* solution) {                          \
+    return validate_solution(problem, solution);                                                  \
+  }                                                                                               \
+  double fclib_merit_##kind(fclib_##kind* problem, fclib_merit merit, fclib_solution* solution) { \
+    return merit_of(problem, merit, solution);                                                    \
+  }
+
+FCLIB_FOR_EACH_KIND(FCLIB_FUNCTIONS_OF)
+
+#undef FCLIB_FUNCTIONS_OF
+
+}  // extern "C"

@@ -1,0 +1,41 @@
+// Errors on their way to C: nothing is thrown across, the message is kept.
+#pragma once
+
+#include <exception>
+#include <new>
+#include <string>
+
+namespace fclib::c {
+
+/// Keeps a message for fclib_last_error(), and calls the handler.
+void report(const char* message) noexcept;
+/// A function that succeeds leaves no message.
+void forget_error() noexcept;
+
+/// What body() returns, or `failure` with the message kept.
+template <class Result, class Body>
+Result guarded(Result failure, const Body& body) noexcept {
+  forget_error();
+  try {
+    return body();
+  } catch (const std::bad_alloc&) {
+    report("there is not enough memory");
+  } catch (const std::exception& error) {
+    report(error.what());
+  } catch (...) {
+    report("an unknown error");
+  }
+  return failure;
+}
+
+/// Throws Error (problem).
+[[noreturn]] void fail(const std::string& where, const std::string& message);
+
+/// What a pointer of the caller points to.
+template <class T>
+T& given(T* pointer, const char* name) {
+  if (pointer == nullptr) fail(name, "is NULL");
+  return *pointer;
+}
+
+}  // namespace fclib::c

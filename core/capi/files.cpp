@@ -1,0 +1,168 @@
+// The functions of fclib.h that read, write and free.
+#include <atomic>
+#include <memory>
+
+#include "capi/errors.hpp"
+#include "capi/from_c.hpp"
+#include "capi/to_c.hpp"
+#include "io/hdf5/hdf5.hpp"
+
+namespace fclib::c {
+
+namespace {
+
+// settings of the process
+std::atomic<bool> replace{false};
+std::atomic<int> compression{WriteOptions{}.compression};
+
+/// 3.1 checks no value and converts no matrix.
+WriteOptions write_options() {
+  return {.validate = false, .replace = replace, .compression = compression};
+}
+
+template <class C>
+int write_problem(const C* c, const char* path) {
+  return guarded(0, [&] {
+    const auto problem = problem_as_given(given(c, "problem"));
+    WriteOptions options = write_options();
+    options.append = true;
+    write_file(&given(path, "path"), &problem, nullptr, {}, options);
+    return 1;
+  });
+}
+
+template <class C>
+C* read_c(const char* path) {
+  return guarded<C*>(nullptr, [&] {
+    using P = CoreOf<C>;
+    RawProblem problem = read_raw_problem(&given(path, "path"), P::kind);
+    return to_c<C>(problem);
+  });
+}
+
+template <class C>
+void delete_members(C* c) {
+  if (c == nullptr) return;
+  free_members(*c);
+  *c = C{};
+}
+
+}  // namespace
+
+}  // namespace fclib::c
+
+using namespace fclib;
+using namespace fclib::c;
+
+extern "C" {
+
+#define FCLIB_FUNCTIONS_OF(kind)                                                           \
+  int fclib_write_##kind(fclib_##kind* problem, const char* path) {                        \
+    return write_problem(problem, path);                                                   \
+  }                                                                                        \
+  fclib_##kind* fclib_read_##kind(const char* path) { return read_c<fclib_##kind>(path); } \
+  void fclib_delete_##kind(fclib_##kind* problem) { delete_members(problem); }
+
+FCLIB_FOR_EACH_KIND(FCLIB_FUNCTIONS_OF)
+
+#undef FCLIB_FUNCTIONS_OF
+
+int fclib_write_solution(fclib_solution* solution, const char* path) {
+  return guarded(0, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    const Solution whole = std::visit(
+        [&](const auto& p) { return solution_of(given(solution, "solution"), p, Parts::all); },
+        outline);
+    write_solution(path, whole, write_options());
+    return 1;
+  });
+}
+
+int fclib_write_guesses(int number_of_guesses, fclib_solution* guesses, const char* path) {
+  return guarded(0, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    const std::size_t count = size_of(number_of_guesses, "number_of_guesses");
+    if (count > 0) given(guesses, "guesses");
+    std::vector<Solution> all;
+    for (std::size_t k = 0; k < count; ++k) {
+      all.push_back(std::visit(
+          [&](const auto& p) { return solution_of(guesses[k], p, Parts::all); }, outline));
+    }
+    write_guesses(path, all, write_options());
+    return 1;
+  });
+}
+
+fclib_solution* fclib_read_solution(const char* path) {
+  return guarded<fclib_solution*>(nullptr, [&] {
+    auto solution = read_solution(&given(path, "path"));
+    if (!solution) throw Error(ErrorKind::file, "holds no solution", "/", path);
+    Owned<fclib_solution> c(allocate<fclib_solution>(1));
+    to_c(*solution, read_outline(path), std::string(path) + ": /solution", *c);
+    return c.release();
+  });
+}
+
+fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses) {
+  if (number_of_guesses != nullptr) *number_of_guesses = 0;
+  return guarded<fclib_solution*>(nullptr, [&] {
+    int& number = given(number_of_guesses, "number_of_guesses");
+    auto guesses = read_guesses(&given(path, "path"));
+    if (guesses.empty()) throw Error(ErrorKind::file, "holds no guesses", "/", path);
+    const Problem outline = read_outline(path);
+    const int count = static_cast<int>(guesses.size());
+    const auto release = [&](fclib_solution* array) { fclib_delete_solutions(array, count); };
+    std::unique_ptr<fclib_solution, decltype(release)> array(
+        allocate<fclib_solution>(guesses.size()), release);
+    for (std::size_t k = 0; k < guesses.size(); ++k) {
+      to_c(guesses[k], outline, std::string(path) + ": /guesses/" + std::to_string(k + 1),
+           array.get()[k]);
+    }
+    number = count;
+    return array.release();
+  });
+}
+
+void fclib_delete_solutions(fclib_solution* data, int count) {
+  if (data == nullptr) return;
+  for (int k = 0; k < count; ++k) free_members(data[k]);
+  std::free(data);
+}
+
+int fclib_create_int_attributes_in_info(const char* path, const char* attr_name, int attr_value) {
+  return guarded(0, [&] {
+    write_int_attribute(&given(path, "path"), &given(attr_name, "attr_name"), attr_value,
+                        write_options());
+    return 1;
+  });
+}
+
+const char* fclib_problem_kind(const char* path) {
+  return guarded<const char*>(nullptr, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    // the kinds are literals
+    return std::visit([]<class P>(const P&) { return P::kind.data(); }, outline);
+  });
+}
+
+int fclib_set_write_mode(fclib_write_mode mode) {
+  return guarded(0, [&] {
+    if (mode != FCLIB_WRITE_ADD && mode != FCLIB_WRITE_REPLACE) {
+      fail("write mode", std::to_string(static_cast<int>(mode)) + " is none");
+    }
+    replace = mode == FCLIB_WRITE_REPLACE;
+    return 1;
+  });
+}
+
+int fclib_set_compression(int level) {
+  return guarded(0, [&] {
+    if (level < 0 || level > 9) {
+      fail("compression level", std::to_string(level) + " is outside 0..9");
+    }
+    compression = level;
+    return 1;
+  });
+}
+
+}  // extern "C"

@@ -1,0 +1,147 @@
+#include "capi/from_c.hpp"
+
+#include <vector>
+
+#include "capi/errors.hpp"
+#include "io/hdf5/raw.hpp"
+
+namespace fclib::c {
+
+namespace {
+
+template <class Number>
+std::vector<Number> numbers(const Number* values, std::size_t size, const std::string& where) {
+  if (size == 0) return {};
+  if (values == nullptr) fail(where, "is NULL, but has " + std::to_string(size) + " entries");
+  return {values, values + size};
+}
+
+std::string text(const char* value) { return value != nullptr ? std::string(value) : absent_text; }
+
+Matrix matrix(const fclib_matrix& c, const std::string& where) {
+  Matrix a;
+  a.rows = c.m;
+  a.cols = c.n;
+  const std::size_t rows = size_of(c.m, where + "/m");
+  const std::size_t cols = size_of(c.n, where + "/n");
+  std::size_t entries = size_of(c.nzmax, where + "/nzmax");
+  if (c.nz >= 0) {
+    a.storage = Storage::triplet;
+    entries = static_cast<std::size_t>(c.nz);
+    a.p = numbers(c.p, entries, where + "/p");
+  } else if (c.nz == nz_csc || c.nz == nz_csr) {
+    a.storage = c.nz == nz_csc ? Storage::csc : Storage::csr;
+    a.p = numbers(c.p, (c.nz == nz_csc ? cols : rows) + 1, where + "/p");
+  } else if (c.nz == nz_dense) {
+    a.storage = Storage::dense;
+    entries = rows * cols;
+  } else {
+    fail(where + "/nz", std::to_string(c.nz) + " is no storage");
+  }
+  if (a.storage != Storage::dense) a.i = numbers(c.i, entries, where + "/i");
+  a.x = numbers(c.x, entries, where + "/x");
+  if (c.info != nullptr) {
+    a.info = MatrixInfo{.comment = text(c.info->comment),
+                        .conditioning = c.info->conditioning,
+                        .determinant = c.info->determinant,
+                        .rank = c.info->rank};
+  }
+  return a;
+}
+
+}  // namespace
+
+std::size_t size_of(int count, const std::string& where) {
+  if (count < 0) fail(where, "is " + std::to_string(count) + ", but must not be negative");
+  return static_cast<std::size_t>(count);
+}
+
+Vector vector(const double* values, Index size, const std::string& where) {
+  if (size == 0) return {};
+  if (values == nullptr) fail(where, "is NULL, but has " + std::to_string(size) + " entries");
+  return Eigen::Map<const Vector>(values, size);
+}
+
+template <class C>
+CoreOf<C> problem_as_given(const C& c) {
+  using P = CoreOf<C>;
+  const std::string group = "/" + group_name<P>() + "/";
+  P problem;
+  // the matrices say how long the vectors are
+  std::string there;
+  std::string missing;
+  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
+    if constexpr (std::is_same_v<Type, Index>) {
+      problem.*field.member = c.*member;
+    } else if constexpr (std::is_same_v<Type, Matrix>) {
+      const std::string where = group + field_path(field);
+      if (field.presence == Presence::mixed) {
+        (c.*member != nullptr ? there : missing) = where;
+        if (c.*member == nullptr) return;
+      }
+      problem.*field.member = matrix(given(c.*member, where.c_str()), where);
+    }
+  });
+  if (!there.empty() && !missing.empty()) fail(missing, "is NULL, but " + there + " is not");
+  const auto [planar, spatial] = P::dimensions;
+  if (c.spacedim != planar && c.spacedim != spatial) {
+    fail(group + "spacedim", "is " + std::to_string(c.spacedim) + ", but must be " +
+                                 std::to_string(planar) + " or " + std::to_string(spatial));
+  }
+  count_contacts(problem);
+  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
+    if constexpr (std::is_same_v<Type, Vector>) {
+      problem.*field.member =
+          vector(c.*member, problem.size(field.rows), group + field_path(field));
+    }
+  });
+  problem.info = {absent_text, absent_text, absent_text};
+  if (c.info != nullptr) {
+    for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
+      problem.info.*field.member = text(c.info->*member);
+    });
+  }
+  return problem;
+}
+
+template <class C>
+CoreOf<C> valid_problem(const C& c) {
+  using P = CoreOf<C>;
+  P problem = problem_as_given(c);
+  for_each_field<P>([&]<class Type>(const Field<P, Type>& field) {
+    if constexpr (std::is_same_v<Type, Matrix>) {
+      Matrix& a = problem.*field.member;
+      const bool compressed = a.storage == Storage::csc || a.storage == Storage::csr;
+      if (!compressed || a.p.empty() || a.p.back() < 0) return;
+      const auto entries = static_cast<std::size_t>(a.p.back());
+      a.i.resize(std::min(a.i.size(), entries));
+      a.x.resize(std::min(a.x.size(), entries));
+    }
+  });
+  validate(problem);
+  return problem;
+}
+
+template <class P>
+Solution solution_of(const fclib_solution& c, const P& problem, Parts parts) {
+  Solution solution;
+  for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::* member) {
+    if (parts == Parts::some && field.presence == Presence::optional && c.*member == nullptr) {
+      return;
+    }
+    solution.*field.member =
+        vector(c.*member, problem.size(field.rows), "/solution/" + std::string(field.name));
+  });
+  return solution;
+}
+
+#define FCLIB_FROM_C(kind)                                             \
+  template CoreOf<fclib_##kind> problem_as_given(const fclib_##kind&); \
+  template CoreOf<fclib_##kind> valid_problem(const fclib_##kind&);    \
+  template Solution solution_of(const fclib_solution&, const CoreOf<fclib_##kind>&, Parts);
+
+FCLIB_FOR_EACH_KIND(FCLIB_FROM_C)
+
+#undef FCLIB_FROM_C
+
+}  // namespace fclib::c

@@ -1,0 +1,28 @@
+// What a caller hands over, as structs of the core.
+#pragma once
+
+#include <string>
+
+#include "capi/structs.hpp"
+
+namespace fclib::c {
+
+std::size_t size_of(int count, const std::string& where);
+
+Vector vector(const double* values, Index size, const std::string& where);
+
+/// The problem as it is, unchecked but for what its own sizes need.
+template <class C>
+CoreOf<C> problem_as_given(const C& c);
+
+/// The problem, valid, without the room that nzmax leaves.
+template <class C>
+CoreOf<C> valid_problem(const C& c);
+
+enum class Parts { all, some };
+
+/// The solution of a problem; with Parts::some v and u may be missing.
+template <class P>
+Solution solution_of(const fclib_solution& c, const P& problem, Parts parts);
+
+}  // namespace fclib::c

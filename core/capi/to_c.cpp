@@ -1,0 +1,115 @@
+#include "capi/to_c.hpp"
+
+#include <cstring>
+
+#include "capi/errors.hpp"
+
+namespace fclib::c {
+
+namespace {
+
+double* copy_vector(const Vector& values) {
+  const auto size = static_cast<std::size_t>(values.size());
+  MallocArray<double> result(size);
+  if (size > 0) std::memcpy(result.data(), values.data(), size * sizeof(double));
+  return result.release();
+}
+
+char* copy_text(const std::string& value) {
+  if (value == absent_text) return nullptr;
+  auto* result = allocate<char>(value.size() + 1);
+  std::memcpy(result, value.c_str(), value.size());
+  return result;
+}
+
+fclib_matrix* to_c(RawMatrix& a) {
+  Owned<fclib_matrix> c(allocate<fclib_matrix>(1));
+  c->nzmax = static_cast<int>(a.x.size());
+  c->m = a.rows;
+  c->n = a.cols;
+  switch (a.storage) {
+    case Storage::triplet:
+      c->nz = static_cast<int>(a.x.size());
+      break;
+    case Storage::csc:
+      c->nz = nz_csc;
+      break;
+    case Storage::csr:
+      c->nz = nz_csr;
+      break;
+    case Storage::dense:
+      c->nz = nz_dense;
+      break;
+  }
+  if (a.storage != Storage::dense) {
+    c->p = a.p.release();
+    c->i = a.i.release();
+  }
+  c->x = a.x.release();
+  if (a.info) {
+    c->info = allocate<fclib_matrix_info>(1);
+    c->info->comment = copy_text(a.info->comment);
+    c->info->conditioning = a.info->conditioning;
+    c->info->determinant = a.info->determinant;
+    c->info->rank = a.info->rank;
+  }
+  return c.release();
+}
+
+}  // namespace
+
+void free_members(fclib_matrix& a) {
+  std::free(a.p);
+  std::free(a.i);
+  std::free(a.x);
+  if (a.info != nullptr) std::free(a.info->comment);
+  std::free(a.info);
+}
+
+template <class C>
+C* to_c(RawProblem& problem) {
+  Owned<C> c(allocate<C>(1));
+  for (auto& [name, value] : problem.members) {
+    for_each_member<C>([&]<class Field, class Pointer>(const Field& field, Pointer member) {
+      if (field.name != name) return;
+      using CType = std::remove_reference_t<decltype((*c).*member)>;
+      if constexpr (std::is_same_v<CType, int>) {
+        (*c).*member = std::get<Index>(value);
+      } else if constexpr (std::is_same_v<CType, fclib_matrix*>) {
+        (*c).*member = to_c(std::get<RawMatrix>(value));
+      } else {
+        (*c).*member = std::get<MallocArray<double>>(value).release();
+      }
+    });
+  }
+  Owned<fclib_info> info(allocate<fclib_info>(1));
+  bool informed = false;
+  for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
+    (*info).*member = copy_text(problem.info.*field.member);
+    informed = informed || (*info).*member != nullptr;
+  });
+  if (informed) c->info = info.release();
+  return c.release();
+}
+
+void to_c(const Solution& solution, const Problem& outline, const std::string& where,
+          fclib_solution& c) {
+  for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::* member) {
+    const Index size = std::visit([&](const auto& p) { return p.size(field.rows); }, outline);
+    const Vector& values = solution.*field.member;
+    if (values.size() != size) {
+      fail(where + "/" + std::string(field.name),
+           "has " + std::to_string(values.size()) + " entries, expected " + std::to_string(size));
+    }
+    const bool absent = field.presence != Presence::required && size == 0;
+    if (!absent) c.*member = copy_vector(values);
+  });
+}
+
+#define FCLIB_TO_C(kind) template fclib_##kind* to_c(RawProblem&);
+
+FCLIB_FOR_EACH_KIND(FCLIB_TO_C)
+
+#undef FCLIB_TO_C
+
+}  // namespace fclib::c

@@ -1,0 +1,69 @@
+#include "io/hdf5/contents.hpp"
+
+#include <algorithm>
+
+namespace fclib::hdf5 {
+
+std::vector<std::string> kinds_of(const Group& root) {
+  std::vector<std::string> kinds;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    if (root.has(group_name<P>())) kinds.emplace_back(P::kind);
+  });
+  return kinds;
+}
+
+Contents contents_of(const Group& root) {
+  Contents contents;
+  contents.kinds = kinds_of(root);
+  contents.solution = root.has("solution");
+  if (root.has("guesses")) {
+    const Handle handle = open_group(root, "guesses");
+    const Group guesses{handle.id(), "/guesses"};
+    contents.guesses = read_number<Index>(guesses, "number_of_guesses");
+    if (contents.guesses < 0) fail(guesses.child("number_of_guesses"), "is negative");
+  }
+  return contents;
+}
+
+std::string owner_of(const std::vector<std::string>& kinds, std::string_view preferred) {
+  if (kinds.empty()) fail("/", "holds no problem in a known FCLIB layout; it must come first");
+  const bool found = std::find(kinds.begin(), kinds.end(), preferred) != kinds.end();
+  return found ? std::string(preferred) : kinds.front();
+}
+
+namespace {
+
+template <class P>
+P read_sizes(const Group& root) {
+  const Handle handle = open_group(root, group_name<P>());
+  const Group group{handle.id(), root.child(group_name<P>())};
+  P problem;
+  std::size_t contacts = 0;
+  for_each_stored_field<P>(
+      group, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
+        const std::string name(field.name);
+        if constexpr (std::is_same_v<Member, Vector>) {
+          if (field.member == &P::mu) contacts = open_numbers(place, name, false).size;
+        } else if constexpr (std::is_same_v<Member, Matrix>) {
+          const Handle matrix = open_group(place, name);
+          problem.*field.member = read_matrix_sizes<Matrix>({matrix.id(), place.child(name)});
+        } else {
+          problem.*field.member = read_number<Member>(place, name);
+        }
+      });
+  require_contacts(problem, contacts);
+  return problem;
+}
+
+}  // namespace
+
+Problem outline_of(const Group& root) {
+  const std::string owner = owner_of(kinds_of(root));
+  Problem problem;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    if (owner == P::kind) problem = read_sizes<P>(root);
+  });
+  return problem;
+}
+
+}  // namespace fclib::hdf5

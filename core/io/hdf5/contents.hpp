@@ -1,0 +1,60 @@
+// What a file holds, and how large its problems are.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "io/hdf5/read.hpp"
+#include "io/hdf5/read_objects.hpp"
+#include "problem.hpp"
+
+namespace fclib::hdf5 {
+
+std::vector<std::string> kinds_of(const Group& root);
+
+Contents contents_of(const Group& root);
+
+/// The kind of the problem that a solution of the file belongs to.
+std::string owner_of(const std::vector<std::string>& kinds, std::string_view preferred = "global");
+
+/// The sizes of that problem.
+Problem outline_of(const Group& root);
+
+/// Calls visit(field, place) for each field that the group of a formulation has, with the group in
+/// which it lies.
+template <class P, class Visitor>
+void for_each_stored_field(const Group& group, const Visitor& visit) {
+  const Handle vectors_handle = open_group(group, "vectors");
+  const Group vectors{vectors_handle.id(), group.child("vectors")};
+  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
+    const Group& place = std::is_same_v<Member, Vector> ? vectors : group;
+    if (field.presence == Presence::required || place.has(std::string(field.name))) {
+      visit(field, place);
+    }
+  });
+}
+
+/// The sizes of a matrix; A is Matrix or RawMatrix.
+template <class A>
+A read_matrix_sizes(const Group& group) {
+  A a;
+  a.rows = read_number<Index>(group, "m");
+  a.cols = read_number<Index>(group, "n");
+  if (a.rows < 0) fail(group.child("m"), "is negative");
+  if (a.cols < 0) fail(group.child("n"), "is negative");
+  return a;
+}
+
+/// Makes mu as long as the matrices say, where that is how long it is in the file.
+template <class P>
+void require_contacts(P& outline, std::size_t stored) {
+  if (static_cast<std::size_t>(contact_count(outline)) != stored) {
+    detail::require_size(static_cast<Index>(stored), contact_count(outline), Dim::nc,
+                         "/" + group_name<P>() + "/vectors/mu", "entries");
+  }
+  count_contacts(outline);
+}
+
+}  // namespace fclib::hdf5

@@ -1,0 +1,82 @@
+// Problems as files have them, without validation and without copies: for the C interface.
+#pragma once
+
+#include <algorithm>
+#include <cstdlib>
+#include <memory>
+#include <new>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "linalg/matrix.hpp"
+#include "problem_info.hpp"
+
+namespace fclib {
+
+/// The value of a text that a file does not have, where it is read raw; writing it without
+/// validation leaves it out. No text of a file can hold a NUL.
+inline const std::string absent_text(1, '\0');
+
+/// The storages of a matrix as files and C structs number them in `nz`; from 0 on it is the number
+/// of triplets.
+constexpr Index nz_csc = -1;
+constexpr Index nz_csr = -2;
+constexpr Index nz_dense = -3;
+
+/// Numbers in memory from malloc, which C code takes over as it is.
+template <class Number>
+class MallocArray {
+ public:
+  MallocArray() = default;
+  /// Not set to zero. There is memory even for no number.
+  explicit MallocArray(std::size_t size)
+      : data_(static_cast<Number*>(std::malloc(std::max<std::size_t>(size, 1) * sizeof(Number)))),
+        size_(size) {
+    if (data_ == nullptr) throw std::bad_alloc();
+  }
+  [[nodiscard]] Number* data() { return data_.get(); }
+  [[nodiscard]] std::size_t size() const { return size_; }
+  Number& operator[](std::size_t k) { return data_.get()[k]; }
+  /// Forgets what is beyond `size`, which is no more than there is.
+  void shorten(std::size_t size) { size_ = size; }
+  /// The memory is the caller's, to be freed.
+  Number* release() { return data_.release(); }
+
+ private:
+  struct Free {
+    void operator()(Number* data) const { std::free(data); }
+  };
+  std::unique_ptr<Number[], Free> data_;
+  std::size_t size_ = 0;
+};
+
+/// A matrix as a file has it: as Matrix, but i and x may go on after the last entry, since nzmax
+/// leaves room there.
+struct RawMatrix {
+  Storage storage = Storage::csr;
+  Index rows = 0;
+  Index cols = 0;
+  MallocArray<Index> p;
+  MallocArray<Index> i;
+  MallocArray<double> x;
+  std::optional<MatrixInfo> info;
+};
+
+/// A problem as a file has it: its arrays have the lengths that the matrices declare, nothing else
+/// is checked.
+struct RawProblem {
+  struct Member {
+    std::string_view name;  ///< of the field
+    std::variant<Index, RawMatrix, MallocArray<double>> value;
+  };
+  std::vector<Member> members;  ///< those that the file has
+  ProblemInfo info;             ///< of texts that may be absent_text
+};
+
+/// The problem of this kind, without validation, and without a copy of its arrays.
+RawProblem read_raw_problem(const std::string& path, std::string_view kind);
+
+}  // namespace fclib

@@ -1,0 +1,36 @@
+// Reads FCLIB files. hdf5.hpp has their layout.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "problem.hpp"
+
+namespace fclib {
+
+/// What a file holds.
+struct Contents {
+  std::vector<std::string> kinds;  ///< "local", "global", ...
+  bool solution = false;
+  Index guesses = 0;  ///< how many
+};
+
+Contents read_contents(const std::string& path);
+
+/// The problem in the file, validated. `kind` chooses where there are several.
+Problem read_problem(const std::string& path, std::string_view kind = {});
+
+/// The problem that the solution and the guesses of the file belong to, its sizes alone: matrices
+/// have no entries, mu is zero. It is the global one where there are several, as in libfclib 3.1.
+Problem read_outline(const std::string& path);
+
+/// The stored solution, or nothing where the file has none. Its sizes are not checked against a
+/// problem: merit() and solve() do.
+std::optional<Solution> read_solution(const std::string& path);
+
+/// The stored guesses, as read_solution.
+std::vector<Solution> read_guesses(const std::string& path);
+
+}  // namespace fclib

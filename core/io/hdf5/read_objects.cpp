@@ -1,0 +1,158 @@
+#include "io/hdf5/read_objects.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace fclib::hdf5 {
+
+namespace {
+
+/// deflate cannot shrink data further than this
+constexpr double best_compression = 1100.0;
+constexpr std::size_t small_dataset = std::size_t{1} << 20;
+
+hsize_t size_of_file_with(hid_t object) {
+  const Handle file(H5Iget_file_id(object), H5Fclose);
+  hsize_t size = 0;
+  H5Fget_filesize(file.id(), &size);
+  return size;
+}
+
+/// What a dataset takes in its file, in bytes.
+double stored_bytes(hid_t dataset) {
+  return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
+}
+
+/// The properties of a dataset, none where its data are in one piece in its file: to find that out
+/// is cheap, to ask for properties is not. Throws where the data are in other files.
+Handle properties_of(hid_t dataset, const std::string& path) {
+  if (H5Dget_offset(dataset) != HADDR_UNDEF) return {-1, H5Pclose};
+  Handle properties(H5Dget_create_plist(dataset), H5Pclose);
+  if (!properties.ok()) fail(path, "has no properties that HDF5 can read");
+  if (H5Pget_layout(properties.id()) == H5D_VIRTUAL || H5Pget_external_count(properties.id()) > 0) {
+    fail(path, "keeps its data in other places, which are not read");
+  }
+  return properties;
+}
+
+/// Throws where HDF5 would ask for much more memory than the file has data, for chunks that are too
+/// many or too large; and where it would unpack data by filters that trust what they read.
+void require_chunks(const Handle& properties, hid_t dataset, double entries, double entry_size,
+                    const std::string& path) {
+  if (!properties.ok() || H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
+  hsize_t extents[H5S_MAX_RANK] = {};
+  const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, extents);
+  double chunk = 1;
+  for (int k = 0; k < rank; ++k) chunk *= static_cast<double>(extents[k]);
+  constexpr double many = 1024;
+  constexpr double large = 1 << 26;
+  const auto file_size = static_cast<double>(size_of_file_with(dataset));
+  if (rank < 1 || chunk < 1 || entries / chunk > std::max(many, file_size) ||
+      chunk * entry_size > std::max(large, best_compression * file_size)) {
+    fail(path, "has chunks that the file does not hold");
+  }
+  for (int k = 0; k < H5Pget_nfilters(properties.id()); ++k) {
+    std::size_t values = 0;
+    const H5Z_filter_t filter = H5Pget_filter2(properties.id(), static_cast<unsigned>(k), nullptr,
+                                               &values, nullptr, 0, nullptr, nullptr);
+    if (filter == H5Z_FILTER_NBIT || filter == H5Z_FILTER_SCALEOFFSET) {
+      fail(path, "is packed by a filter that is not read (n-bit or scale-offset)");
+    }
+  }
+}
+
+void read_as(const Numbers& dataset, hid_t memory, void* values) {
+  if (dataset.size > 0 &&
+      H5Dread(dataset.id.id(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
+    fail(dataset.path, "cannot be read (the file is damaged or cut short)");
+  }
+}
+
+}  // namespace
+
+Numbers open_numbers(const Group& group, const std::string& name, bool integers) {
+  const std::string path = group.child(name);
+  Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!dataset.ok()) {
+    fail(path, group.has(name) ? "is not a dataset that HDF5 can open" : "the dataset is missing");
+  }
+  const Handle type(H5Dget_type(dataset.id()), H5Tclose);
+  const H5T_class_t kind = H5Tget_class(type.id());
+  if (integers && kind != H5T_INTEGER) fail(path, "does not hold integers");
+  if (kind != H5T_INTEGER && kind != H5T_FLOAT) fail(path, "does not hold numbers");
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  const hssize_t points = H5Sget_simple_extent_npoints(space.id());
+  if (points < 0) fail(path, "has no size");
+  if (H5Sget_simple_extent_ndims(space.id()) > 1) fail(path, "has more than one dimension");
+  const auto size = static_cast<std::size_t>(points);
+  const auto entry_size = static_cast<double>(H5Tget_size(type.id()));
+  const double bytes = static_cast<double>(size) * entry_size;
+  const Handle properties = properties_of(dataset.id(), path);
+  if (bytes > static_cast<double>(small_dataset) &&
+      bytes > best_compression * stored_bytes(dataset.id())) {
+    fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
+  }
+  require_chunks(properties, dataset.id(), static_cast<double>(size), entry_size, path);
+  if (size > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
+    fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
+  }
+  const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
+                                                 (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
+  return {std::move(dataset), path, size, narrow};
+}
+
+void read_into(const Numbers& dataset, double* values) {
+  read_as(dataset, H5T_NATIVE_DOUBLE, values);
+}
+
+void read_into(const Numbers& dataset, std::int32_t* values) {
+  if (dataset.narrow) {
+    read_as(dataset, H5T_NATIVE_INT32, values);
+    return;
+  }
+  // HDF5 would clip what does not fit
+  std::vector<std::int64_t> wide(dataset.size);
+  read_as(dataset, H5T_NATIVE_INT64, wide.data());
+  using Limits = std::numeric_limits<std::int32_t>;
+  for (std::size_t k = 0; k < wide.size(); ++k) {
+    if (wide[k] < Limits::min() || wide[k] > Limits::max()) {
+      fail(dataset.path + "[" + std::to_string(k) + "]",
+           std::to_string(wide[k]) + " does not fit a 32-bit integer");
+    }
+    values[k] = static_cast<std::int32_t>(wide[k]);
+  }
+}
+
+std::string read_text(const Group& group, const std::string& name) {
+  const std::string path = group.child(name);
+  const Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
+  const Handle type(H5Dget_type(dataset.id()), H5Tclose);
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  if (H5Tget_class(type.id()) != H5T_STRING) fail(path, "does not hold text");
+  if (H5Sget_simple_extent_npoints(space.id()) != 1) fail(path, "does not hold one text");
+  const std::size_t length = H5Tget_size(type.id());
+  const Handle properties = properties_of(dataset.id(), path);
+  require_chunks(properties, dataset.id(), 1, static_cast<double>(length), path);
+  if (H5Tis_variable_str(type.id()) > 0) {
+    char* value = nullptr;
+    if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
+      fail(path, "cannot be read");
+    }
+    std::string text = value != nullptr ? value : "";
+    H5Dvlen_reclaim(type.id(), space.id(), H5P_DEFAULT, &value);
+    return text;
+  }
+  if (length > small_dataset && static_cast<double>(length) > stored_bytes(dataset.id())) {
+    fail(path,
+         "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
+  }
+  std::string text(length, '\0');
+  if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) < 0) {
+    fail(path, "cannot be read");
+  }
+  text.resize(std::min(text.find('\0'), text.size()));
+  return text;
+}
+
+}  // namespace fclib::hdf5

@@ -1,0 +1,36 @@
+// Writes FCLIB files. hdf5.hpp has their layout.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "problem.hpp"
+
+namespace fclib {
+
+/// How a file is written.
+struct WriteOptions {
+  bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
+  bool append = false;   ///< keep what the file holds: the other problems, the other guesses
+  bool replace = false;  ///< what is there already gives way; false: it is an error
+  int compression = 6;   ///< level of deflate, 0 (none) to 9
+};
+
+/// Writes a new file, or replaces the old one whole; or adds to it (WriteOptions::append), where a
+/// problem that replaces one of its kind takes its solution and its guesses with it. With
+/// validation, no solution and no guess comes to belong to another problem. They must be complete
+/// (v for a global problem, u): the readers of libfclib 3.1 end their host's process where they are
+/// not.
+void write_file(const std::string& path, ProblemPointer problem, const Solution* solution = nullptr,
+                const std::vector<Solution>& guesses = {}, const WriteOptions& options = {});
+
+/// Puts a solution into a file that has its problem, by default in place of the one it had.
+void write_solution(const std::string& path, const Solution& solution,
+                    const WriteOptions& options = {.replace = true});
+
+/// Puts guesses into a file that has their problem, by default in place of those it had; or after
+/// those (WriteOptions::append).
+void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
+                   const WriteOptions& options = {.replace = true});
+
+}  // namespace fclib

@@ -1,0 +1,150 @@
+#include "io/hdf5/write_objects.hpp"
+
+#include <algorithm>
+
+namespace fclib::hdf5 {
+
+namespace {
+
+/// Smaller datasets are not worth a chunk and a filter.
+constexpr std::size_t chunked_from = 64;
+/// What a reader's cache of one dataset holds, by HDF5's default.
+constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
+/// What the index of a dataset in chunks takes, in bytes.
+constexpr std::size_t index_bytes = 254;
+/// What filters are tried on.
+constexpr std::size_t sample_entries = std::size_t{1} << 16;
+/// Datasets up to this many bytes lie in their own header.
+constexpr std::size_t compact_bytes = 4096;
+/// Groups of up to this many members keep them in their own header: all of ours do.
+constexpr unsigned compact_links = 32;
+
+/// The ways to store an array.
+enum class Filter { none, deflate, shuffle_and_deflate };
+
+/// An array to write, and its types in the file and in memory.
+struct Array {
+  hid_t stored;
+  hid_t memory;
+  const void* data;
+  std::size_t size;
+
+  [[nodiscard]] std::size_t bytes() const { return size * H5Tget_size(stored); }
+};
+
+Handle dataset_properties() {
+  Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  H5Pset_obj_track_times(properties.id(), false);
+#if H5_VERSION_GE(1, 10, 5)
+  H5Pset_dset_no_attrs_hint(properties.id(), true);
+#endif
+  return properties;
+}
+
+Handle create_array(hid_t group, const std::string& name, const Array& array, Filter filter,
+                    int compression) {
+  const hsize_t extent = array.size;
+  const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
+  const Handle layout = dataset_properties();
+  if (filter != Filter::none) {
+    const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
+    H5Pset_chunk(layout.id(), 1, &chunk);
+    if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
+    H5Pset_deflate(layout.id(), static_cast<unsigned>(compression));
+  } else if (array.bytes() <= compact_bytes) {
+    H5Pset_layout(layout.id(), H5D_COMPACT);
+  }
+  Handle dataset(H5Dcreate2(group, name.c_str(), array.stored, space.id(), H5P_DEFAULT, layout.id(),
+                            H5P_DEFAULT),
+                 H5Dclose);
+  if (!dataset.ok()) fail(name, "cannot be created");
+  if (array.size > 0) {
+    check(H5Dwrite(dataset.id(), array.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data), name);
+  }
+  return dataset;
+}
+
+/// The filter that makes an array smallest, found by trying them on its beginning. Shuffling
+/// gathers the bytes that numbers of one size share, but hides numbers that come again.
+Filter best_filter(const Target& group, const Array& array) {
+  if (array.size < chunked_from || group.compression == 0) return Filter::none;
+  Array sample = array;
+  sample.size = std::min(array.size, sample_entries);
+  Filter best = Filter::none;
+  std::size_t least = sample.bytes();
+  for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
+    std::size_t size = index_bytes;
+    {
+      const Handle trial = create_array(group.scratch, "trial", sample, filter, group.compression);
+      check(H5Dflush(trial.id()), "");
+      size += H5Dget_storage_size(trial.id());
+    }
+    check(H5Ldelete(group.scratch, "trial", H5P_DEFAULT), "");
+    if (size < least) {
+      best = filter;
+      least = size;
+    }
+  }
+  return best;
+}
+
+void write_array(const Target& group, const std::string& name, const Array& array) {
+  create_array(group.id, name, array, best_filter(group, array), group.compression);
+}
+
+Handle text_type(const std::string& text) {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  H5Tset_size(type.id(), text.size() + 1);
+  return type;
+}
+
+}  // namespace
+
+void keep_small(hid_t properties) {
+  check(H5Pset_link_phase_change(properties, compact_links, compact_links), "");
+  check(H5Pset_est_link_info(properties, 4, 6), "");
+  check(H5Pset_obj_track_times(properties, false), "");  // the same problem gives the same bytes
+}
+
+Handle create_group(const Group& parent, const std::string& name) {
+  const Handle properties(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  keep_small(properties.id());
+  Handle group(H5Gcreate2(parent.id, name.c_str(), H5P_DEFAULT, properties.id(), H5P_DEFAULT),
+               H5Gclose);
+  if (!group.ok()) fail(parent.child(name), "cannot be created");
+  return group;
+}
+
+void write_numbers(const Target& group, const std::string& name, const double* values,
+                   std::size_t size) {
+  write_array(group, name, {H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values, size});
+}
+
+void write_numbers(const Target& group, const std::string& name, const std::int32_t* values,
+                   std::size_t size) {
+  write_array(group, name, {H5T_STD_I32LE, H5T_NATIVE_INT32, values, size});
+}
+
+void write_text(const Group& group, const std::string& name, const std::string& text) {
+  const Handle type = text_type(text);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle layout = dataset_properties();
+  if (text.size() < compact_bytes) H5Pset_layout(layout.id(), H5D_COMPACT);
+  const Handle dataset(H5Dcreate2(group.id, name.c_str(), type.id(), space.id(), H5P_DEFAULT,
+                                  layout.id(), H5P_DEFAULT),
+                       H5Dclose);
+  if (!dataset.ok()) fail(group.child(name), "cannot be created");
+  check(H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.c_str()),
+        group.child(name));
+}
+
+void write_text_attribute(const Group& group, const char* name, const std::string& text) {
+  const Handle type = text_type(text);
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle attribute(
+      H5Acreate2(group.id, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  if (!attribute.ok()) fail(group.path, std::string("attribute ") + name + " cannot be created");
+  check(H5Awrite(attribute.id(), type.id(), text.c_str()), group.path);
+}
+
+}  // namespace fclib::hdf5

@@ -1,0 +1,55 @@
+// Groups, datasets and attributes, written as small as HDF5 can, and to the same bytes each time.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "io/hdf5/handles.hpp"
+
+namespace fclib::hdf5 {
+
+/// A group to write into, and how.
+struct Target : Group {
+  int compression = 0;
+  hid_t scratch = -1;  ///< a group of another file, to try things in
+};
+
+/// What makes small groups small, for the properties of a group or of a file.
+void keep_small(hid_t properties);
+
+Handle create_group(const Group& parent, const std::string& name);
+
+/// A new group inside another, written alike.
+class NewGroup {
+ public:
+  NewGroup(const Target& parent, const std::string& name)
+      : handle_(create_group(parent, name)),
+        target_{{handle_.id(), parent.child(name)}, parent.compression, parent.scratch} {}
+  [[nodiscard]] const Target& target() const { return target_; }
+
+ private:
+  Handle handle_;
+  Target target_;
+};
+
+void write_numbers(const Target& group, const std::string& name, const double* values,
+                   std::size_t size);
+void write_numbers(const Target& group, const std::string& name, const std::int32_t* values,
+                   std::size_t size);
+
+/// Values is any vector of doubles or of integers of 32 bits.
+template <class Values>
+void write_numbers(const Target& group, const std::string& name, const Values& values) {
+  write_numbers(group, name, values.data(), static_cast<std::size_t>(values.size()));
+}
+
+template <class Number>
+void write_number(const Target& group, const std::string& name, Number value) {
+  write_numbers(group, name, &value, 1);
+}
+
+void write_text(const Group& group, const std::string& name, const std::string& text);
+
+void write_text_attribute(const Group& group, const char* name, const std::string& text);
+
+}  // namespace fclib::hdf5

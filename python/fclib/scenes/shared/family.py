@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
 
 import fclib
-from fclib.scenes._solids import Solids
+from fclib.scenes.shared.solids import Solids
 
 Law = Literal["velocity", "gap"]
 

@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
 
-import fclib
+from fclib import _core, _registry, _solve
 from fclib.analysis._conic import Program
 from fclib.analysis._contacts import completed
 from fclib.analysis._data import Array, Data
@@ -82,9 +82,9 @@ class Reference:
         reason: why it is not certified, empty where it is.
     """
 
-    problem: fclib.Problem = field(repr=False, compare=False)
-    solution: fclib.Solution | None = field(repr=False, compare=False)
-    merit: fclib.Merit | None
+    problem: _solve.Problem = field(repr=False, compare=False)
+    solution: _core.Solution | None = field(repr=False, compare=False)
+    merit: _core.Merit | None
     target: float
     runs: tuple[Confirmation, ...]
     confirmed: bool
@@ -137,7 +137,7 @@ class Reference:
     def attributes(self) -> dict[str, float | str]:
         """What the file says of /solution: the merits, the algorithms, versions and date."""
         if self.solution is None or self.merit is None:
-            raise fclib.ProblemError("there is no solution to speak of")
+            raise _core.ProblemError("there is no solution to speak of")
         merits = {
             f"merit_{name}": float(getattr(self.merit, name))
             for name in (
@@ -160,7 +160,7 @@ class Reference:
         now = datetime.datetime.now(datetime.timezone.utc)
         return {
             **merits,
-            "merit_1": fclib.merit_1(self.problem, self.solution),
+            "merit_1": _core.merit_1(self.problem, self.solution),
             "algorithms": "; ".join(said[:1] + said[-1:] if self.confirmed else said[:1]),
             "certified": "yes" if self.certified else f"no: {self.reason}",
             "reaction": self.reaction,
@@ -172,7 +172,7 @@ class Reference:
 def versions() -> str:
     """Of fclib and of what it computes with."""
     names = ("numpy", "scipy", "clarabel")
-    found = [f"fclib {fclib.__version__}"]
+    found = [f"fclib {_core.version}"]
     for name in names:
         try:
             found.append(f"{name} {importlib.metadata.version(name)}")
@@ -182,7 +182,7 @@ def versions() -> str:
 
 
 def reference(
-    problem: fclib.Problem, *, target: float = TARGET, time_limit: float = 10.0
+    problem: _solve.Problem, *, target: float = TARGET, time_limit: float = 10.0
 ) -> Reference:
     """The reference solution of a problem.
 
@@ -206,7 +206,7 @@ def reference(
     solution = first.solution
     runs, confirmed, others = _confirm(data, solution, run, target, time_limit)
     reaction, freedom, solution = _least(data, solution, target)
-    merit = fclib.merit(problem, solution)
+    merit = _core.merit(problem, solution)
     reasons = []
     if not merit.error <= target:
         reasons.append(f"the error {merit.error:.1e} is above {target:.0e}")
@@ -227,10 +227,10 @@ def reference(
     )
 
 
-def _families(result: fclib.Result) -> tuple[str, ...]:
+def _families(result: _core.Result) -> tuple[str, ...]:
     """What a solver is made of; of a chain, what worked on the solution."""
     if result.solver != "auto":
-        return (fclib.find_solver(result.solver).family,)
+        return (_registry.find_solver(result.solver).family,)
     found: set[str] = set()
     for stage in result.stages:
         # gauss-seidel comes first in nearly every chain: it counts where it ended the work
@@ -239,15 +239,15 @@ def _families(result: fclib.Result) -> tuple[str, ...]:
     return tuple(sorted(found)) or ("none",)
 
 
-def _first(data: Data, target: float, time_limit: float) -> tuple[fclib.Result, Confirmation]:
+def _first(data: Data, target: float, time_limit: float) -> tuple[_core.Result, Confirmation]:
     """The best result of the first algorithms, up to one within the target."""
     best = None
     for name in FIRST:
         try:
-            result = fclib.solve(data.problem, name, target / 10, time_limit=time_limit)
+            result = _solve.solve(data.problem, name, target / 10, time_limit=time_limit)
             if best is not None and not result.error < best.error:
                 continue
-        except fclib.UnsuitableError:
+        except _core.UnsuitableError:
             if name == "auto":
                 raise
             continue
@@ -260,7 +260,7 @@ def _first(data: Data, target: float, time_limit: float) -> tuple[fclib.Result, 
 
 
 def _confirm(
-    data: Data, solution: fclib.Solution, run: Confirmation, target: float, time_limit: float
+    data: Data, solution: _core.Solution, run: Confirmation, target: float, time_limit: float
 ) -> tuple[tuple[Confirmation, ...], bool, tuple[float, ...]]:
     """Runs of other families until one agrees, and the velocities of other solutions."""
     _, u = completed(data, solution)
@@ -272,12 +272,12 @@ def _confirm(
         # what does not come soon from zero is not waited for
         limit = min(time_limit, 2.0) if start == "zero" else time_limit
         for name in SECOND:
-            info = fclib.find_solver(name)
+            info = _registry.find_solver(name)
             if info.family in run.families or not _takes(info, data):
                 continue
             try:
-                result = fclib.solve(data.problem, name, target, time_limit=limit, guess=guess)
-            except fclib.UnsuitableError:
+                result = _solve.solve(data.problem, name, target, time_limit=limit, guess=guess)
+            except _core.UnsuitableError:
                 continue
             difference = float(np.linalg.norm(completed(data, result.solution)[1] - u)) / speed
             found = Confirmation(
@@ -291,23 +291,23 @@ def _confirm(
     return tuple(tried), False, tuple(others)
 
 
-def _takes(info: fclib.SolverInfo, data: Data) -> bool:
+def _takes(info: _core.SolverInfo, data: Data) -> bool:
     rolling = len(data.friction) > 1
     return data.d in (info.rolling_dimensions if rolling else info.dimensions)
 
 
-def _rounded(solution: fclib.Solution) -> fclib.Solution:
+def _rounded(solution: _core.Solution) -> _core.Solution:
     def short(x: Array) -> Array:
         return np.array([float(f"{value:.{DIGITS - 1}e}") for value in x])
 
     multiplier = None if solution.l is None else short(solution.l)
-    return fclib.Solution(r=short(solution.r), l=multiplier)
+    return _core.Solution(r=short(solution.r), l=multiplier)
 
 
 # ---- the reaction of least norm
 
 
-def _least(data: Data, solution: fclib.Solution, target: float) -> tuple[str, int, fclib.Solution]:
+def _least(data: Data, solution: _core.Solution, target: float) -> tuple[str, int, _core.Solution]:
     """Whether the reactions of the velocity are unique, how free they are, and the least ones."""
     problem, d = data.problem, data.d
     if problem.nc == 0:
@@ -340,8 +340,8 @@ def _least(data: Data, solution: fclib.Solution, target: float) -> tuple[str, in
             r[rows] = least
     if freedom == 0:
         return ("one of several" if skipped else "unique"), 0, solution
-    least_one = _complete(data, fclib.Solution(r=r, l=_multiplier(data, r)))
-    if skipped or not fclib.merit(problem, least_one).error <= target:
+    least_one = _complete(data, _core.Solution(r=r, l=_multiplier(data, r)))
+    if skipped or not _core.merit(problem, least_one).error <= target:
         return "one of several", freedom, solution
     return "minimum norm", freedom, least_one
 
@@ -359,11 +359,11 @@ def _multiplier(data: Data, r: Array) -> Array | None:
     return np.asarray(-np.linalg.solve(R.toarray(), V.T @ r + data.local.s))
 
 
-def _complete(data: Data, solution: fclib.Solution) -> fclib.Solution:
+def _complete(data: Data, solution: _core.Solution) -> _core.Solution:
     """With u, recomputed, and v of a global problem."""
     problem = data.problem
     _, u = completed(data, solution)
-    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         from fclib.analysis._contacts import velocity
 
         v = velocity(problem, data, solution)

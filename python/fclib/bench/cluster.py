@@ -22,7 +22,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import fclib
+from fclib import _core
 from fclib.bench import problems
 from fclib.bench.conduct import Runner
 from fclib.bench.job import Job, Record
@@ -138,7 +138,7 @@ def on_scheduler(address: str, send: bool = False) -> Iterator[Runner]:
     try:
         client = Client(address, timeout=PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
-        raise fclib.Error(f"{address}: no Dask scheduler answers: {error}") from None
+        raise _core.Error(f"{address}: no Dask scheduler answers: {error}") from None
     with client:
         yield runner(client, send)
 
@@ -166,7 +166,7 @@ def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
         cores = int(given.pop("cores", "1"))
         processes = int(given.pop("processes", cores))
     except ValueError as error:
-        raise fclib.OptionError(
+        raise _core.OptionError(
             f"slurm: workers, cores and processes are numbers: {error}"
         ) from None
     known = {name: given.pop(name) for name in ("queue", "account", "walltime") if name in given}
@@ -191,12 +191,12 @@ def _ask_sbatch(script: str) -> None:
         try:
             asked = subprocess.run(command, capture_output=True, text=True, check=False)
         except OSError as error:
-            raise fclib.Error(
+            raise _core.Error(
                 f"slurm: sbatch: {error.strerror}; --slurm needs a machine that submits to Slurm"
             ) from None
     if asked.returncode:
         words = " ".join(asked.stderr.replace("sbatch: ", "").replace("error: ", "").split())
-        raise fclib.Error(f"slurm: sbatch refuses the job: {words}")
+        raise _core.Error(f"slurm: sbatch refuses the job: {words}")
 
 
 @contextmanager
@@ -216,7 +216,7 @@ def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]
         with Client(cluster) as client:
             yield runner(client, send)
     except (OSError, RuntimeError) as error:
-        raise fclib.Error(f"slurm: {error}") from error
+        raise _core.Error(f"slurm: {error}") from error
     finally:
         with suppress(Exception):
             cluster.close()

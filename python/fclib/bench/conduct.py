@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import fclib
+from fclib import _core
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Job, Record
@@ -70,13 +70,13 @@ def conduct(
         fclib.Error: a problem cannot be found, made or read.
     """
     if not processes.supported():
-        raise fclib.Error("fclib bench needs Linux: its limits are kept by way of /proc")
+        raise _core.Error("fclib bench needs Linux: its limits are kept by way of /proc")
     Path(store).parent.mkdir(parents=True, exist_ok=True)
     new = not Path(store).exists()
     with Store(store) as opened:
         try:
             plan = campaign.plan(opened, tell)
-        except (fclib.Error, ImportError):
+        except (_core.Error, ImportError):
             if new:
                 opened.discard()
             raise

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core
 from fclib.bench import machine, processes
 from fclib.bench.job import MERITS, ORDERLY, Record
 from fclib.bench.worker import Problems, of_signal, one_line, send, serve
@@ -270,11 +270,11 @@ class Keeper:
         """Recompute every merit, and let it decide."""
         try:
             problem = self.problems.get(order)
-            merit = fclib.merit(problem, fclib.Solution(**vectors))
-        except fclib.FileError as error:
+            merit = _core.merit(problem, _core.Solution(**vectors))
+        except _core.FileError as error:
             record.status, record.message = "unreadable", one_line(error)
             return
-        except (fclib.Error, TypeError, ValueError) as error:
+        except (_core.Error, TypeError, ValueError) as error:
             record.status, record.message = "garbage", one_line(error)
             return
         record.merits = {name: float(getattr(merit, name)) for name in MERITS}

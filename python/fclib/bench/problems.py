@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core, _digest
 from fclib.bench.job import ProblemFacts
 
 SUFFIXES = (".hdf5", ".h5")
@@ -49,7 +49,7 @@ def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
         else:
             matches = [p for p in _glob(path) if p.is_file()]
         if not matches:
-            raise fclib.FileError(f"{path}: there is no such file, and none in such a folder")
+            raise _core.FileError(f"{path}: there is no such file, and none in such a folder")
         found |= dict.fromkeys(sorted(match.resolve() for match in matches))
     return list(found)
 
@@ -79,14 +79,14 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     Raises:
         fclib.Error: it cannot be read.
     """
-    kinds = [name for name in fclib.contents(path) if name not in ("solution", "guesses")]
+    kinds = [name for name in _core.contents(path) if name not in ("solution", "guesses")]
     kind = "global" if "global" in kinds else kinds[0] if kinds else None
-    problem = fclib.read(path, kind)
+    problem = _core.read(path, kind)
     matrix: Any = getattr(problem, "W", None)
     if matrix is None:
         matrix = getattr(problem, "M", None)
     return ProblemFacts(
-        hash=fclib.digest(problem),
+        hash=_digest.digest(problem),
         name=f"{path.parent.name}/{path.stem}" if path.stem[0].isdigit() else path.stem,
         family=family or _scene_of(problem.info) or path.parent.name,
         path=str(path),
@@ -101,7 +101,7 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     )
 
 
-def _scene_of(info: fclib.ProblemInfo) -> str:
+def _scene_of(info: _core.ProblemInfo) -> str:
     """The family that a simulated problem names in the last line of its description."""
     lines = info.description.splitlines()
     try:
@@ -115,7 +115,7 @@ def _scene_of(info: fclib.ProblemInfo) -> str:
 
 def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
     """The files of a recipe; make(folder) writes them where they are not there yet."""
-    text = json.dumps({"fclib": fclib.__version__, **recipe}, sort_keys=True)
+    text = json.dumps({"fclib": _core.version, **recipe}, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
     folder = cache_folder() / "problems" / name
     if not folder.is_dir():
@@ -162,11 +162,11 @@ def simulated(
             scene = kind(**parameters).scene(seed)
         except (KeyError, TypeError, ValueError) as error:
             # the text of a KeyError is in quotes otherwise
-            raise fclib.OptionError(f"simulate {family}: {error.args[0]}") from None
+            raise _core.OptionError(f"simulate {family}: {error.args[0]}") from None
         for step in simulate.simulate(scene, max(wanted) + 1):
             if step.index in wanted and step.problem.nc:
                 local = step.problem.condense().replace(info=step.problem.info)
-                fclib.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
+                _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
 
     return made(recipe, make)
 
@@ -182,12 +182,12 @@ def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
     def make(folder: Path) -> None:
         for number in range(count):
             problem = _plant(contacts, spacedim, seed + number)
-            fclib.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
+            _core.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
 
     return made(recipe, make)
 
 
-def _plant(nc: int, d: int, seed: int) -> fclib.LocalProblem:
+def _plant(nc: int, d: int, seed: int) -> _core.LocalProblem:
     import scipy.sparse as sp
 
     random = np.random.Generator(np.random.PCG64([seed, nc, d]))
@@ -211,10 +211,10 @@ def _plant(nc: int, d: int, seed: int) -> fclib.LocalProblem:
     j = (d * columns[:, None, None] + np.arange(d)) + np.zeros((1, d, 1), int)
     A = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(d * nc, d * nc))
     W = sp.csr_array(A @ A.T + 0.5 * sp.eye_array(d * nc))
-    return fclib.LocalProblem(
+    return _core.LocalProblem(
         spacedim=d,
         W=W,
         q=u.ravel() - W @ r.ravel(),
         mu=mu,
-        info=fclib.ProblemInfo(title=f"Planted, {nc} contacts, seed {seed}"),
+        info=_core.ProblemInfo(title=f"Planted, {nc} contacts, seed {seed}"),
     )

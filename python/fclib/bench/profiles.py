@@ -25,7 +25,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-import fclib
+from fclib import _core
 from fclib.bench.campaign import toml
 from fclib.bench.store import Store
 
@@ -45,7 +45,7 @@ RESAMPLES = 2000
 VIRTUAL_BEST = "virtual best"
 
 
-class ProfileError(fclib.Error, ValueError):
+class ProfileError(_core.Error, ValueError):
     """There is nothing to be compared."""
 
 

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import fclib
+from fclib import _core, _digest, _registry, _solve
 from fclib.bench import processes
 
 CACHE = 256e6  # [bytes] of problems that a process keeps
@@ -42,9 +42,9 @@ class Problems:
     """The problems read last, while they are small enough together."""
 
     def __init__(self) -> None:
-        self.kept: OrderedDict[tuple[str, str], tuple[fclib.Problem, int]] = OrderedDict()
+        self.kept: OrderedDict[tuple[str, str], tuple[_solve.Problem, int]] = OrderedDict()
 
-    def get(self, order: dict[str, Any]) -> fclib.Problem:
+    def get(self, order: dict[str, Any]) -> _solve.Problem:
         """The problem of an order.
 
         Raises:
@@ -52,9 +52,9 @@ class Problems:
         """
         key = (order["path"], order["hash"])
         if key not in self.kept:
-            problem = fclib.read(order["path"], order["kind"])
-            if fclib.digest(problem) != order["hash"]:
-                raise fclib.FileError(
+            problem = _core.read(order["path"], order["kind"])
+            if _digest.digest(problem) != order["hash"]:
+                raise _core.FileError(
                     f"{order['path']}: has changed since the campaign looked at it; start it again"
                 )
             self.kept[key] = problem, Path(order["path"]).stat().st_size
@@ -77,14 +77,14 @@ def load_modules(paths: list[str]) -> None:
             continue
         spec = importlib.util.spec_from_file_location(name, path)
         if spec is None or spec.loader is None:
-            raise fclib.SolverError(f"{path}: is no file of Python")
+            raise _registry.SolverError(f"{path}: is no file of Python")
         module = importlib.util.module_from_spec(spec)
         sys.modules[name] = module
         try:
             spec.loader.exec_module(module)
         except Exception as error:
             del sys.modules[name]
-            raise fclib.SolverError(f"{path}: {type(error).__name__}: {error}") from error
+            raise _registry.SolverError(f"{path}: {type(error).__name__}: {error}") from error
 
 
 def send(link: socket, message: bytes) -> None:
@@ -146,13 +146,13 @@ def answer(
     """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
     try:
         problem = problems.get(order)
-    except (fclib.Error, OSError, MemoryError) as error:
+    except (_core.Error, OSError, MemoryError) as error:
         return {"status": "unreadable", "message": one_line(error)}, []
     try:
         load_modules(order["modules"])
-        solver = fclib.find_solver(order["solver"])
+        solver = _registry.find_solver(order["solver"])
         solver.check_options(order["options"])
-    except fclib.Error as error:
+    except _core.Error as error:
         return {"status": "error", "message": one_line(error)}, []
 
     processes.release_memory()
@@ -163,9 +163,9 @@ def answer(
     send(keeper, b"started")
     before = total_cpu(me)
     start = time.perf_counter()
-    result: fclib.Result | None = None
+    result: _core.Result | None = None
     try:
-        result = fclib.solve(
+        result = _solve.solve(
             problem,
             order["solver"],
             order["tol"],
@@ -217,7 +217,7 @@ def total_cpu(pid: int) -> float:
 
 def classify(error: Exception) -> str:
     """The status of a run that ended with an exception."""
-    if isinstance(error, fclib.UnsuitableError):
+    if isinstance(error, _core.UnsuitableError):
         return "unsuitable"
     causes: list[BaseException] = [error]
     while (cause := causes[-1].__cause__) is not None:
@@ -229,7 +229,7 @@ def classify(error: Exception) -> str:
         return of_signal(int(found[1]))
     if any(words in text for words in NOTHING):
         return "nothing"
-    if isinstance(error, fclib.SolverError):
+    if isinstance(error, _registry.SolverError):
         if any(words in text for words in GARBAGE):
             return "garbage"
         # not the solver has raised, but the conversion of its answer into numbers
@@ -249,7 +249,7 @@ def of_signal(number: int) -> str:
 def one_line(error: BaseException) -> str:
     """What an exception says."""
     text = " ".join(str(error).split())
-    known = isinstance(error, (fclib.Error, OSError))
+    known = isinstance(error, (_core.Error, OSError))
     return (text if known and text else f"{type(error).__name__}: {text}")[:500]
 
 

@@ -22,10 +22,10 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
-from fclib.bench import problems
+from fclib.bench import made, problems
 from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
+from fclib.bench.modules import load_modules
 from fclib.bench.store import Store
-from fclib.bench.worker import load_modules
 
 PUBLISHED = Path(__file__).with_name("campaigns")
 NUMBERS = ("time_limit", "wall_limit", "memory")  # that a group of problems may set for itself
@@ -217,20 +217,33 @@ class Campaign:
     def _paths(self, group: Group) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
         if group.simulate is not None:
-            paths += problems.simulated(
+            paths += made.simulated(
                 family=group.simulate["family"],
                 parameters=group.simulate.get("parameters", {}),
                 steps=group.simulate["steps"],
                 seed=group.simulate.get("seed", 0),
             )
         if group.planted is not None:
-            paths += problems.planted(
+            paths += made.planted(
                 count=group.planted["count"],
                 contacts=group.planted["contacts"],
                 spacedim=group.planted.get("spacedim", 3),
                 seed=group.planted.get("seed", 0),
             )
         return paths
+
+
+def published_means(store: str | Path) -> dict[tuple[str, float], float]:
+    """Means of the fastest solver, by family and tolerance, which the campaigns quote."""
+    found = {}
+    with Store(store, create=False) as opened:
+        for text in opened.texts():
+            campaign = toml().loads(text)
+            for group in campaign.get("problems", ()):
+                for tol in group.get("tolerances", campaign.get("tolerances", ())):
+                    if "published_mean" in group:
+                        found[group.get("family", ""), float(tol)] = float(group["published_mean"])
+    return found
 
 
 def toml() -> Any:

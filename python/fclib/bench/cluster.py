@@ -1,8 +1,8 @@
 """Jobs on a Dask cluster: the same campaign on many machines.
 
-A task is a job; in the worker of Dask it is done by a keeper, as on one machine, so that no solver
-harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by others. The
-records come back to the one process that writes the store.
+A task is a job; in the worker of Dask it is done by a supervisor, as on one machine, so that no
+solver harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by
+others. The records come back to the one process that writes the store.
 
 The problems are read from where the campaign found them, a folder that all machines share, or are
 sent: then each worker gets the bytes of a file once, and keeps it in its cache folder.
@@ -23,10 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
-from fclib.bench import problems
-from fclib.bench.conduct import Runner
-from fclib.bench.job import Job, Record
-from fclib.bench.pool import Hand
+from fclib.bench import made
+from fclib.bench.job import Job, Record, Runner
+from fclib.bench.pool import SupervisorClient
 
 AHEAD = 3  # jobs a thread of the cluster that are on their way at once
 PATIENCE = 20.0  # [s] for a scheduler to answer
@@ -34,7 +33,7 @@ RETRIES = 5  # of a job whose worker of Dask dies
 
 # ---- in the workers of Dask
 
-_idle: list[Hand] = []  # one keeper for each thread that has been at work
+_idle: list[SupervisorClient] = []  # one supervisor for each thread that has been at work
 _lock = threading.Lock()
 
 
@@ -44,17 +43,17 @@ def do(job: Job, data: bytes | None = None) -> Record:
         path = _kept(job.problem.hash, data)
         job = dataclasses.replace(job, problem=dataclasses.replace(job.problem, path=str(path)))
     with _lock:
-        hand = _idle.pop() if _idle else Hand(job.threads)
+        supervisor = _idle.pop() if _idle else SupervisorClient(job.threads)
     try:
-        return hand.do(job)
+        return supervisor.do(job)
     finally:
         with _lock:
-            _idle.append(hand)
+            _idle.append(supervisor)
 
 
 def _kept(name: str, data: bytes) -> Path:
     """The file of these bytes in the cache folder."""
-    folder = problems.cache_folder() / "sent"
+    folder = made.cache_folder() / "sent"
     path = folder / f"{name}.hdf5"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,7 +68,7 @@ def _kept(name: str, data: bytes) -> Path:
 
 
 def runner(client: Any, send: bool = False) -> Runner:
-    """What `conduct` needs to run its jobs on a cluster.
+    """What `run_campaign` needs to run its jobs on a cluster.
 
     Args:
         client: a ``distributed.Client``.

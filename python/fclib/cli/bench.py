@@ -181,7 +181,9 @@ def run(
                 except ImportError as error:
                     fail(f'{error}; pip install "fclib[bench]"')
             show = stack.enter_context(live(chosen.name, as_json))
-            progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show, tell=tell)
+            progress = bench.run_campaign(
+                chosen, path, jobs=jobs, runner=runner, show=show, tell=tell
+            )
     except KeyboardInterrupt:
         there = path.exists()
         fail(f"interrupted; the same command goes on with {path}" if there else "interrupted")

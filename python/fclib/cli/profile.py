@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from fclib.bench import profiles
+from fclib.bench.campaign import published_means
 from fclib.cli._output import Json, Report, err, fail, make_table, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
@@ -125,7 +126,7 @@ def run(
         machine=machine,
     )
     costs = profiles.costs(rows, metric)
-    published = profiles.published(store)
+    published = published_means(store)
     tables: dict[str, list[dict[str, Any]]] = {
         "summary": profiles.summary(costs, penalty, shift),
         "profile": shares_within(costs),

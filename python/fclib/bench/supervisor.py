@@ -1,12 +1,12 @@
-"""The process that keeps a worker: it hands it a job, watches it, kills it, and judges its answer.
+"""The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
 
-``python -m fclib.bench.keeper FD`` serves jobs from a socket until that is closed. The keeper never
-runs a solver: that is done by the worker that it forks, and renews after every failure. The
-solution comes back as numbers, and the keeper recomputes every merit from its own copy of the
-problem, so that nothing a solver does in its process changes the verdict.
+``python -m fclib.bench.supervisor FD`` serves jobs from a socket until that is closed. The
+supervisor never runs a solver: that is done by the worker that it forks, and renews after every
+failure. The solution comes back as numbers, and the supervisor recomputes every merit from its own
+copy of the problem, so that nothing a solver does in its process changes the verdict.
 
 A run is killed with all processes that descend from it, in whatever group or session they are: what
-loses its parent becomes a child of the keeper.
+loses its parent becomes a child of the supervisor.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Watch:
             processes.lower(pid, resource.RLIMIT_CPU, used + max(1, seconds))
 
 
-class Keeper:
+class Supervisor:
     """A worker, and the problems that its answers are judged by."""
 
     def __init__(self, campaign: Connection) -> None:
@@ -292,15 +292,15 @@ def main() -> None:
     campaign = Connection(int(sys.argv[1]))
     processes.adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    keeper = Keeper(campaign)
+    supervisor = Supervisor(campaign)
     try:
         while True:
             order = campaign.recv()
-            campaign.send(keeper.do(order))
+            campaign.send(supervisor.do(order))
     except (EOFError, OSError, CampaignGone):
         pass
     finally:
-        keeper.stop()
+        supervisor.stop()
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ from scipy.linalg import qr
 
 from fclib import _core, _registry, _solve
 from fclib.analysis._conic import Program
-from fclib.analysis._contacts import completed
+from fclib.analysis._contacts import completed, velocity
 from fclib.analysis._data import Array, Data
 from fclib.analysis._spectrum import DENSE, EPS
 
@@ -364,8 +364,6 @@ def _complete(data: Data, solution: _core.Solution) -> _core.Solution:
     problem = data.problem
     _, u = completed(data, solution)
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
-        from fclib.analysis._contacts import velocity
-
         v = velocity(problem, data, solution)
         return solution.replace(v=v, u=data.matrices["H"].T @ v + problem.w)
     return solution.replace(u=u)

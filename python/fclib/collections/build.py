@@ -84,7 +84,7 @@ def build(
             build_scene(plan, out, report, pictures)
     else:
         build_in_processes(todo, out, jobs, report, pictures)
-    return gather(out)
+    return catalog.gather(out)
 
 
 def build_in_processes(
@@ -158,17 +158,6 @@ def difference(found: str, asked: str) -> str:
     old, new = ({**plan.pop("parameters"), **plan} for plan in (old, new))
     keys = [key for key in new if old.get(key) != new[key]]
     return ", ".join(f"{key}: {old.get(key)}, now {new[key]}" for key in keys[:3])
-
-
-def gather(out: Path) -> Any:
-    """Join the catalogues of all finished scenes of a folder into its own."""
-    rows = [
-        row
-        for part in sorted(out.glob(f"*/*/{catalog.FILE}"))
-        for row in catalog.read_catalog(part).to_pylist()
-    ]
-    catalog.write_catalog(out / catalog.FILE, rows)
-    return catalog.read_catalog(out)
 
 
 @dataclass

@@ -23,9 +23,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fclib import _core, _registry, scenes
+from fclib import _core, _registry
 from fclib.bench.job import MERITS
 from fclib.bench.profiles import METRICS, PENALTY, SHIFT
+from fclib.collections import families, read_catalog
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
@@ -164,8 +165,6 @@ class Problems:
         self.places: dict[str, int] = {}  # by the hash of a store
         self.folder = None
         if catalogue is not None:
-            from fclib.collections import read_catalog
-
             self.folder = catalogue if catalogue.is_dir() else catalogue.parent
             self.rows = read_catalog(catalogue).to_pylist()
             for row in self.rows:
@@ -378,7 +377,7 @@ class _Writer:
         return drawn
 
     def _families(self) -> list[dict[str, Any]]:
-        known: dict[str, Any] = {**scenes.families(), **scenes.assemblies()}
+        known = families()
         groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
         for row in self.problems.rows:
             groups[row.get("collection") or "", row["family"]].append(row)

@@ -456,21 +456,22 @@ def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Ar
     for _ in range(10):
         c = start + kernel @ z
         x = faces.basis @ c
-        gaps, slopes = [], []
+        gaps, gradients = [], []
         for mu, components in limits:
             tangent = np.stack([x[d * at + k] for k in components], axis=1)
             norm = np.linalg.norm(tangent, axis=1)
             gap = mu * x[d * at] - norm
             for k in np.flatnonzero(gap < -EPS * norm):
-                slope = mu[k] * faces.basis[d * at[k]]
+                gradient = mu[k] * faces.basis[d * at[k]]
                 for j, component in enumerate(components):
-                    slope = slope - tangent[k, j] / norm[k] * faces.basis[d * at[k] + component]
+                    along = faces.basis[d * at[k] + component]
+                    gradient = gradient - tangent[k, j] / norm[k] * along
                 gaps.append(gap[k])
-                slopes.append(slope @ kernel)
+                gradients.append(gradient @ kernel)
         for k in faces.rays[c[faces.rays] < 0]:
             gaps.append(c[k])
-            slopes.append(kernel[k])
+            gradients.append(kernel[k])
         if not gaps:
             break
-        z = z - np.linalg.lstsq(np.array(slopes), np.array(gaps), rcond=1e-8)[0]
+        z = z - np.linalg.lstsq(np.array(gradients), np.array(gaps), rcond=1e-8)[0]
     return scale * x

@@ -198,7 +198,7 @@ def imported(path: Path, package: Path) -> set[str]:
                 base = ".".join([*here[: len(here) - node.level + 1], *filter(None, [base])])
             names = [f"{base}.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.Call) and "import_module" in ast.dump(node.func):
-            names = [arg.value for arg in node.args if isinstance(arg, ast.Constant)]
+            names = [str(arg.value) for arg in node.args if isinstance(arg, ast.Constant)]
         for name in names:
             first, _, rest = name.partition(".")
             if first == "fclib":

@@ -16,7 +16,7 @@ build.py      a family into files, gone on with after a kill. Needs plan.py, cat
 verify.py     files as the catalogue says, solutions judged anew
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
-library.py    the package's and the user's folder, over all of these: `fclib.collection`, `fclib.load`
+library.py    the package's and the user's folder, over all of these: `collection` and `load`
 choose.py     the lists of chosen problems, by rules that anyone can repeat
 """
 

@@ -35,7 +35,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "overhead.sqlite"
         start = time.perf_counter()
-        progress = bench.conduct(campaign, path, jobs=arguments.jobs)
+        progress = bench.run_campaign(campaign, path, jobs=arguments.jobs)
         wall = time.perf_counter() - start
         with bench.Store(path) as store:
             rows = store.results()

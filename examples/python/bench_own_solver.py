@@ -30,7 +30,7 @@ def main() -> None:
             ],
         }
     )
-    done = bench.conduct(campaign, STORE, jobs=1)
+    done = bench.run_campaign(campaign, STORE, jobs=1)
     print(f"{done.planned} runs, {done.skipped} of them stored before")
 
     rows = profiles.load(STORE)

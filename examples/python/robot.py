@@ -68,7 +68,7 @@ def main(path: Path) -> None:
             "problems": [{"files": [str(folder.resolve())], "family": scene.name}],
         }
     )
-    bench.conduct(campaign, "robot.sqlite", jobs=1)
+    bench.run_campaign(campaign, "robot.sqlite", jobs=1)
     for row in profiles.summary(profiles.costs(profiles.load("robot.sqlite"))):
         solved = f"{row['solved']} of {row['of']}, fastest on {row['fastest']}"
         print(f"{row['solver']:16} solved {solved}, mean {1e6 * row['mean']:.0f} us")

@@ -76,9 +76,9 @@ def campaign(store: Path, jobs: int, show: Callable[[bench.Progress], None]) -> 
     """Run the campaign `quick`, or what is left of it.
 
     Raises:
-        fclib.Error: as `fclib.bench.conduct` does.
+        fclib.Error: as `fclib.bench.run_campaign` does.
     """
-    return bench.conduct(bench.Campaign.read(CAMPAIGN), store, jobs=jobs, show=show)
+    return bench.run_campaign(bench.Campaign.read(CAMPAIGN), store, jobs=jobs, show=show)
 
 
 def write_csv(path: Path, runs: Sequence[bench.Run]) -> None:

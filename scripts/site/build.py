@@ -33,7 +33,7 @@ AS_THEY_ARE = {
 # the menu; FOLDER/* stands for the generated pages of a folder
 MENU = {
     "Start": ["first-steps", "examples/index"],
-    "The problem": ["mathematics", "format", "analysis"],
+    "The problem": ["mathematics", "format", "analysis", "glossary"],
     "The collection": ["collection", "families/index", "families-of-your-own"],
     "The solvers": ["choosing", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],

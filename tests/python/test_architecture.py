@@ -4,6 +4,7 @@ A new folder must be given a place here.
 """
 
 import ast
+import graphlib
 import re
 from pathlib import Path
 
@@ -41,28 +42,30 @@ FORBIDDEN = {
 # made by the build from the files that are there
 GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 
-# what a part of the Python package may import: "api" is fclib itself
+# the parts of the Python package in one order, and what each may import of those above it: wherever
+# in a file an import stands, it counts. "__init__" is what `import fclib` gives
 PYTHON: dict[str, set[str]] = {
+    "_core": set(),
+    "_digest": set(),
     "_registry": {"_core"},
     "_solve": {"_core", "_registry"},
-    "_digest": set(),
-    "__init__": {"_core", "_digest", "_registry", "_solve"},
-    "scenes": {"api"},
-    "simulate": {"api", "scenes"},
-    "external": {"api", "_registry"},
-    "analysis": {"api"},
-    "bench": {"api", "external", "scenes", "simulate"},
-    "collections": {"api", "analysis", "scenes", "simulate"},
-    "report": {"api", "bench", "collections", "scenes"},
-    "demo": {"api", "scenes", "simulate", "bench", "report"},
-    "doctor": {"_core", "api", "external"},
+    "external": {"_core", "_registry"},
+    "analysis": {"_core", "_digest", "_registry", "_solve"},
+    "scenes": {"_core"},
+    "simulate": {"_core", "_solve", "scenes"},
+    "collections": {"_core", "_digest", "_solve", "analysis", "scenes", "simulate"},
+    "__init__": {"_core", "_digest", "_registry", "_solve", "collections"},
+    "bench": {"_core", "_digest", "_registry", "_solve", "scenes", "simulate"},
+    "report": {"_core", "_registry", "bench", "collections"},
+    "demo": {"__init__", "scenes", "simulate", "bench"},
+    "doctor": {"_core", "__init__", "external"},
     "cli": {
-        "api",
+        "__init__",
+        "external",
         "analysis",
-        "collections",
         "scenes",
         "simulate",
-        "external",
+        "collections",
         "bench",
         "report",
         "demo",
@@ -70,8 +73,6 @@ PYTHON: dict[str, set[str]] = {
     },
     "__main__": {"cli"},
 }
-# and what only its functions import, when they are called
-LATER: dict[str, set[str]] = {"__init__": {"collections"}}
 ARROW = "files -> io -> problem -> convert -> solver -> solution -> merit"
 
 
@@ -184,10 +185,12 @@ def test_no_solver_and_no_formulation_is_named_outside_its_file(root: Path) -> N
 # ---- Python
 
 
-def imports_of(path: Path, root: Path) -> set[str]:
-    """The parts of fclib that a module imports, wherever in it."""
-    inside = path.relative_to(root).with_suffix("").parts
-    package = ("fclib", *inside[:-1])
+def imported(path: Path, package: Path) -> set[str]:
+    """What a module imports of the package, wherever in it, by the dots after `fclib`.
+
+    "" is the package itself. A name that is imported from a module is that module.
+    """
+    here = ("fclib", *path.relative_to(package).with_suffix("").parts[:-1])
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         names: list[str] = []
@@ -196,35 +199,98 @@ def imports_of(path: Path, root: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom):
             base = node.module or ""
             if node.level:
-                base = ".".join([*package[: len(package) - node.level + 1], *filter(None, [base])])
+                base = ".".join([*here[: len(here) - node.level + 1], *filter(None, [base])])
             names = [f"{base}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.Call) and "import_module" in ast.dump(node.func):
+            names = [str(arg.value) for arg in node.args if isinstance(arg, ast.Constant)]
         for name in names:
-            parts = name.split(".")
-            if parts[0] == "fclib":
-                part = parts[1] if len(parts) > 1 else ""
-                found.add(part if part in PYTHON or part == "_core" else "api")
+            first, _, rest = name.partition(".")
+            if first == "fclib":
+                while rest and not is_module(package, rest):
+                    rest = rest.rpartition(".")[0]
+                found.add(rest)
     return found
 
 
-def test_imports_follow_the_arrow(root: Path) -> None:
+def is_module(package: Path, name: str) -> bool:
+    """Whether there is a module of this name; `_core` is built."""
+    path = package.joinpath(*name.split("."))
+    return name == "_core" or path.is_dir() or path.with_suffix(".py").is_file()
+
+
+def name_of(path: Path, package: Path) -> str:
+    """The name of a module, as `imported` has it."""
+    parts = path.relative_to(package).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+@pytest.fixture(scope="module")
+def modules(root: Path) -> dict[str, set[str]]:
+    """For each module of the package, what it imports of it."""
     package = root / "python" / "fclib"
-    modules = sorted(package.rglob("*.py"))
-    assert len(modules) > 10
+    found = {name_of(path, package): imported(path, package) for path in package.rglob("*.py")}
+    assert len(found) > 100
+    return found
+
+
+def python_part(module: str) -> str:
+    return module.partition(".")[0] or "__init__"
+
+
+def test_imports_follow_the_arrow(modules: dict[str, set[str]]) -> None:
     wrong = []
-    for path in modules:
-        part = path.relative_to(package).with_suffix("").parts[0]
+    for name, targets in modules.items():
+        part = python_part(name)
         assert part in PYTHON, f"fclib.{part} has no place: give it one in PYTHON of this test"
-        for other in imports_of(path, package):
-            if other not in {part} | PYTHON[part] | LATER.get(part, set()):
-                wrong.append(f"{path.relative_to(package)} imports {other}")
+        others = {python_part(target) for target in targets} - {part}
+        wrong += [f"fclib.{name} imports {other}" for other in others - PYTHON[part]]
     assert not wrong
 
 
-def test_parts_do_not_import_each_other_in_circles() -> None:
-    settled: set[str] = {"_core", "api"}
+def test_the_parts_stand_in_one_order(modules: dict[str, set[str]]) -> None:
+    above: set[str] = set()
     for part, needed in PYTHON.items():
-        assert needed <= settled, part
-        settled.add(part)
+        assert needed <= above, f"{part} comes before {needed - above}"
+        used = {
+            python_part(t) for name in modules if python_part(name) == part for t in modules[name]
+        }
+        assert needed <= used, f"{part} no longer imports {needed - used}"
+        above.add(part)
+
+
+def test_modules_do_not_import_each_other_in_circles(modules: dict[str, set[str]]) -> None:
+    # of a package the modules alone: its __init__ gathers names of theirs
+    graph = {name: targets - {name} for name, targets in modules.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"in a circle: {' -> '.join(error.args[1])}")
+
+
+def test_no_module_imports_by_way_of_its_own_package(modules: dict[str, set[str]]) -> None:
+    inside = {name: name.rpartition(".")[0] for name in modules if "." in name}
+    assert not [name for name, package in inside.items() if package in modules[name]]
+
+
+def test_what_families_share_imports_no_family(modules: dict[str, set[str]]) -> None:
+    helpers = {name for name in modules if name.startswith("scenes.shared")}
+    assert helpers
+    assert not [
+        f"fclib.{name} imports {target}"
+        for name in helpers
+        for target in modules[name]
+        if target.startswith("scenes") and target not in helpers
+    ]
+
+
+def test_no_command_imports_that_of_another(modules: dict[str, set[str]]) -> None:
+    commands = {name for name in modules if name.startswith("cli.") and "._" not in name}
+    assert commands
+    # choose.py has commands that come below `fclib collection`
+    wrong = {(a, b) for a in commands for b in modules[a] & commands} - {
+        ("cli.collection", "cli.choose")
+    }
+    assert not wrong
 
 
 def test_only_the_core_reads_files(root: Path) -> None:
@@ -235,11 +301,17 @@ def test_only_the_core_reads_files(root: Path) -> None:
 def test_the_checks_see_what_they_should(tmp_path: Path) -> None:
     module = tmp_path / "report" / "page.py"
     module.parent.mkdir()
+    for name in ("bench", "simulate", "scenes", "cli"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "scenes" / "wall.py").touch()
     module.write_text(
-        "import fclib\nfrom fclib import solve, bench\nfrom ..simulate import x\n"
-        "from fclib.scenes import y\ndef f():\n    import fclib.cli\n"
+        "import fclib\nfrom fclib import bench, solve, _core\nfrom ..simulate import x\n"
+        "from fclib.scenes.wall import Wall\ndef f():\n    import fclib.cli\n"
     )
-    assert imports_of(module, tmp_path) == {"api", "bench", "simulate", "scenes", "cli"}
+    assert imported(module, tmp_path) == {*("", "_core", "bench", "simulate", "scenes.wall", "cli")}
+    late = tmp_path / "late.py"
+    late.write_text("import importlib\ndef f():\n    importlib.import_module('fclib.cli')\n")
+    assert imported(late, tmp_path) == {"cli"}
     chain = {"solvers/a.cpp": {"solve/b.hpp"}, "solve/b.hpp": {"merit/c.hpp"}}
     assert reached(chain, "solvers/a.cpp") == {"solve/b.hpp", "merit/c.hpp"}
     with pytest.raises(pytest.fail.Exception, match="new"):

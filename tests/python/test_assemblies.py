@@ -9,7 +9,8 @@ import pytest
 
 import fclib
 from fclib import scenes
-from fclib.scenes import Assembled, _assembly
+from fclib.scenes import Assembled
+from fclib.scenes.shared import assembly
 
 FAMILIES: dict[str, Any] = dict(scenes.assemblies())
 
@@ -54,7 +55,7 @@ def solved(problem: Any) -> Any:
 def test_sizes_grow_by_the_ladder() -> None:
     for name, most in (("Wall", 8), ("Packing", 8)):
         numbers = [blocks(name, number).nc for number in range(0, most, 2)]
-        wanted = _assembly.SIZES[: most // 2]
+        wanted = assembly.SIZES[: most // 2]
         assert all(0.4 * size <= nc <= 1.1 * size for nc, size in zip(numbers, wanted, strict=True))
         assert [blocks(name, number).nc for number in range(1, most, 2)] == numbers
 
@@ -64,14 +65,14 @@ def test_wall_at_rest_stays_on_the_ground() -> None:
     solution = solved(problem)
     np.testing.assert_allclose(solution.v, 0, atol=1e-6)
     normal = solution.r.reshape(-1, 3)[:, 0]
-    ground = _assembly.running_bond(_assembly.SIZES[2], 0).first < 0
-    weight = problem.M.diagonal()[::6].sum() * _assembly.GRAVITY * _assembly.STEP
+    ground = assembly.running_bond(assembly.SIZES[2], 0).first < 0
+    weight = problem.M.diagonal()[::6].sum() * assembly.GRAVITY * assembly.STEP
     np.testing.assert_allclose(normal[ground].sum(), weight, rtol=1e-6)
 
 
 def test_pushed_packing_has_the_impulse() -> None:
     rest, pushed = blocks("Packing", 4), blocks("Packing", 5, push=2.0)
-    weight = rest.M.diagonal()[::6].sum() * _assembly.GRAVITY * _assembly.STEP
+    weight = rest.M.diagonal()[::6].sum() * assembly.GRAVITY * assembly.STEP
     np.testing.assert_allclose(rest.f[2::6].sum(), -weight)
     np.testing.assert_allclose((pushed.f - rest.f)[0::6].sum(), -2 * weight)
     assert not (pushed.f - rest.f)[2::6].any()
@@ -79,7 +80,7 @@ def test_pushed_packing_has_the_impulse() -> None:
 
 def test_columns_turn_and_move_bodies_as_rigid() -> None:
     """A rotation of everything about a point leaves no relative velocity but on the ground."""
-    bodies = _assembly.running_bond(60, 0)
+    bodies = assembly.running_bond(60, 0)
     problem: Any = bodies.problem(0.5, "")
     omega, fixed = np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, 3.0])
     linear = np.cross(omega, bodies.centres - fixed)

@@ -233,7 +233,7 @@ def test_what_rests_takes_its_reactions_from_the_guess() -> None:
     assert sum(stage.factorisations for stage in fclib.solve(nearby).stages) > 0
 
 
-def test_a_good_guess_on_few_bodies_is_mended_on_the_bodies() -> None:
+def test_a_good_guess_on_few_bodies_is_repaired_on_the_bodies() -> None:
     problem = bodies(5, nc=40, hyperstatic=True)
     guess = fclib.solve(problem).solution
     rng = np.random.default_rng(0)

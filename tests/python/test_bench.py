@@ -52,11 +52,11 @@ def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
 
 def test_a_campaign_is_run_once(tmp_path: Path) -> None:
     path = tmp_path / "store.sqlite"
-    first = bench.conduct(campaign(), path, jobs=2)
+    first = bench.run_campaign(campaign(), path, jobs=2)
     assert (first.planned, first.skipped, first.solved) == (18, 0, 18)
-    again = bench.conduct(campaign(), path)
+    again = bench.run_campaign(campaign(), path)
     assert (again.planned, again.skipped, again.solved) == (18, 18, 0)
-    more = bench.conduct(campaign(repeats=2), path)
+    more = bench.run_campaign(campaign(repeats=2), path)
     assert (more.planned, more.skipped, more.solved) == (36, 18, 18)
     with bench.Store(path) as store:
         rows = store.results()
@@ -75,7 +75,7 @@ def test_the_merits_are_those_of_the_solution(tmp_path: Path) -> None:
     fclib.write(tmp_path / "one.hdf5", planted_global(3).problem)
     path = tmp_path / "store.sqlite"
     chosen = campaign(solvers=["nsgs"], tolerances=[1e-6], problems=[{"files": str(tmp_path)}])
-    bench.conduct(chosen, path)
+    bench.run_campaign(chosen, path)
     with bench.Store(path) as store:
         (row,) = store.results()
     problem = fclib.read(tmp_path / "one.hdf5")
@@ -134,7 +134,7 @@ def test_problems_are_made_the_same_each_time(
 def test_history_on_request(tmp_path: Path) -> None:
     for wanted in (False, True):
         path = tmp_path / f"{wanted}.sqlite"
-        bench.conduct(campaign(history=wanted, solvers=["nsgs"], tolerances=[1e-8]), path)
+        bench.run_campaign(campaign(history=wanted, solvers=["nsgs"], tolerances=[1e-8]), path)
         with bench.Store(path) as store:
             histories = [store.history(row["run"]) for row in store.results()]
         assert all(bool(history) == wanted for history in histories)
@@ -155,7 +155,7 @@ def test_what_is_interrupted_is_not_said_to_run(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        bench.conduct(campaign(), path, show=stop)
+        bench.run_campaign(campaign(), path, show=stop)
     (shown,) = [
         json.loads(line) for line in run_cli("--status", path, "--json").stdout.splitlines()
     ]
@@ -299,7 +299,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FCLIB_CACHE", str(tmp_path_factory.getbasetemp() / "cache"))
         path = tmp_path_factory.mktemp("small") / "store.sqlite"
-        bench.conduct(campaign(history=True), path, jobs=2)
+        bench.run_campaign(campaign(history=True), path, jobs=2)
         yield path
 
 

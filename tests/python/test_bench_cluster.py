@@ -73,7 +73,7 @@ def test_the_same_rows_as_on_one_machine_while_a_worker_dies(
     scheduler: Any, tmp_path: Path
 ) -> None:
     chosen = campaign(tmp_path)
-    bench.conduct(chosen, tmp_path / "local.sqlite", jobs=2)
+    bench.run_campaign(chosen, tmp_path / "local.sqlite", jobs=2)
     killed: list[int] = []
 
     def show(progress: bench.Progress) -> None:
@@ -85,7 +85,7 @@ def test_the_same_rows_as_on_one_machine_while_a_worker_dies(
 
     address = scheduler.scheduler.address
     with cluster.on_scheduler(address) as runner:
-        progress = bench.conduct(chosen, tmp_path / "dask.sqlite", runner=runner, show=show)
+        progress = bench.run_campaign(chosen, tmp_path / "dask.sqlite", runner=runner, show=show)
     assert killed
     assert progress.done == progress.planned == 16
     assert rows(tmp_path / "dask.sqlite") == rows(tmp_path / "local.sqlite")
@@ -108,7 +108,7 @@ def test_problems_that_are_sent(
     def show(progress: bench.Progress) -> None:
         assert progress.statuses["unreadable"] == 0
 
-    progress = bench.conduct(chosen, tmp_path / "sent.sqlite", runner=runner, show=show)
+    progress = bench.run_campaign(chosen, tmp_path / "sent.sqlite", runner=runner, show=show)
     assert progress.solved == progress.planned == 8
     kept = sorted((cache / "sent").iterdir())
     assert len(kept) == 4
@@ -153,9 +153,9 @@ def test_slurm_that_is_not_here_or_refuses(tmp_path: Path, monkeypatch: pytest.M
 def test_slurm_gives_the_same_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)  # where the jobs leave what they say
     chosen = campaign(tmp_path, solvers=["nsgs"])
-    bench.conduct(chosen, tmp_path / "local.sqlite")
+    bench.run_campaign(chosen, tmp_path / "local.sqlite")
     with cluster.on_slurm({"workers": "2", "memory": "1GB"}) as runner:
-        bench.conduct(chosen, tmp_path / "slurm.sqlite", runner=runner)
+        bench.run_campaign(chosen, tmp_path / "slurm.sqlite", runner=runner)
     assert rows(tmp_path / "slurm.sqlite") == rows(tmp_path / "local.sqlite")
 
 

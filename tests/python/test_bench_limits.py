@@ -18,7 +18,7 @@ import fclib
 from fclib import bench
 from fclib.bench import problems
 from fclib.bench.job import Job
-from fclib.bench.pool import Hand
+from fclib.bench.pool import SupervisorClient
 from helpers import planted_local
 
 LIMIT = 0.5  # [s]
@@ -236,11 +236,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def hand(folder: Path) -> Iterator[Hand]:
+def supervisor(folder: Path) -> Iterator[SupervisorClient]:
     os.environ["FCLIB_TEST_SPIN"] = str(folder / "spin.so")
-    hand = Hand(1)
-    yield hand
-    hand.end()
+    supervisor = SupervisorClient(1)
+    yield supervisor
+    supervisor.end()
     del os.environ["FCLIB_TEST_SPIN"]
 
 
@@ -258,12 +258,14 @@ def job(folder: Path, solver: str, **changes: Any) -> Job:
 
 
 @pytest.mark.parametrize("name", EXPECTED)
-def test_what_no_solver_should_do_has_its_own_status(name: str, folder: Path, hand: Hand) -> None:
+def test_what_no_solver_should_do_has_its_own_status(
+    name: str, folder: Path, supervisor: SupervisorClient
+) -> None:
     # only who sleeps is to meet the clock on the wall, on a machine that is shared
     wall = LIMIT if EXPECTED[name] == "wall_limit" else 20 * LIMIT
-    hand.do(job(folder, "auto"))  # the worker is warm
+    supervisor.do(job(folder, "auto"))  # the worker is warm
     start = time.monotonic()
-    record = hand.do(job(folder, f"bad-{name}", wall=wall))
+    record = supervisor.do(job(folder, f"bad-{name}", wall=wall))
     took = time.monotonic() - start
     assert record.status == EXPECTED[name], record
     # the clock of the CPU holds on a machine that is shared, that on the wall if that is not busy
@@ -272,7 +274,7 @@ def test_what_no_solver_should_do_has_its_own_status(name: str, folder: Path, ha
         assert took < wall + LATE
     assert not record.solved
     # the next one is not touched by it
-    after = hand.do(job(folder, "auto"))
+    after = supervisor.do(job(folder, "auto"))
     assert after.status == "converged"
     assert after.merits is not None
     assert after.merits["error"] <= 1e-8
@@ -292,26 +294,30 @@ def left_over() -> list[str]:
 
 
 @pytest.mark.parametrize("command", PROGRAMS)
-def test_programs_too(command: str, folder: Path, hand: Hand) -> None:
-    record = hand.do(job(folder, f"cmd:{command}", wall=20 * LIMIT))
+def test_programs_too(command: str, folder: Path, supervisor: SupervisorClient) -> None:
+    record = supervisor.do(job(folder, f"cmd:{command}", wall=20 * LIMIT))
     assert record.status == PROGRAMS[command], record
 
 
-def test_words_on_the_standard_streams_do_no_harm(folder: Path, hand: Hand) -> None:
-    assert hand.do(job(folder, "bad-chatters")).status == "converged"
+def test_words_on_the_standard_streams_do_no_harm(
+    folder: Path, supervisor: SupervisorClient
+) -> None:
+    assert supervisor.do(job(folder, "bad-chatters")).status == "converged"
 
 
-def test_the_limits_leave_the_clocks_alone(folder: Path, hand: Hand) -> None:
+def test_the_limits_leave_the_clocks_alone(folder: Path, supervisor: SupervisorClient) -> None:
     # a limit of the kernel makes the clock of a process tick in milliseconds
     for _ in range(5):
-        record = hand.do(job(folder, "bad-has_a_helper"))
+        record = supervisor.do(job(folder, "bad-has_a_helper"))
         assert record.status == "converged", record
         assert record.cpu_s is not None
         assert record.cpu_s > 0
 
 
-def test_a_message_says_what_a_crashed_solver_said(folder: Path, hand: Hand) -> None:
-    record = hand.do(job(folder, "bad-segfaults"))
+def test_a_message_says_what_a_crashed_solver_said(
+    folder: Path, supervisor: SupervisorClient
+) -> None:
+    record = supervisor.do(job(folder, "bad-segfaults"))
     assert "SIGSEGV" in record.message
     assert "about to read from nowhere" in record.message
 
@@ -319,30 +325,32 @@ def test_a_message_says_what_a_crashed_solver_said(folder: Path, hand: Hand) -> 
 def test_a_file_that_changes_is_no_fault_of_the_solver(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "problem.hdf5"
     shutil.copy(folder / "problem.hdf5", path)
-    hand = Hand(1)
+    supervisor = SupervisorClient(1)
     try:
         given = job(folder, "auto")
         moved = Job(**{**vars(given), "problem": problems.look(path)})
         fclib.write(path, planted_local(4, nc=5).problem)
-        record = hand.do(moved)
+        record = supervisor.do(moved)
         assert (record.status, record.merits) == ("unreadable", None)
         assert "has changed" in record.message
         assert str(path) in record.message
     finally:
-        hand.end()
+        supervisor.end()
 
 
-def test_a_keeper_that_is_killed_is_replaced(folder: Path, hand: Hand) -> None:
-    hand.give(job(folder, "auto"))
-    assert hand.process is not None
-    hand.process.kill()
-    while (taken := hand.take()) is None:
+def test_a_supervisor_that_is_killed_is_replaced(
+    folder: Path, supervisor: SupervisorClient
+) -> None:
+    supervisor.give(job(folder, "auto"))
+    assert supervisor.process is not None
+    supervisor.process.kill()
+    while (taken := supervisor.take()) is None:
         pass
     assert taken[1].status == "converged"
 
 
-def test_what_is_measured(folder: Path, hand: Hand) -> None:
-    record = hand.do(job(folder, "nsgs", history=True))
+def test_what_is_measured(folder: Path, supervisor: SupervisorClient) -> None:
+    record = supervisor.do(job(folder, "nsgs", history=True))
     assert record.status == "converged"
     assert record.merits is not None
     assert set(record.merits) == set(bench.job.MERITS)

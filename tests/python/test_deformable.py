@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import fclib
 from fclib import scenes
 from fclib.scenes import Scene
-from fclib.scenes._solids import Bed, Block, Load, Solids
+from fclib.scenes.shared.solids import Bed, Block, Load, Solids
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")

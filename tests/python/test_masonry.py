@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from fclib import scenes
-from fclib.scenes import _masonry
+from fclib.scenes.shared import masonry
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
@@ -51,9 +51,9 @@ def weight(step: Step) -> float:
     st.floats(0, 0.5),
 )
 def test_grown_outline_moves_every_side(angles: list[float], distance: float) -> None:
-    outline = [_masonry.on_circle(2.0, angle) for angle in sorted(angles)]
+    outline = [masonry.on_circle(2.0, angle) for angle in sorted(angles)]
     for (x, z), (a, b), (c, d) in zip(
-        _masonry.grown(outline, distance), outline, [*outline[1:], outline[0]], strict=True
+        masonry.grown(outline, distance), outline, [*outline[1:], outline[0]], strict=True
     ):
         normal = np.array([d - b, a - c]) / math.hypot(d - b, a - c)
         # to the right of a side that runs counterclockwise is outside
@@ -61,17 +61,17 @@ def test_grown_outline_moves_every_side(angles: list[float], distance: float) ->
 
 
 def test_cut_outline_loses_its_corners() -> None:
-    square = _masonry.rectangle(0, 2, 0, 1)
-    shape = _masonry.cut(square, 0.1)
+    square = masonry.rectangle(0, 2, 0, 1)
+    shape = masonry.cut(square, 0.1)
     assert len(shape) == 8
-    assert _masonry.area(shape) == pytest.approx(2 - 4 * 0.5 * 0.1**2)
+    assert masonry.area(shape) == pytest.approx(2 - 4 * 0.5 * 0.1**2)
 
 
 def test_ring_is_a_polygon_of_its_thickness() -> None:
-    outlines = _masonry.ring(2.0, 0.3, 0.0, math.pi, 7)
+    outlines = masonry.ring(2.0, 0.3, 0.0, math.pi, 7)
     # sin(2 phi) / 2 (R^2 - r^2) for each voussoir of half angle phi
     each = 0.5 * math.sin(math.pi / 7) * (2.15**2 - 1.85**2)
-    np.testing.assert_allclose([_masonry.area(outline) for outline in outlines], each)
+    np.testing.assert_allclose([masonry.area(outline) for outline in outlines], each)
 
 
 # ---- arches
@@ -224,7 +224,7 @@ def test_ram_pushes_the_upper_courses() -> None:
 
 
 def test_arcade_is_filled_without_gaps() -> None:
-    arcade = _masonry.Arcade(
+    arcade = masonry.Arcade(
         spans=2,
         voussoirs=9,
         radius=1.5,
@@ -239,7 +239,7 @@ def test_arcade_is_filled_without_gaps() -> None:
     # all that is above the springings, less the polygons below the rings
     whole = 2 * arcade.end * (arcade.top - arcade.base)
     opening = 9 * 0.5 * math.sin(math.pi / 9) * arcade.inner**2
-    total = sum(_masonry.area(outline) for _, outline in arcade.stones())
+    total = sum(masonry.area(outline) for _, outline in arcade.stones())
     assert total == pytest.approx(whole - 2 * opening)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fclib import scenes
-from fclib.scenes import _mjcf
+from fclib.scenes.shared import mjcf
 
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
@@ -336,7 +336,7 @@ def test_chute_has_the_published_sizes(grains: int) -> None:
 def test_polyhedra_are_convex_and_neither_flat_nor_needles() -> None:
     from scipy.spatial import ConvexHull
 
-    corners = _mjcf.polyhedra(np.random.Generator(np.random.PCG64(0)), 200)
+    corners = mjcf.polyhedra(np.random.Generator(np.random.PCG64(0)), 200)
     for each in corners:
         hull = ConvexHull(each)
         assert len(hull.vertices) == 8

@@ -6,6 +6,15 @@
 
 Existence is decided by conic programs, for which Clarabel is needed: ``pip install
 "fclib[analysis]"``.
+
+_analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _existence.py
+_existence.py   whether there is a solution, with its proof. Needs _conic.py
+_reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
+_least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
+_contacts.py    statuses and energies, contact by contact
+_spectrum.py    ranks, singular values, definiteness
+_conic.py       conic programs, solved by Clarabel
+_data.py        a problem's matrices and its local form, which all others start from
 """
 
 from fclib.analysis._analyze import Analysis, Definiteness, Uniqueness, Units, analyze

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-import fclib
+from fclib import _core, _digest, _solve
 from fclib.analysis._data import SYMMETRIC, Data, asymmetry, columns
 from fclib.analysis._existence import Certificate, Existence, Slater, existence, slater
 from fclib.analysis._spectrum import DENSE, EPS, Spectrum, lowest_eigenvalue, spectrum
@@ -96,7 +96,7 @@ class Analysis:
         units, slater, existence, uniqueness: see there.
     """
 
-    problem: fclib.Problem = field(repr=False, compare=False)
+    problem: _solve.Problem = field(repr=False, compare=False)
     digest: str
     nnz: dict[str, int]
     sparsity: dict[str, float]
@@ -135,7 +135,7 @@ class Analysis:
             "mu_min": float(problem.mu.min()) if problem.nc else None,
             "mu_max": float(problem.mu.max()) if problem.nc else None,
         }
-        if isinstance(problem, (fclib.LocalRollingProblem, fclib.GlobalRollingProblem)):
+        if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
             record["mu_r_min"] = float(problem.mu_r.min()) if problem.nc else None
             record["mu_r_max"] = float(problem.mu_r.max()) if problem.nc else None
         for name in self.nnz:
@@ -197,7 +197,7 @@ class Analysis:
         return " ".join(text)
 
     @property
-    def matrix_info(self) -> dict[str, fclib.MatrixInfo]:
+    def matrix_info(self) -> dict[str, _core.MatrixInfo]:
         """MATRIX_INFO of RT-0444, of the matrices that the problem has and that were looked at."""
         own = {name for name in self.nnz if getattr(self.problem, name, None) is not None}
         known = self.problem.matrix_info
@@ -206,7 +206,7 @@ class Analysis:
             found = self.spectra[name]
             full = found.rank == min(getattr(self.problem, name).shape)
             of = "" if full else " of what is not singular"
-            result[name] = fclib.MatrixInfo(
+            result[name] = _core.MatrixInfo(
                 comment=f"conditioning{of} and rank by {found.method}, "
                 f"zero below {found.threshold:.1e}",
                 conditioning=found.conditioning,
@@ -217,7 +217,7 @@ class Analysis:
 
 
 def analyze(
-    problem: fclib.Problem,
+    problem: _solve.Problem,
     *,
     tol: float = 1e-8,
     time_limit: float = 20.0,
@@ -252,7 +252,7 @@ def analyze(
     numbers = data.local.islands().contact
     return Analysis(
         problem=problem,
-        digest=fclib.digest(problem),
+        digest=_digest.digest(problem),
         nnz={name: int(a.nnz) for name, a in matrices.items()},
         sparsity={name: a.nnz / max(1, a.shape[0] * a.shape[1]) for name, a in matrices.items()},
         asymmetry={name: asymmetry(matrices[name]) for name in ("W", "M", "R") if name in matrices},

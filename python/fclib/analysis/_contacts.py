@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import fclib
+from fclib import _core, _solve
 from fclib.analysis._data import Array, Data
 
 
-def completed(data: Data, solution: fclib.Solution) -> tuple[Array, Array]:
+def completed(data: Data, solution: _core.Solution) -> tuple[Array, Array]:
     """R and u, recomputed from the data."""
     problem, r = data.problem, solution.r
-    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         return r, data.matrices["H"].T @ velocity(problem, data, solution) + problem.w
     u = data.W @ r + data.local.q
     if solution.l is not None and "V" in data.matrices:
@@ -24,7 +24,7 @@ def completed(data: Data, solution: fclib.Solution) -> tuple[Array, Array]:
 
 
 def velocity(
-    problem: fclib.GlobalProblem | fclib.GlobalRollingProblem, data: Data, solution: fclib.Solution
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem, data: Data, solution: _core.Solution
 ) -> Array:
     """The generalised velocity: the solution's, or what follows from its reactions."""
     if solution.v is not None:
@@ -32,17 +32,17 @@ def velocity(
     impulse = data.matrices["H"] @ solution.r + problem.f
     if solution.l is not None and "G" in data.matrices:
         impulse = impulse + data.matrices["G"] @ solution.l
-    return _solve(data, impulse)
+    return _velocity_of(data, impulse)
 
 
-def _solve(data: Data, impulse: Array) -> Array:
+def _velocity_of(data: Data, impulse: Array) -> Array:
     from scipy.sparse.linalg import splu
 
     M = data.matrices["M"]
     return np.asarray(splu(M).solve(impulse)) if M.shape[0] else impulse
 
 
-def contacts(problem: fclib.Problem, solution: fclib.Solution) -> npt.NDArray[np.void]:
+def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[np.void]:
     """One row a contact, as ``pandas.DataFrame(contacts(...))`` takes it.
 
     Args:
@@ -59,7 +59,7 @@ def contacts(problem: fclib.Problem, solution: fclib.Solution) -> npt.NDArray[np
     Raises:
         fclib.ProblemError: problem or solution is not valid.
     """
-    each = fclib.contact_merits(problem, solution)
+    each = _core.contact_merits(problem, solution)
     data = Data.of(problem)
     d, nc = data.d, problem.nc
     r, u = solution.r, each["u"]
@@ -120,21 +120,21 @@ class Energy:
     residual: float
 
 
-def energy(problem: fclib.Problem, solution: fclib.Solution) -> Energy:
+def energy(problem: _solve.Problem, solution: _core.Solution) -> Energy:
     """The energy balance of a solution.
 
     Raises:
         fclib.ProblemError: problem or solution is not valid.
     """
-    fclib.merit(problem, solution)  # validates both
+    _core.merit(problem, solution)  # validates both
     data = Data.of(problem)
     r, u = completed(data, solution)
     q = data.local.q
     work = float(r @ (u + q)) / 2
     nan = float("nan")
-    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         M = data.matrices["M"]
-        v, still = velocity(problem, data, solution), _solve(data, problem.f)
+        v, still = velocity(problem, data, solution), _velocity_of(data, problem.f)
         kinetic, free = float(v @ (M @ v)) / 2, float(still @ (M @ still)) / 2
         prescribed = float(r @ problem.w)
         bilateral = 0.0

@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-import fclib
+from fclib import _core, _solve
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
-Global: TypeAlias = fclib.GlobalProblem | fclib.GlobalRollingProblem
+Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
+Global: TypeAlias = _core.GlobalProblem | _core.GlobalRollingProblem
 
 SYMMETRIC = 1e-12  # max |A - A^T| / max |A| up to which a matrix counts as symmetric
 
@@ -42,13 +42,13 @@ def asymmetry(a: Any) -> float:
 class Data:
     """A problem, and its local form."""
 
-    problem: fclib.Problem
+    problem: _solve.Problem
     local: Local  # the problem itself, or condensed
 
     @classmethod
-    def of(cls, problem: fclib.Problem) -> Data:
+    def of(cls, problem: _solve.Problem) -> Data:
         """Raises fclib.UnsuitableError where M is singular."""
-        if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
             return cls(problem, problem.condense())
         return cls(problem, problem)
 
@@ -78,7 +78,7 @@ class Data:
     def friction(self) -> list[tuple[Array, slice]]:
         """The coefficients, each with the components of a contact that it bounds."""
         d = self.d
-        if isinstance(self.local, fclib.LocalRollingProblem):
+        if isinstance(self.local, _core.LocalRollingProblem):
             half = (d + 1) // 2
             return [(self.local.mu, slice(1, half)), (self.local.mu_r, slice(half, d))]
         return [(self.local.mu, slice(1, d))]

@@ -24,7 +24,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
-import fclib
+from fclib import _core, _solve
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
 
@@ -85,7 +85,7 @@ class Certificate:
         return int(np.count_nonzero(self.y))
 
 
-def farkas(problem: fclib.Problem, y: Array, z: Array | None = None) -> Certificate | None:
+def farkas(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate | None:
     """The proof that y (and z) are, judged from the data alone; None where they prove nothing.
 
     Args:
@@ -100,7 +100,7 @@ def farkas(problem: fclib.Problem, y: Array, z: Array | None = None) -> Certific
     local, d, p = data.local, data.d, problem.p
     y = np.asarray(y, dtype=float)
     if y.shape != (problem.nc,) or (z is not None and np.shape(z) != (p,)):
-        raise fclib.ProblemError(f"y must have nc = {problem.nc} entries, z p = {p}")
+        raise _core.ProblemError(f"y must have nc = {problem.nc} entries, z p = {p}")
     if not np.isfinite(y).all() or (y < 0).any():
         return None
     normal = np.zeros(problem.m)
@@ -249,9 +249,9 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
 def _reachable(data: Data) -> tuple[sp.csr_array, Array, sp.csr_array, Array]:
     """A, c, B, e: velocities are A x + c for all x with B x = e."""
     problem, local = data.problem, data.local
-    bodies = isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
+    bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
     if bodies and asymmetry(data.matrices["M"]) <= SYMMETRIC:
-        assert isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem))
+        assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
         G, b = data.matrices.get("G"), problem.b
         if G is None or b is None:
             return data.matrices["H"].T.tocsr(), problem.w, _nothing(problem.n), np.zeros(0)
@@ -311,7 +311,7 @@ class Existence:
     verdict: str
     reason: str
     certificate: Certificate | None = field(default=None, repr=False)
-    solution: fclib.Solution | None = field(default=None, repr=False, compare=False)
+    solution: _core.Solution | None = field(default=None, repr=False, compare=False)
     error: float = float("nan")
 
 
@@ -321,8 +321,8 @@ def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> E
     solution, error, proof = None, float("nan"), None
     why = ""
     try:
-        result = fclib.solve(problem, "auto", tol, time_limit=time_limit)
-    except fclib.UnsuitableError as refused:
+        result = _solve.solve(problem, "auto", tol, time_limit=time_limit)
+    except _core.UnsuitableError as refused:
         why = f"no solver takes it: {refused}"
     else:
         error = result.error

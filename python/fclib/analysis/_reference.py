@@ -4,10 +4,8 @@ The first algorithm gives the solution, the second one confirms it: it shares no
 first, and its velocity must agree. It starts from zero; where it ends nowhere, or at another
 solution (frictional problems may have several), from the first's reactions rounded to three digits.
 
-Where the reactions of a velocity are not unique, the solution has the one of least norm: min ||r||
-over W r = W r*, r in the faces of the cones that the velocity leaves open - none where the contact
-opens, a ray where it slides, K where it sticks. That is a conic program, solved island by island;
-its answer is brought into the kernel of W on these faces, where W r keeps its value to rounding.
+Where the reactions of a velocity are not unique, the solution has the one of least norm
+(`_least_norm.py`).
 """
 
 from __future__ import annotations
@@ -18,19 +16,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg import qr
 
-import fclib
-from fclib.analysis._conic import Program
+from fclib import _core, _registry, _solve
 from fclib.analysis._contacts import completed
 from fclib.analysis._data import Array, Data
-from fclib.analysis._spectrum import DENSE, EPS
+from fclib.analysis._least_norm import least_norm
 
 TARGET = 1e-12  # of the merit
 CONFIRMED = 1e2  # the confirming error may be this many times the target
 AGREE = 1e-8  # distance of the velocities, relative to max(||u||, ||q||)
-MOVES = 1e-9  # a velocity above this, relative to the same, opens or slides
 DIGITS = 3  # of the reactions that a second try starts from
 
 # what runs inside the default solver, in the families of the others
@@ -82,9 +76,9 @@ class Reference:
         reason: why it is not certified, empty where it is.
     """
 
-    problem: fclib.Problem = field(repr=False, compare=False)
-    solution: fclib.Solution | None = field(repr=False, compare=False)
-    merit: fclib.Merit | None
+    problem: _solve.Problem = field(repr=False, compare=False)
+    solution: _core.Solution | None = field(repr=False, compare=False)
+    merit: _core.Merit | None
     target: float
     runs: tuple[Confirmation, ...]
     confirmed: bool
@@ -137,7 +131,7 @@ class Reference:
     def attributes(self) -> dict[str, float | str]:
         """What the file says of /solution: the merits, the algorithms, versions and date."""
         if self.solution is None or self.merit is None:
-            raise fclib.ProblemError("there is no solution to speak of")
+            raise _core.ProblemError("there is no solution to speak of")
         merits = {
             f"merit_{name}": float(getattr(self.merit, name))
             for name in (
@@ -160,7 +154,7 @@ class Reference:
         now = datetime.datetime.now(datetime.timezone.utc)
         return {
             **merits,
-            "merit_1": fclib.merit_1(self.problem, self.solution),
+            "merit_1": _core.merit_1(self.problem, self.solution),
             "algorithms": "; ".join(said[:1] + said[-1:] if self.confirmed else said[:1]),
             "certified": "yes" if self.certified else f"no: {self.reason}",
             "reaction": self.reaction,
@@ -172,7 +166,7 @@ class Reference:
 def versions() -> str:
     """Of fclib and of what it computes with."""
     names = ("numpy", "scipy", "clarabel")
-    found = [f"fclib {fclib.__version__}"]
+    found = [f"fclib {_core.version}"]
     for name in names:
         try:
             found.append(f"{name} {importlib.metadata.version(name)}")
@@ -182,7 +176,7 @@ def versions() -> str:
 
 
 def reference(
-    problem: fclib.Problem, *, target: float = TARGET, time_limit: float = 10.0
+    problem: _solve.Problem, *, target: float = TARGET, time_limit: float = 10.0
 ) -> Reference:
     """The reference solution of a problem.
 
@@ -205,8 +199,8 @@ def reference(
         return Reference(problem, None, None, target, (run,), False, "none", 0, (), reason)
     solution = first.solution
     runs, confirmed, others = _confirm(data, solution, run, target, time_limit)
-    reaction, freedom, solution = _least(data, solution, target)
-    merit = fclib.merit(problem, solution)
+    reaction, freedom, solution = least_norm(data, solution, target)
+    merit = _core.merit(problem, solution)
     reasons = []
     if not merit.error <= target:
         reasons.append(f"the error {merit.error:.1e} is above {target:.0e}")
@@ -227,10 +221,10 @@ def reference(
     )
 
 
-def _families(result: fclib.Result) -> tuple[str, ...]:
+def _families(result: _core.Result) -> tuple[str, ...]:
     """What a solver is made of; of a chain, what worked on the solution."""
     if result.solver != "auto":
-        return (fclib.find_solver(result.solver).family,)
+        return (_registry.find_solver(result.solver).family,)
     found: set[str] = set()
     for stage in result.stages:
         # gauss-seidel comes first in nearly every chain: it counts where it ended the work
@@ -239,15 +233,15 @@ def _families(result: fclib.Result) -> tuple[str, ...]:
     return tuple(sorted(found)) or ("none",)
 
 
-def _first(data: Data, target: float, time_limit: float) -> tuple[fclib.Result, Confirmation]:
+def _first(data: Data, target: float, time_limit: float) -> tuple[_core.Result, Confirmation]:
     """The best result of the first algorithms, up to one within the target."""
     best = None
     for name in FIRST:
         try:
-            result = fclib.solve(data.problem, name, target / 10, time_limit=time_limit)
+            result = _solve.solve(data.problem, name, target / 10, time_limit=time_limit)
             if best is not None and not result.error < best.error:
                 continue
-        except fclib.UnsuitableError:
+        except _core.UnsuitableError:
             if name == "auto":
                 raise
             continue
@@ -260,7 +254,7 @@ def _first(data: Data, target: float, time_limit: float) -> tuple[fclib.Result, 
 
 
 def _confirm(
-    data: Data, solution: fclib.Solution, run: Confirmation, target: float, time_limit: float
+    data: Data, solution: _core.Solution, run: Confirmation, target: float, time_limit: float
 ) -> tuple[tuple[Confirmation, ...], bool, tuple[float, ...]]:
     """Runs of other families until one agrees, and the velocities of other solutions."""
     _, u = completed(data, solution)
@@ -272,12 +266,12 @@ def _confirm(
         # what does not come soon from zero is not waited for
         limit = min(time_limit, 2.0) if start == "zero" else time_limit
         for name in SECOND:
-            info = fclib.find_solver(name)
+            info = _registry.find_solver(name)
             if info.family in run.families or not _takes(info, data):
                 continue
             try:
-                result = fclib.solve(data.problem, name, target, time_limit=limit, guess=guess)
-            except fclib.UnsuitableError:
+                result = _solve.solve(data.problem, name, target, time_limit=limit, guess=guess)
+            except _core.UnsuitableError:
                 continue
             difference = float(np.linalg.norm(completed(data, result.solution)[1] - u)) / speed
             found = Confirmation(
@@ -291,188 +285,14 @@ def _confirm(
     return tuple(tried), False, tuple(others)
 
 
-def _takes(info: fclib.SolverInfo, data: Data) -> bool:
+def _takes(info: _core.SolverInfo, data: Data) -> bool:
     rolling = len(data.friction) > 1
     return data.d in (info.rolling_dimensions if rolling else info.dimensions)
 
 
-def _rounded(solution: fclib.Solution) -> fclib.Solution:
+def _rounded(solution: _core.Solution) -> _core.Solution:
     def short(x: Array) -> Array:
         return np.array([float(f"{value:.{DIGITS - 1}e}") for value in x])
 
     multiplier = None if solution.l is None else short(solution.l)
-    return fclib.Solution(r=short(solution.r), l=multiplier)
-
-
-# ---- the reaction of least norm
-
-
-def _least(data: Data, solution: fclib.Solution, target: float) -> tuple[str, int, fclib.Solution]:
-    """Whether the reactions of the velocity are unique, how free they are, and the least ones."""
-    problem, d = data.problem, data.d
-    if problem.nc == 0:
-        return "unique", 0, solution
-    _, u = completed(data, solution)
-    islands = data.local.islands()
-    local_W, r = data.W.tocsr(), solution.r.copy()
-    freedom, skipped = 0, False
-    threshold = MOVES * max(float(np.linalg.norm(u)), data.speed)
-    V = data.matrices.get("V")
-    order = np.argsort(islands.contact, kind="stable")
-    for island in np.split(order, np.cumsum(np.bincount(islands.contact))[:-1]):
-        rows = (d * island[:, None] + np.arange(d)).ravel()
-        if not r[rows].any():
-            continue
-        if rows.size > DENSE:
-            skipped = True
-            continue
-        block = local_W[rows][:, rows].toarray()
-        if V is not None:
-            # lambda may change too, and no velocity of it
-            block = _held(block, V.tocsr()[rows].toarray(), data.matrices["R"].toarray())
-        faces = _faces(data, island, r, u, threshold)
-        kernel = _kernel(block @ faces.basis)
-        if kernel.shape[1] == 0:
-            continue
-        freedom += kernel.shape[1]
-        least = _least_in(data, faces, block, r[rows], kernel)
-        if least is not None and np.linalg.norm(least) <= np.linalg.norm(r[rows]):
-            r[rows] = least
-    if freedom == 0:
-        return ("one of several" if skipped else "unique"), 0, solution
-    least_one = _complete(data, fclib.Solution(r=r, l=_multiplier(data, r)))
-    if skipped or not fclib.merit(problem, least_one).error <= target:
-        return "one of several", freedom, solution
-    return "minimum norm", freedom, least_one
-
-
-def _held(W: Array, V: Array, R: Array) -> Array:
-    """W - V R^-1 V^T."""
-    return W - V @ np.linalg.solve(R, V.T)
-
-
-def _multiplier(data: Data, r: Array) -> Array | None:
-    """Lambda from r."""
-    if "V" not in data.matrices or data.local.s is None:
-        return None
-    V, R = data.matrices["V"], data.matrices["R"]
-    return np.asarray(-np.linalg.solve(R.toarray(), V.T @ r + data.local.s))
-
-
-def _complete(data: Data, solution: fclib.Solution) -> fclib.Solution:
-    """With u, recomputed, and v of a global problem."""
-    problem = data.problem
-    _, u = completed(data, solution)
-    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
-        from fclib.analysis._contacts import velocity
-
-        v = velocity(problem, data, solution)
-        return solution.replace(v=v, u=data.matrices["H"].T @ v + problem.w)
-    return solution.replace(u=u)
-
-
-@dataclass(frozen=True)
-class Faces:
-    """The reactions that a velocity leaves open, contact by contact.
-
-    Attributes:
-        basis: (d contacts, directions): where nothing slides, unit vectors.
-        sticking: positions in the island of the contacts that may have any reaction in K.
-        rays: the directions that are those of sliding contacts: not negative.
-        contacts: of the island.
-    """
-
-    basis: Array
-    sticking: Any
-    rays: Any
-    contacts: Any
-
-
-def _faces(data: Data, island: Any, r: Array, u: Array, threshold: float) -> Faces:
-    d = data.d
-    entries: list[tuple[int, int, float]] = []
-    sticking, rays = [], []
-    count = 0
-    for at, contact in enumerate(island):
-        own = slice(d * contact, d * contact + d)
-        reaction, speed = r[own], u[own]
-        if not reaction.any() or speed[0] > threshold:
-            continue
-        if np.linalg.norm(speed[1:]) > threshold:
-            # it slides, or rolls: its reaction keeps its direction
-            direction = reaction / np.linalg.norm(reaction)
-            entries += [(d * at + k, count, float(direction[k])) for k in range(d)]
-            rays.append(count)
-            count += 1
-            continue
-        entries += [(d * at + k, count + k, 1.0) for k in range(d)]
-        sticking.append(at)
-        count += d
-    basis = np.zeros((d * len(island), count))
-    for row, column, value in entries:
-        basis[row, column] = value
-    return Faces(basis, np.array(sticking, int), np.array(rays, int), island)
-
-
-def _kernel(a: Array) -> Array:
-    """An orthonormal basis of the kernel."""
-    if a.shape[1] == 0:
-        return np.zeros((0, 0))
-    # the rows' complement: A^T P = Q R with falling |R_kk|
-    q, upper, _ = qr(a.T, pivoting=True)
-    values = abs(np.diag(upper))
-    limit = 10 * max(a.shape) * EPS * values.max(initial=0)
-    return np.asarray(q[:, int((values > limit).sum()) :])
-
-
-def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Array | None:
-    """The reaction of least norm with the same W r, or None where it was not found.
-
-    The conic program leaves W r and the cones by its tolerance. Its answer is brought into the
-    kernel, and Newton steps of least norm on the constraints that are broken end at rounding.
-    """
-    d, B = data.d, sp.csr_array(faces.basis)
-    size = B.shape[1]
-    scale = float(np.linalg.norm(r))
-    start = faces.basis.T @ r / scale  # the columns are orthonormal
-    A = W @ faces.basis
-    A = sp.csr_array(np.where(abs(A) > EPS * abs(A).max(), A, 0) / abs(A).max())
-    program = Program(size)
-    program.equal(A, A @ start)
-    at = faces.sticking
-    limits = [(mu[faces.contacts[at]], list(range(d))[part]) for mu, part in data.friction]
-    for mu, components in limits:
-        stacked = sp.vstack(
-            [sp.diags_array(mu) @ B[d * at], *(B[d * at + k] for k in components)], format="csr"
-        )
-        length = 1 + len(components)
-        order = np.arange(length * at.size).reshape(length, -1).T.ravel()
-        program.second_order(stacked[order], np.zeros(order.size), length)
-    program.nonnegative(B[d * at], np.zeros(at.size))
-    rays = sp.csr_array(sp.eye_array(size, format="csr")[faces.rays])
-    program.nonnegative(rays, np.zeros(faces.rays.size))
-    answer = program.solve(np.zeros(size), sp.eye_array(size, format="csc"), tol=1e-11)
-    z = kernel.T @ (np.array(answer.x) - start)
-    if not np.isfinite(z).all():
-        return None
-    for _ in range(10):
-        c = start + kernel @ z
-        x = faces.basis @ c
-        gaps, slopes = [], []
-        for mu, components in limits:
-            tangent = np.stack([x[d * at + k] for k in components], axis=1)
-            norm = np.linalg.norm(tangent, axis=1)
-            gap = mu * x[d * at] - norm
-            for k in np.flatnonzero(gap < -EPS * norm):
-                slope = mu[k] * faces.basis[d * at[k]]
-                for j, component in enumerate(components):
-                    slope = slope - tangent[k, j] / norm[k] * faces.basis[d * at[k] + component]
-                gaps.append(gap[k])
-                slopes.append(slope @ kernel)
-        for k in faces.rays[c[faces.rays] < 0]:
-            gaps.append(c[k])
-            slopes.append(kernel[k])
-        if not gaps:
-            break
-        z = z - np.linalg.lstsq(np.array(slopes), np.array(gaps), rcond=1e-8)[0]
-    return scale * x
+    return _core.Solution(r=short(solution.r), l=multiplier)

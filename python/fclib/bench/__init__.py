@@ -1,15 +1,34 @@
 """The bench: solvers are run here, and judged by the merit, never by themselves.
 
-    campaign -> job -> pool | cluster -> keeper -> worker -> keeper -> record -> store -> profiles
+    campaign ──> job ──> pool | cluster ──> supervisor ──> worker: the solver
+                                                │
+    profiles, plots <── store <── record <──────┘ the merit
 
-One run by hand is `run`; thousands are a `Campaign` and `conduct`. A keeper is a process that forks
-a worker, hands it a job, watches its time and memory, and judges what it returns.
+One run by hand is `run`; thousands are a `Campaign` and `run_campaign`. A supervisor is a process
+that forks a worker, hands it a job, watches its time and memory, and judges what it returns.
+
+campaign.py     what is to be run: a TOML file becomes jobs. Needs problems.py, made.py, modules.py
+problems.py     the files that a campaign names, and what it knows of the problem in each
+made.py         problems that a campaign has made: steps of a scene, random ones
+modules.py      files of Python with solvers of the user's own
+job.py          what travels: a job there, a record back, and the statuses of a record
+runner.py       runs a campaign: what the store lacks goes to the pool or the cluster
+pool.py         supervisors on this machine, several at once
+cluster.py      the same in the workers of Dask, on many machines
+supervisor.py   the process that watches a worker, and judges. Knows no campaign
+worker.py       the process that solves
+processes.py    processes as Linux shows them
+machine.py      what a record says of its machine
+store.py        one SQLite file, one row a run
+profiles.py     what the runs of a store say. Knows rows alone
+plots.py        profiles as pictures
+single.py       one run by hand, in this process
 """
 
 from fclib.bench.campaign import Campaign, CampaignError
-from fclib.bench.conduct import Progress, conduct
 from fclib.bench.job import STATUSES, Job, Limits, ProblemFacts, Record, SolverChoice
-from fclib.bench.run import COLUMNS, Run, run
+from fclib.bench.runner import Progress, run_campaign
+from fclib.bench.single import COLUMNS, Run, run
 from fclib.bench.store import Store, StoreError
 
 __all__ = [
@@ -26,6 +45,6 @@ __all__ = [
     "SolverChoice",
     "Store",
     "StoreError",
-    "conduct",
     "run",
+    "run_campaign",
 ]

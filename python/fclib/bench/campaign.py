@@ -21,11 +21,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import fclib
-from fclib.bench import problems
+from fclib import _core, _registry
+from fclib.bench import made, problems
 from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
+from fclib.bench.modules import load_modules
 from fclib.bench.store import Store
-from fclib.bench.worker import load_modules
 
 PUBLISHED = Path(__file__).with_name("campaigns")
 NUMBERS = ("time_limit", "wall_limit", "memory")  # that a group of problems may set for itself
@@ -51,7 +51,7 @@ MADE = {
 }
 
 
-class CampaignError(fclib.Error, ValueError):
+class CampaignError(_core.Error, ValueError):
     """A campaign asks for what cannot be done, or what is not understood."""
 
 
@@ -140,7 +140,7 @@ class Campaign:
         modules = tuple(str((base / m).resolve()) for m in _texts(entries, "modules"))
         try:
             load_modules(list(modules))
-        except fclib.SolverError as error:
+        except _registry.SolverError as error:
             raise CampaignError(f"modules: {error}") from None
         choices, missing = _solvers(entries.get("solvers"), modules)
         rows = _tables(entries)
@@ -179,7 +179,7 @@ class Campaign:
         for group in self.groups:
             try:
                 paths = self._paths(group)
-            except fclib.FileError as error:
+            except _core.FileError as error:
                 if not group.optional:
                     raise
                 tell(f"left out: {error}")
@@ -217,20 +217,33 @@ class Campaign:
     def _paths(self, group: Group) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
         if group.simulate is not None:
-            paths += problems.simulated(
+            paths += made.simulated(
                 family=group.simulate["family"],
                 parameters=group.simulate.get("parameters", {}),
                 steps=group.simulate["steps"],
                 seed=group.simulate.get("seed", 0),
             )
         if group.planted is not None:
-            paths += problems.planted(
+            paths += made.planted(
                 count=group.planted["count"],
                 contacts=group.planted["contacts"],
                 spacedim=group.planted.get("spacedim", 3),
                 seed=group.planted.get("seed", 0),
             )
         return paths
+
+
+def published_means(store: str | Path) -> dict[tuple[str, float], float]:
+    """Means of the fastest solver, by family and tolerance, which the campaigns quote."""
+    found = {}
+    with Store(store, create=False) as opened:
+        for text in opened.texts():
+            campaign = toml().loads(text)
+            for group in campaign.get("problems", ()):
+                for tol in group.get("tolerances", campaign.get("tolerances", ())):
+                    if "published_mean" in group:
+                        found[group.get("family", ""), float(tol)] = float(group["published_mean"])
+    return found
 
 
 def toml() -> Any:
@@ -348,9 +361,9 @@ def _solvers(
         if not isinstance(options, Mapping):
             raise CampaignError(f"{where}options: is no table, as in options = {{ name = value }}")
         try:
-            info = fclib.find_solver(name)
+            info = _registry.find_solver(name)
             info.check_options(options)
-        except fclib.OptionError as error:
+        except _core.OptionError as error:
             if not entries.get("optional", False):
                 raise CampaignError(f"{where[:-1]}: {error}") from None
             missing.append(str(error))
@@ -385,10 +398,10 @@ def parse_solver(text: str) -> dict[str, Any]:
     return {"name": name, "options": options}
 
 
-def version_of(info: fclib.SolverInfo, modules: Sequence[str] = ()) -> str:
+def version_of(info: _core.SolverInfo, modules: Sequence[str] = ()) -> str:
     """What tells two versions of a solver apart: its package's, or the digest of its file."""
     if info.origin == "fclib":
-        return fclib.__version__
+        return _core.version
     file: str | None = next((path for path in modules if Path(path).stem == info.origin), None)
     if info.name.startswith("cmd:"):
         file = shutil.which(shlex.split(info.name.removeprefix("cmd:"))[0])

@@ -1,8 +1,8 @@
 """Jobs on a Dask cluster: the same campaign on many machines.
 
-A task is a job; in the worker of Dask it is done by a keeper, as on one machine, so that no solver
-harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by others. The
-records come back to the one process that writes the store.
+A task is a job; in the worker of Dask it is done by a supervisor, as on one machine, so that no
+solver harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by
+others. The records come back to the one process that writes the store.
 
 The problems are read from where the campaign found them, a folder that all machines share, or are
 sent: then each worker gets the bytes of a file once, and keeps it in its cache folder.
@@ -22,11 +22,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-import fclib
-from fclib.bench import problems
-from fclib.bench.conduct import Runner
-from fclib.bench.job import Job, Record
-from fclib.bench.pool import Hand
+from fclib import _core
+from fclib.bench import made
+from fclib.bench.job import Job, Record, Runner
+from fclib.bench.pool import SupervisorClient
 
 AHEAD = 3  # jobs a thread of the cluster that are on their way at once
 PATIENCE = 20.0  # [s] for a scheduler to answer
@@ -34,7 +33,7 @@ RETRIES = 5  # of a job whose worker of Dask dies
 
 # ---- in the workers of Dask
 
-_idle: list[Hand] = []  # one keeper for each thread that has been at work
+_idle: list[SupervisorClient] = []  # one supervisor for each thread that has been at work
 _lock = threading.Lock()
 
 
@@ -44,17 +43,17 @@ def do(job: Job, data: bytes | None = None) -> Record:
         path = _kept(job.problem.hash, data)
         job = dataclasses.replace(job, problem=dataclasses.replace(job.problem, path=str(path)))
     with _lock:
-        hand = _idle.pop() if _idle else Hand(job.threads)
+        supervisor = _idle.pop() if _idle else SupervisorClient(job.threads)
     try:
-        return hand.do(job)
+        return supervisor.do(job)
     finally:
         with _lock:
-            _idle.append(hand)
+            _idle.append(supervisor)
 
 
 def _kept(name: str, data: bytes) -> Path:
     """The file of these bytes in the cache folder."""
-    folder = problems.cache_folder() / "sent"
+    folder = made.cache_folder() / "sent"
     path = folder / f"{name}.hdf5"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,7 +68,7 @@ def _kept(name: str, data: bytes) -> Path:
 
 
 def runner(client: Any, send: bool = False) -> Runner:
-    """What `conduct` needs to run its jobs on a cluster.
+    """What `run_campaign` needs to run its jobs on a cluster.
 
     Args:
         client: a ``distributed.Client``.
@@ -138,7 +137,7 @@ def on_scheduler(address: str, send: bool = False) -> Iterator[Runner]:
     try:
         client = Client(address, timeout=PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
-        raise fclib.Error(f"{address}: no Dask scheduler answers: {error}") from None
+        raise _core.Error(f"{address}: no Dask scheduler answers: {error}") from None
     with client:
         yield runner(client, send)
 
@@ -166,7 +165,7 @@ def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
         cores = int(given.pop("cores", "1"))
         processes = int(given.pop("processes", cores))
     except ValueError as error:
-        raise fclib.OptionError(
+        raise _core.OptionError(
             f"slurm: workers, cores and processes are numbers: {error}"
         ) from None
     known = {name: given.pop(name) for name in ("queue", "account", "walltime") if name in given}
@@ -191,12 +190,12 @@ def _ask_sbatch(script: str) -> None:
         try:
             asked = subprocess.run(command, capture_output=True, text=True, check=False)
         except OSError as error:
-            raise fclib.Error(
+            raise _core.Error(
                 f"slurm: sbatch: {error.strerror}; --slurm needs a machine that submits to Slurm"
             ) from None
     if asked.returncode:
         words = " ".join(asked.stderr.replace("sbatch: ", "").replace("error: ", "").split())
-        raise fclib.Error(f"slurm: sbatch refuses the job: {words}")
+        raise _core.Error(f"slurm: sbatch refuses the job: {words}")
 
 
 @contextmanager
@@ -216,7 +215,7 @@ def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]
         with Client(cluster) as client:
             yield runner(client, send)
     except (OSError, RuntimeError) as error:
-        raise fclib.Error(f"slurm: {error}") from error
+        raise _core.Error(f"slurm: {error}") from error
     finally:
         with suppress(Exception):
             cluster.close()

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 # how a run may end; the first group is said by the solver and confirmed by the merit
 STATUSES: Mapping[str, str] = MappingProxyType(
@@ -174,3 +174,7 @@ class Record:
     def solved(self) -> bool:
         """Whether the error, recomputed, met the tolerance within the limits."""
         return self.status == "converged"
+
+
+# does jobs, here or elsewhere, and yields each with its record as it is done
+Runner: TypeAlias = Callable[[Iterator[Job]], Iterator[tuple[Job, Record]]]

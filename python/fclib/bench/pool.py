@@ -1,4 +1,4 @@
-"""Jobs on this machine: several keepers at once, each a process of its own."""
+"""Jobs on this machine: several supervisors at once, each a process of its own."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ THREADS = (
     "NUMEXPR_NUM_THREADS",
     "RAYON_NUM_THREADS",
 )
-ATTEMPTS = 3  # at a job whose keeper is killed from outside
+ATTEMPTS = 3  # at a job whose supervisor is killed from outside
 
 
-class Hand:
-    """The other end of a keeper, which is started when it is needed."""
+class SupervisorClient:
+    """The other end of a supervisor, which is started when it is needed."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads
@@ -49,7 +49,7 @@ class Hand:
         ours, theirs = socket.socketpair()
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "fclib.bench.keeper", str(theirs.fileno())],
+                [sys.executable, "-m", "fclib.bench.supervisor", str(theirs.fileno())],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
@@ -59,7 +59,7 @@ class Hand:
         self.link = Connection(ours.detach())
 
     def take(self) -> tuple[Job, Record] | None:
-        """What came of the job; None where the keeper is gone, and the job given anew."""
+        """What came of the job; None where the supervisor is gone, and the job given anew."""
         assert self.job is not None
         assert self.link is not None
         try:
@@ -69,7 +69,7 @@ class Hand:
             if self.attempts < ATTEMPTS:
                 self.give(self.job)
                 return None
-            record = Record("killed", "its keeper was killed, as often as it was tried")
+            record = Record("killed", "its supervisor was killed, as often as it was tried")
         job, self.job, self.attempts = self.job, None, 0
         return job, record
 
@@ -81,7 +81,7 @@ class Hand:
         return taken[1]
 
     def end(self) -> None:
-        """Let the keeper go, which kills what it runs."""
+        """Let the supervisor go, which kills what it runs."""
         if self.link is not None:
             self.link.close()
             self.link = None
@@ -99,34 +99,34 @@ def run(jobs: Iterator[Job], processes: int) -> Iterator[tuple[Job, Record]]:
 
     Where the iteration is given up, what is running is killed.
     """
-    hands = [Hand(0) for _ in range(processes)]
-    busy: dict[Connection, Hand] = {}
+    supervisors = [SupervisorClient(0) for _ in range(processes)]
+    busy: dict[Connection, SupervisorClient] = {}
 
-    def next_one(hand: Hand) -> None:
+    def next_one(supervisor: SupervisorClient) -> None:
         job = next(jobs, None)
         if job is not None:
-            hand.give(job)
-            assert hand.link is not None
-            busy[hand.link] = hand
+            supervisor.give(job)
+            assert supervisor.link is not None
+            busy[supervisor.link] = supervisor
 
     try:
-        for hand in hands:
-            next_one(hand)
+        for supervisor in supervisors:
+            next_one(supervisor)
         while busy:
             for link in wait(list(busy)):
                 assert isinstance(link, Connection)
-                hand = busy.pop(link)
-                taken = hand.take()
+                supervisor = busy.pop(link)
+                taken = supervisor.take()
                 if taken is None:
-                    assert hand.link is not None
-                    busy[hand.link] = hand
+                    assert supervisor.link is not None
+                    busy[supervisor.link] = supervisor
                     continue
-                next_one(hand)  # the worker need not wait for what becomes of the record
+                next_one(supervisor)  # the worker need not wait for what becomes of the record
                 yield taken
     finally:
-        for hand in hands:
-            if hand.link is not None:
-                hand.link.close()
-                hand.link = None
-        for hand in hands:
-            hand.end()
+        for supervisor in supervisors:
+            if supervisor.link is not None:
+                supervisor.link.close()
+                supervisor.link = None
+        for supervisor in supervisors:
+            supervisor.end()

@@ -25,8 +25,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-import fclib
-from fclib.bench.campaign import toml
+from fclib import _core
 from fclib.bench.store import Store
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -45,7 +44,7 @@ RESAMPLES = 2000
 VIRTUAL_BEST = "virtual best"
 
 
-class ProfileError(fclib.Error, ValueError):
+class ProfileError(_core.Error, ValueError):
     """There is nothing to be compared."""
 
 
@@ -357,19 +356,6 @@ def failures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         {"solver": solver, **{status: own[status] for status in statuses}}
         for solver, own in counts.items()
     ]
-
-
-def published(store: str | Path) -> dict[tuple[str, float], float]:
-    """Means of the fastest solver, by family and tolerance, which the campaigns quote."""
-    found = {}
-    with Store(store, create=False) as opened:
-        for text in opened.texts():
-            campaign = toml().loads(text)
-            for group in campaign.get("problems", ()):
-                for tol in group.get("tolerances", campaign.get("tolerances", ())):
-                    if "published_mean" in group:
-                        found[group.get("family", ""), float(tol)] = float(group["published_mean"])
-    return found
 
 
 def families(

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fclib
+from fclib import _core
 from fclib.bench.job import MERITS, Job, ProblemFacts, Record
 
 VERSION = 1  # of the schema
@@ -97,7 +97,7 @@ RUN = (
 )
 
 
-class StoreError(fclib.Error, ValueError):
+class StoreError(_core.Error, ValueError):
     """A file is no store, or one of another version."""
 
 

@@ -1,20 +1,18 @@
 """The process that solves: it is limited, watched and never trusted.
 
-It is forked by a keeper, and talks to it over a socket, in JSON and in the bytes of arrays. It
+It is forked by a supervisor, and talks to it over a socket, in JSON and in the bytes of arrays. It
 reads the problem, sets its own limits, says that it starts, runs the solver, and sends what that
-returned; the keeper judges it.
+returned; the supervisor judges it.
 """
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 import os
 import re
 import resource
 import signal
-import sys
 import time
 from collections import OrderedDict
 from pathlib import Path
@@ -24,8 +22,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import fclib
+from fclib import _core, _digest, _registry, _solve
 from fclib.bench import processes
+from fclib.bench.modules import load_modules
 
 CACHE = 256e6  # [bytes] of problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
@@ -42,9 +41,9 @@ class Problems:
     """The problems read last, while they are small enough together."""
 
     def __init__(self) -> None:
-        self.kept: OrderedDict[tuple[str, str], tuple[fclib.Problem, int]] = OrderedDict()
+        self.kept: OrderedDict[tuple[str, str], tuple[_solve.Problem, int]] = OrderedDict()
 
-    def get(self, order: dict[str, Any]) -> fclib.Problem:
+    def get(self, order: dict[str, Any]) -> _solve.Problem:
         """The problem of an order.
 
         Raises:
@@ -52,9 +51,9 @@ class Problems:
         """
         key = (order["path"], order["hash"])
         if key not in self.kept:
-            problem = fclib.read(order["path"], order["kind"])
-            if fclib.digest(problem) != order["hash"]:
-                raise fclib.FileError(
+            problem = _core.read(order["path"], order["kind"])
+            if _digest.digest(problem) != order["hash"]:
+                raise _core.FileError(
                     f"{order['path']}: has changed since the campaign looked at it; start it again"
                 )
             self.kept[key] = problem, Path(order["path"]).stat().st_size
@@ -62,29 +61,6 @@ class Problems:
         while len(self.kept) > 1 and sum(size for _, size in self.kept.values()) > CACHE:
             self.kept.popitem(last=False)
         return self.kept[key][0]
-
-
-def load_modules(paths: list[str]) -> None:
-    """Import files of Python, once, so that the solvers in them are registered.
-
-    Raises:
-        fclib.SolverError: a file cannot be imported.
-    """
-    for path in paths:
-        name = Path(path).stem
-        known = sys.modules.get(name)
-        if known is not None and getattr(known, "__file__", None) == path:
-            continue
-        spec = importlib.util.spec_from_file_location(name, path)
-        if spec is None or spec.loader is None:
-            raise fclib.SolverError(f"{path}: is no file of Python")
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[name] = module
-        try:
-            spec.loader.exec_module(module)
-        except Exception as error:
-            del sys.modules[name]
-            raise fclib.SolverError(f"{path}: {type(error).__name__}: {error}") from error
 
 
 def send(link: socket, message: bytes) -> None:
@@ -105,7 +81,7 @@ def receive(link: socket) -> bytes:
 
 
 def limit(order: dict[str, Any]) -> None:
-    """A limit of the kernel on the address space, at twice the memory that the keeper kills at.
+    """A limit of the kernel on the address space, at twice the memory that the supervisor kills at.
 
     It is that of this process and of what it has left from earlier runs, as the interpreter of
     another package's solver; what it starts later inherits it.
@@ -123,36 +99,36 @@ def unlimit() -> None:
         processes.lower(pid, resource.RLIMIT_AS, resource.RLIM_INFINITY)
 
 
-def serve(keeper: socket, problems: Problems) -> None:
-    """Do what comes, until the keeper is gone."""
+def serve(supervisor: socket, problems: Problems) -> None:
+    """Do what comes, until the supervisor is gone."""
     processes.die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the campaign's
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     while True:
         try:
-            order = json.loads(receive(keeper))
+            order = json.loads(receive(supervisor))
         except (EOFError, OSError):
             os._exit(0)
-        reply, arrays = answer(order, problems, keeper)
+        reply, arrays = answer(order, problems, supervisor)
         unlimit()
-        send(keeper, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
+        send(supervisor, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
         for array in arrays:
-            send(keeper, array.tobytes())
+            send(supervisor, array.tobytes())
 
 
 def answer(
-    order: dict[str, Any], problems: Problems, keeper: socket
+    order: dict[str, Any], problems: Problems, supervisor: socket
 ) -> tuple[dict[str, Any], list[npt.NDArray[np.float64]]]:
     """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
     try:
         problem = problems.get(order)
-    except (fclib.Error, OSError, MemoryError) as error:
+    except (_core.Error, OSError, MemoryError) as error:
         return {"status": "unreadable", "message": one_line(error)}, []
     try:
         load_modules(order["modules"])
-        solver = fclib.find_solver(order["solver"])
+        solver = _registry.find_solver(order["solver"])
         solver.check_options(order["options"])
-    except fclib.Error as error:
+    except _core.Error as error:
         return {"status": "error", "message": one_line(error)}, []
 
     processes.release_memory()
@@ -160,12 +136,12 @@ def answer(
     resident = processes.peak_memory()
     me = os.getpid()
     limit(order)
-    send(keeper, b"started")
+    send(supervisor, b"started")
     before = total_cpu(me)
     start = time.perf_counter()
-    result: fclib.Result | None = None
+    result: _core.Result | None = None
     try:
-        result = fclib.solve(
+        result = _solve.solve(
             problem,
             order["solver"],
             order["tol"],
@@ -217,7 +193,7 @@ def total_cpu(pid: int) -> float:
 
 def classify(error: Exception) -> str:
     """The status of a run that ended with an exception."""
-    if isinstance(error, fclib.UnsuitableError):
+    if isinstance(error, _core.UnsuitableError):
         return "unsuitable"
     causes: list[BaseException] = [error]
     while (cause := causes[-1].__cause__) is not None:
@@ -229,7 +205,7 @@ def classify(error: Exception) -> str:
         return of_signal(int(found[1]))
     if any(words in text for words in NOTHING):
         return "nothing"
-    if isinstance(error, fclib.SolverError):
+    if isinstance(error, _registry.SolverError):
         if any(words in text for words in GARBAGE):
             return "garbage"
         # not the solver has raised, but the conversion of its answer into numbers
@@ -240,7 +216,7 @@ def classify(error: Exception) -> str:
 
 
 def of_signal(number: int) -> str:
-    """The status of a process that a signal has ended, where the keeper has not sent it."""
+    """The status of a process that a signal has ended, where the supervisor has not sent it."""
     if number == signal.SIGXCPU:
         return "cpu_limit"
     return "killed" if number in (signal.SIGKILL, signal.SIGTERM) else "crashed"
@@ -249,7 +225,7 @@ def of_signal(number: int) -> str:
 def one_line(error: BaseException) -> str:
     """What an exception says."""
     text = " ".join(str(error).split())
-    known = isinstance(error, (fclib.Error, OSError))
+    known = isinstance(error, (_core.Error, OSError))
     return (text if known and text else f"{type(error).__name__}: {text}")[:500]
 
 

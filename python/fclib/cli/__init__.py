@@ -1,8 +1,18 @@
-"""The command line: ``fclib COMMAND``, one module for each command.
+"""The command line: ``fclib COMMAND``, one module for each command; none imports another's.
 
-All of them keep the same rules. Results go to the
-standard output, as a table or with ``--json`` as one object a line; errors and progress go to the
-standard error. The exit status is 0 only if all went well, 1 if not, 2 for a usage error.
+All of them keep the same rules. Results go to the standard output, as a table or with ``--json`` as
+one object a line; errors and progress go to the standard error. The exit status is 0 only if all
+went well, 1 if not, 2 for a usage error.
+
+What commands share:
+
+_output.py     tables, JSON lines, errors, a bar, options that many have
+_progress.py   bars for what takes long: a build, a campaign
+_files.py      files that hold several things
+_build.py      the build of `collection` and `simulate`
+_profile.py    the profile of `profile` and `demo`
+
+`choose.py` has the commands of ``fclib collection choose``, which `collection.py` takes in.
 """
 
 from __future__ import annotations

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
 from rich.text import Text
 from typer.core import TyperGroup
 
@@ -20,6 +18,7 @@ from fclib.bench import machine
 from fclib.bench.campaign import parse_solver
 from fclib.bench.store import Status
 from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
+from fclib.cli._progress import duration, live
 from fclib.collections import library
 
 SILENT = 30.0  # [s] after which a campaign elsewhere that gives no sign of life is taken for dead
@@ -41,42 +40,6 @@ app = typer.Typer(
     help="Run campaigns: problems x solvers x tolerances, within limits.\n\n"
     "CAMPAIGN is a TOML file, or the name of a published one; the word run may be left out.",
 )
-
-
-def duration(seconds: float) -> str:
-    """A time for people: 0:12, 3:05:00."""
-    whole = round(max(0.0, seconds))
-    hours, rest = divmod(whole, 3600)
-    return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"
-
-
-@contextmanager
-def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
-    """Show how far a campaign is: a bar on a terminal, else a line every ten seconds."""
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[words]}", markup=False),
-    )
-    said = time.monotonic()
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        task = bar.add_task(name, total=None, words="")
-
-        def show(progress: bench.Progress) -> None:
-            nonlocal said
-            done = sum(progress.statuses.values())
-            left = (progress.planned - progress.done) / progress.rate if done else None
-            words = f"{progress.solved} solved, {done - progress.solved} not"
-            if left is not None:
-                words += f", {progress.rate:.1f}/s, {duration(left)} left"
-            bar.update(task, total=progress.planned, completed=progress.done, words=words)
-            if not quiet and not err.is_terminal and time.monotonic() - said > 10:
-                said = time.monotonic()
-                err.print(f"{name}: {progress.done} of {progress.planned}, {words}")
-
-        yield show
 
 
 @app.command("run")
@@ -181,7 +144,9 @@ def run(
                 except ImportError as error:
                     fail(f'{error}; pip install "fclib[bench]"')
             show = stack.enter_context(live(chosen.name, as_json))
-            progress = bench.conduct(chosen, path, jobs=jobs, runner=runner, show=show, tell=tell)
+            progress = bench.run_campaign(
+                chosen, path, jobs=jobs, runner=runner, show=show, tell=tell
+            )
     except KeyboardInterrupt:
         there = path.exists()
         fail(f"interrupted; the same command goes on with {path}" if there else "interrupted")

@@ -3,83 +3,38 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-import fclib
 from fclib import collections
+from fclib.cli import choose
+from fclib.cli._build import (
+    Analyze,
+    Count,
+    Form,
+    FormOption,
+    Pictures,
+    Select,
+    SelectOption,
+    build_plans,
+    ranges_of,
+)
 from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
-from fclib.collections import choose
+from fclib.cli._progress import many_bars
 from fclib.collections.archives import FetchError
-from fclib.collections.build import BuildError
-from fclib.collections.known import KNOWN, choices, differing
+from fclib.collections.known import KNOWN, choices
 
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
 )
-choose_app = typer.Typer(
-    help="Make the lists of chosen problems: the sets hard and tiny, the family LocalProblems.",
-    no_args_is_help=True,
-)
-app.add_typer(choose_app, name="choose")
-
-
-class Form(str, Enum):
-    """The forms of a problem that are written."""
-
-    GLOBAL = "global"
-    LOCAL = "local"
-    BOTH = "both"
-
-
-class Select(str, Enum):
-    """Which problems are kept, where not all are."""
-
-    EVERY = "every"
-    HARD = "hard"
+app.add_typer(choose.app, name="choose")
 
 
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
-Count = Annotated[
-    int | None, typer.Option(help="Problems kept of each family; all by default.", min=1)
-]
 Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
-FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
-SelectOption = Annotated[
-    Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
-]
-Analyze = Annotated[
-    bool, typer.Option("--analyze", help="Also ranks, conditioning, existence; slow.")
-]
-Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
-
-
-@contextmanager
-def many_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """A bar for each family on the standard error, where that is a terminal."""
-    columns = (
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
-        tasks: dict[str, Any] = {}
-
-        def show(name: str, done: int, total: int) -> None:
-            if name not in tasks:
-                tasks[name] = bars.add_task(name, total=total)
-            bars.update(tasks[name], completed=done, total=total)
-
-        yield show
 
 
 @app.command("list")
@@ -201,33 +156,6 @@ def show_set(name: str, as_json: bool) -> None:
         out.print(make_table(report.records))
 
 
-def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A row for each family of a catalogue: how many problems, and from where to where."""
-    found = []
-    for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
-        own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
-
-        def span(key: str, own: list[dict[str, Any]] = own) -> str:
-            values = [row[key] for row in own if row[key] is not None]
-            return f"{min(values):.4g} to {max(values):.4g}" if values else ""
-
-        found.append(
-            {
-                "family": family,
-                "set": name,
-                "version": own[0]["version"] or "",
-                "problems": len(own),
-                "solved": sum(row["status"] == "converged" for row in own),
-                "dof": span("n"),
-                "contacts": span("nc"),
-                "density": span("density"),
-                "mu": span("mu_max"),
-                "largest error": max(row["error"] for row in own),
-            }
-        )
-    return found
-
-
 @app.command()
 def build(
     names: Annotated[
@@ -262,52 +190,7 @@ def build(
         ]
     except ValueError as error:
         usage_error(error)
-    run(plans, folder, jobs, pictures, as_json)
-
-
-def run(
-    plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
-) -> None:
-    """Build plans, and print what came of them; exit status 1 where a problem was not solved."""
-    try:
-        with many_bars() as bars:
-            table = collections.build(
-                plans,
-                folder,
-                jobs=jobs or len(os.sched_getaffinity(0)),
-                progress=bars,
-                pictures=pictures,
-            )
-    except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError) as error:
-        fail(str(error))
-    mine = {plan.name for plan in plans}
-    rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
-    report = Report(as_json)
-    for row in ranges_of(rows):
-        report.add(row, row["solved"] == row["problems"])
-    if not as_json:
-        if report.records:
-            out.print(make_table(report.records))
-        else:
-            out.print("Nothing touches in any step: no problem was stored.")
-        unsolved = [row for row in rows if row["status"] != "converged"]
-        if unsolved:
-            worst = max(unsolved, key=lambda row: float(row["error"]))
-            out.print(
-                f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
-                f" {worst['id']}, error {worst['error']:.1e}. A simulation went on from there."
-            )
-        for name in dict.fromkeys(plan.collection for plan in plans if plan.chosen):
-            own = [row for row in rows if row["collection"] == name]
-            built = {row["family"] for row in own}
-            other = [id for id in differing(name, own) if id.split("/")[1] in built]
-            out.print(
-                f"{len(own) - len(other)} of {len(own)} problems of the set {name} have the data"
-                " that its list says"
-                + (f"; not {', '.join(other[:3])}: another machine?" if other else "")
-            )
-        out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
-    raise typer.Exit(int(report.failed))
+    build_plans(plans, folder, jobs, pictures, as_json)
 
 
 @app.command()
@@ -380,88 +263,3 @@ def get(
     rows = collections.read_catalog(folder).to_pylist()
     own = [row for row in rows if f"{row['collection']}/{row['family']}" in fetched]
     out.print(make_table(ranges_of(own)))
-
-
-List = Annotated[Path, typer.Option("--out", help="The list that is written, JSON.")]
-PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
-
-
-@choose_app.command("hard")
-def choose_hard(
-    stores: Annotated[list[Path], typer.Argument(help="Stores of fclib bench.")],
-    folder: Annotated[Path, typer.Option("--in", help="The collection that they are of.")],
-    target: List,
-    tol: Annotated[float, typer.Option(help="Tolerance of the runs that count.")] = 1e-8,
-    share: Annotated[
-        float, typer.Option(help="Of the solvers that must have failed.", min=0.0, max=1.0)
-    ] = 0.5,
-    per_family: PerFamily = 5,
-) -> None:
-    """What most solvers fail on, from campaigns over the global files of a collection."""
-    from fclib.bench import Store
-
-    runs = []
-    try:
-        for path in stores:
-            with Store(path, create=False) as store:
-                runs += store.results()
-        chosen = choose.hard(runs, folder, tol=tol, share=share, per_family=per_family)
-    except (fclib.Error, collections.CatalogError, ImportError, ValueError) as error:
-        fail(str(error))
-    solvers = sorted({run["solver"] for run in runs if run["tol"] == tol})
-    limits = sorted({run["time_limit"] for run in runs if run["tol"] == tol})
-    rule = {"tol": tol, "share": share, "per_family": per_family}
-    choose.write_list(target, chosen, rule | {"solvers": solvers, "time_limits": limits})
-    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
-
-
-@choose_app.command("local")
-def choose_local(
-    folder: Folder,
-    target: List,
-    sample: Annotated[int, typer.Option(help="Problems of a family that are looked at.")] = 200,
-    per_family: PerFamily = 4,
-    spins: Annotated[int, typer.Option(help="Spinning bodies that are drawn.", min=0)] = 2000,
-    asymmetric: Annotated[int, typer.Option(help="Of them, those that are taken.", min=0)] = 16,
-) -> None:
-    """The contacts that one-contact solvers find hardest, from the local files of a collection."""
-    try:
-        with many_bars() as bars:
-            found = choose.local(
-                folder,
-                sample=sample,
-                per_family=per_family,
-                spins=spins,
-                asymmetric=asymmetric,
-                progress=bars,
-            )
-    except (collections.CatalogError, ImportError, fclib.Error) as error:
-        fail(str(error))
-    rule = {
-        "sample": sample,
-        "per_family": per_family,
-        "spins": spins,
-        "asymmetric": asymmetric,
-        "sweeps": choose.SWEEPS,
-        "tol": choose.LOCAL_TOLERANCE,
-    }
-    choose.write_local(target, found, rule)
-    tell_chosen([contact.origin for contact in found], target)
-
-
-@choose_app.command("tiny")
-def choose_tiny(target: List) -> None:
-    """One problem of each kind: simulated anew, with the digests of its data."""
-    try:
-        chosen = choose.tiny()
-    except (ImportError, ValueError, FloatingPointError) as error:
-        fail(str(error))
-    choose.write_list(target, chosen, {"kinds": len(chosen)})
-    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
-
-
-def tell_chosen(names: list[str], target: Path) -> None:
-    """Say what was taken."""
-    for name in names:
-        out.print(name, highlight=False)
-    out.print(f"{len(names)} problems:  {target}")

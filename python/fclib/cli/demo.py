@@ -9,7 +9,6 @@ from typing import Annotated, Any
 import typer
 
 from fclib import bench, demo
-from fclib.cli import profile
 from fclib.cli._output import (
     Json,
     Report,
@@ -21,7 +20,8 @@ from fclib.cli._output import (
     out,
     progress_bar,
 )
-from fclib.cli.bench import live
+from fclib.cli._profile import print_profile
+from fclib.cli._progress import live
 
 TABLE_ROWS = 24  # the CSV has them all
 
@@ -52,7 +52,7 @@ def compare(folder: Path, as_json: bool) -> None:
     with live(demo.CAMPAIGN, as_json) as show:
         demo.campaign(store, min(2, os.cpu_count() or 1), show)
     try:
-        profile.run(store, folder / "profile", as_json=as_json, quiet=as_json)
+        print_profile(store, folder / "profile", as_json=as_json, quiet=as_json)
     except ImportError as error:
         say.print(f'No pictures: {error}; pip install "fclib[bench]"', highlight=False)
     say.print(f"The runs:      {store}  (fclib bench --status {store})", highlight=False)

@@ -8,8 +8,7 @@ from typing import Annotated
 import typer
 
 from fclib import collections, scenes
-from fclib.cli._output import Json, err, fail
-from fclib.cli.collection import (
+from fclib.cli._build import (
     Analyze,
     Count,
     Form,
@@ -17,8 +16,9 @@ from fclib.cli.collection import (
     Pictures,
     Select,
     SelectOption,
-    run,
+    build_plans,
 )
+from fclib.cli._output import Json, err, fail
 
 
 def command(
@@ -87,4 +87,4 @@ def command(
     except ValueError as error:
         fail(str(error))
     err.print(f"Simulating {loaded.name}, {steps} steps ...", highlight=False)
-    run([plan], folder, 1, pictures, as_json)
+    build_plans([plan], folder, 1, pictures, as_json)

@@ -11,11 +11,13 @@ the family's scene that have a contact, or the problems of a family assembled di
 
 plan.py       what is built of a family, and which of its problems are kept
 known.py      the sets, their versions and their families; lists of chosen problems in data/
-build.py      a family into files, gone on with after a kill
-catalog.py    a row for each problem; catalog.parquet
-library.py    the package's and the user's folder: `fclib.collection` and `fclib.load`
-archives.py   publish and get
+catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
+build.py      a family into files, gone on with after a kill. Needs plan.py, catalog.py, figures.py
+verify.py     files as the catalogue says, solutions judged anew
 figures.py    distributions and pictures
+archives.py   publish and get. Needs catalog.py, known.py
+library.py    the package's and the user's folder, over all of these: `collection` and `load`
+choose.py     the lists of chosen problems, by rules that anyone can repeat
 """
 
 from fclib.collections.archives import get, publish

@@ -148,9 +148,7 @@ def get(
         except ValueError as error:
             raise FetchError(f"{base}{archive}: is not what the registry says: {error}") from error
         unpack(Path(path), folder)
-    from fclib.collections.build import gather
-
-    gather(folder)
+    catalog.gather(folder)
     return wanted
 
 

@@ -30,8 +30,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import fclib
-from fclib import scenes
+from fclib import _core, _digest, _solve, scenes
 from fclib.collections import catalog
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
 
@@ -85,7 +84,7 @@ def build(
             build_scene(plan, out, report, pictures)
     else:
         build_in_processes(todo, out, jobs, report, pictures)
-    return gather(out)
+    return catalog.gather(out)
 
 
 def build_in_processes(
@@ -161,17 +160,6 @@ def difference(found: str, asked: str) -> str:
     return ", ".join(f"{key}: {old.get(key)}, now {new[key]}" for key in keys[:3])
 
 
-def gather(out: Path) -> Any:
-    """Join the catalogues of all finished scenes of a folder into its own."""
-    rows = [
-        row
-        for part in sorted(out.glob(f"*/*/{catalog.FILE}"))
-        for row in catalog.read_catalog(part).to_pylist()
-    ]
-    catalog.write_catalog(out / catalog.FILE, rows)
-    return catalog.read_catalog(out)
-
-
 @dataclass
 class Kept:
     """The rows of the problems that are kept, and how many were looked at."""
@@ -202,7 +190,7 @@ class Item:
     """A problem of a plan with its solution, before it is stored."""
 
     problem: Any
-    result: fclib.Result
+    result: _core.Result
     step: int  # of the simulation, or the problem's number
     time: float | None = None  # at the start of the step [s]
     bodies: int | None = None
@@ -220,7 +208,7 @@ def items(plan: Plan, kept: Kept, start: State | None) -> Iterator[Item]:
                 kept.looked += 1
                 continue
             problem = plan.scene.problem(number)
-            result = fclib.solve(problem, plan.solver, tol=plan.tol, **plan.options)
+            result = _solve.solve(problem, plan.solver, tol=plan.tol, **plan.options)
             yield Item(problem, result, number)
         return
     from fclib.simulate import simulate
@@ -278,7 +266,7 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
     local = item.problem.condense() if is_global else item.problem
     sweeps = None
     if plan.select == "hard":
-        trial = fclib.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
+        trial = _solve.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
         sweeps = trial.iterations
     row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
     if plan.analyze:
@@ -291,8 +279,8 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
         problem = item.problem if form == "global" else local
         solution = item.result.solution
         if form == "local":
-            solution = fclib.Solution(r=solution.r, u=solution.u, l=solution.l)
-        fclib.write(out / path, problem, solution)
+            solution = _core.Solution(r=solution.r, u=solution.u, l=solution.l)
+        _core.write(out / path, problem, solution)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
         for file, _ in catalog.files_of({**dict.fromkeys(catalog.FILES), **gone}):
@@ -302,7 +290,7 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
     """The row of a problem: all but its files."""
     problem, result = item.problem, item.result
-    merit = fclib.merit(problem, result.solution)
+    merit = _core.merit(problem, result.solution)
     mu = np.asarray(problem.mu)
     return {
         "id": f"{plan.name}/{number:04d}",
@@ -332,7 +320,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "status": str(result.status),
         "tol": plan.tol,
         "error": merit.error,
-        "digest": fclib.digest(problem),
+        "digest": _digest.digest(problem),
     }
 
 

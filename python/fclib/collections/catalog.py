@@ -140,6 +140,15 @@ def read_catalog(path: str | Path) -> Any:
     return table
 
 
+def gather(out: Path) -> Any:
+    """Join the catalogues of all finished scenes of a folder into its own."""
+    rows = [
+        row for part in sorted(out.glob(f"*/*/{FILE}")) for row in read_catalog(part).to_pylist()
+    ]
+    write_catalog(out / FILE, rows)
+    return read_catalog(out)
+
+
 def replace_file(path: Path, write: Any) -> None:
     """Call `write` with the path of a new file beside `path`, which then takes its place."""
     descriptor, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")

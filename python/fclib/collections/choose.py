@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
-from fclib import scenes
+from fclib import _core, _digest, _solve, scenes
 from fclib.collections import catalog
 from fclib.collections.known import Choice
 from fclib.collections.plan import source
@@ -57,7 +56,7 @@ def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int
     """A problem by its number. ValueError where the scene has not so many."""
     scene = source(family, dict(parameters), seed)
     if isinstance(scene, scenes.Assembled):
-        digest = fclib.digest(scene.problem(number))
+        digest = _digest.digest(scene.problem(number))
         return Choice(family, scene.parameters, seed, number, number, digest)
     from fclib.simulate import simulate
 
@@ -65,7 +64,7 @@ def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int
     for step in simulate(scene, 20 * number + 5000):
         if step.problem.nc:
             if looked == number:
-                digest = fclib.digest(step.problem)
+                digest = _digest.digest(step.problem)
                 return Choice(family, dict(scene.parameters), seed, number, step.index, digest)
             looked += 1
     raise ValueError(f"{family}: has no problem {number}")
@@ -133,7 +132,7 @@ def hard(
 
 def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
     """A problem of a catalogue, with the parameters that its file says."""
-    problem = fclib.read(folder / (row["global_file"] or row["local_file"]))
+    problem = _core.read(folder / (row["global_file"] or row["local_file"]))
     made = json.loads(problem.info.description.splitlines()[-1])
     return Choice(
         row["family"], made["parameters"], row["seed"], row["number"], row["step"], row["digest"]
@@ -180,7 +179,7 @@ def measure(problem: Any, origin: str) -> Contact:
     """Let each local solver try a problem of one contact."""
     sweeps = {}
     for name in LOCAL_SOLVERS:
-        result = fclib.solve(
+        result = _solve.solve(
             problem, "nsgs", tol=LOCAL_TOLERANCE, max_iterations=SWEEPS, local_solver=name
         )
         sweeps[name] = result.iterations if result.converged else SWEEPS + 1
@@ -191,8 +190,8 @@ def one_contact(W: Any, q: Any, mu: float, mu_r: float | None) -> Any:
     """A problem of one contact from its block (d x d)."""
     values: dict[str, Any] = {"spacedim": len(q), "W": W, "q": q, "mu": np.array([mu])}
     if mu_r is None:
-        return fclib.LocalProblem(**values)
-    return fclib.LocalRollingProblem(**values, mu_r=np.array([mu_r]))
+        return _core.LocalProblem(**values)
+    return _core.LocalRollingProblem(**values, mu_r=np.array([mu_r]))
 
 
 def contacts_of(path: Path) -> Iterator[tuple[int, Any]]:
@@ -200,8 +199,8 @@ def contacts_of(path: Path) -> Iterator[tuple[int, Any]]:
 
     q_c = u_c - W_cc r_c holds what the other contacts and the bilateral constraints do.
     """
-    problem: Any = fclib.read(path)
-    solution: Any = fclib.read_solution(path)
+    problem: Any = _core.read(path)
+    solution: Any = _core.read_solution(path)
     d = problem.spacedim
     W = problem.W.tocsr() if hasattr(problem.W, "tocsr") else problem.W
     r, u = solution.r.reshape(-1, d), solution.u.reshape(-1, d)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, overload
 
-import fclib
+from fclib import _core
 from fclib.collections import archives, catalog, known
 from fclib.collections.build import build
 
@@ -19,7 +19,7 @@ SOURCE = "FCLIB_COLLECTION_URL"  # environment: where published archives lie
 def default_folder() -> Path:
     """The folder that FCLIB_COLLECTION names, or one in the user's cache, by version."""
     named = os.environ.get(FOLDER)
-    return Path(named) if named else archives.cache_folder() / f"collection-{fclib.__version__}"
+    return Path(named) if named else archives.cache_folder() / f"collection-{_core.version}"
 
 
 def ensure(name: str, folder: Path) -> None:
@@ -96,9 +96,9 @@ class Collection(Sequence[Any]):
                 return self.folder / file
         raise KeyError(f"the {form} form of {ids[which]} was not built, or it has none")
 
-    def solution(self, which: int | str, form: str | None = None) -> fclib.Solution | None:
+    def solution(self, which: int | str, form: str | None = None) -> _core.Solution | None:
         """The stored solution of a problem."""
-        return fclib.read_solution(self.path(which, form))
+        return _core.read_solution(self.path(which, form))
 
     def __len__(self) -> int:
         return len(self.ids)
@@ -113,7 +113,7 @@ class Collection(Sequence[Any]):
         """The global form, or the only one, of a problem, by its place or its name."""
         if isinstance(which, slice):
             return [self[i] for i in range(*which.indices(len(self)))]
-        return fclib.read(self.path(which))
+        return _core.read(self.path(which))
 
 
 def load(name: str, form: str | None = None, folder: str | Path | None = None) -> Any:
@@ -138,5 +138,5 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
         for own in (form,) if form else FORMS:
             path = known.DATA / f"{name}-{own}.hdf5"
             if path.is_file():
-                return fclib.read(path)
-    return fclib.read(Collection(f"{parts[0]}/{parts[1]}", folder).path(name, form))
+                return _core.read(path)
+    return _core.read(Collection(f"{parts[0]}/{parts[1]}", folder).path(name, form))

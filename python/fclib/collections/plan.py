@@ -9,8 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-import fclib
-from fclib import scenes
+from fclib import _core, scenes
 
 Form = Literal["global", "local", "both"]
 Selection = Literal["every", "hard"]
@@ -106,7 +105,7 @@ class Plan:
         """All that decides what is built, as JSON."""
         return json.dumps(
             {
-                "fclib": fclib.__version__,
+                "fclib": _core.version,
                 "version": self.version,
                 **origin(self.scene),
                 "problems": self.problems,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import fclib
+from fclib import _core, _digest
 from fclib.collections import catalog
 
 
@@ -52,14 +52,14 @@ def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) 
     if catalog.sha256(file) != digest:
         return Verdict(name, path, "changed", None, f"{file}: its SHA-256 is not the catalogue's")
     try:
-        problem: Any = fclib.read(file)
-        solution = fclib.read_solution(file)
-    except fclib.Error as reason:
+        problem: Any = _core.read(file)
+        solution = _core.read_solution(file)
+    except _core.Error as reason:
         return Verdict(name, path, "unreadable", None, str(reason))
     if solution is None:
         return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
-    error = fclib.merit(problem, solution).error
-    if problem.formulation == row["formulation"] and fclib.digest(problem) != row["digest"]:
+    error = _core.merit(problem, solution).error
+    if problem.formulation == row["formulation"] and _digest.digest(problem) != row["digest"]:
         return Verdict(name, path, "wrong digest", error, f"{file}: holds another problem")
     stored = float(row["error"])
     # the local form is another problem by rounding, and its error another number

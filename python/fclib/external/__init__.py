@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import fclib
+from fclib import _core
 
 
 class Adapter(Protocol):
@@ -36,10 +36,10 @@ class Adapter(Protocol):
     def version(self) -> str:
         """The version of the package, where nothing is missing; empty where it tells none."""
 
-    def solvers(self) -> Sequence[fclib.SolverInfo]:
+    def solvers(self) -> Sequence[_core.SolverInfo]:
         """The entries, where nothing is missing."""
 
-    def find(self, name: str) -> fclib.SolverInfo | None:
+    def find(self, name: str) -> _core.SolverInfo | None:
         """The entry of a name that begins with the prefix."""
 
 
@@ -58,7 +58,7 @@ def adapters() -> tuple[Adapter, ...]:
     return tuple(importlib.import_module(f"{__name__}.{name}") for name in names)
 
 
-def solvers() -> list[fclib.SolverInfo]:
+def solvers() -> list[_core.SolverInfo]:
     """Those that can be used here."""
     return [info for adapter in adapters() if not adapter.missing() for info in adapter.solvers()]
 
@@ -69,7 +69,7 @@ def absent() -> list[Absent]:
     return [Absent(solvers, word) for solvers, word in missing if word]
 
 
-def find(name: str) -> fclib.SolverInfo | None:
+def find(name: str) -> _core.SolverInfo | None:
     """The solver of this name, where its prefix is that of an adapter.
 
     Raises:
@@ -79,10 +79,10 @@ def find(name: str) -> fclib.SolverInfo | None:
         if not name.startswith(adapter.PREFIX):
             continue
         if word := adapter.missing():
-            raise fclib.OptionError(f"solver '{name}': {word}")
+            raise _core.OptionError(f"solver '{name}': {word}")
         found = adapter.find(name)
         if found is None:
             known = ", ".join(info.name for info in adapter.solvers())
-            raise fclib.OptionError(f"solver '{name}': unknown; there is: {known}")
+            raise _core.OptionError(f"solver '{name}': unknown; there is: {known}")
         return found
     return None

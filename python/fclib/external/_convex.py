@@ -26,12 +26,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-import fclib
+from fclib import _core, _registry
 from fclib._registry import make_solver
 from fclib.external._words import RELAXATION
 
 Array: TypeAlias = npt.NDArray[np.float64]
-Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
+Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 PATIENCE = 50  # iterations of ACLM without a better one, which is the accuracy of the inner solver
 CITATION = "Acary, Cadoux, Lemarechal & Malick 2011"
 
@@ -64,7 +64,7 @@ class Relaxation:
         """Raises UnsuitableError where W is not symmetric."""
         W = sp.csc_array(problem.W)
         if abs(W - W.T).max() > 1e-10 * abs(W).max():
-            raise fclib.UnsuitableError("a convex solver takes no asymmetric W")
+            raise _core.UnsuitableError("a convex solver takes no asymmetric W")
         self.W, self.q, self.d = W, problem.q, problem.spacedim
         self.friction = _friction(problem)
         self.stiffness = float(W.diagonal().mean()) or 1.0
@@ -89,7 +89,7 @@ class Relaxation:
 def _friction(problem: Local) -> list[tuple[Array, slice]]:
     """The coefficients, each with the components of a contact that it bounds."""
     d = problem.spacedim
-    if isinstance(problem, fclib.LocalRollingProblem):
+    if isinstance(problem, _core.LocalRollingProblem):
         half = (d + 1) // 2
         return [(problem.mu, slice(1, half)), (problem.mu_r, slice(half, d))]
     return [(problem.mu, slice(1, d))]
@@ -120,24 +120,24 @@ def _program(P: Any, friction: list[tuple[Array, slice]], d: int) -> Program:
 
 Inner = Annotated[
     float,
-    fclib.Option("tolerance of the convex problems, relative to tol", lowest=1e-6, highest=1),
+    _registry.Option("tolerance of the convex problems, relative to tol", lowest=1e-6, highest=1),
 ]
 
 
 def entries(
     package: str, title: str, citation: str, conic: Callable[[Program, float], ConicSolver]
-) -> tuple[fclib.SolverInfo, ...]:
+) -> tuple[_core.SolverInfo, ...]:
     """ACLM and the relaxation by one conic solver; conic(program, tolerance) makes it."""
 
-    def aclm(problem: Local, r: Array, monitor: fclib.Monitor, *, inner: Inner = 1e-2) -> Array:
+    def aclm(problem: Local, r: Array, monitor: _core.Monitor, *, inner: Inner = 1e-2) -> Array:
         return _aclm(problem, r, monitor, lambda p: conic(p, inner * monitor.tolerance))
 
     def relaxation(
-        problem: Local, r: Array, monitor: fclib.Monitor, *, inner: Inner = 1e-2
+        problem: Local, r: Array, monitor: _core.Monitor, *, inner: Inner = 1e-2
     ) -> Array:
         return _relaxation(problem, r, monitor, lambda p: conic(p, inner * monitor.tolerance))
 
-    def entry(function: Callable[..., Array], family: str, words: str) -> fclib.SolverInfo:
+    def entry(function: Callable[..., Array], family: str, words: str) -> _core.SolverInfo:
         return make_solver(
             function,
             name=f"{package}:{function.__name__}",
@@ -156,7 +156,7 @@ def entries(
     )
 
 
-def _relaxation(problem: Local, r: Array, monitor: fclib.Monitor, make: Make) -> Array:
+def _relaxation(problem: Local, r: Array, monitor: _core.Monitor, make: Make) -> Array:
     """One convex problem; what it does not solve is said to be inaccurate."""
     if monitor.stop(r):
         return r
@@ -166,7 +166,7 @@ def _relaxation(problem: Local, r: Array, monitor: fclib.Monitor, make: Make) ->
     return r
 
 
-def _aclm(problem: Local, r: Array, monitor: fclib.Monitor, make: Make) -> Array:
+def _aclm(problem: Local, r: Array, monitor: _core.Monitor, make: Make) -> Array:
     """The fixed point, one convex problem an iteration; the best iterate is returned."""
     if monitor.stop(r):
         return r

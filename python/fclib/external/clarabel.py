@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core
 
 PREFIX = "clarabel:"
 SOLVERS = "clarabel:aclm, clarabel:relaxation"
@@ -32,7 +32,7 @@ def version() -> str:
 
 
 @functools.cache
-def solvers() -> Sequence[fclib.SolverInfo]:
+def solvers() -> Sequence[_core.SolverInfo]:
     """The entries."""
     from fclib.external import _convex
 
@@ -41,7 +41,7 @@ def solvers() -> Sequence[fclib.SolverInfo]:
     )
 
 
-def find(name: str) -> fclib.SolverInfo | None:
+def find(name: str) -> _core.SolverInfo | None:
     """The entry of a name."""
     return next((info for info in solvers() if info.name == name), None)
 

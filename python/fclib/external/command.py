@@ -31,12 +31,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
-import fclib
+from fclib import _core, _registry
 from fclib._registry import make_solver
 
 PREFIX = "cmd:"
 SOLVERS = "cmd:PROGRAM {input} {output}"
-Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
+Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 PLACES = ("input", "output", "tol", "time_limit", "max_iterations")
 
 
@@ -50,12 +50,12 @@ def version() -> str:
     return ""
 
 
-def solvers() -> Sequence[fclib.SolverInfo]:
+def solvers() -> Sequence[_core.SolverInfo]:
     """None is listed: their names are commands."""
     return ()
 
 
-def find(name: str) -> fclib.SolverInfo:
+def find(name: str) -> _core.SolverInfo:
     """The entry of a command.
 
     Raises:
@@ -64,13 +64,13 @@ def find(name: str) -> fclib.SolverInfo:
     try:
         words = shlex.split(name.removeprefix(PREFIX))
     except ValueError as error:
-        raise fclib.OptionError(f"solver '{name}': {error}") from None
+        raise _core.OptionError(f"solver '{name}': {error}") from None
     if not words or not any("{input}" in word for word in words):
-        raise fclib.OptionError(f"solver '{name}': is not of the form {SOLVERS}")
+        raise _core.OptionError(f"solver '{name}': is not of the form {SOLVERS}")
     if shutil.which(words[0]) is None:
-        raise fclib.OptionError(f"solver '{name}': there is no program {words[0]}")
+        raise _core.OptionError(f"solver '{name}': there is no program {words[0]}")
 
-    def function(problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
+    def function(problem: Local, r: Any, monitor: _core.Monitor) -> Any:
         return _solve(words, problem, r, monitor)
 
     return make_solver(
@@ -86,12 +86,12 @@ def find(name: str) -> fclib.SolverInfo:
     )
 
 
-def _solve(words: list[str], problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
+def _solve(words: list[str], problem: Local, r: Any, monitor: _core.Monitor) -> Any:
     if monitor.stop(r):
         return r
     with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
         given, made = Path(folder) / "input.hdf5", Path(folder) / "output.hdf5"
-        fclib.write(given, problem, guesses=[fclib.Solution(r=r)] if r.any() else [])
+        _core.write(given, problem, guesses=[_core.Solution(r=r)] if r.any() else [])
         values = (given, made, monitor.tolerance, monitor.time_left, monitor.max_iterations)
         command = [
             _filled(word, dict(zip(PLACES, map(str, values), strict=True))) for word in words
@@ -103,7 +103,7 @@ def _solve(words: list[str], problem: Local, r: Any, monitor: fclib.Monitor) -> 
         writes = any("{output}" in word for word in words)
         solution = _solution(made if writes else given, words[0])
     if solution.r.shape != r.shape:
-        raise fclib.SolverError(
+        raise _registry.SolverError(
             f"{words[0]}: its solution has r of length {solution.r.size}, expected {r.size}"
         )
     stop = monitor.stop(solution.r)
@@ -119,16 +119,16 @@ def _filled(word: str, values: dict[str, str]) -> str:
     return word
 
 
-def _solution(path: Path, program: str) -> fclib.Solution:
+def _solution(path: Path, program: str) -> _core.Solution:
     if not path.exists():
-        raise fclib.SolverError(f"{program}: ended well, but made no output")
+        raise _registry.SolverError(f"{program}: ended well, but made no output")
     try:
-        solution = fclib.read_solution(path)
-    except fclib.Error as error:
+        solution = _core.read_solution(path)
+    except _core.Error as error:
         word = str(error).replace(str(path), "its output")
-        raise fclib.SolverError(f"{program}: {word}") from error
+        raise _registry.SolverError(f"{program}: {word}") from error
     if solution is None:
-        raise fclib.SolverError(f"{program}: ended well, but wrote no /solution")
+        raise _registry.SolverError(f"{program}: ended well, but wrote no /solution")
     return solution
 
 
@@ -154,7 +154,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
                 start_new_session=True,
             )
         except OSError as error:
-            raise fclib.SolverError(f"{command[0]}: {error.strerror}") from error
+            raise _registry.SolverError(f"{command[0]}: {error.strerror}") from error
         end = time.monotonic() + time_limit
         pause, in_time = 1e-3, True
         try:
@@ -176,7 +176,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
         if in_time and process.returncode != 0:
             code = process.returncode
             how = f"was ended by signal {-code}" if code < 0 else f"ended with exit status {code}"
-            raise fclib.SolverError(f"{command[0]}: {how}{_last_line(words)}")
+            raise _registry.SolverError(f"{command[0]}: {how}{_last_line(words)}")
     return cpu_s, in_time
 
 

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core
 from fclib._registry import make_solver
 
 PREFIX = "pinocchio:"
@@ -52,7 +52,7 @@ def version() -> str:
 
 
 @functools.cache
-def solvers() -> Sequence[fclib.SolverInfo]:
+def solvers() -> Sequence[_core.SolverInfo]:
     """The entries."""
     return (
         _entry("ADMM", "optimisation", "ADMM with a spectral penalty"),
@@ -60,13 +60,13 @@ def solvers() -> Sequence[fclib.SolverInfo]:
     )
 
 
-def find(name: str) -> fclib.SolverInfo | None:
+def find(name: str) -> _core.SolverInfo | None:
     """The entry of a name."""
     return next((info for info in solvers() if info.name == name), None)
 
 
-def _entry(which: str, family: str, title: str) -> fclib.SolverInfo:
-    def function(problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+def _entry(which: str, family: str, title: str) -> _core.SolverInfo:
+    def function(problem: _core.LocalProblem, r: Any, monitor: _core.Monitor) -> Any:
         return _solve(which, problem, r, monitor)
 
     return make_solver(
@@ -82,7 +82,7 @@ def _entry(which: str, family: str, title: str) -> fclib.SolverInfo:
     )
 
 
-def _solve(which: str, problem: fclib.LocalProblem, r: Any, monitor: fclib.Monitor) -> Any:
+def _solve(which: str, problem: _core.LocalProblem, r: Any, monitor: _core.Monitor) -> Any:
     """Slice by slice; the best iterate is returned."""
     if monitor.stop(r):
         return r
@@ -91,11 +91,11 @@ def _solve(which: str, problem: fclib.LocalProblem, r: Any, monitor: fclib.Monit
     pin = importlib.import_module("pinocchio")
     m = problem.m
     if m**2 * 8 > STACK:
-        raise fclib.UnsuitableError(f"Pinocchio takes up to {MOST} contacts, not {problem.nc}")
+        raise _core.UnsuitableError(f"Pinocchio takes up to {MOST} contacts, not {problem.nc}")
     order = np.arange(m).reshape(-1, 3)[:, [1, 2, 0]].ravel()
     W = sp.csc_matrix(sp.csr_array(problem.W)[order][:, order])
     if which == "ADMM" and abs(W - W.T).max() > 1e-10 * abs(W).max():
-        raise fclib.UnsuitableError("ADMM of Pinocchio takes no asymmetric W")
+        raise _core.UnsuitableError("ADMM of Pinocchio takes no asymmetric W")
     stiffness = float(W.diagonal().mean()) or 1.0
     speed = float(np.linalg.norm(problem.q)) or 1.0
     W, q = W / stiffness, problem.q[order] / speed

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core
 
 PREFIX = "scs:"
 SOLVERS = "scs:aclm, scs:relaxation"
@@ -34,14 +34,14 @@ def version() -> str:
 
 
 @functools.cache
-def solvers() -> Sequence[fclib.SolverInfo]:
+def solvers() -> Sequence[_core.SolverInfo]:
     """The entries."""
     from fclib.external import _convex
 
     return _convex.entries("scs", "the splitting conic solver SCS", "O'Donoghue 2021", Conic)
 
 
-def find(name: str) -> fclib.SolverInfo | None:
+def find(name: str) -> _core.SolverInfo | None:
     """The entry of a name."""
     return next((info for info in solvers() if info.name == name), None)
 

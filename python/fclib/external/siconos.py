@@ -34,7 +34,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-import fclib
+from fclib import _core, _registry
 from fclib._registry import make_solver
 from fclib.external._words import RELAXATION
 
@@ -47,7 +47,7 @@ START_LIMIT = 60.0  # [s]
 BIG = 10**6
 # by rows is written in blocks
 STORAGES = {"fc2d": "dense", "fc3d": "csr", "rolling_fc3d": "csc"}
-Local: TypeAlias = fclib.LocalProblem | fclib.LocalRollingProblem
+Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 HUBER = "Acary, Bremond & Huber 2018"
 # families, as those of fclib
 SPLIT = "splitting"
@@ -138,7 +138,7 @@ def version() -> str:
 
 
 @functools.cache
-def solvers() -> Sequence[fclib.SolverInfo]:
+def solvers() -> Sequence[_core.SolverInfo]:
     """The entries."""
     return (
         *(_entry(n, "fc3d", "FRICTION_3D", *row) for n, row in FC3D.items()),
@@ -156,7 +156,7 @@ def solvers() -> Sequence[fclib.SolverInfo]:
     )
 
 
-def find(name: str) -> fclib.SolverInfo | None:
+def find(name: str) -> _core.SolverInfo | None:
     """The entry of a name."""
     return next((info for info in solvers() if info.name == name), None)
 
@@ -170,8 +170,8 @@ def _entry(
     title: str,
     citation: str,
     iterations: int,
-) -> fclib.SolverInfo:
-    def function(problem: Local, r: Any, monitor: fclib.Monitor) -> Any:
+) -> _core.SolverInfo:
+    def function(problem: Local, r: Any, monitor: _core.Monitor) -> Any:
         return _solve(kind, f"SICONOS_{prefix}_{identifier}", one_contact, problem, r, monitor)
 
     one_contact = f"SICONOS_{ONE_CONTACT[name]}" if name in ONE_CONTACT else ""
@@ -190,14 +190,14 @@ def _entry(
 
 
 def _solve(
-    kind: str, identifier: str, one_contact: str, problem: Local, r: Any, monitor: fclib.Monitor
+    kind: str, identifier: str, one_contact: str, problem: Local, r: Any, monitor: _core.Monitor
 ) -> Any:
     """One solve, or two where the tolerances do not mean the same."""
     if monitor.stop(r) or problem.nc == 0:
         return r
     with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
         path = Path(folder) / "problem.dat"
-        fclib.write_siconos(path, problem.with_storage(STORAGES[kind]))
+        _core.write_siconos(path, problem.with_storage(STORAGES[kind]))
         order = {
             "path": str(path),
             "kind": kind,
@@ -253,7 +253,7 @@ class Worker:
                 raise
         reply: dict[str, Any] = json.loads(line)
         if "failure" in reply:
-            raise fclib.SolverError(f"siconos: {order['solver']}: {reply['failure']}")
+            raise _registry.SolverError(f"siconos: {order['solver']}: {reply['failure']}")
         return reply
 
     def _exchange(self, order: bytes, time_left: float) -> bytes:
@@ -287,7 +287,7 @@ class Worker:
             if not chunk:
                 code = self.process.wait()
                 name = f"signal {-code}" if code < 0 else f"exit status {code}"
-                raise fclib.SolverError(f"siconos: its process ended with {name}")
+                raise _registry.SolverError(f"siconos: its process ended with {name}")
             line += chunk
         return line
 
@@ -307,7 +307,9 @@ class Worker:
                 start_new_session=True,
             )
             if self._read_line(START_LIMIT) is None:
-                raise fclib.SolverError(f"siconos: {wanted[0]} does not start in {START_LIMIT} s")
+                raise _registry.SolverError(
+                    f"siconos: {wanted[0]} does not start in {START_LIMIT} s"
+                )
         return self.process
 
     def end(self) -> None:

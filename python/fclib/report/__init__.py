@@ -5,6 +5,18 @@
 
 All numbers come from the stores of `fclib.bench` and from the catalogue of `fclib.collections`.
 Files of problems are read for their pictures alone: the pattern and the network of contacts.
+
+site.py        the pages of the site: problems, families, solvers, runs
+runs.py        the runs of stores, as the site needs them, summed by `bench.profiles`
+view.py        what the page of one problem shows, and that page by itself
+network.py     the contact network of a problem, in space: positions from H, or a graph
+recipes.py     lines to copy: how to get and solve a problem
+paper.py       figures and tables for a paper
+libraries.py   JavaScript libraries for the pages, out of Python packages
+error.py       ReportError
+assets/        the pages themselves: HTML, CSS, JavaScript
+
+site.py needs all others but paper.py; view.py needs network.py; paper.py needs runs.py.
 """
 
 from fclib.report.error import ReportError

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import fclib
+from fclib import _core
 
 
-class ReportError(fclib.Error, ValueError):
+class ReportError(_core.Error, ValueError):
     """There is nothing to report, nowhere to put it, or nothing to draw it with."""

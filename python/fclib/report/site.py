@@ -23,10 +23,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import fclib
-from fclib import scenes
+from fclib import _core, _registry
 from fclib.bench.job import MERITS
 from fclib.bench.profiles import METRICS, PENALTY, SHIFT
+from fclib.collections import families, read_catalog
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
@@ -165,8 +165,6 @@ class Problems:
         self.places: dict[str, int] = {}  # by the hash of a store
         self.folder = None
         if catalogue is not None:
-            from fclib.collections import read_catalog
-
             self.folder = catalogue if catalogue.is_dir() else catalogue.parent
             self.rows = read_catalog(catalogue).to_pylist()
             for row in self.rows:
@@ -265,10 +263,10 @@ class _Writer:
             shutil.copyfile(ASSETS / name, target / name)
         site: dict[str, Any] = {
             "title": self.title or "Frictional contact problems",
-            "version": fclib.__version__,
+            "version": _core.version,
             "metrics": {name: label for name, (label, _) in METRICS.items()},
             "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
-            "merits": [[name, inspect.getdoc(getattr(fclib.Merit, name))] for name in MERITS],
+            "merits": [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS],
             "charges": {"penalty": PENALTY, "shift": SHIFT},
             "tolerances": [],
             "headlines": [],
@@ -278,7 +276,7 @@ class _Writer:
         if self.campaigns is not None:
             site |= self._runs(self.campaigns)
         else:
-            site["solvers"] = [_solver(info.name, info.name, {}) for info in fclib.solvers()]
+            site["solvers"] = [_solver(info.name, info.name, {}) for info in _registry.solvers()]
         drawn = self._views()
         site["families"] = self._families()
         site["views"] = drawn
@@ -368,10 +366,10 @@ class _Writer:
             file = files[place]
             assert file is not None
             try:
-                problem: Any = fclib.read(file)
-                solution = fclib.read_solution(file) if "solution" in fclib.contents(file) else None
+                problem: Any = _core.read(file)
+                solution = _core.read_solution(file) if "solution" in _core.contents(file) else None
                 self.put(f"views/{place}", view_of(problem, solution))
-            except fclib.Error:
+            except _core.Error:
                 continue  # a file that went away or was damaged has no picture; its runs stay
             rows[place]["view"] = True
             drawn += 1
@@ -379,7 +377,7 @@ class _Writer:
         return drawn
 
     def _families(self) -> list[dict[str, Any]]:
-        known: dict[str, Any] = {**scenes.families(), **scenes.assemblies()}
+        known = families()
         groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
         for row in self.problems.rows:
             groups[row.get("collection") or "", row["family"]].append(row)
@@ -446,8 +444,8 @@ def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
         found |= {key: row[key] for key in ("options", "version", "origin")}
         found["family"] = row["solver_family"]
     try:
-        info = fclib.find_solver(name)
-    except fclib.Error:
+        info = _registry.find_solver(name)
+    except _core.Error:
         return found  # of another machine, or a program of the user's
     return found | {
         "title": info.title,

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import ConvexHull, QhullError
 
-import fclib
+from fclib import _core
 from fclib.report.libraries import libraries
 from fclib.report.network import Network, network_of
 
@@ -134,7 +134,7 @@ def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
     # the first components are those of a force, also where friction rolls
     tangential = 1 if d == 2 or (d == 3 and hasattr(problem, "mu_r")) else 2
     force = r[:, : 1 + tangential]
-    each = fclib.contact_merits(problem, solution)
+    each = _core.contact_merits(problem, solution)
     found: dict[str, Any] = {
         "reactions": rounded(force),
         "status": "".join(str(STATUS.index(name)) for name in each["status"]),
@@ -142,7 +142,7 @@ def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
     if network.frames is not None:
         inside = network.frames[:, :, : 1 + tangential]
         found["forces"] = rounded(np.einsum("kij,kj->ki", inside, force))
-    merit = fclib.merit(problem, solution)
+    merit = _core.merit(problem, solution)
     names = [name for name in dir(merit) if not name.startswith("_")]
     found["merit"] = rounded({name: float(getattr(merit, name)) for name in names}, 6)
     return found

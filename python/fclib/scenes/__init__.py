@@ -2,7 +2,9 @@
 
 A family is a frozen dataclass of parameters with a method ``scene(seed)``, for what is simulated,
 or ``problem(number, seed)``, for what is assembled directly. A file dropped into this folder is
-found by a scan; nothing else names it. `_family.py` says what a family must have.
+found by a scan; nothing else names it. `shared/family.py` says what a family must have, and the
+package `shared` holds what families are made with. A variant of a family is a subclass of it, in
+its file or in one of its own (`chute.py`, `rolling_chute.py`).
 
     >>> import fclib.scenes
     >>> sorted(fclib.scenes.families())
@@ -18,7 +20,7 @@ import pkgutil
 from collections.abc import Iterator
 from typing import Any
 
-from fclib.scenes._family import Assembled, Assembly, Described, Family, Law, Scene, parameter
+from fclib.scenes.shared.family import Assembled, Assembly, Described, Family, Law, Scene, parameter
 
 __all__ = [
     "Assembled",
@@ -48,7 +50,7 @@ def found() -> Iterator[tuple[str, Any]]:
     """The dataclasses of this folder's files, by name."""
     members: dict[str, Any] = {}
     for module_info in pkgutil.iter_modules(__path__):
-        if module_info.name.startswith("_"):
+        if module_info.ispkg:  # what families share
             continue
         module = importlib.import_module(f"{__name__}.{module_info.name}")
         for name, member in vars(module).items():

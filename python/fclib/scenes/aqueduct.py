@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
-from fclib.scenes import _masonry, _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import masonry, mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Aqueduct:
     time_step: float = parameter(1e-2, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "thickness", "width", "arris", "density", "time_step"),
             non_negative=("mu", "settlement", "lap"),
@@ -71,17 +71,17 @@ class Aqueduct:
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; nothing of it is random."""
-        masonry = _masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap, arris=self.arris)
+        built = masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap, arris=self.arris)
         front, back = -0.5 * self.width, 0.5 * self.width
         course = 1.5 * self.thickness
         plinth = 0.5 * self.radius
         bottom = plinth
-        walls: dict[int, list[list[_masonry.Point]]] = {-1: [], 1: []}
+        walls: dict[int, list[list[masonry.Point]]] = {-1: [], 1: []}
         piers: list[tuple[float, float]] = []
         for tier in range(self.tiers):
             # one course on an upper tier
             courses = self.courses if tier == 0 else 1
-            arcade = _masonry.Arcade(
+            arcade = masonry.Arcade(
                 spans=self.spans,
                 voussoirs=self.voussoirs,
                 radius=self.radius,
@@ -101,26 +101,26 @@ class Aqueduct:
                     # every second course is of two stones
                     edges = [left, right] if k % 2 == 0 else [left, 0.5 * (left + right), right]
                     stones += [
-                        (f"pier{i}.{k}.{j}", _masonry.rectangle(a, b, low, low + course))
+                        (f"pier{i}.{k}.{j}", masonry.rectangle(a, b, low, low + course))
                         for j, (a, b) in enumerate(pairwise(edges))
                     ]
             for i, (name, outline) in enumerate(stones):
-                colour = _mjcf.shade(i + tier % 2 * len(stones), 2 * len(stones))
+                colour = mjcf.shade(i + tier % 2 * len(stones), 2 * len(stones))
                 joint = self._joint(name)
                 leaves = [front, back] if joint is None else [front, joint, back]
                 for k, (near, far) in enumerate(pairwise(leaves)):
-                    masonry.stone(f"tier{tier}.{name}.{k}", outline, near, far, colour)
+                    built.stone(f"tier{tier}.{name}.{k}", outline, near, far, colour)
             for side, wall in walls.items():
                 wall += arcade.wall(side, bottom, 2 * self.thickness)
             bottom = arcade.top
         for name, side in (("left", -1), ("right", 1)):
-            masonry.support(name, walls[side], front, back)
+            built.support(name, walls[side], front, back)
         for i, (left, right) in enumerate(piers):
-            outline = _masonry.rectangle(
+            outline = masonry.rectangle(
                 left - 0.5 * self.thickness, right + 0.5 * self.thickness, 0.0, plinth
             )
             sinks = i == (self.spans - 1) // 2
-            masonry.support(
+            built.support(
                 f"plinth{i}",
                 [outline],
                 1.1 * front,
@@ -130,15 +130,15 @@ class Aqueduct:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Aqueduct",
-                bodies=masonry.bodies,
-                assets=masonry.assets,
+                bodies=built.bodies,
+                assets=built.assets,
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=self.radius,
-                rest=[*masonry.rest, *masonry.keyframe()],
+                rest=[*built.rest, *built.keyframe()],
             ),
             focus=(0.0, 0.0, 0.5 * bottom, 0.45 * bottom),
         )

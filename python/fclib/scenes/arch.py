@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fclib.scenes import _masonry, _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import masonry, mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class Arch:
     time_step: float = parameter(5e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=(
                 "radius",
@@ -69,39 +69,39 @@ class Arch:
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; nothing of it is random."""
-        masonry = _masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap)
+        built = masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap)
         start = 0.5 * (math.pi - self.opening)
         # the foot of the ring, inside and outside, stands above the floor by the springing
         foot = (self.radius - 0.5 * self.thickness) * math.sin(start)
         centre = (0.0, self.springing - foot)
         front, back = -0.5 * self.depth, 0.5 * self.depth
-        outlines = _masonry.ring(
+        outlines = masonry.ring(
             self.radius, self.thickness, start, math.pi - start, self.voussoirs, centre
         )
         for i, outline in enumerate(outlines):
-            masonry.stone(f"voussoir{i}", outline, front, back, _mjcf.shade(i, self.voussoirs))
+            built.stone(f"voussoir{i}", outline, front, back, mjcf.shade(i, self.voussoirs))
 
         # the top of an abutment goes on beyond the foot on both sides
         more = 0.1 * self.thickness
-        inner = _masonry.on_circle(self.radius - 0.5 * self.thickness - more, start, centre)
-        outer = _masonry.on_circle(self.radius + 0.5 * self.thickness + more, start, centre)
+        inner = masonry.on_circle(self.radius - 0.5 * self.thickness - more, start, centre)
+        outer = masonry.on_circle(self.radius + 0.5 * self.thickness + more, start, centre)
         right = [(inner[0], 0.0), (outer[0], 0.0), outer, inner]
         left = [(-x, z) for x, z in reversed(right)]
-        masonry.support("left", [left], front - more, back + more)
-        masonry.support(
+        built.support("left", [left], front - more, back + more)
+        built.support(
             "right", [right], front - more, back + more, axis=(1, 0, 0), speed=self.spread
         )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Arch",
-                bodies=masonry.bodies,
-                assets=masonry.assets,
+                bodies=built.bodies,
+                assets=built.assets,
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=0.5 * self.radius,
-                rest=[*masonry.rest, *masonry.keyframe()],
+                rest=[*built.rest, *built.keyframe()],
             ),
         )

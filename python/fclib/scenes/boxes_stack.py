@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class BoxesStack:
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("size", "mass", "time_step"),
             non_negative=("mu", "gap", "offset", "yaw"),
@@ -63,18 +63,18 @@ class BoxesStack:
         for i, (x, y, yaw) in enumerate(draws):
             z = (i + 0.5) * self.size + (i + 1) * self.gap
             bodies.append(
-                f'<body name="box{i}" pos="{_mjcf.numbers(x, y, z)}"'
-                f' euler="{_mjcf.numbers(0, 0, yaw)}"><freejoint/>'
+                f'<body name="box{i}" pos="{mjcf.numbers(x, y, z)}"'
+                f' euler="{mjcf.numbers(0, 0, yaw)}"><freejoint/>'
                 f'<geom type="mesh" mesh="box" mass="{self.mass!r}" friction="{self.mu!r}"'
-                f' condim="3" material="solid" rgba="{_mjcf.shade(i, self.boxes)}"/></body>'
+                f' condim="3" material="solid" rgba="{mjcf.shade(i, self.boxes)}"/></body>'
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "BoxesStack",
                 bodies=bodies,
-                assets=[_mjcf.block_mesh("box", self.size, self.size, self.size)],
+                assets=[mjcf.block_mesh("box", self.size, self.size, self.size)],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,

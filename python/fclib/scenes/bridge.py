@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fclib.scenes import _masonry, _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import masonry, mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +56,7 @@ class Bridge:
     time_step: float = parameter(5e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=(
                 "radius",
@@ -80,8 +80,8 @@ class Bridge:
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; nothing of it is random."""
-        masonry = _masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap, arris=self.arris)
-        arcade = _masonry.Arcade(
+        built = masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap, arris=self.arris)
+        arcade = masonry.Arcade(
             spans=1,
             voussoirs=self.voussoirs,
             radius=self.radius,
@@ -96,30 +96,30 @@ class Bridge:
         front, back = -0.5 * self.width, 0.5 * self.width
         stones = arcade.stones()
         for i, (name, outline) in enumerate(stones):
-            masonry.stone(name, outline, front, back, _mjcf.shade(i, len(stones)))
+            built.stone(name, outline, front, back, mjcf.shade(i, len(stones)))
         # long enough for the wagon to stand on it
         approach = 4 * WAGON * self.width
         velocity = [0.0] * (6 * len(stones))
         if self.load:
-            masonry.bodies.append(self._wagon(-arcade.end - 0.6 * approach, arcade.top))
+            built.bodies.append(self._wagon(-arcade.end - 0.6 * approach, arcade.top))
             velocity += [self.speed, 0, 0, 0, 0, 0]
-        masonry.support("left", arcade.wall(-1, 0.0, approach), front, back)
+        built.support("left", arcade.wall(-1, 0.0, approach), front, back)
         right = arcade.wall(1, 0.0, approach)
-        masonry.support("right", right, front, back, axis=(1, 0, 0), speed=self.spread)
-        velocity += [0.0] * len(masonry.speeds)
+        built.support("right", right, front, back, axis=(1, 0, 0), speed=self.spread)
+        velocity += [0.0] * len(built.speeds)
         reach = arcade.end + 0.5 * approach
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Bridge",
-                bodies=masonry.bodies,
-                assets=masonry.assets,
+                bodies=built.bodies,
+                assets=built.assets,
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=0.5 * self.radius,
-                rest=[*masonry.rest, *masonry.keyframe(velocity)],
+                rest=[*built.rest, *built.keyframe(velocity)],
             ),
             focus=(0.0, 0.0, 0.5 * arcade.top, 0.5 * reach),
         )
@@ -129,16 +129,16 @@ class Bridge:
         a = WAGON * self.width
         wheels = "".join(
             f'<geom type="sphere" size="{0.4 * a!r}" mass="{0.05 * self.load!r}" condim="1"'
-            f' pos="{_mjcf.numbers(along * a, across * a, 0.4 * a)}" priority="1"'
+            f' pos="{mjcf.numbers(along * a, across * a, 0.4 * a)}" priority="1"'
             ' material="solid" rgba="0.25 0.26 0.28 1"/>'
             for along in (-1, 1)
             for across in (-0.8, 0.8)
         )
         # the law on velocities keeps a small penetration
         return (
-            f'<body name="wagon" pos="{_mjcf.numbers(x, 0, z - 0.5 * self.lap)}"><freejoint/>'
-            f'<geom type="box" size="{_mjcf.numbers(1.3 * a, 0.9 * a, 0.35 * a)}"'
-            f' pos="{_mjcf.numbers(0, 0, 0.9 * a)}" mass="{0.8 * self.load!r}" condim="3"'
+            f'<body name="wagon" pos="{mjcf.numbers(x, 0, z - 0.5 * self.lap)}"><freejoint/>'
+            f'<geom type="box" size="{mjcf.numbers(1.3 * a, 0.9 * a, 0.35 * a)}"'
+            f' pos="{mjcf.numbers(0, 0, 0.9 * a)}" mass="{0.8 * self.load!r}" condim="3"'
             f' friction="{self.mu!r}" material="solid" rgba="0.62 0.2 0.16 1"/>{wheels}</body>'
         )
 

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class Capsules:
     time_step: float = parameter(2.5e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "radius", "mass", "width", "time_step"),
             non_negative=("mu", "tilt", "gap", "speed"),
@@ -76,18 +76,18 @@ class Capsules:
         for i, axis in enumerate(directions):
             layer, cell = divmod(i, side * side)
             x, y, z = cells[cell % side], cells[cell // side], (layer + 0.5) * height
-            ends = _mjcf.numbers(*(-half * axis), *(half * axis))
+            ends = mjcf.numbers(*(-half * axis), *(half * axis))
             bodies.append(
-                f'<body name="capsule{i}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'
+                f'<body name="capsule{i}" pos="{mjcf.numbers(x, y, z)}"><freejoint/>'
                 f'<geom type="capsule" size="{self.radius!r}" fromto="{ends}"'
                 f' mass="{self.mass!r}" friction="{self.mu!r}" condim="3" material="solid"'
-                f' rgba="{_mjcf.shade(i, self.capsules)}"/></body>'
+                f' rgba="{mjcf.shade(i, self.capsules)}"/></body>'
             )
-        bodies += _mjcf.walls(0.5 * self.width, self.width, self.mu)
+        bodies += mjcf.walls(0.5 * self.width, self.width, self.mu)
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Capsules",
                 bodies=bodies,
                 time_step=self.time_step,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fclib.scenes._family import parameter
 from fclib.scenes.humanoid import Humanoid
+from fclib.scenes.shared.family import parameter
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class Chain:
     time_step: float = parameter(5e-4, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "thickness", "mass", "time_step"),
             non_negative=("mu", "gap"),
@@ -81,8 +81,8 @@ class Chain:
         for i in range(self.links):
             turn = 0.5 * math.pi * (i % 2)
             links.append(
-                f'<body name="link{i}" pos="{_mjcf.numbers(0, 0, z)}"'
-                f' euler="{_mjcf.numbers(0, 0, turn)}">'
+                f'<body name="link{i}" pos="{mjcf.numbers(0, 0, z)}"'
+                f' euler="{mjcf.numbers(0, 0, turn)}">'
                 + ("<freejoint/>" if i else "")
                 + "".join(self._rods(pitch, i))
                 + "</body>"
@@ -96,7 +96,7 @@ class Chain:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Chain",
                 bodies=links,
                 time_step=self.time_step,
@@ -130,8 +130,8 @@ class Chain:
         masses = self.mass * lengths / lengths.sum()
         return [
             f'<geom type="capsule" size="{0.5 * self.thickness!r}"'
-            f' fromto="{_mjcf.numbers(x, 0, z, x2, 0, z2)}" mass="{mass.item()!r}"'
+            f' fromto="{mjcf.numbers(x, 0, z, x2, 0, z2)}" mass="{mass.item()!r}"'
             f' friction="{self.mu!r}" condim="3" material="solid"'
-            f' rgba="{_mjcf.shade(link, self.links)}"/>'
+            f' rgba="{mjcf.shade(link, self.links)}"/>'
             for (x, z), (x2, z2), mass in zip(corners, following, masses, strict=True)
         ]

@@ -10,8 +10,8 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class Chute:
 
     def __post_init__(self) -> None:
         name = type(self).__name__
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "slope", "trough", "time_step"),
             non_negative=("mu", "spread", "spheres"),
@@ -68,10 +68,10 @@ class Chute:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the grains and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
-        corners = _mjcf.polyhedra(random, self.shapes)
+        corners = mjcf.polyhedra(random, self.shapes)
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         draws = random.uniform(size=(self.grains, 3))
-        turned = _mjcf.rotations(random, self.grains)
+        turned = mjcf.rotations(random, self.grains)
 
         pitch = 2.05 * self.radius
         width = pitch * self.across
@@ -92,22 +92,22 @@ class Chute:
                 else f'type="mesh" mesh="grain{int(shape * self.shapes)}"'
             )
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"grain{i}",
                     place,
                     f'{form} density="{self.density!r}"',
                     self._surface(),
-                    _mjcf.shade(i, self.grains),
+                    mjcf.shade(i, self.grains),
                     turned[i],
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 type(self).__name__,
                 bodies=bodies,
-                assets=[_mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
+                assets=[mjcf.polyhedron_mesh(f"grain{k}", c) for k, c in enumerate(corners)],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
@@ -117,17 +117,17 @@ class Chute:
 
     def _surface(self) -> str:
         """The friction of a grain; that of a contact is the larger one of its two geometries."""
-        return _mjcf.surface(self.mu)
+        return mjcf.surface(self.mu)
 
     def _chute(self, pitch: float, width: float, up: Vector, away: Vector) -> list[str]:
         """The slope, and walls beside it and at the end of the trough; planes without end."""
-        friction = _mjcf.surface(self.mu)
+        friction = mjcf.surface(self.mu)
         rows = -(-self.grains // (self.across * self.layers))
         length = pitch * (rows + 2 + self.layers / math.tan(self.slope))
         elements = [
-            f'<geom name="slope" type="plane" size="{_mjcf.numbers(0.5 * width, 0.5 * length, 1)}"'
-            f' pos="{_mjcf.numbers(*(0.5 * length * up))}"'
-            f' xyaxes="{_mjcf.numbers(0, 1, 0, *up)}" {friction} rgba="0.62 0.6 0.57 1"/>'
+            f'<geom name="slope" type="plane" size="{mjcf.numbers(0.5 * width, 0.5 * length, 1)}"'
+            f' pos="{mjcf.numbers(*(0.5 * length * up))}"'
+            f' xyaxes="{mjcf.numbers(0, 1, 0, *up)}" {friction} rgba="0.62 0.6 0.57 1"/>'
         ]
         height = 1.2 * self.layers * pitch
         walls = (
@@ -137,8 +137,8 @@ class Chute:
         )
         for i, (place, axis) in enumerate(walls):
             elements.append(
-                f'<geom name="wall{i}" type="plane" size="0 0 1" pos="{_mjcf.numbers(*place)}"'
-                f' zaxis="{_mjcf.numbers(*axis)}" {friction} rgba="0 0 0 0"/>'
+                f'<geom name="wall{i}" type="plane" size="0 0 1" pos="{mjcf.numbers(*place)}"'
+                f' zaxis="{mjcf.numbers(*axis)}" {friction} rgba="0 0 0 0"/>'
             )
         # the frame: the edges of the slope and of the trough, and the rim of the side walls
         ends = []
@@ -147,9 +147,9 @@ class Chute:
             top = np.array([self.trough, y, height])
             rim = foot + height / math.sin(self.slope) * up
             for start, stop in ((foot, foot + length * up), (foot, end), (end, top), (top, rim)):
-                elements.append(_mjcf.bar(start, stop, 0.1 * self.radius))
+                elements.append(mjcf.bar(start, stop, 0.1 * self.radius))
             ends.append(top)
-        elements.append(_mjcf.bar(ends[0], ends[1], 0.1 * self.radius))
+        elements.append(mjcf.bar(ends[0], ends[1], 0.1 * self.radius))
         return elements
 
 

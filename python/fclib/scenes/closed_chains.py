@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +48,7 @@ class ClosedChains:
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "radius", "gap", "density", "time_step"),
             non_negative=("mu", "offset", "tilt", "damping"),
@@ -62,7 +62,7 @@ class ClosedChains:
         # the circle through the joints of a regular polygon
         circle = 0.5 * self.length / math.sin(math.pi / self.links)
         height = 0.8 * circle + 0.5 * self.length
-        ends = _mjcf.numbers(0, -1.3 * circle, height, 0, 1.3 * circle, height)
+        ends = mjcf.numbers(0, -1.3 * circle, height, 0, 1.3 * circle, height)
         bar = 2 * self.radius
         bodies = [
             f'<geom name="bar" type="capsule" size="{bar!r}" fromto="{ends}" condim="3"'
@@ -89,13 +89,13 @@ class ClosedChains:
             last = self.links - 1
             rest += [
                 f'<equality><connect body1="link{i}.{last}" body2="link{i}.0"'
-                f' anchor="{_mjcf.numbers(self.length, 0, 0)}"/></equality>',
+                f' anchor="{mjcf.numbers(self.length, 0, 0)}"/></equality>',
                 f'<contact><exclude body1="link{i}.{last}" body2="link{i}.0"/></contact>',
             ]
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "ClosedChains",
                 bodies=bodies,
                 time_step=self.time_step,
@@ -116,17 +116,17 @@ class ClosedChains:
         inner = ""
         for k in reversed(range(self.links)):
             where = (
-                f'pos="{_mjcf.numbers(*place)}" euler="{_mjcf.numbers(*turn)}"'
+                f'pos="{mjcf.numbers(*place)}" euler="{mjcf.numbers(*turn)}"'
                 if k == 0
-                else f'pos="{_mjcf.numbers(self.length, 0, 0)}" euler="{_mjcf.numbers(0, 0, bend)}"'
+                else f'pos="{mjcf.numbers(self.length, 0, 0)}" euler="{mjcf.numbers(0, 0, bend)}"'
             )
             joint = "<freejoint/>" if k == 0 else f'<joint type="ball" damping="{self.damping!r}"/>'
             # rods end before the joint: round ends of two links meet there
             inner = (
                 f'<body name="link{chain}.{k}" {where}>{joint}'
                 f'<geom type="capsule" size="{self.radius!r}"'
-                f' fromto="{_mjcf.numbers(0, 0, 0, self.length, 0, 0)}" condim="3"'
+                f' fromto="{mjcf.numbers(0, 0, 0, self.length, 0, 0)}" condim="3"'
                 f' friction="{self.mu!r}" density="{self.density!r}" material="solid"'
-                f' rgba="{_mjcf.shade(chain, self.chains)}"/>{inner}</body>'
+                f' rgba="{mjcf.shade(chain, self.chains)}"/>{inner}</body>'
             )
         return inner

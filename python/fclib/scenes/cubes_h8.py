@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
-from fclib.scenes._solids import Bed, Block, Load, Solids
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.solids import Bed, Block, Load, Solids
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class CubesH8:
     small: ClassVar[Mapping[str, Any]] = {}
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("size", "upper", "young", "density", "rise", "time_step"),
             non_negative=("mu", "gap", "offset", "yaw", "fall", "bed", "damping"),

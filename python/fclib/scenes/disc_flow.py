@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +39,7 @@ class DiscFlow:
     time_step: float = parameter(4e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "slope", "time_step"),
             non_negative=("mu", "spread"),
@@ -69,12 +69,12 @@ class DiscFlow:
             # rows follow the ramp
             z = (row + 1.0) * pitch / math.cos(self.slope) - rise * x
             bodies.append(
-                _mjcf.disc(
+                mjcf.disc(
                     f"disc{i}",
                     (x + dx, z + dz),
                     radius,
                     self.density,
-                    f'friction="{self.mu!r}" condim="3" rgba="{_mjcf.shade(i, self.discs)}"',
+                    f'friction="{self.mu!r}" condim="3" rgba="{mjcf.shade(i, self.discs)}"',
                 )
             )
         end = 0.5 * width
@@ -82,9 +82,9 @@ class DiscFlow:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "DiscFlow",
-                bodies=[*bodies, *_mjcf.lines(walls, f'friction="{self.mu!r}"')],
+                bodies=[*bodies, *mjcf.lines(walls, f'friction="{self.mu!r}"')],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 Pair = tuple[float, float]
 
@@ -52,7 +52,7 @@ class FourBar:
 
     def __post_init__(self) -> None:
         lengths = (self.crank, self.coupler, self.rocker, self.frame)
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("crank", "coupler", "rocker", "frame", "block", "density", "time_step"),
             non_negative=("mu", "gain", "inertia"),
@@ -80,26 +80,26 @@ class FourBar:
             for k, offset in enumerate(offsets):
                 x, z = middle + 0.1 * self.block * offset, (k + 0.5) * self.block
                 bodies.append(
-                    f'<body name="block{i}.{k}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'
+                    f'<body name="block{i}.{k}" pos="{mjcf.numbers(x, y, z)}"><freejoint/>'
                     f'<geom type="mesh" mesh="block" condim="3" friction="{self.mu!r}"'
                     f' density="{self.density!r}" material="solid"'
-                    f' rgba="{_mjcf.shade(k, self.blocks)}"/></body>'
+                    f' rgba="{mjcf.shade(k, self.blocks)}"/></body>'
                 )
         loops, motors = [], []
         for i in range(self.linkages):
             loops.append(
                 f'<connect body1="coupler{i}" body2="rocker{i}"'
-                f' anchor="{_mjcf.numbers(self.coupler, 0, 0)}"/>'
+                f' anchor="{mjcf.numbers(self.coupler, 0, 0)}"/>'
             )
             motors.append(f'<velocity joint="crank{i}" kv="{self.gain!r}"/>')
-        controls = _mjcf.numbers(*[self.speed] * self.linkages)
+        controls = mjcf.numbers(*[self.speed] * self.linkages)
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "FourBar",
                 bodies=bodies,
-                assets=[_mjcf.block_mesh("block", self.block, self.block, self.block)],
+                assets=[mjcf.block_mesh("block", self.block, self.block, self.block)],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
@@ -159,7 +159,7 @@ class FourBar:
             self._rod(self.rocker, index) + self._rod(-self._leg, index, touches=True),
         )
         height = 2.5 * self.block
-        return f'<body name="frame{index}" pos="{_mjcf.numbers(0, y, height)}">{parts}</body>'
+        return f'<body name="frame{index}" pos="{mjcf.numbers(0, y, height)}">{parts}</body>'
 
     def _bar(
         self,
@@ -173,11 +173,11 @@ class FourBar:
         """A body that turns about y, at an angle to x; `base` is the angle of what carries it."""
         x, z = at
         # into the axes of the body that carries it
-        place = _mjcf.numbers(
+        place = mjcf.numbers(
             x * math.cos(base) + z * math.sin(base), 0, z * math.cos(base) - x * math.sin(base)
         )
         return (
-            f'<body name="{name}" pos="{place}" euler="{_mjcf.numbers(0, base - angle, 0)}">'
+            f'<body name="{name}" pos="{place}" euler="{mjcf.numbers(0, base - angle, 0)}">'
             f'<joint name="{name}" axis="0 -1 0" armature="{flywheel!r}"/>{inside}</body>'
         )
 
@@ -186,7 +186,7 @@ class FourBar:
         collides = "" if touches else ' contype="0" conaffinity="0"'
         return (
             f'<geom type="capsule" size="{self._radius!r}"{collides} condim="3"'
-            f' fromto="{_mjcf.numbers(0, 0, 0, length, 0, 0)}" density="{self.density!r}"'
+            f' fromto="{mjcf.numbers(0, 0, 0, length, 0, 0)}" density="{self.density!r}"'
             f' friction="{self.mu!r}" material="solid"'
-            f' rgba="{_mjcf.shade(2 * index, 2 * self.linkages)}"/>'
+            f' rgba="{mjcf.shade(2 * index, 2 * self.linkages)}"/>'
         )

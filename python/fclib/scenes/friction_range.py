@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 COEFFICIENTS = (0.0, 0.01, 0.1, 0.3, 0.6, 1.0, 2.0, 5.0, 10.0)  # mu
 
@@ -33,10 +33,10 @@ class FrictionRange:
     push: float = parameter(0.5, "1", "impulse on the top course, in weights of all blocks")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("push",), at_least={"contacts": 4})
+        mjcf.check(self, non_negative=("push",), at_least={"contacts": 4})
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """The wall of COEFFICIENTS[number]; the seed draws the masses."""
         mu = COEFFICIENTS[number]
-        bodies = _assembly.running_bond(self.contacts, seed, push=self.push)
+        bodies = assembly.running_bond(self.contacts, seed, push=self.push)
         return bodies.problem(mu, f"mu = {mu:g}")

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 Triple = tuple[float, float, float]
 
@@ -132,7 +132,7 @@ class Humanoid:
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("height", "mass", "stone", "block", "time_step"),
             non_negative=("mu", "stiffness", "damping", "drop", "roughness", "bar"),
@@ -157,15 +157,15 @@ class Humanoid:
             place = 2.4 * self.stone * place + 0.15 * self.stone * np.array([x, y])
             places.append((*place.tolist(), self.roughness + 0.6 * a))
             bodies.append(
-                f'<body name="stone{i}" pos="{_mjcf.numbers(*places[-1])}">'
+                f'<body name="stone{i}" pos="{mjcf.numbers(*places[-1])}">'
                 f"<freejoint/>"
-                f'<geom type="ellipsoid" size="{_mjcf.numbers(a, 0.8 * a, 0.6 * a)}"'
+                f'<geom type="ellipsoid" size="{mjcf.numbers(a, 0.8 * a, 0.6 * a)}"'
                 f' density="2500" friction="{self.mu!r}" condim="3" material="solid"'
-                f' rgba="{_mjcf.shade(i, self.stones)}"/></body>'
+                f' rgba="{mjcf.shade(i, self.stones)}"/></body>'
             )
         if self.roughness:
             reach = 0.5 * self.height
-            bodies += _mjcf.uneven_ground(
+            bodies += mjcf.uneven_ground(
                 random, self.roughness, self.block, (-reach, reach + self._way), reach, self.mu
             )
         rest = []
@@ -186,7 +186,7 @@ class Humanoid:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 type(self).__name__,
                 bodies=bodies,
                 time_step=self.time_step,
@@ -215,7 +215,7 @@ class Humanoid:
         """A bar across in both hands."""
         surface = self._surface(len(LIMBS))
         return (
-            f'<body name="bar" pos="{_mjcf.numbers(*place)}"><freejoint/>'
+            f'<body name="bar" pos="{mjcf.numbers(*place)}"><freejoint/>'
             f'<geom type="capsule" size="{self._numbers(0.02)}" mass="{self.bar!r}"'
             f' fromto="{self._numbers(0, -0.4, 0, 0, 0.4, 0)}" {surface}/></body>'
         )
@@ -226,13 +226,13 @@ class Humanoid:
         return self.height / 1.7
 
     def _numbers(self, *lengths: float) -> str:
-        return _mjcf.numbers(*(self._scale * x for x in lengths))
+        return mjcf.numbers(*(self._scale * x for x in lengths))
 
     def _trunk(self, z: float) -> str:
         """The whole body, hips at a height z [m]."""
         mass = self.mass * (1 - sum(limb.share for limb in LIMBS))
         return (
-            f'<body name="trunk" pos="{_mjcf.numbers(0, 0, z)}"><freejoint/>'
+            f'<body name="trunk" pos="{mjcf.numbers(0, 0, z)}"><freejoint/>'
             f'<geom type="capsule" size="{self._numbers(0.11)}" mass="{mass!r}"'
             f' fromto="{self._numbers(0, 0, 0, 0, 0, 0.3)}" {self._surface(0)}/>'
             f"{self._limbs('trunk')}</body>"
@@ -249,9 +249,9 @@ class Humanoid:
 
     def _joints(self, limb: Limb) -> str:
         return "".join(
-            f'<joint name="{limb.name}.{axis}" axis="{_mjcf.numbers(*_AXES[axis])}"'
+            f'<joint name="{limb.name}.{axis}" axis="{mjcf.numbers(*_AXES[axis])}"'
             f" {self._held(limb, rest)}"
-            f' limited="true" range="{_mjcf.numbers(low, high)}"/>'
+            f' limited="true" range="{mjcf.numbers(low, high)}"/>'
             for axis, rest, low, high in limb.joints
         )
 
@@ -271,5 +271,5 @@ class Humanoid:
     def _surface(self, index: int) -> str:
         return (
             f'friction="{self.mu!r}" condim="3" material="solid"'
-            f' rgba="{_mjcf.shade(index, len(LIMBS) + 1)}"'
+            f' rgba="{mjcf.shade(index, len(LIMBS) + 1)}"'
         )

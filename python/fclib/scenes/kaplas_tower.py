@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +51,7 @@ class KaplasTower:
     time_step: float = parameter(5e-4, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "width", "thickness", "mass", "time_step"),
             non_negative=("mu", "clearance", "gap", "offset"),
@@ -74,19 +74,19 @@ class KaplasTower:
                 x = radius * math.cos(angle) + draws[level, i, 0]
                 y = radius * math.sin(angle) + draws[level, i, 1]
                 bodies.append(
-                    f'<body name="plank{level}.{i}" pos="{_mjcf.numbers(x, y, z)}"'
-                    f' euler="{_mjcf.numbers(0, 0, angle + math.pi / 2)}"><freejoint/>'
+                    f'<body name="plank{level}.{i}" pos="{mjcf.numbers(x, y, z)}"'
+                    f' euler="{mjcf.numbers(0, 0, angle + math.pi / 2)}"><freejoint/>'
                     f'<geom type="mesh" mesh="plank" mass="{self.mass!r}" friction="{self.mu!r}"'
                     f' condim="3" material="solid"'
-                    f' rgba="{_mjcf.shade(2 * level + i % 2, 2 * self.levels)}"/></body>'
+                    f' rgba="{mjcf.shade(2 * level + i % 2, 2 * self.levels)}"/></body>'
                 )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "KaplasTower",
                 bodies=bodies,
-                assets=[_mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
+                assets=[mjcf.block_mesh("plank", self.length, self.width, self.thickness)],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,

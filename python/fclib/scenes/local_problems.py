@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-import fclib
+from fclib import _core
 
 FILE = Path(__file__).with_name("local_problems.json")
 
@@ -50,8 +50,8 @@ class LocalProblems:
             "W": np.array(record["W"]),
             "q": np.array(record["q"]),
             "mu": np.array([record["mu"]]),
-            "info": fclib.ProblemInfo(title=record["origin"]),
+            "info": _core.ProblemInfo(title=record["origin"]),
         }
         if record["mu_r"] is None:
-            return fclib.LocalProblem(**values)
-        return fclib.LocalRollingProblem(**values, mu_r=np.array([record["mu_r"]]))
+            return _core.LocalProblem(**values)
+        return _core.LocalRollingProblem(**values, mu_r=np.array([record["mu_r"]]))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
-from fclib.scenes import _masonry, _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import masonry, mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +47,7 @@ class LowWall:
     time_step: float = parameter(1e-2, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "height", "density", "time_step"),
             non_negative=("mu", "push", "lap"),
@@ -56,24 +56,24 @@ class LowWall:
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; nothing of it is random."""
-        masonry = _masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap)
+        built = masonry.Masonry(density=self.density, mu=self.mu, lap=self.lap)
         for course in range(self.courses):
             bottom = course * self.height
             for i, (left, right, front, back) in enumerate(self._course(course)):
-                masonry.stone(
+                built.stone(
                     f"stone{course}.{i}",
-                    _masonry.rectangle(left, right, bottom, bottom + self.height),
+                    masonry.rectangle(left, right, bottom, bottom + self.height),
                     front,
                     back,
-                    _mjcf.shade(2 * course + i % 2, 2 * self.courses),
+                    mjcf.shade(2 * course + i % 2, 2 * self.courses),
                 )
         if self.push:
             # against the middle of the wall, below its top
             top = (self.courses - 0.25) * self.height
-            masonry.support(
+            built.support(
                 "ram",
                 [
-                    _masonry.rectangle(
+                    masonry.rectangle(
                         -0.75 * self.length, 0.75 * self.length, top - 1.5 * self.height, top
                     )
                 ],
@@ -85,15 +85,15 @@ class LowWall:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "LowWall",
-                bodies=masonry.bodies,
-                assets=masonry.assets,
+                bodies=built.bodies,
+                assets=built.assets,
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=self.length,
-                rest=[*masonry.rest, *masonry.keyframe()],
+                rest=[*built.rest, *built.keyframe()],
             ),
         )
 

@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
-from fclib.scenes._solids import Block, Load, Solids
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
+from fclib.scenes.shared.solids import Block, Load, Solids
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +61,7 @@ class LowWallFEM:
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=(
                 *("block", "height", "depth", "young", "density", "rise", "width", "time_step"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 RATIOS = (1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6)  # of the top course to the lowest
 
@@ -34,10 +34,10 @@ class MassRatios:
     push: float = parameter(0.5, "1", "impulse on the top course, in weights of all blocks")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
+        mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """The wall of RATIOS[number]; the seed draws the masses."""
         ratio = RATIOS[number]
-        bodies = _assembly.running_bond(self.contacts, seed, push=self.push, ratio=ratio)
+        bodies = assembly.running_bond(self.contacts, seed, push=self.push, ratio=ratio)
         return bodies.problem(self.mu, f"mass ratio {ratio:g}")

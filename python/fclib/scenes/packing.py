@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 SPACING = 0.02  # of the lattice [m]
 REACH = 1.12  # spacings at which two spheres touch
@@ -36,12 +36,12 @@ class Packing:
     shake: float = parameter(0.08, "1", "deviation of a place, in spacings of the lattice")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("mu", "push", "shake"))
+        mjcf.check(self, non_negative=("mu", "push", "shake"))
 
     def problem(self, number: int, seed: int = 0) -> Any:
-        """Sizes of `_assembly.SIZES`, each at rest and pushed; the seed draws places and radii."""
+        """Sizes of `assembly.SIZES`, each at rest and pushed; the seed draws places and radii."""
         size, pushed = divmod(number, 2)
-        return self.of_size(_assembly.SIZES[size], self.push if pushed else 0.0, seed)
+        return self.of_size(assembly.SIZES[size], self.push if pushed else 0.0, seed)
 
     def of_size(self, contacts: int, push: float, seed: int = 0) -> Any:
         """A packing of about so many contacts."""
@@ -74,9 +74,9 @@ class Packing:
         masses = 2500 * 4 / 3 * np.pi * radii**3
         impulses = np.zeros((len(centres), 3))
         pushed = np.flatnonzero(grid[:, 0] == side - 1)
-        weight = masses.sum() * _assembly.GRAVITY * _assembly.STEP
+        weight = masses.sum() * assembly.GRAVITY * assembly.STEP
         impulses[pushed, 0] = -push * weight / len(pushed)
-        bodies = _assembly.Bodies(
+        bodies = assembly.Bodies(
             masses=masses,
             inertias=np.repeat((0.4 * masses * radii**2)[:, None], 3, axis=1),
             centres=centres,

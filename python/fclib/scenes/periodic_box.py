@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class PeriodicBox:
     time_step: float = parameter(0.02, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu", "spread"),
@@ -60,34 +60,34 @@ class PeriodicBox:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the polyhedra and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
-        corners = _mjcf.polyhedra(random, self.shapes)
+        corners = mjcf.polyhedra(random, self.shapes)
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         kinds = random.integers(self.shapes, size=self.polyhedra)
-        turned = _mjcf.rotations(random, self.polyhedra)
+        turned = mjcf.rotations(random, self.polyhedra)
 
         side = math.floor(self.period / (2.05 * self.radius))
         pitch, height = self.period / side, 2.05 * self.radius
-        bodies = _mjcf.posts(0.5 * self.period, self.period)
+        bodies = mjcf.posts(0.5 * self.period, self.period)
         for i in range(self.polyhedra):
             layer, cell = divmod(i, side * side)
             x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"polyhedron{i}",
                     (x, y, height * (layer + 0.5)),
                     f'type="mesh" mesh="shape{kinds[i]}" density="{self.density!r}"',
-                    _mjcf.surface(self.mu),
-                    _mjcf.shade(i, self.polyhedra),
+                    mjcf.surface(self.mu),
+                    mjcf.shade(i, self.polyhedra),
                     turned[i],
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "PeriodicBox",
                 bodies=bodies,
-                assets=[_mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
+                assets=[mjcf.polyhedron_mesh(f"shape{k}", c) for k, c in enumerate(corners)],
                 time_step=self.time_step,
                 gravity=self.gravity,
                 floor_mu=self.mu,

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class PlanarBlocks:
     time_step: float = parameter(2e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("length", "height", "density", "time_step"),
             non_negative=("mu", "gap", "offset", "disc_radius", "disc_speed", "delay"),
@@ -69,12 +69,12 @@ class PlanarBlocks:
                 first, last = bonded and i == 0, bonded and i == self.blocks
                 x += 0.25 * pitch * (first - last)
                 bodies.append(
-                    _mjcf.block(
+                    mjcf.block(
                         f"block{course}.{i}",
                         (x, z),
                         "half" if first or last else "block",
                         self.density * (half if first or last else self.length) * self.height,
-                        f'{look} rgba="{_mjcf.shade(2 * course + i % 2, 2 * self.courses)}"',
+                        f'{look} rgba="{mjcf.shade(2 * course + i % 2, 2 * self.courses)}"',
                     )
                 )
         velocity = np.zeros((len(bodies), 3))
@@ -82,7 +82,7 @@ class PlanarBlocks:
             away = self.disc_speed * self.delay + 0.5 * (self.blocks + 1) * pitch
             place = (-away - self.disc_radius, self.courses * self.height * 0.8)
             bodies.append(
-                _mjcf.disc(
+                mjcf.disc(
                     "disc",
                     place,
                     self.disc_radius,
@@ -96,12 +96,12 @@ class PlanarBlocks:
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "PlanarBlocks",
                 bodies=bodies,
                 assets=[
-                    _mjcf.block_mesh("block", self.length, self.height, self.height),
-                    _mjcf.block_mesh("half", half, self.height, self.height),
+                    mjcf.block_mesh("block", self.length, self.height, self.height),
+                    mjcf.block_mesh("half", half, self.height, self.height),
                 ],
                 time_step=self.time_step,
                 gravity=self.gravity,

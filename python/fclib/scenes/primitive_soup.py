@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 # half axes of a shape for its radius: boxes x, y, z; cylinders and capsules radius, half length
 SHAPES = {
@@ -51,7 +51,7 @@ class PrimitiveSoup:
     time_step: float = parameter(0.0125, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu",),
@@ -65,30 +65,30 @@ class PrimitiveSoup:
         """The scene; the seed draws the shapes and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
         kinds = random.integers(len(SHAPES), size=self.bodies)
-        turned = _mjcf.rotations(random, self.bodies)
+        turned = mjcf.rotations(random, self.bodies)
         pitch = 2.05 * self.radius
         side = math.floor(self.width / pitch)
-        bodies = _mjcf.walls(0.5 * self.width, self.width, self.mu)
+        bodies = mjcf.walls(0.5 * self.width, self.width, self.mu)
         for i in range(self.bodies):
             layer, cell = divmod(i, side * side)
             place = np.array([*divmod(cell, side), layer + 0.5])
             place[:2] -= 0.5 * (side - 1)
             shape = list(SHAPES)[kinds[i]]
-            size = _mjcf.numbers(*(self.radius * np.array(SHAPES[shape])))
+            size = mjcf.numbers(*(self.radius * np.array(SHAPES[shape])))
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"{shape}{i}",
                     pitch * place,
                     f'type="{shape}" size="{size}" density="{self.density!r}"',
                     self._surface(),
-                    _mjcf.shade(i, self.bodies),
+                    mjcf.shade(i, self.bodies),
                     turned[i],
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 type(self).__name__,
                 bodies=bodies,
                 time_step=self.time_step,
@@ -102,4 +102,4 @@ class PrimitiveSoup:
 
     def _surface(self) -> str:
         """The friction of a body; that of a contact is the larger one of its two geometries."""
-        return _mjcf.surface(self.mu)
+        return mjcf.surface(self.mu)

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 Pair = tuple[float, float]
 
@@ -60,7 +60,7 @@ class Quadruped:
     time_step: float = parameter(4e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("crank", "mass", "block", "density", "time_step"),
             non_negative=("mu", "inertia", "gain", "roughness"),
@@ -78,8 +78,8 @@ class Quadruped:
             for pivot in ((x, 0.0), (x + a * PIVOT[0], a * PIVOT[1])):
                 axles += (
                     f'<geom type="capsule" size="{0.2 * a!r}" contype="0" conaffinity="0" mass="0"'
-                    f' fromto="{_mjcf.numbers(pivot[0], -2.5 * a, pivot[1])}'
-                    f' {_mjcf.numbers(pivot[0], 2.5 * a, pivot[1])}" rgba="0.45 0.47 0.5 1"/>'
+                    f' fromto="{mjcf.numbers(pivot[0], -2.5 * a, pivot[1])}'
+                    f' {mjcf.numbers(pivot[0], 2.5 * a, pivot[1])}" rgba="0.45 0.47 0.5 1"/>'
                 )
             for side, y in (("left", 2.5 * a), ("right", -2.5 * a)):
                 name = f"{end}.{side}"
@@ -88,25 +88,25 @@ class Quadruped:
                 legs += self._leg(name, x, y, phase)
                 loops.append(
                     f'<connect body1="coupler.{name}" body2="rocker.{name}"'
-                    f' anchor="{_mjcf.numbers(COUPLER * a, 0, 0)}"/>'
+                    f' anchor="{mjcf.numbers(COUPLER * a, 0, 0)}"/>'
                 )
                 motors.append(f'<velocity joint="crank.{name}" kv="{self.gain!r}"/>')
         trunk = (
-            f'<body name="trunk" pos="{_mjcf.numbers(0, 0, height)}"><freejoint/>'
-            f'<geom type="box" size="{_mjcf.numbers(7 * a, 1.5 * a, 0.8 * a)}"'
-            f' pos="{_mjcf.numbers(0, 0, 0.8 * a)}" mass="{self.mass!r}" condim="3"'
-            f' friction="{self.mu!r}" material="solid" rgba="{_mjcf.shade(0, 5)}"/>'
+            f'<body name="trunk" pos="{mjcf.numbers(0, 0, height)}"><freejoint/>'
+            f'<geom type="box" size="{mjcf.numbers(7 * a, 1.5 * a, 0.8 * a)}"'
+            f' pos="{mjcf.numbers(0, 0, 0.8 * a)}" mass="{self.mass!r}" condim="3"'
+            f' friction="{self.mu!r}" material="solid" rgba="{mjcf.shade(0, 5)}"/>'
             f"{axles}{legs}</body>"
         )
         # backwards: the foot that stands goes to the rear
-        controls = _mjcf.numbers(*[-self.speed] * 4)
+        controls = mjcf.numbers(*[-self.speed] * 4)
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Quadruped",
                 bodies=[
-                    *_mjcf.uneven_ground(
+                    *mjcf.uneven_ground(
                         random, self.roughness, self.block, (-10 * a, 40 * a), 7 * a, self.mu
                     ),
                     trunk,
@@ -198,8 +198,8 @@ class Quadruped:
             y = 0.0
         turn = (base or 0.0) - angle
         return (
-            f'<body name="{name}" pos="{_mjcf.numbers(x, y, z)}"'
-            f' euler="{_mjcf.numbers(0, turn, 0)}">'
+            f'<body name="{name}" pos="{mjcf.numbers(x, y, z)}"'
+            f' euler="{mjcf.numbers(0, turn, 0)}">'
             f'<joint name="{name}" axis="0 -1 0" armature="{drive!r}"/>'
             + (f'<joint name="{name}.aside" axis="0 0 1"/>' if swings else "")
             + f"{inside}</body>"
@@ -209,16 +209,16 @@ class Quadruped:
         """A rod in the plane of its body that touches nothing."""
         return (
             f'<geom type="capsule" size="{0.15 * self.crank!r}" contype="0" conaffinity="0"'
-            f' fromto="{_mjcf.numbers(start[0], 0, start[1], end[0], 0, end[1])}"'
-            f' density="{self.density!r}" material="solid" rgba="{_mjcf.shade(index, 5)}"/>'
+            f' fromto="{mjcf.numbers(start[0], 0, start[1], end[0], 0, end[1])}"'
+            f' density="{self.density!r}" material="solid" rgba="{mjcf.shade(index, 5)}"/>'
         )
 
     def _sole(self, foot: Pair) -> str:
         """A foot: a bar across, as wide as two of them need to carry the trunk."""
         half = 2.2 * self.crank
-        ends = _mjcf.numbers(foot[0], -half, foot[1], foot[0], half, foot[1])
+        ends = mjcf.numbers(foot[0], -half, foot[1], foot[0], half, foot[1])
         return (
             f'<geom type="capsule" size="{self._radius!r}" condim="3" friction="{self.mu!r}"'
             f' fromto="{ends}" density="{self.density!r}" material="solid"'
-            f' rgba="{_mjcf.shade(4, 5)}"/>'
+            f' rgba="{mjcf.shade(4, 5)}"/>'
         )

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 TIMES = (1, 2, 4, 8, 16)  # copies of each contact
 
@@ -35,10 +35,10 @@ class RepeatedContacts:
     push: float = parameter(0.5, "1", "impulse on the top course, in weights of all blocks")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
+        mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """The wall of TIMES[number]; the seed draws the masses."""
         times = TIMES[number]
-        bodies = _assembly.running_bond(self.contacts, seed, push=self.push).repeated(times)
+        bodies = assembly.running_bond(self.contacts, seed, push=self.push).repeated(times)
         return bodies.problem(self.mu, f"each contact {times} times")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import parameter
 from fclib.scenes.chute import Chute
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class RollingChute(Chute):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _mjcf.check(self, non_negative=("mu_r",))
+        mjcf.check(self, non_negative=("mu_r",))
 
     def _surface(self) -> str:
-        return _mjcf.surface(self.mu, self.mu_r)
+        return mjcf.surface(self.mu, self.mu_r)

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class RollingDiscs:
     time_step: float = parameter(4e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu", "mu_r", "spread"),
@@ -67,19 +67,19 @@ class RollingDiscs:
             x = (cell - 0.5 * (self.per_row - 1) + 0.5 * (row % 2)) * pitch
             place = (x + dx, (row + 0.6) * pitch + dz)
             bodies.append(
-                _mjcf.disc(
+                mjcf.disc(
                     f"disc{i}",
                     place,
                     radius,
                     self.density,
                     f'friction="{self.mu!r} 0 {self.mu_r!r}" condim="6"'
-                    f' rgba="{_mjcf.shade(i, self.discs)}"',
+                    f' rgba="{mjcf.shade(i, self.discs)}"',
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "RollingDiscs",
                 bodies=bodies,
                 time_step=self.time_step,

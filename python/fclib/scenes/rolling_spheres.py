@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,7 @@ class RollingSpheres:
     time_step: float = parameter(4e-3, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu", "mu_r", "spread"),
@@ -70,15 +70,15 @@ class RollingSpheres:
             x, y = pitch * place + 0.2 * self.radius * (2 * draws[i, 1:] - 1)
             z = self.radius + layer * pitch
             bodies.append(
-                f'<body name="sphere{i}" pos="{_mjcf.numbers(x, y, z)}"><freejoint/>'
+                f'<body name="sphere{i}" pos="{mjcf.numbers(x, y, z)}"><freejoint/>'
                 f'<geom type="sphere" size="{radius!r}" density="{self.density!r}"'
                 f' friction="{self.mu!r} 0 {self.mu_r!r}" condim="6" material="solid"'
-                f' rgba="{_mjcf.shade(i, self.spheres)}"/></body>'
+                f' rgba="{mjcf.shade(i, self.spheres)}"/></body>'
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "RollingSpheres",
                 bodies=bodies,
                 time_step=self.time_step,

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +53,7 @@ class SliderCrank:
     time_step: float = parameter(2e-4, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("crank", "rod", "pin", "clearance", "density", "time_step"),
             non_negative=("mu", "inertia", "gain"),
@@ -72,7 +72,7 @@ class SliderCrank:
         shaft, bodies, loops = "", [], []
         for i in range(self.sliders):
             y = pitch * (i - 0.5 * (self.sliders - 1))
-            colour = _mjcf.shade(i, self.sliders)
+            colour = mjcf.shade(i, self.sliders)
             angle = start + 2 * math.pi * i / self.sliders
             x, z = self.crank * math.cos(angle), self.crank * math.sin(angle)
             tilt = math.asin(-z / self.rod)
@@ -82,11 +82,11 @@ class SliderCrank:
                 self._slider(i, x + self.rod * math.cos(tilt), y, colour),
             ]
             loops.append(
-                f'<connect body1="rod{i}" body2="shaft" anchor="{_mjcf.numbers(0, 0, 0)}"/>'
+                f'<connect body1="rod{i}" body2="shaft" anchor="{mjcf.numbers(0, 0, 0)}"/>'
             )
         half = 0.5 * pitch * self.sliders
         shaft = (
-            f'<body name="shaft" pos="{_mjcf.numbers(0, 0, self._height)}">'
+            f'<body name="shaft" pos="{mjcf.numbers(0, 0, self._height)}">'
             f'<joint name="shaft" axis="0 -1 0" armature="{self.inertia!r}"/>'
             f"{self._bar((0, -half, 0), (0, half, 0), 0.8 * self.pin, IRON)}{shaft}</body>"
         )
@@ -96,11 +96,11 @@ class SliderCrank:
             for y in [pitch * (i - 0.5 * (self.sliders - 1))]
             for z in (self._height - 3.4 * self.pin, self._height + 3.4 * self.pin)
         ]
-        controls = _mjcf.numbers(self.speed)
+        controls = mjcf.numbers(self.speed)
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "SliderCrank",
                 bodies=[shaft, *bodies, *rails],
                 time_step=self.time_step,
@@ -151,8 +151,8 @@ class SliderCrank:
             # a little longer than a side, so that the corners are closed
             half = (0.5 * wall, self._width, circle * math.tan(math.pi / self.sides))
             faces.append(
-                f'<geom type="box" size="{_mjcf.numbers(*half)}" pos="{_mjcf.numbers(*place)}"'
-                f' euler="{_mjcf.numbers(0, -angle, 0)}" contype="2" conaffinity="1" condim="3"'
+                f'<geom type="box" size="{mjcf.numbers(*half)}" pos="{mjcf.numbers(*place)}"'
+                f' euler="{mjcf.numbers(0, -angle, 0)}" contype="2" conaffinity="1" condim="3"'
                 f' friction="{self.mu!r}" density="{self.density!r}" material="solid"'
                 f' rgba="{colour}"/>'
             )
@@ -167,31 +167,31 @@ class SliderCrank:
         )
         # joints act before the body's own rotation
         return (
-            f'<body name="plane{i}" pos="{_mjcf.numbers(x, y, self._height + z)}">'
-            f'<body name="rod{i}" euler="{_mjcf.numbers(0, -tilt, 0)}">'
+            f'<body name="plane{i}" pos="{mjcf.numbers(x, y, self._height + z)}">'
+            f'<body name="rod{i}" euler="{mjcf.numbers(0, -tilt, 0)}">'
             f"{joints}{bar}{''.join(faces)}</body></body>"
         )
 
     def _slider(self, i: int, x: float, y: float, colour: str) -> str:
         """A slider with its pin, two cheeks beside the rod and a crown."""
-        cheek = _mjcf.numbers(2.2 * self.pin, 0.4 * self.pin, 1.2 * self.pin)
-        crown = _mjcf.numbers(0.5 * self.pin, 3 * self.pin, 3 * self.pin)
+        cheek = mjcf.numbers(2.2 * self.pin, 0.4 * self.pin, 1.2 * self.pin)
+        crown = mjcf.numbers(0.5 * self.pin, 3 * self.pin, 3 * self.pin)
         look = (
             f'contype="0" conaffinity="0" density="{self.density!r}" material="solid"'
             f' rgba="{colour}"'
         )
         cheeks = "".join(
-            f'<geom type="box" size="{cheek}" pos="{_mjcf.numbers(self.pin, side, 0)}" {look}/>'
+            f'<geom type="box" size="{cheek}" pos="{mjcf.numbers(self.pin, side, 0)}" {look}/>'
             for side in (-2.2 * self.pin, 2.2 * self.pin)
         )
         end = self._width - self.pin * 0.1
         return (
-            f'<body name="slider{i}" pos="{_mjcf.numbers(x, y, self._height)}">'
+            f'<body name="slider{i}" pos="{mjcf.numbers(x, y, self._height)}">'
             f'<joint name="slider{i}" type="slide" axis="1 0 0"/>'
             f'<geom type="capsule" size="{self.pin!r}" contype="1" conaffinity="2" condim="3"'
-            f' fromto="{_mjcf.numbers(0, -end, 0, 0, end, 0)}" friction="{self.mu!r}"'
+            f' fromto="{mjcf.numbers(0, -end, 0, 0, end, 0)}" friction="{self.mu!r}"'
             f' density="{self.density!r}" material="solid" rgba="{IRON}"/>{cheeks}'
-            f'<geom type="box" size="{crown}" pos="{_mjcf.numbers(3.5 * self.pin, 0, 0)}" {look}/>'
+            f'<geom type="box" size="{crown}" pos="{mjcf.numbers(3.5 * self.pin, 0, 0)}" {look}/>'
             "</body>"
         )
 
@@ -207,7 +207,7 @@ class SliderCrank:
         weight = f'density="{self.density!r}"' if mass is None else f'mass="{mass!r}"'
         return (
             f'<geom type="capsule" size="{radius!r}" contype="0" conaffinity="0" {weight}'
-            f' fromto="{_mjcf.numbers(*start, *end)}" material="solid" rgba="{colour}"/>'
+            f' fromto="{mjcf.numbers(*start, *end)}" material="solid" rgba="{colour}"/>'
         )
 
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class Spheres:
     time_step: float = parameter(0.02, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu", "offset"),
@@ -57,7 +57,7 @@ class Spheres:
         """The scene; the seed draws the offsets."""
         random = np.random.Generator(np.random.PCG64(seed))
         draws = random.uniform(-self.offset, self.offset, size=(self.spheres, 3))
-        friction = _mjcf.surface(self.mu)
+        friction = mjcf.surface(self.mu)
         shape = f'type="sphere" size="{self.radius!r}"'
         bodies = []
         # the bed: touching, their centres in the plane of the floor
@@ -65,7 +65,7 @@ class Spheres:
         for i in range(self.bed * self.bed):
             x, y = 2 * self.radius * (np.array(divmod(i, self.bed)) - half)
             bodies.append(
-                f'<geom {shape} pos="{_mjcf.numbers(x, y, 0)}" {friction} rgba="0.62 0.6 0.57 1"/>'
+                f'<geom {shape} pos="{mjcf.numbers(x, y, 0)}" {friction} rgba="0.62 0.6 0.57 1"/>'
             )
         # the column: offsets leave no overlap
         pitch = 2 * (1 + self.offset) * self.radius
@@ -76,18 +76,18 @@ class Spheres:
             place = pitch * place + self.radius * draw
             place[2] += self.radius * (2 + self.offset)
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"sphere{i}",
                     place,
                     f'{shape} density="{self.density!r}"',
                     friction,
-                    _mjcf.shade(i, self.spheres),
+                    mjcf.shade(i, self.spheres),
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "Spheres",
                 bodies=bodies,
                 time_step=self.time_step,

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ class SpheresBox:
     time_step: float = parameter(0.02, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "load", "time_step"),
             non_negative=("mu", "offset", "gap"),
@@ -60,7 +60,7 @@ class SpheresBox:
         """The scene; the seed draws the offsets."""
         random = np.random.Generator(np.random.PCG64(seed))
         draws = random.uniform(-self.offset, self.offset, size=(self.spheres, 2))
-        friction = _mjcf.surface(self.mu)
+        friction = mjcf.surface(self.mu)
         pitch, rise = 2 * (1 + self.offset) * self.radius, 2 * self.radius + self.gap
         sides = np.array([self.along_x, self.along_y])
         bodies = []
@@ -69,12 +69,12 @@ class SpheresBox:
             place = pitch * (np.array(divmod(cell, self.along_y)) - 0.5 * (sides - 1))
             place += self.radius * draw
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"sphere{i}",
                     np.append(place, (layer + 0.5) * rise),
                     f'type="sphere" size="{self.radius!r}" density="{self.density!r}"',
                     friction,
-                    _mjcf.shade(i, self.spheres),
+                    mjcf.shade(i, self.spheres),
                 )
             )
         layers = -(-self.spheres // (self.along_x * self.along_y))
@@ -82,16 +82,16 @@ class SpheresBox:
         height, half = rise * layers, 0.5 * self.radius
         mass = self.load * self.spheres * self.density * 4 / 3 * math.pi * self.radius**3
         bodies.append(
-            f'<body name="lid" pos="{_mjcf.numbers(0, 0, height + half)}">'
+            f'<body name="lid" pos="{mjcf.numbers(0, 0, height + half)}">'
             '<joint type="slide" axis="0 0 1"/>'
-            f'<geom type="box" size="{_mjcf.numbers(x, y, half)}" mass="{mass!r}" {friction}'
+            f'<geom type="box" size="{mjcf.numbers(x, y, half)}" mass="{mass!r}" {friction}'
             ' material="solid" rgba="0.45 0.47 0.5 1"/></body>'
         )
-        bodies += _mjcf.walls((x, y), height, self.mu)
+        bodies += mjcf.walls((x, y), height, self.mu)
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "SpheresBox",
                 bodies=bodies,
                 time_step=self.time_step,

@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import Scene, parameter
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import Scene, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +42,7 @@ class SpheresInABox:
     time_step: float = parameter(0.0125, "s", "time step h")
 
     def __post_init__(self) -> None:
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
             non_negative=("mu", "spread", "gap"),
@@ -59,7 +59,7 @@ class SpheresInABox:
         radii = self.radius * (1 - self.spread * draws[:, 0])
         pitch = 2 * self.radius + self.gap
         side = math.floor(self.width / pitch)
-        bodies = _mjcf.walls(0.5 * self.width, self.width, self.mu)
+        bodies = mjcf.walls(0.5 * self.width, self.width, self.mu)
         for i, radius in enumerate(radii.tolist()):
             layer, cell = divmod(i, side * side)
             # somewhere in the cell, without touching its faces
@@ -67,18 +67,18 @@ class SpheresInABox:
             x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
             place = np.array([x, y, pitch * (layer + 0.5)]) + room * (2 * draws[i, 1:] - 1)
             bodies.append(
-                _mjcf.grain(
+                mjcf.grain(
                     f"sphere{i}",
                     place,
                     f'type="sphere" size="{radius!r}" density="{self.density!r}"',
-                    _mjcf.surface(self.mu),
-                    _mjcf.shade(i, self.spheres),
+                    mjcf.surface(self.mu),
+                    mjcf.shade(i, self.spheres),
                 )
             )
         return Scene.of(
             self,
             seed,
-            _mjcf.document(
+            mjcf.document(
                 "SpheresInABox",
                 bodies=bodies,
                 time_step=self.time_step,

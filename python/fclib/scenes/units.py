@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 LENGTHS = (1e-3, 1.0, 1e3)  # unit of length [m]
 MASSES = (1e-3, 1.0, 1e3)  # unit of mass [kg]
@@ -35,12 +35,12 @@ class Units:
     push: float = parameter(0.5, "1", "impulse on the top course, in weights of all blocks")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
+        mjcf.check(self, non_negative=("mu", "push"), at_least={"contacts": 4})
 
     def problem(self, number: int, seed: int = 0) -> Any:
         """The wall in LENGTHS[number // 3] and MASSES[number % 3]; the seed draws the masses."""
         length, mass = LENGTHS[number // len(MASSES)], MASSES[number % len(MASSES)]
-        bodies = _assembly.running_bond(self.contacts, seed, push=self.push)
+        bodies = assembly.running_bond(self.contacts, seed, push=self.push)
         return bodies.in_units(length, mass).problem(
             self.mu, f"unit of length {length:g} m, of mass {mass:g} kg"
         )

@@ -9,9 +9,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from fclib.scenes import _mjcf
-from fclib.scenes._family import parameter
 from fclib.scenes.humanoid import Humanoid, Limb, Triple
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.family import parameter
 
 # of a body of 1.7 m [m]: from the trunk's origin to its hips, from there to knee and ankle
 HIP, THIGH, SHIN = 0.1, 0.4, 0.38
@@ -56,7 +56,7 @@ class Walker(Humanoid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _mjcf.check(
+        mjcf.check(
             self,
             positive=("period", "airborne", "gain", "crouch"),
             non_negative=("stride", "lift", "sway", "gain_rate"),
@@ -120,7 +120,7 @@ class Walker(Humanoid):
         ]
         keys = [
             f'<key name="gait{i}" time="{self.period * i / KEYS!r}"'
-            f' ctrl="{_mjcf.numbers(*self._controls(self.period * (i % KEYS) / KEYS))}"/>'
+            f' ctrl="{mjcf.numbers(*self._controls(self.period * (i % KEYS) / KEYS))}"/>'
             for i in range(KEYS + 1)
         ]
         ahead, aside = self.stride / self.period, self.trunk(0.0)
@@ -143,8 +143,8 @@ class Walker(Humanoid):
             *motors,
             "</actuator>",
             "<keyframe>",
-            f'<key name="start" qpos="{_mjcf.numbers(*position)}"'
-            f' qvel="{_mjcf.numbers(*velocity)}"/>',
+            f'<key name="start" qpos="{mjcf.numbers(*position)}"'
+            f' qvel="{mjcf.numbers(*velocity)}"/>',
             *keys,
             "</keyframe>",
         ]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from fclib.scenes import _assembly, _mjcf
-from fclib.scenes._family import parameter
+from fclib.scenes.shared import assembly, mjcf
+from fclib.scenes.shared.family import parameter
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,20 +25,20 @@ class Wall:
     authors: ClassVar[str] = "the authors of FCLIB"
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "ladder"
-    problems: ClassVar[int] = 2 * len(_assembly.SIZES)
+    problems: ClassVar[int] = 2 * len(assembly.SIZES)
 
     mu: float = parameter(0.6, "1", "coefficient of friction")
     push: float = parameter(1.0, "1", "impulse on every second wall, in weights of all its blocks")
 
     def __post_init__(self) -> None:
-        _mjcf.check(self, non_negative=("mu", "push"))
+        mjcf.check(self, non_negative=("mu", "push"))
 
     def problem(self, number: int, seed: int = 0) -> Any:
-        """Sizes of `_assembly.SIZES`, each at rest and pushed; the seed draws the masses."""
+        """Sizes of `assembly.SIZES`, each at rest and pushed; the seed draws the masses."""
         size, pushed = divmod(number, 2)
-        return self.of_size(_assembly.SIZES[size], self.push if pushed else 0.0, seed)
+        return self.of_size(assembly.SIZES[size], self.push if pushed else 0.0, seed)
 
     def of_size(self, contacts: int, push: float, seed: int = 0) -> Any:
         """A wall of about so many contacts."""
-        bodies = _assembly.running_bond(contacts, seed, push=push)
+        bodies = assembly.running_bond(contacts, seed, push=push)
         return bodies.problem(self.mu, f"{len(bodies.masses)} blocks, push {push:g}")

@@ -9,6 +9,7 @@
 
 moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
+mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks too much
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
 periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
@@ -21,7 +22,8 @@ scikit-fem, in that of `_skfem.py`.
 
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
-from fclib.simulate.mujoco_model import MujocoModel, UnsupportedSceneError
+from fclib.simulate.mujoco_model import MujocoModel
+from fclib.simulate.mujoco_scene import UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
 from fclib.simulate.simulation import Model, State, Step, engine, model_of, provenance, simulate
 

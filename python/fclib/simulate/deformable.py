@@ -37,8 +37,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from fclib.scenes import Scene, _mjcf
-from fclib.scenes._solids import Block, Load, Solids
+from fclib.scenes import Scene
+from fclib.scenes.shared import mjcf
+from fclib.scenes.shared.solids import Block, Load, Solids
 from fclib.simulate import _skfem
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
@@ -433,20 +434,20 @@ def picture(model: DeformableModel, x: Vector) -> str:
         corner = 4 * np.arange(len(quads))[:, None]
         triangles = (corner + np.array([0, 1, 2, 0, 2, 3])).reshape(-1, 3)
         sheet = np.tile([(0, 0), (1, 0), (1, 1), (0, 1)], (len(quads), 1))
-        colour = " ".join(_mjcf.shade(i, count).split()[:3])
+        colour = " ".join(mjcf.shade(i, count).split()[:3])
         assets += [
             f'<texture name="t{i}" type="2d" builtin="flat" mark="edge" rgb1="{colour}"'
             ' markrgb="0.2 0.24 0.3" width="64" height="64"/>',
             f'<material name="m{i}" texture="t{i}" specular="0.2" shininess="0.3"/>',
-            f'<mesh name="b{i}" inertia="shell" vertex="{_mjcf.numbers(*x[quads].ravel())}"'
-            f' texcoord="{_mjcf.numbers(*sheet.ravel())}"'
+            f'<mesh name="b{i}" inertia="shell" vertex="{mjcf.numbers(*x[quads].ravel())}"'
+            f' texcoord="{mjcf.numbers(*sheet.ravel())}"'
             f' face="{" ".join(map(str, triangles.ravel().tolist()))}"/>',
         ]
         bodies.append(
             f'<body><freejoint/><geom type="mesh" mesh="b{i}" material="m{i}" mass="1"/></body>'
         )
     extent = float(np.ptp(x, axis=0).max())
-    return _mjcf.document(
+    return mjcf.document(
         model.scene.name,
         bodies=bodies,
         assets=assets,

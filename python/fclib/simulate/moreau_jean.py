@@ -56,7 +56,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-import fclib
+from fclib import _core, _solve
 from fclib.scenes import Law
 
 Vector: TypeAlias = npt.NDArray[np.float64]
@@ -190,7 +190,7 @@ class MoreauJean:
         return model.assemble(self.h, shared_speed=self.law == "gap")
 
     def problem(
-        self, system: System, v: Vector, info: fclib.ProblemInfo | None = None
+        self, system: System, v: Vector, info: _core.ProblemInfo | None = None
     ) -> StepProblem:
         """The problem of the step from velocity v (n): the active contacts and what they move."""
         h = self.h
@@ -229,13 +229,13 @@ class MoreauJean:
             "mu": contacts.mu,
             "b": b[rows] if rows.size else None,
             "spacedim": d,
-            "info": info or fclib.ProblemInfo(),
+            "info": info or _core.ProblemInfo(),
         }
-        problem: fclib.GlobalProblem | fclib.GlobalRollingProblem
+        problem: _core.GlobalProblem | _core.GlobalRollingProblem
         if contacts.mu_r is None:
-            problem = fclib.GlobalProblem(**fields)
+            problem = _core.GlobalProblem(**fields)
         else:
-            problem = fclib.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
+            problem = _core.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
         velocity = np.zeros_like(v)
         if apart.size:
             others = np.setdiff1d(np.arange(len(b)), rows)
@@ -249,7 +249,7 @@ class MoreauJean:
 class StepProblem:
     """The problem of one step, and what it leaves out."""
 
-    problem: fclib.GlobalProblem | fclib.GlobalRollingProblem
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem
     contacts: Contacts  # nc, the active ones
     dofs: npt.NDArray[np.int64]  # (n') degrees of freedom of the system that the problem has
     free: Vector  # (n) velocity after the step of the others, 0 at `dofs`
@@ -288,10 +288,10 @@ def free_velocity(M: Sparse, G: Sparse, f: Vector, b: Vector) -> Vector:
     if not len(b):
         v: Vector = sp.linalg.spsolve(sp.csc_array(M), f)
         return np.atleast_1d(v)
-    alone = fclib.GlobalProblem(
+    alone = _core.GlobalProblem(
         M=M, H=sp.csc_array((len(f), 0)), G=G, f=f, w=[], mu=[], b=b, spacedim=3
     )
-    return np.asarray(fclib.solve(alone).solution.v)
+    return np.asarray(_solve.solve(alone).solution.v)
 
 
 def block_columns(blocks: npt.NDArray[np.intp], d: int) -> npt.NDArray[np.intp]:

@@ -9,10 +9,7 @@ A limit of a joint or a tendon is a contact without friction: its row is N, its 
 and its pair is (-1 - kind, index). Contacts of condim 6 make rolling problems; their spin
 friction, which FCLIB's law does not have, is left out.
 
-Keyframes called gait... hold controls at their times: straight between them, the last one's are the
-first one's again, and so on. The configuration of such a scene is (q, t).
-
-A planar scene moves in a plane y = const: slides along x and z, hinges about y (`plane.py`).
+A scene with a gait (`mujoco_scene.py`) has the configuration (q, t).
 """
 
 from __future__ import annotations
@@ -28,26 +25,19 @@ import scipy.sparse as sp
 from fclib.scenes import Scene
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector, components
-from fclib.simulate.periodic import PeriodicCell, add_ghosts
-from fclib.simulate.plane import NORMAL, in_plane
+from fclib.simulate.mujoco_scene import (
+    Gait,
+    UnsupportedSceneError,
+    compile_scene,
+    has_condim,
+    periodic_cell,
+    refuse_out_of_plane,
+    refuse_unsupported,
+)
+from fclib.simulate.plane import in_plane
 
-MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
-FLAT: Final = 1e-9  # sine of the angle of a joint's axis to the plane
 ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
-
-# features that a scene may leave out knowingly, and the flag of MuJoCo that does so, if any
-IGNORABLE: Final = {
-    "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
-    "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
-    "torsion": None,  # spin friction of condim 4: taken as condim 3
-    "anisotropy": None,  # two coefficients: their geometric mean
-    "activation": None,  # actuators with a state: it stays as it is at the start
-}
-
-
-class UnsupportedSceneError(ValueError):
-    """The scene holds something that these problems cannot represent yet."""
 
 
 class MujocoModel:
@@ -231,133 +221,6 @@ class MujocoModel:
                 )
         if self.data.warning[kinds.mjWARN_INERTIA].number:
             raise ValueError(f"{self.scene.name}: the mass matrix is singular")
-
-
-@dataclass(frozen=True)
-class Gait:
-    """Controls that change with time and come back: those of the keyframes gait..., in turn."""
-
-    times: Vector  # (k) from 0, increasing; the last one is the period [s]
-    values: Vector  # (k x nu) controls
-
-    @classmethod
-    def of(cls, scene: Scene, m: Any) -> Gait | None:
-        """The gait of a model, None where it has none. ValueError where it makes no cycle."""
-        keys = [m.key(i) for i in range(m.nkey) if m.key(i).name.startswith("gait")]
-        if not keys:
-            return None
-        times = np.array([key.time[0] for key in keys])
-        values = np.array([key.ctrl for key in keys])
-        if len(keys) < 2 or times[0] != 0 or not (np.diff(times) > 0).all():
-            raise ValueError(
-                f"{scene.name}: the keyframes gait... must be two or more, their times from 0 and"
-                f" increasing, not {times.tolist()}"
-            )
-        if (values[0] != values[-1]).any():
-            raise ValueError(
-                f"{scene.name}: the controls of the keyframes {keys[0].name!r} and"
-                f" {keys[-1].name!r}, the first and the last, differ: the gait would jump"
-            )
-        return cls(times, values)
-
-    def controls(self, time: float) -> Vector:
-        """At a time [s] (nu)."""
-        time = time % self.times[-1]
-        after = min(int(np.searchsorted(self.times, time, side="right")), len(self.times) - 1)
-        start, end = self.times[after - 1], self.times[after]
-        share = (time - start) / (end - start)
-        controls: Vector = (1 - share) * self.values[after - 1] + share * self.values[after]
-        return controls
-
-
-def compile_scene(scene: Scene) -> Any:
-    """The MjModel of a scene, with the options that problems need. ValueError for bad MJCF."""
-    unknown = set(scene.ignore) - set(IGNORABLE)
-    if unknown:
-        raise ValueError(
-            f"{scene.name}: cannot ignore {', '.join(sorted(unknown))};"
-            f" only {', '.join(sorted(IGNORABLE))}"
-        )
-    try:
-        if scene.path is not None:
-            spec = mujoco.MjSpec.from_file(str(scene.path))
-        else:
-            spec = mujoco.MjSpec.from_string(scene.xml)
-        if scene.period is not None:
-            add_ghosts(spec)
-        if spec.memory < 0:
-            spec.memory = MEMORY
-        m = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(f"{scene.name}: MuJoCo refuses the MJCF: {reason}") from error
-
-    m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # these serve MuJoCo's own step, and override fakes margins, distances and friction
-    enable = mujoco.mjtEnableBit
-    for flag in (
-        enable.mjENBL_OVERRIDE,
-        enable.mjENBL_SLEEP,
-        enable.mjENBL_IPC,
-        enable.mjENBL_SPECULATIVE,
-    ):
-        m.opt.enableflags &= ~int(flag)
-    for feature in scene.ignore:
-        flag = IGNORABLE[feature]
-        if flag is not None:
-            m.opt.disableflags |= int(flag)
-    return m
-
-
-def periodic_cell(scene: Scene, m: Any) -> PeriodicCell:
-    """The cell of a scene that has a period. ValueError where a body is too large for it."""
-    try:
-        return PeriodicCell(m, scene.period or (0.0, 0.0))
-    except ValueError as error:
-        raise ValueError(f"{scene.name}: {error}") from None
-
-
-def has_condim(m: Any, condim: int) -> bool:
-    """Whether a contact of the model may have so many components."""
-    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
-    return bool(condim in m.geom_condim[collides] or condim in m.pair_dim)
-
-
-def refuse_unsupported(scene: Scene, m: Any) -> None:
-    """Name all that the scene asks and no problem can hold, before the first step."""
-    lost = []
-    loss_off = m.opt.disableflags & int(IGNORABLE["frictionloss"])
-    if not loss_off and (m.dof_frictionloss.any() or m.tendon_frictionloss.any()):
-        lost.append('dry friction in joints or tendons (left out with ignore=("frictionloss",))')
-    if has_condim(m, 4) and "torsion" not in scene.ignore:
-        lost.append('contacts of condim 4, torsional friction (left out with ignore=("torsion",))')
-    if m.na and "activation" not in scene.ignore:
-        lost.append('actuators with a state (held with ignore=("activation",))')
-    if m.nflex:
-        lost.append("deformable bodies (flex)")
-    if m.flg_surfacevel:
-        lost.append("surfaces with a prescribed velocity (surfacevel)")
-    if m.flg_adhesion:
-        lost.append("adhesion")
-    if m.nplugin:
-        lost.append("plugins")
-    if lost:
-        raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
-
-
-def refuse_out_of_plane(scene: Scene, m: Any, d: Any) -> None:
-    """UnsupportedSceneError where a joint of a planar scene leaves the plane x, z."""
-    mujoco.mj_kinematics(m, d)
-    slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
-    along = np.abs(d.xaxis @ NORMAL)
-    kept = ((m.jnt_type == slide) & (along < FLAT)) | ((m.jnt_type == hinge) & (along > 1 - FLAT))
-    for joint in np.flatnonzero(~kept):
-        body = m.body(m.jnt_bodyid[joint]).name
-        raise UnsupportedSceneError(
-            f"{scene.name}: joint {joint} (body {body!r}) leaves the plane x, z of a planar scene;"
-            " its joints are slides along x and z and hinges about y"
-        )
 
 
 def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-import fclib
+from fclib import _core, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
@@ -38,8 +38,8 @@ class Step:
 
     index: int  # 0, 1, ...
     time: float  # at the start of the step [s]
-    problem: fclib.GlobalProblem | fclib.GlobalRollingProblem  # nc is 0 where nothing touches
-    result: fclib.Result  # its status tells whether the solver reached the tolerance
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem  # nc is 0 where nothing touches
+    result: _core.Result  # its status tells whether the solver reached the tolerance
     velocity: Vector  # v (n) of the whole system after the step
     dofs: npt.NDArray[np.int64]  # (n') which of them the problem has: those that contacts move
     contacts: Contacts  # nc, the active ones, at the start of the step
@@ -118,8 +118,8 @@ def _march(
 
         options = dict(settings["options"])
         if settings["warm_start"] and problem.nc and len(state.r):
-            options["guess"] = fclib.Solution(r=carry_over(state, contacts))
-        result = fclib.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
+            options["guess"] = _core.Solution(r=carry_over(state, contacts))
+        result = _solve.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
 
         after = part.free
         after[part.dofs] = result.solution.v
@@ -173,14 +173,14 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
 
 def describe(
     scene: Scene, scheme: MoreauJean, settings: dict[str, Any], index: int
-) -> fclib.ProblemInfo:
+) -> _core.ProblemInfo:
     """What travels with a problem: its name, its mathematics, and all that regenerates it.
 
     The last line of the description is JSON, which `provenance` reads back.
     """
     origin = {
         "generator": "fclib.simulate",
-        "fclib": fclib.__version__,
+        "fclib": _core.version,
         **engine(scene),
         "scene": scene.name,
         "parameters": dict(scene.parameters),
@@ -211,7 +211,7 @@ def describe(
     words_of_components = (
         "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
     )
-    return fclib.ProblemInfo(
+    return _core.ProblemInfo(
         title=f"{scene.title or scene.name}, step {index}",
         description="\n".join([*words, json.dumps(origin, default=str)]).lstrip(),
         math_info=(
@@ -231,7 +231,7 @@ def engine(scene: Scene) -> dict[str, str]:
     return {"scikit-fem": _skfem.VERSION}
 
 
-def provenance(info: fclib.ProblemInfo) -> dict[str, Any]:
+def provenance(info: _core.ProblemInfo) -> dict[str, Any]:
     """What a simulated problem's info says of its origin. ValueError where it says nothing."""
     lines = info.description.splitlines()
     try:

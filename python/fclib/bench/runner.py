@@ -1,4 +1,4 @@
-"""Conducts a campaign: what is not in the store yet is run, and stored as it comes."""
+"""Runs a campaign: what is not in the store yet is run, and stored as it comes."""
 
 from __future__ import annotations
 
@@ -8,16 +8,15 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
-import fclib
+from fclib import _core
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
-from fclib.bench.job import Job, Record
+from fclib.bench.job import Job, Runner
 from fclib.bench.store import Store
 
 BEAT = 2.0  # [s] between two signs of life in the store
-Runner: TypeAlias = Callable[[Iterator[Job]], Iterator[tuple[Job, Record]]]
 
 
 @dataclass
@@ -46,7 +45,7 @@ class Progress:
         return sum(self.statuses.values()) / max(1e-9, time.monotonic() - self.start)
 
 
-def conduct(
+def run_campaign(
     campaign: Campaign,
     store: str | Path,
     *,
@@ -70,13 +69,13 @@ def conduct(
         fclib.Error: a problem cannot be found, made or read.
     """
     if not processes.supported():
-        raise fclib.Error("fclib bench needs Linux: its limits are kept by way of /proc")
+        raise _core.Error("fclib bench needs Linux: its limits are kept by way of /proc")
     Path(store).parent.mkdir(parents=True, exist_ok=True)
     new = not Path(store).exists()
     with Store(store) as opened:
         try:
             plan = campaign.plan(opened, tell)
-        except (fclib.Error, ImportError):
+        except (_core.Error, ImportError):
             if new:
                 opened.discard()
             raise

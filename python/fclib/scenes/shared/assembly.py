@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-import fclib
+from fclib import _core
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class Bodies:
     impulses: Vector  # (n x 3) [N s]
     gravity: float = GRAVITY  # [m/s^2]
 
-    def problem(self, mu: Any, title: str) -> fclib.GlobalProblem:
+    def problem(self, mu: Any, title: str) -> _core.GlobalProblem:
         """The problem G3DFC of a step from rest; mu is a number or (nc)."""
         count, nc = len(self.masses), len(self.normals)
         parts = [self._rows(self.second, 1.0), self._rows(self.first, -1.0)]
@@ -50,14 +50,14 @@ class Bodies:
         f = np.zeros((count, 6))
         f[:, 2] = -self.masses * self.gravity * STEP
         f[:, :3] += self.impulses
-        return fclib.GlobalProblem(
+        return _core.GlobalProblem(
             M=sp.diags_array(np.concatenate([linear, self.inertias], axis=1).ravel()).tocsc(),
             H=transposed.T.tocsc(),
             f=f.ravel(),
             w=np.zeros(3 * nc),
             mu=np.broadcast_to(np.asarray(mu, dtype=float), (nc,)).copy(),
             spacedim=3,
-            info=fclib.ProblemInfo(
+            info=_core.ProblemInfo(
                 title=title,
                 math_info=(
                     f"one step from rest, h = {STEP:g} s; M v = H r + f, u = H^T v + w;"

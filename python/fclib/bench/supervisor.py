@@ -1,12 +1,12 @@
-"""The process that keeps a worker: it hands it a job, watches it, kills it, and judges its answer.
+"""The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
 
-``python -m fclib.bench.keeper FD`` serves jobs from a socket until that is closed. The keeper never
-runs a solver: that is done by the worker that it forks, and renews after every failure. The
-solution comes back as numbers, and the keeper recomputes every merit from its own copy of the
-problem, so that nothing a solver does in its process changes the verdict.
+``python -m fclib.bench.supervisor FD`` serves jobs from a socket until that is closed. The
+supervisor never runs a solver: that is done by the worker that it forks, and renews after every
+failure. The solution comes back as numbers, and the supervisor recomputes every merit from its own
+copy of the problem, so that nothing a solver does in its process changes the verdict.
 
 A run is killed with all processes that descend from it, in whatever group or session they are: what
-loses its parent becomes a child of the keeper.
+loses its parent becomes a child of the supervisor.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from typing import Any
 
 import numpy as np
 
-import fclib
+from fclib import _core
 from fclib.bench import machine, processes
 from fclib.bench.job import MERITS, ORDERLY, Record
 from fclib.bench.worker import Problems, of_signal, one_line, send, serve
 
 READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
-LOOKS = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
+PAUSES = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
 GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
-ARMS = 1.0  # [s] of CPU after which the kernel is told the limit, too: see Watch.arm
+LIMIT_CPU_AFTER = 1.0  # [s] of CPU after which the kernel has the limit too: Watch.limit_cpu
 LONGEST = 1 << 40  # [bytes] of a message
 
 
@@ -60,7 +60,7 @@ class Watch:
         self.start = time.monotonic()
         self.cpu_before, self.memory_before = processes.usage(pid)
         self.cpu, self.memory = 0.0, self.memory_before
-        self.armed = False
+        self.cpu_limited = False
 
     @property
     def wall(self) -> float:
@@ -77,8 +77,8 @@ class Watch:
         self.cpu = max(self.cpu, cpu - self.cpu_before)
         self.memory = max(self.memory, memory)
         most_wall, most_cpu, most_memory = self.limits
-        if self.cpu > ARMS and not self.armed and math.isfinite(most_cpu):
-            self.arm(math.ceil(most_cpu - self.cpu + GRACE) + 1)
+        if self.cpu > LIMIT_CPU_AFTER and not self.cpu_limited and math.isfinite(most_cpu):
+            self.limit_cpu(math.ceil(most_cpu - self.cpu + GRACE) + 1)
         if self.memory - self.memory_before > most_memory:
             raise WorkerEnded("memory", f"killed above {most_memory:g} MB")
         if self.cpu > most_cpu + GRACE:
@@ -86,20 +86,20 @@ class Watch:
         if self.wall > most_wall + GRACE:
             raise WorkerEnded("wall_limit", f"killed after {self.wall:.1f} s")
 
-    def arm(self, seconds: int) -> None:
+    def limit_cpu(self, seconds: int) -> None:
         """Set RLIMIT_CPU of each process, for the case that this one is held up.
 
         Not before a run has become a long one, and its worker does not serve another: where there
         is such a limit, Linux counts the CPU time of a process in ticks of some milliseconds, even
         after it is lifted, and those who measure short solves by it would read 0.
         """
-        self.armed = True
+        self.cpu_limited = True
         for pid in processes.tree(self.pid):
             used = math.ceil(processes.own_cpu(pid))
             processes.lower(pid, resource.RLIMIT_CPU, used + max(1, seconds))
 
 
-class Keeper:
+class Supervisor:
     """A worker, and the problems that its answers are judged by."""
 
     def __init__(self, campaign: Connection) -> None:
@@ -107,9 +107,9 @@ class Keeper:
         self.problems = Problems()
         self.pid = 0
         self.link: socket.socket | None = None  # to the worker
-        self.words = -1  # the standard error of the worker
-        self.said = b""
-        self.armed = False  # whether the worker has a limit of CPU time
+        self.stderr = -1  # the standard error of the worker
+        self.stderr_tail = b""
+        self.cpu_limited = False  # whether the worker has a limit of CPU time
 
     def start(self) -> socket.socket:
         """The link to the worker, which is forked where there is none."""
@@ -134,7 +134,7 @@ class Keeper:
                 os._exit(1)
         theirs.close()
         os.close(writing)
-        self.words, self.said = reading, b""
+        self.stderr, self.stderr_tail = reading, b""
         self.link = ours
         return ours
 
@@ -143,22 +143,22 @@ class Keeper:
         if self.link is None:
             return None
         status = processes.kill_all(self.pid)
-        while select.select([self.words], [], [], 0)[0] and self.listen():
+        while select.select([self.stderr], [], [], 0)[0] and self.listen():
             pass
         self.link.close()
-        os.close(self.words)
-        self.link, self.pid, self.armed = None, 0, False
+        os.close(self.stderr)
+        self.link, self.pid, self.cpu_limited = None, 0, False
         return status
 
     def listen(self) -> bool:
         """Take what the worker says on its standard error, whose end is kept; False at the last."""
-        heard = os.read(self.words, 1 << 16)
-        self.said = (self.said + heard)[-2000:]
-        return bool(heard)
+        text = os.read(self.stderr, 1 << 16)
+        self.stderr_tail = (self.stderr_tail + text)[-2000:]
+        return bool(text)
 
-    def last_words(self) -> str:
+    def last_line(self) -> str:
         """The last line of the worker's standard error."""
-        lines = self.said.decode(errors="replace").strip().splitlines()
+        lines = self.stderr_tail.decode(errors="replace").strip().splitlines()
         return f": {lines[-1][:300]}" if lines else ""
 
     def receive(self, watch: Watch) -> bytes:
@@ -169,16 +169,16 @@ class Keeper:
             CampaignGone: the campaign is over.
         """
         assert self.link is not None
-        link, pause = self.link, LOOKS[0]
-        hears: list[Any] = [link, self.campaign, self.words]
+        link, pause = self.link, PAUSES[0]
+        sources: list[Any] = [link, self.campaign, self.stderr]
         got, size = bytearray(), 8
         whole = False  # whether the length has been read
         while True:
-            ready = select.select(hears, [], [], pause)[0]
+            ready = select.select(sources, [], [], pause)[0]
             if self.campaign in ready:  # nothing is sent while a job is being done
                 raise CampaignGone
-            if self.words in ready and not self.listen():
-                hears.remove(self.words)
+            if self.stderr in ready and not self.listen():
+                sources.remove(self.stderr)
             if link in ready:
                 try:
                     part = link.recv(min(size - len(got), 1 << 22))
@@ -196,7 +196,7 @@ class Keeper:
                     return bytes(got)
             if link not in ready or not whole:
                 watch.check()
-                pause = min(1.5 * pause, LOOKS[1])
+                pause = min(1.5 * pause, PAUSES[1])
 
     def ended(self) -> WorkerEnded:
         """Why a worker that has closed its link has ended."""
@@ -211,8 +211,8 @@ class Keeper:
         if os.WIFSIGNALED(how):
             number = os.WTERMSIG(how)
             name = signal.Signals(number).name
-            return WorkerEnded(of_signal(number), f"ended by {name}{self.last_words()}")
-        return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{self.last_words()}")
+            return WorkerEnded(of_signal(number), f"ended by {name}{self.last_line()}")
+        return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{self.last_line()}")
 
     def do(self, order: dict[str, Any]) -> Record:
         """Do a job."""
@@ -231,7 +231,7 @@ class Keeper:
             return record
         if vectors:
             self.judge(order, record, vectors)
-        if record.status in ORDERLY and not self.armed:
+        if record.status in ORDERLY and not self.cpu_limited:
             processes.kill_orphans(but=self.pid)
         else:
             self.stop()
@@ -244,7 +244,7 @@ class Keeper:
             WorkerEnded: it has ended, or was to be ended; what is known of it is in the record.
         """
         link = self.start()
-        self.said = b""
+        self.stderr_tail = b""
         try:
             send(link, json.dumps(order).encode())
         except OSError:
@@ -258,7 +258,7 @@ class Keeper:
             finally:
                 record.wall_s, record.total_cpu_s = watch.wall, watch.cpu
                 record.memory = watch.memory - watch.memory_before
-                self.armed = watch.armed
+                self.cpu_limited = watch.cpu_limited
         said = json.loads(reply)
         said["memory"] = max(said.get("memory", 0.0), record.memory or 0.0) or None
         names = said.pop("vectors", [])
@@ -270,11 +270,11 @@ class Keeper:
         """Recompute every merit, and let it decide."""
         try:
             problem = self.problems.get(order)
-            merit = fclib.merit(problem, fclib.Solution(**vectors))
-        except fclib.FileError as error:
+            merit = _core.merit(problem, _core.Solution(**vectors))
+        except _core.FileError as error:
             record.status, record.message = "unreadable", one_line(error)
             return
-        except (fclib.Error, TypeError, ValueError) as error:
+        except (_core.Error, TypeError, ValueError) as error:
             record.status, record.message = "garbage", one_line(error)
             return
         record.merits = {name: float(getattr(merit, name)) for name in MERITS}
@@ -292,15 +292,15 @@ def main() -> None:
     campaign = Connection(int(sys.argv[1]))
     processes.adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    keeper = Keeper(campaign)
+    supervisor = Supervisor(campaign)
     try:
         while True:
             order = campaign.recv()
-            campaign.send(keeper.do(order))
+            campaign.send(supervisor.do(order))
     except (EOFError, OSError, CampaignGone):
         pass
     finally:
-        keeper.stop()
+        supervisor.stop()
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
-import fclib
+from fclib import _core, _solve
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Run:
     iterations: int
     cpu_s: float  # [s] CPU time of the solver alone
     error: float  # Merit.error, recomputed from the returned solution
-    result: fclib.Result = field(repr=False, compare=False)
+    result: _core.Result = field(repr=False, compare=False)
 
     @property
     def record(self) -> dict[str, Any]:
@@ -46,7 +46,7 @@ COLUMNS = (
 
 def run(
     name: str,
-    problem: fclib.Problem,
+    problem: _solve.Problem,
     solver: str = "auto",
     tol: float = 1e-8,
     time_limit: float | None = None,
@@ -67,8 +67,8 @@ def run(
     Raises:
         fclib.Error: as ``fclib.solve`` does.
     """
-    result = fclib.solve(problem, solver, tol, time_limit=time_limit, callback=callback, **options)
-    error = fclib.merit(problem, result.solution).error
+    result = _solve.solve(problem, solver, tol, time_limit=time_limit, callback=callback, **options)
+    error = _core.merit(problem, result.solution).error
     status = result.status
     if status == "converged" and not error <= tol:
         status = "inaccurate"

@@ -9,8 +9,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
 
-import fclib
-from fclib.scenes._solids import Solids
+from fclib import _core
+from fclib.scenes.shared.solids import Solids
 
 Law = Literal["velocity", "gap"]
 
@@ -133,7 +133,7 @@ class Assembled:
         problem = family.problem(number, self.seed)
         origin = {
             "generator": "fclib.scenes",
-            "fclib": fclib.__version__,
+            "fclib": _core.version,
             "scene": self.name,
             "parameters": self.parameters,
             "seed": self.seed,
@@ -145,7 +145,7 @@ class Assembled:
             f"Friction: {family.friction}.",
             json.dumps(origin, default=str),
         ]
-        info = fclib.ProblemInfo(
+        info = _core.ProblemInfo(
             title=f"{family.title}, {problem.info.title}",
             description="\n".join(words),
             math_info=problem.info.math_info,

@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fclib.scenes import _mjcf
+from fclib.scenes.shared import mjcf
 
 Point = tuple[float, float]  # x, z [m]
 
@@ -62,7 +62,7 @@ class Masonry:
         """
         joint = ""
         if speed:
-            joint = f'<joint name="{name}" type="slide" axis="{_mjcf.numbers(*axis)}"/>'
+            joint = f'<joint name="{name}" type="slide" axis="{mjcf.numbers(*axis)}"/>'
             # at 10 m/s^2
             gain = self.mass * 10.0 / (YIELD * abs(speed))
             self.rest += [
@@ -77,8 +77,8 @@ class Masonry:
 
     def keyframe(self, velocity: Sequence[float] = ()) -> list[str]:
         """The start: the speeds of the drives, and velocities (n) if any."""
-        words = [f'ctrl="{_mjcf.numbers(*self.speeds)}"'] if self.speeds else []
-        words += [f'qvel="{_mjcf.numbers(*velocity)}"'] if velocity else []
+        words = [f'ctrl="{mjcf.numbers(*self.speeds)}"'] if self.speeds else []
+        words += [f'qvel="{mjcf.numbers(*velocity)}"'] if velocity else []
         return [f'<keyframe><key name="start" {" ".join(words)}/></keyframe>'] if words else []
 
     def _body(
@@ -99,7 +99,7 @@ class Masonry:
             shape = grown([(a - x, b - z) for a, b in outline], 0.5 * self.lap)
             if self.arris:
                 shape = cut(shape, self.arris)
-            corners = [_mjcf.numbers(a, side * reach, b) for side in (-1, 1) for a, b in shape]
+            corners = [mjcf.numbers(a, side * reach, b) for side in (-1, 1) for a, b in shape]
             mesh = f"{name}.{i}" if i else name
             self.assets.append(f'<mesh name="{mesh}" vertex="{"  ".join(corners)}"/>')
             # the mesh is drawn where its vertices say
@@ -107,7 +107,7 @@ class Masonry:
                 f'<geom type="mesh" mesh="{mesh}" condim="3" density="{self.density!r}"'
                 f' friction="{self.mu!r}" material="solid" rgba="{colour}"/>'
             )
-        place = _mjcf.numbers(x, 0.5 * (front + back), z)
+        place = mjcf.numbers(x, 0.5 * (front + back), z)
         self.bodies.append(f'<body name="{name}" pos="{place}">{joint}{shapes}</body>')
 
 

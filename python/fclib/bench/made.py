@@ -1,0 +1,137 @@
+"""Small problems that a campaign has made: steps of a scene, and random ones around a solution.
+
+What is made goes into a cache folder, under a name that says how it was made, so that it is made
+once; the same recipe gives the same problems, bit for bit.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fclib import _core
+from fclib.bench.problems import SUFFIXES
+
+
+def cache_folder() -> Path:
+    """Where problems that are made are kept: $FCLIB_CACHE, or fclib in the user's cache."""
+    own = os.environ.get("FCLIB_CACHE")
+    if own:
+        return Path(own)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fclib"
+
+
+def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
+    """The files of a recipe; make(folder) writes them where they are not there yet."""
+    text = json.dumps({"fclib": _core.version, **recipe}, sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:16]
+    folder = cache_folder() / "problems" / name
+    if not folder.is_dir():
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(prefix=f".{name}-", dir=folder.parent))
+        try:
+            make(part)
+            (part / "recipe.json").write_text(text)
+            try:
+                part.rename(folder)
+            except OSError:
+                if not folder.is_dir():  # else another campaign was faster
+                    raise
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
+    return sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES)
+
+
+def simulated(
+    family: str, parameters: Mapping[str, Any], steps: Sequence[int], seed: int
+) -> list[Path]:
+    """The local problems of some steps of a scene; steps without contact are left out.
+
+    Raises:
+        ImportError: MuJoCo is not there.
+        fclib.OptionError: there is no such family, or it refuses the parameters.
+    """
+    wanted = set(steps)
+    recipe = {
+        "scene": family,
+        "parameters": dict(parameters),
+        "steps": sorted(wanted),
+        "seed": seed,
+    }
+
+    def make(folder: Path) -> None:
+        from fclib import scenes, simulate
+
+        try:
+            kind = scenes.get(family)
+            known = [item.name for item in dataclasses.fields(kind)]
+            if unknown := [name for name in parameters if name not in known]:
+                raise ValueError(f"has no parameter {unknown[0]}; it has {', '.join(known)}")
+            scene = kind(**parameters).scene(seed)
+        except (KeyError, TypeError, ValueError) as error:
+            # the text of a KeyError is in quotes otherwise
+            raise _core.OptionError(f"simulate {family}: {error.args[0]}") from None
+        for step in simulate.simulate(scene, max(wanted) + 1):
+            if step.index in wanted and step.problem.nc:
+                local = step.problem.condense().replace(info=step.problem.info)
+                _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
+
+    return made(recipe, make)
+
+
+def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
+    """Random local problems around a solution in which contacts are open, stick and slide in turn.
+
+    W = A A^T + I / 2 with A sparse, about 6 blocks a row; u and r obey Coulomb's law, and
+    q = u - W r.
+    """
+    recipe = {"planted": count, "contacts": contacts, "spacedim": spacedim, "seed": seed}
+
+    def make(folder: Path) -> None:
+        for number in range(count):
+            problem = _plant(contacts, spacedim, seed + number)
+            _core.write(folder / f"planted-{spacedim}d-{contacts}-{seed + number}.hdf5", problem)
+
+    return made(recipe, make)
+
+
+def _plant(nc: int, d: int, seed: int) -> _core.LocalProblem:
+    import scipy.sparse as sp
+
+    random = np.random.Generator(np.random.PCG64([seed, nc, d]))
+    mu = random.uniform(0.2, 0.8, nc)
+    u, r = np.zeros((nc, d)), np.zeros((nc, d))
+    for k in range(nc):
+        tangent = random.standard_normal(d - 1)
+        tangent /= np.linalg.norm(tangent)
+        normal = random.uniform(0.5, 2.0)
+        if k % 3 == 0:  # open
+            u[k] = [random.uniform(0.1, 1.0), *random.uniform(-1, 1, d - 1)]
+        elif k % 3 == 1:  # sticks
+            r[k] = [normal, *(random.uniform(0, 0.9) * mu[k] * normal * tangent)]
+        else:  # slides
+            r[k] = [normal, *(mu[k] * normal * tangent)]
+            u[k] = [0.0, *(-random.uniform(0.1, 1.0) * tangent)]
+    rows = np.repeat(np.arange(nc), 3)
+    columns = random.integers(0, nc, rows.size)
+    blocks = random.standard_normal((rows.size, d, d)) / np.sqrt(3 * d)
+    i = (d * rows[:, None, None] + np.arange(d)[:, None]) + np.zeros((1, 1, d), int)
+    j = (d * columns[:, None, None] + np.arange(d)) + np.zeros((1, d, 1), int)
+    A = sp.csr_array((blocks.ravel(), (i.ravel(), j.ravel())), shape=(d * nc, d * nc))
+    W = sp.csr_array(A @ A.T + 0.5 * sp.eye_array(d * nc))
+    return _core.LocalProblem(
+        spacedim=d,
+        W=W,
+        q=u.ravel() - W @ r.ravel(),
+        mu=mu,
+        info=_core.ProblemInfo(title=f"Planted, {nc} contacts, seed {seed}"),
+    )

@@ -1,0 +1,116 @@
+"""What ``fclib collection build`` and ``fclib simulate`` share: their options, and the build."""
+
+from __future__ import annotations
+
+import os
+from enum import Enum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from fclib import collections
+from fclib.cli._output import Report, fail, make_table, out
+from fclib.cli._progress import many_bars
+from fclib.collections.build import BuildError
+from fclib.collections.known import differing
+
+
+class Form(str, Enum):
+    """The forms of a problem that are written."""
+
+    GLOBAL = "global"
+    LOCAL = "local"
+    BOTH = "both"
+
+
+class Select(str, Enum):
+    """Which problems are kept, where not all are."""
+
+    EVERY = "every"
+    HARD = "hard"
+
+
+Count = Annotated[
+    int | None, typer.Option(help="Problems kept of each family; all by default.", min=1)
+]
+FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
+SelectOption = Annotated[
+    Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
+]
+Analyze = Annotated[
+    bool, typer.Option("--analyze", help="Also ranks, conditioning, existence; slow.")
+]
+Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
+
+
+def build_plans(
+    plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
+) -> None:
+    """Build plans, and print what came of them; exit status 1 where a problem was not solved."""
+    try:
+        with many_bars() as bars:
+            table = collections.build(
+                plans,
+                folder,
+                jobs=jobs or len(os.sched_getaffinity(0)),
+                progress=bars,
+                pictures=pictures,
+            )
+    except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError) as error:
+        fail(str(error))
+    mine = {plan.name for plan in plans}
+    rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
+    report = Report(as_json)
+    for row in ranges_of(rows):
+        report.add(row, row["solved"] == row["problems"])
+    if not as_json:
+        if report.records:
+            out.print(make_table(report.records))
+        else:
+            out.print("Nothing touches in any step: no problem was stored.")
+        unsolved = [row for row in rows if row["status"] != "converged"]
+        if unsolved:
+            worst = max(unsolved, key=lambda row: float(row["error"]))
+            out.print(
+                f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
+                f" {worst['id']}, error {worst['error']:.1e}. A simulation went on from there."
+            )
+        for name in dict.fromkeys(plan.collection for plan in plans if plan.chosen):
+            own = [row for row in rows if row["collection"] == name]
+            built = {row["family"] for row in own}
+            other = [id for id in differing(name, own) if id.split("/")[1] in built]
+            out.print(
+                f"{len(own) - len(other)} of {len(own)} problems of the set {name} have the data"
+                " that its list says"
+                + (f"; not {', '.join(other[:3])}: another machine?" if other else "")
+            )
+        out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
+    raise typer.Exit(int(report.failed))
+
+
+def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """A row for each family of a catalogue: how many problems, and from where to where."""
+    found = []
+    for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
+        own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
+
+        def span(key: str, own: list[dict[str, Any]] = own) -> str:
+            values = [row[key] for row in own if row[key] is not None]
+            return f"{min(values):.4g} to {max(values):.4g}" if values else ""
+
+        found.append(
+            {
+                "family": family,
+                "set": name,
+                "version": own[0]["version"] or "",
+                "problems": len(own),
+                "solved": sum(row["status"] == "converged" for row in own),
+                "dof": span("n"),
+                "contacts": span("nc"),
+                "density": span("density"),
+                "mu": span("mu_max"),
+                "largest error": max(row["error"] for row in own),
+            }
+        )
+    return found

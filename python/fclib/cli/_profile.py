@@ -1,0 +1,168 @@
+"""The tables and pictures of a store, which ``fclib profile`` and ``fclib demo`` print."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fclib.bench import profiles
+from fclib.bench.campaign import published_means
+from fclib.cli._output import Report, err, make_table, out
+
+TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
+
+
+def print_profile(
+    store: Path,
+    folder: Path | None,
+    *,
+    metric: str = "cpu_s",
+    solver: Sequence[str] = (),
+    family: Sequence[str] = (),
+    tol: Sequence[float] = (),
+    campaign: str | None = None,
+    machine: str | None = None,
+    penalty: float = profiles.PENALTY,
+    shift: float = profiles.SHIFT,
+    formats: Sequence[str] = ("pdf", "svg", "png"),
+    as_json: bool = False,
+    quiet: bool = False,
+) -> None:
+    """Print the tables of a store, and draw its pictures where a folder is given."""
+    rows = profiles.load(
+        store,
+        campaign=campaign,
+        families=family,
+        solvers=solver,
+        tolerances=tol,
+        machine=machine,
+    )
+    costs = profiles.costs(rows, metric)
+    published = published_means(store)
+    tables: dict[str, list[dict[str, Any]]] = {
+        "summary": profiles.summary(costs, penalty, shift),
+        "profile": shares_within(costs),
+        "statuses": profiles.failures(rows),
+        "families": profiles.families(costs, published),
+        "pairs": [dataclasses.asdict(pair) for pair in profiles.pairs(costs)],
+        "work-precision": profiles.work_precision(rows, metric, penalty, shift),
+    }
+    if not quiet and as_json:
+        report = Report(True)
+        for table, records in tables.items():
+            for record in records:
+                report.add({"table": table, **record})
+    elif not quiet:
+        show(tables, costs, penalty, shift)
+    if folder is not None:
+        draw(tables, costs, rows, store, folder, formats)
+        err.print(f"Pictures and tables: {folder}", highlight=False)
+
+
+def show(
+    tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, penalty: float, shift: float
+) -> None:
+    """The tables, for people."""
+    words = profiles.METRICS[costs.metric][0]
+    several = len({instance.tol for instance in costs.instances}) > 1
+    out.print(
+        f"{len(costs.instances)} problems{' at a tolerance' if several else ''}, {words};"
+        f" shifted geometric means, shift {shift:g}, failures as {penalty:g} x the limit",
+        highlight=False,
+    )
+    if costs.left_out:
+        out.print(f"{costs.left_out} left out, which not all solvers have run", highlight=False)
+    titles = {
+        "summary": None,
+        "profile": "Performance profile: solved within a multiple of the best",
+        "statuses": "How the runs ended",
+        "families": "The fastest solver of each problem, by family",
+    }
+    for name, title in titles.items():
+        out.print()
+        out.print(make_table(tables[name], title))
+    best = tables["summary"][1]["solver"]
+    shown = [pair for pair in profiles.pairs(costs, against=best) if pair.both]
+    if shown:
+        out.print()
+        records = [
+            {
+                "solver": pair.first,
+                "ratio": pair.ratio,
+                "95 % interval": f"{pair.low:.3g} to {pair.high:.3g}",
+                "both solve": pair.both,
+                "only it": pair.only_first,
+                f"only {best}": pair.only_second,
+            }
+            for pair in shown
+        ]
+        out.print(make_table(records, f"Geometric means of ratios to {best}, where both solve"))
+
+
+def draw(
+    tables: dict[str, list[dict[str, Any]]],
+    costs: profiles.Costs,
+    rows: Sequence[dict[str, Any]],
+    store: Path,
+    folder: Path,
+    formats: Sequence[str],
+) -> None:
+    """Pictures and CSV files into a folder."""
+    from fclib.bench import plots
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for table, records in tables.items():
+        if table != "profile":
+            write_csv(folder / f"{table}.csv", records)
+    steps = curve_rows(costs, profiles.ratios(costs.values), "tau")
+    write_csv(folder / f"performance-{costs.metric}.csv", steps)
+    write_csv(folder / f"data-{costs.metric}.csv", curve_rows(costs, costs.values, costs.metric))
+    plots.performance(costs, folder, formats)
+    plots.data(costs, folder, formats, per_contact=False)
+    plots.data(costs, folder, formats, per_contact=True)
+    if len({row["tol"] for row in rows}) > 1:
+        plots.work_precision(tables["work-precision"], costs.metric, folder, formats)
+    longest = max((row["wall_s"] or 0.0 for row in rows), default=0.0)
+    times = np.geomspace(1e-5, max(longest, 1e-4), 300)
+    curves = profiles.convergence(store, rows, times)
+    if curves:
+        plots.convergence(curves, times, folder, formats)
+
+
+def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """A table, whole or not at all."""
+    if not rows:
+        return
+    part = path.with_name(f".{path.name}.part")
+    with part.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+    part.replace(path)
+
+
+def curve_rows(costs: profiles.Costs, values: profiles.Array, name: str) -> list[dict[str, Any]]:
+    """The steps of curves as a table: the bound, then a column a solver."""
+    finite = np.unique(values[np.isfinite(values)])
+    shares = profiles.share_within(values, finite)
+    return [
+        {name: float(bound), **dict(zip(costs.solvers, shares[:, k].tolist(), strict=True))}
+        for k, bound in enumerate(finite)
+    ]
+
+
+def shares_within(costs: profiles.Costs) -> list[dict[str, Any]]:
+    """The performance profile at a few ratios, in percent."""
+    shares = profiles.performance_profile(costs.values, np.array([*TAUS, np.finfo(float).max]))
+    names = [f"<= {tau:g}x" for tau in TAUS] + ["solved"]
+    rows = [
+        {"solver": solver, **{n: f"{100 * s:.0f} %" for n, s in zip(names, own, strict=True)}}
+        for solver, own in zip(costs.solvers, shares.tolist(), strict=True)
+    ]
+    means = dict(zip(costs.solvers, shares.mean(axis=1), strict=True))
+    return sorted(rows, key=lambda row: -means[row["solver"]])

@@ -1,0 +1,102 @@
+"""``fclib collection choose``: the lists of chosen problems, made anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import fclib
+from fclib import collections
+from fclib.bench import Store
+from fclib.cli._output import fail, out
+from fclib.cli._progress import many_bars
+from fclib.collections import choose
+
+app = typer.Typer(
+    help="Make the lists of chosen problems: the sets hard and tiny, the family LocalProblems.",
+    no_args_is_help=True,
+)
+
+List = Annotated[Path, typer.Option("--out", help="The list that is written, JSON.")]
+PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
+
+
+@app.command("hard")
+def choose_hard(
+    stores: Annotated[list[Path], typer.Argument(help="Stores of fclib bench.")],
+    folder: Annotated[Path, typer.Option("--in", help="The collection that they are of.")],
+    target: List,
+    tol: Annotated[float, typer.Option(help="Tolerance of the runs that count.")] = 1e-8,
+    share: Annotated[
+        float, typer.Option(help="Of the solvers that must have failed.", min=0.0, max=1.0)
+    ] = 0.5,
+    per_family: PerFamily = 5,
+) -> None:
+    """What most solvers fail on, from campaigns over the global files of a collection."""
+    runs = []
+    try:
+        for path in stores:
+            with Store(path, create=False) as store:
+                runs += store.results()
+        chosen = choose.hard(runs, folder, tol=tol, share=share, per_family=per_family)
+    except (fclib.Error, collections.CatalogError, ImportError, ValueError) as error:
+        fail(str(error))
+    solvers = sorted({run["solver"] for run in runs if run["tol"] == tol})
+    limits = sorted({run["time_limit"] for run in runs if run["tol"] == tol})
+    rule = {"tol": tol, "share": share, "per_family": per_family}
+    choose.write_list(target, chosen, rule | {"solvers": solvers, "time_limits": limits})
+    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
+
+
+@app.command("local")
+def choose_local(
+    folder: Annotated[Path, typer.Argument(help="Folder of a collection.")],
+    target: List,
+    sample: Annotated[int, typer.Option(help="Problems of a family that are looked at.")] = 200,
+    per_family: PerFamily = 4,
+    spins: Annotated[int, typer.Option(help="Spinning bodies that are drawn.", min=0)] = 2000,
+    asymmetric: Annotated[int, typer.Option(help="Of them, those that are taken.", min=0)] = 16,
+) -> None:
+    """The contacts that one-contact solvers find hardest, from the local files of a collection."""
+    try:
+        with many_bars() as bars:
+            found = choose.local(
+                folder,
+                sample=sample,
+                per_family=per_family,
+                spins=spins,
+                asymmetric=asymmetric,
+                progress=bars,
+            )
+    except (collections.CatalogError, ImportError, fclib.Error) as error:
+        fail(str(error))
+    rule = {
+        "sample": sample,
+        "per_family": per_family,
+        "spins": spins,
+        "asymmetric": asymmetric,
+        "sweeps": choose.SWEEPS,
+        "tol": choose.LOCAL_TOLERANCE,
+    }
+    choose.write_local(target, found, rule)
+    tell_chosen([contact.origin for contact in found], target)
+
+
+@app.command("tiny")
+def choose_tiny(target: List) -> None:
+    """One problem of each kind: simulated anew, with the digests of its data."""
+    try:
+        chosen = choose.tiny()
+    except (ImportError, ValueError, FloatingPointError) as error:
+        fail(str(error))
+    choose.write_list(target, chosen, {"kinds": len(chosen)})
+    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
+
+
+def tell_chosen(names: list[str], target: Path) -> None:
+    """Say what was taken."""
+    for name in names:
+        out.print(name, highlight=False)
+    out.print(f"{len(names)} problems:  {target}")

@@ -5,6 +5,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 BUILD := build
 SECONDS := 60
+JOBS ?= auto
 
 # what the installed package is made of
 SOURCES := CMakeLists.txt pyproject.toml README.md \
@@ -20,7 +21,7 @@ CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp
 help:
 	@echo "make setup   install what is missing, build, install fclib into $(VENV)"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
-	@echo "make test    set up, then run all tests"
+	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
 	@echo "make docs    set up, then build the documentation into $(BUILD)/site"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make lint    check style and types (ruff, mypy, clang-format)"
@@ -41,7 +42,7 @@ demo: setup
 test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
-	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest
+	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 docs: setup $(VENV)/.docs-tools
 	$(BIN)/python scripts/site/build.py $(BUILD)/site

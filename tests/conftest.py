@@ -12,6 +12,10 @@ TESTS = Path(__file__).parent
 sys.path.insert(0, str(TESTS))  # for helpers.py, which --import-mode=importlib does not find
 pytest.register_assert_rewrite("helpers")
 
+# one thread for linear algebra: tests run side by side, and threads that wait for others burn time
+for library in ("OPENBLAS", "OMP", "MKL"):
+    os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+
 # the same examples every time, and no deadline: machines differ
 hypothesis.settings.register_profile("fclib", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("fclib")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -43,6 +45,44 @@ def modified(u: Array, mu: Array) -> Array:
     return result
 
 
+def sliding_and_rolling(x: Array) -> tuple[Array, Array]:
+    """The parts x_T and x_R of each row (N, T.., R..), each with a column before it."""
+    half = (x.shape[1] - 1) // 2
+    return x[:, : 1 + half], x[:, half:]
+
+
+def project_rolling(x: Array, mu: Array, mu_r: Array) -> Array:
+    """The projection of each row on { ||x_T|| <= mu x_N, ||x_R|| <= mu_r x_N }.
+
+    The normal part n is the root of n - x_N - mu (||x_T|| - mu n)+ - mu_r (||x_R|| - mu_r n)+,
+    which is the least of four increasing lines: n is the largest of their roots.
+    """
+    half = (x.shape[1] - 1) // 2
+    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(x))
+    normal = np.zeros(len(x))
+    for a in (0 * mu, mu):
+        for b in (0 * mu_r, mu_r):
+            root = (x[:, 0] + a * slides + b * rolls) / (1 + a**2 + b**2)
+            normal = np.maximum(normal, root)
+    result = x.copy()
+    result[:, 0] = normal
+    for part, size, limit in (
+        (slice(1, 1 + half), slides, mu * normal),
+        (slice(1 + half, None), rolls, mu_r * normal),
+    ):
+        beyond = size > limit
+        result[beyond, part] *= (limit[beyond] / size[beyond])[:, None]
+    return result
+
+
+def modified_rolling(u: Array, mu: Array, mu_r: Array) -> Array:
+    """u^ = u + [mu ||u_T|| + mu_r ||u_R||, 0, ...] of each row."""
+    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(u))
+    result = u.copy()
+    result[:, 0] += mu * slides + mu_r * rolls
+    return result
+
+
 def natural_map(r: Array, hat: Array, mu: Array) -> Array:
     """The map r - P_K(r - u^) of each row, without the difference of two large numbers.
 
@@ -56,6 +96,11 @@ def natural_map(r: Array, hat: Array, mu: Array) -> Array:
     normal = (gap / (1 + mu**2))[:, None] * np.column_stack([-mu, directions])
     result = np.where((gap <= 0)[:, None], hat, hat + normal)
     return np.where((mu * norm <= -y[:, 0])[:, None], r, result)
+
+
+def natural_map_rolling(r: Array, hat: Array, mu: Array, mu_r: Array) -> Array:
+    """The map r - P_K(r - u^) of each row."""
+    return r - project_rolling(r - hat, mu, mu_r)
 
 
 @dataclass(frozen=True)
@@ -143,24 +188,31 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
         kinematics = relative(solution.u - u, solution.u, *velocity_terms)
 
     contacts, reactions = u.reshape(-1, d), r.reshape(-1, d)
-    hat = modified(contacts, mu)
+    mu_r = getattr(problem, "mu_r", None)
+    cone: Callable[[Array], Array]
+    if mu_r is None:
+        hat = modified(contacts, mu)
+        cone = partial(project, mu=mu)
+        residual = partial(natural_map, reactions, mu=mu)
+    else:
+        hat = modified_rolling(contacts, mu, mu_r)
+        cone = partial(project_rolling, mu=mu, mu_r=mu_r)
+        residual = partial(natural_map_rolling, reactions, mu=mu, mu_r=mu_r)
     trace = diagonal.reshape(-1, d).mean(axis=1)
     rho = (1 / np.where(trace > 0, trace, 1))[:, None]
     scaled = reactions - rho * hat
-    projected = project(scaled, mu)
+    projected = cone(scaled)
     is_open = ~projected.any(axis=1)
     is_stick = ~is_open & (projected == scaled).all(axis=1)
     norms = np.linalg.norm
     return Verdict(
-        natural=float(norms(natural_map(reactions, hat, mu)) / (norms(q) or 1.0)),
-        scaled_natural=float(
-            norms(natural_map(reactions, rho * hat, mu)) / (norms(rho * q.reshape(-1, d)) or 1.0)
-        ),
+        natural=float(norms(residual(hat)) / (norms(q) or 1.0)),
+        scaled_natural=float(norms(residual(rho * hat)) / (norms(rho * q.reshape(-1, d)) or 1.0)),
         dynamics=dynamics,
         bilateral=bilateral,
         kinematics=kinematics,
-        cone=float(norms(reactions - project(reactions, mu), axis=1).max(initial=0)),
-        dual_cone=float(norms(project(-hat, mu), axis=1).max(initial=0)),
+        cone=float(norms(reactions - cone(reactions), axis=1).max(initial=0)),
+        dual_cone=float(norms(cone(-hat), axis=1).max(initial=0)),
         complementarity=float(np.abs(np.sum(reactions * hat, axis=1)).max(initial=0)),
         open=int(is_open.sum()),
         stick=int(is_stick.sum()),
@@ -233,85 +285,17 @@ def contact_states(
     return u, r, (counts[0], counts[1], counts[2])
 
 
-def planted_global(
-    seed: int,
-    d: int = 3,
-    nc: int = 6,
-    p: int = 0,
-    mu: float | None = None,
-    storage: str = "csr",
-) -> Planted:
-    """A global problem, mixed where p > 0, with its solution."""
-    rng = np.random.default_rng(seed)
-    n = 2 * (d * nc + p) + 1
-    root = rng.standard_normal((n, n)) * (rng.uniform(size=(n, n)) < 0.2)
-    M = root @ root.T / n + np.eye(n)
-    H = np.eye(n, d * nc) + 0.1 * rng.standard_normal((n, d * nc))
-    G = np.eye(n, p, -d * nc) + 0.1 * rng.standard_normal((n, p))
-    coefficients = rng.uniform(0.1, 0.6, nc) if mu is None else np.full(nc, mu)
-    u, r, statuses = contact_states(rng, d, coefficients)
-    lam, f = rng.standard_normal(p), rng.standard_normal(n)
-    v = np.linalg.solve(M, H @ r.ravel() + G @ lam + f)
-    mixed = {"G": stored(G, storage, rng), "b": -G.T @ v} if p else {}
-    problem = fclib.GlobalProblem(
-        spacedim=d,
-        M=stored(M, storage, rng),
-        H=stored(H, storage, rng),
-        f=f,
-        w=u.ravel() - H.T @ v,
-        mu=coefficients,
-        **mixed,
-    )
-    solution = fclib.Solution(v=v, u=u.ravel(), r=r.ravel(), l=lam if p else None)
-    return Planted(problem, solution, statuses)
-
-
-def planted_local(
-    seed: int,
-    d: int = 3,
-    nc: int = 6,
-    p: int = 0,
-    mu: float | None = None,
-    storage: str = "csr",
-    skew: float = 0.0,
-) -> Planted:
-    """A local problem, mixed where p > 0, with its solution; skew > 0 makes W asymmetric."""
-    rng = np.random.default_rng(seed)
-    m = d * nc
-    root = np.eye(m + p) + 0.3 * rng.standard_normal((m + p, m + p)) / np.sqrt(max(1, m + p))
-    whole = root @ root.T
-    asymmetric = rng.standard_normal((m, m))
-    W = whole[:m, :m] + skew * (asymmetric - asymmetric.T) / max(1, m)
-    V, R = whole[:m, m:], whole[m:, m:]
-    coefficients = rng.uniform(0.1, 0.6, nc) if mu is None else np.full(nc, mu)
-    u, r, statuses = contact_states(rng, d, coefficients)
-    lam = rng.standard_normal(p)
-    mixed = {}
-    if p:
-        mixed = {
-            "V": stored(V, storage, rng),
-            "R": stored(R, storage, rng),
-            "s": -V.T @ r.ravel() - R @ lam,
-        }
-    problem = fclib.LocalProblem(
-        spacedim=d,
-        W=stored(W, storage, rng),
-        q=u.ravel() - W @ r.ravel() - V @ lam,
-        mu=coefficients,
-        **mixed,
-    )
-    solution = fclib.Solution(u=u.ravel(), r=r.ravel(), l=lam if p else None)
-    return Planted(problem, solution, statuses)
-
-
-def planted_rolling(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingProblem, Array]:
-    """A problem and its reactions: open, sticking, sliding, rolling, and both, in turn."""
-    rng = np.random.default_rng(seed)
+def rolling_states(
+    rng: np.random.Generator, d: int, mu: Array, mu_r: Array
+) -> tuple[Array, Array, tuple[int, int, int]]:
+    """Velocities and reactions (nc, d): open, sticking, sliding, rolling, and both, in turn."""
+    nc = mu.size
     half = (d - 1) // 2
-    mu, mu_r = rng.uniform(0.2, 0.8, nc), rng.uniform(0.02, 0.3, nc)
-    r, u = np.zeros((nc, d)), np.zeros((nc, d))
+    u, r = np.zeros((nc, d)), np.zeros((nc, d))
+    counts = [0, 0, 0]
     for k in range(nc):
         status = k % 5
+        counts[min(status, 2)] += 1
         if status == 0:
             u[k] = rng.normal(size=d)
             u[k, 0] = abs(u[k, 0]) + 0.1
@@ -325,6 +309,152 @@ def planted_rolling(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingP
             direction /= np.linalg.norm(direction)
             r[k, part] = limit * r[k, 0] * direction * (1.0 if moves else 0.5)
             u[k, part] = -direction * rng.uniform(0.5, 2) if moves else 0.0
+    return u, r, (counts[0], counts[1], counts[2])
+
+
+def planted_law(
+    rng: np.random.Generator, d: int, nc: int, mu: float | None, rolling: bool
+) -> tuple[dict[str, Array], tuple[Array, Array, tuple[int, int, int]]]:
+    """Coefficients of friction, a tenth of them for rolling, and the states of the contacts."""
+    coefficients = rng.uniform(0.1, 0.6, nc) if mu is None else np.full(nc, mu)
+    if not rolling:
+        return {"mu": coefficients}, contact_states(rng, d, coefficients)
+    law = {"mu": coefficients, "mu_r": coefficients / 10}
+    return law, rolling_states(rng, d, **law)
+
+
+def planted_global(
+    seed: int,
+    d: int = 3,
+    nc: int = 6,
+    p: int = 0,
+    mu: float | None = None,
+    storage: str = "csr",
+    rolling: bool = False,
+) -> Planted:
+    """A global problem, mixed where p > 0, with its solution."""
+    rng = np.random.default_rng(seed)
+    n = 2 * (d * nc + p) + 1
+    root = rng.standard_normal((n, n)) * (rng.uniform(size=(n, n)) < 0.2)
+    M = root @ root.T / n + np.eye(n)
+    H = np.eye(n, d * nc) + 0.1 * rng.standard_normal((n, d * nc))
+    G = np.eye(n, p, -d * nc) + 0.1 * rng.standard_normal((n, p))
+    law, (u, r, statuses) = planted_law(rng, d, nc, mu, rolling)
+    lam, f = rng.standard_normal(p), rng.standard_normal(n)
+    v = np.linalg.solve(M, H @ r.ravel() + G @ lam + f)
+    mixed = {"G": stored(G, storage, rng), "b": -G.T @ v} if p else {}
+    kind: Any = fclib.GlobalRollingProblem if rolling else fclib.GlobalProblem
+    problem = kind(
+        spacedim=d,
+        M=stored(M, storage, rng),
+        H=stored(H, storage, rng),
+        f=f,
+        w=u.ravel() - H.T @ v,
+        **law,
+        **mixed,
+    )
+    solution = fclib.Solution(v=v, u=u.ravel(), r=r.ravel(), l=lam if p else None)
+    return Planted(problem, solution, statuses)
+
+
+def planted_local(
+    seed: int,
+    d: int = 3,
+    nc: int = 6,
+    p: int = 0,
+    mu: float | None = None,
+    storage: str = "csr",
+    rolling: bool = False,
+    skew: float = 0.0,
+) -> Planted:
+    """A local problem, mixed where p > 0, with its solution; skew > 0 makes W asymmetric."""
+    rng = np.random.default_rng(seed)
+    m = d * nc
+    root = np.eye(m + p) + 0.3 * rng.standard_normal((m + p, m + p)) / np.sqrt(max(1, m + p))
+    whole = root @ root.T
+    asymmetric = rng.standard_normal((m, m))
+    W = whole[:m, :m] + skew * (asymmetric - asymmetric.T) / max(1, m)
+    V, R = whole[:m, m:], whole[m:, m:]
+    law, (u, r, statuses) = planted_law(rng, d, nc, mu, rolling)
+    lam = rng.standard_normal(p)
+    mixed = {}
+    if p:
+        mixed = {
+            "V": stored(V, storage, rng),
+            "R": stored(R, storage, rng),
+            "s": -V.T @ r.ravel() - R @ lam,
+        }
+    kind: Any = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
+    problem = kind(
+        spacedim=d,
+        W=stored(W, storage, rng),
+        q=u.ravel() - W @ r.ravel() - V @ lam,
+        **law,
+        **mixed,
+    )
+    solution = fclib.Solution(u=u.ravel(), r=r.ravel(), l=lam if p else None)
+    return Planted(problem, solution, statuses)
+
+
+def planted_bodies(
+    seed: int,
+    nc: int = 12,
+    d: int = 3,
+    ratio: float = 1.0,
+    mu: float = 0.5,
+    hyperstatic: bool = False,
+    duplicated: int = 0,
+    boundary: bool = False,
+) -> tuple[fclib.GlobalProblem, Array]:
+    """Bodies of masses from 1 to `ratio` in contact, and reactions that solve it.
+
+    `duplicated` contacts are there twice, `boundary` puts statuses on the cone's boundary: contacts
+    that graze, or stick at the limit of friction.
+    """
+    rng = np.random.default_rng(seed)
+    m = d * nc
+    n = max(3, m // 2 if hyperstatic else 2 * m)
+    mass = np.exp(rng.uniform(0, np.log(ratio), n)) if ratio > 1 else np.ones(n)
+    # a contact links two groups of coordinates, as the bodies that they are
+    H = np.zeros((n, m))
+    for a in range(nc):
+        rows = rng.choice(n, size=min(n, 2 * d), replace=False)
+        H[np.ix_(rows, np.arange(d * a, d * a + d))] = rng.standard_normal((len(rows), d))
+    if duplicated:
+        H = np.hstack([H, H[:, : d * duplicated]])
+        nc += duplicated
+        m = d * nc
+    coefficients = np.full(nc, mu)
+    u, r, _ = contact_states(rng, d, coefficients)
+    if boundary:
+        for a in range(nc):
+            if (a % 2 and r[a, 0] == 0) or u[a, 0] == 0:
+                u[a] = 0  # grazes at rest, or sticks at the limit
+    if duplicated:  # the same velocity and law at both
+        k = nc - duplicated
+        u[k:], r[k:] = u[:duplicated], r[:duplicated]
+    v = rng.standard_normal(n)
+    problem = fclib.GlobalProblem(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=mass * v - H @ r.ravel(),
+        w=u.ravel() - H.T @ v,
+        mu=coefficients,
+    )
+    return problem, r.ravel()
+
+
+def bodies(*arguments: Any, **parameters: Any) -> fclib.GlobalProblem:
+    """The problem of `planted_bodies`."""
+    return planted_bodies(*arguments, **parameters)[0]
+
+
+def planted_rolling(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingProblem, Array]:
+    """A problem and its reactions: open, sticking, sliding, rolling, and both, in turn."""
+    rng = np.random.default_rng(seed)
+    mu, mu_r = rng.uniform(0.2, 0.8, nc), rng.uniform(0.02, 0.3, nc)
+    u, r, _ = rolling_states(rng, d, mu, mu_r)
     root = rng.normal(size=(nc * d, nc * d)) / np.sqrt(nc * d)
     W = root @ root.T + 0.5 * np.eye(nc * d)
     problem = fclib.LocalRollingProblem(

@@ -38,11 +38,19 @@ def folder() -> Path:
     return Path(os.environ.get("FCLIB_DATA", default))
 
 
-REAL = [
-    pytest.param(path, id=f"{path.parent.name}/{path.stem}")
-    for path in sorted(folder().glob("*/*.hdf5"))
-]
-needs_data = pytest.mark.skipif(not REAL, reason=f"there are no real problems in {folder()}")
+FOUND = sorted(folder().glob("*/*.hdf5"))
+needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {folder()}")
+
+
+def few_contacts() -> list[Any]:
+    """Real problems whose ranks dense algebra finds in a moment."""
+    small = []
+    for path in FOUND:
+        with h5py.File(path) as file:
+            group = next(file[name] for name in file if name.startswith("fclib_"))
+            if group["vectors/mu"].size <= 150:
+                small.append(pytest.param(path, id=f"{path.parent.name}/{path.stem}"))
+    return small or [None]
 
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -83,11 +91,9 @@ def assert_no_solution(problem: fclib.Problem, proof: analysis.Certificate | Non
 
 
 @needs_data
-@pytest.mark.parametrize("path", REAL)
+@pytest.mark.parametrize("path", few_contacts())
 def test_ranks_are_those_of_dense_algebra(path: Path) -> None:
     problem = fclib.read(path)
-    if problem.nc > 300:
-        pytest.skip("more than 300 contacts")
     found = analysis.analyze(problem)
     local = problem
     if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import fclib
 from fclib.scenes.packing import Packing
 from helpers import (
-    contact_states,
+    bodies,
     dense,
     judge,
     local_problem,
@@ -24,54 +24,6 @@ from helpers import (
 )
 
 Array = npt.NDArray[np.float64]
-
-
-def bodies(
-    seed: int,
-    nc: int = 12,
-    d: int = 3,
-    ratio: float = 1.0,
-    mu: float = 0.5,
-    hyperstatic: bool = False,
-    duplicated: int = 0,
-    boundary: bool = False,
-) -> fclib.GlobalProblem:
-    """Bodies of masses from 1 to `ratio` in contact, with a planted solution.
-
-    `duplicated` contacts are there twice, `boundary` puts statuses on the cone's boundary: contacts
-    that graze, or stick at the limit of friction.
-    """
-    rng = np.random.default_rng(seed)
-    m = d * nc
-    n = max(3, m // 2 if hyperstatic else 2 * m)
-    mass = np.exp(rng.uniform(0, np.log(ratio), n)) if ratio > 1 else np.ones(n)
-    # a contact links two groups of coordinates, as the bodies that they are
-    H = np.zeros((n, m))
-    for a in range(nc):
-        rows = rng.choice(n, size=min(n, 2 * d), replace=False)
-        H[np.ix_(rows, np.arange(d * a, d * a + d))] = rng.standard_normal((len(rows), d))
-    if duplicated:
-        H = np.hstack([H, H[:, : d * duplicated]])
-        nc += duplicated
-        m = d * nc
-    coefficients = np.full(nc, mu)
-    u, r, _ = contact_states(rng, d, coefficients)
-    if boundary:
-        for a in range(nc):
-            if (a % 2 and r[a, 0] == 0) or u[a, 0] == 0:
-                u[a] = 0  # grazes at rest, or sticks at the limit
-    if duplicated:  # the same velocity and law at both
-        k = nc - duplicated
-        u[k:], r[k:] = u[:duplicated], r[:duplicated]
-    v = rng.standard_normal(n)
-    return fclib.GlobalProblem(
-        spacedim=d,
-        M=np.diag(mass),
-        H=H,
-        f=mass * v - H @ r.ravel(),
-        w=u.ravel() - H.T @ v,
-        mu=coefficients,
-    )
 
 
 def assert_honest(problem: fclib.Problem, result: fclib.Result, tol: float) -> None:

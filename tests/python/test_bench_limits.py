@@ -22,6 +22,7 @@ from fclib.bench.pool import SupervisorClient
 from helpers import planted_local
 
 LIMIT = 0.5  # [s]
+ASLEEP = 1000.0  # [s] of a solver that only a limit ends
 MEMORY = 200.0  # [MB]
 LATE = 2.0  # [s] beyond the limit, when a run has ended and the next one may begin
 
@@ -31,6 +32,7 @@ BAD = """
     import fclib
 
     SPIN = os.environ.get("FCLIB_TEST_SPIN", "")
+    ASLEEP = 1000.0
 
 
     def bad(function):
@@ -39,7 +41,7 @@ BAD = """
 
     @bad
     def sleeps(problem, r, monitor):
-        time.sleep(1000)
+        time.sleep(ASLEEP)
 
 
     @bad
@@ -133,7 +135,7 @@ BAD = """
     @bad
     def closes_everything(problem, r, monitor):
         os.closerange(0, 4096)
-        time.sleep(1000)
+        time.sleep(ASLEEP)
 
 
     @bad
@@ -145,7 +147,7 @@ BAD = """
     def leaves_a_child(problem, r, monitor):
         # in a session of its own, and of nobody's
         subprocess.Popen(["setsid", "sh", "-c", "sleep 12345 & sleep 12345"])
-        time.sleep(1000)
+        time.sleep(ASLEEP)
 
 
     @bad
@@ -268,10 +270,10 @@ def test_what_no_solver_should_do_has_its_own_status(
     record = supervisor.do(job(folder, f"bad-{name}", wall=wall))
     took = time.monotonic() - start
     assert record.status == EXPECTED[name], record
-    # the clock of the CPU holds on a machine that is shared, that on the wall if that is not busy
+    # the clock of the CPU holds on a machine that is shared, too
     assert record.total_cpu_s is None or record.total_cpu_s < LIMIT + LATE
-    if os.getloadavg()[0] < (os.cpu_count() or 1):
-        assert took < wall + LATE
+    # however busy it is, long before a solver that sleeps wakes up of its own accord
+    assert took < ASLEEP / 2
     assert not record.solved
     # the next one is not touched by it
     after = supervisor.do(job(folder, "auto"))

@@ -16,7 +16,7 @@ from helpers import columns, judge
 
 KINDS = ("local3d", "global3d", "local2d", "global2d", "condensed3d")
 EXACT = 1e-12
-TIME_LIMIT = 5.0  # seconds a problem
+SWEEPS = 20_000  # a problem
 
 
 def folder() -> Path:
@@ -33,8 +33,9 @@ def name_of(path: Path) -> str:
     return f"{path.parent.name}/{path.stem}"
 
 
-ALL = [pytest.param(path, id=name_of(path)) for path in files(*KINDS)]
-needs_data = pytest.mark.skipif(not ALL, reason=f"there are no real problems in {folder()}")
+FOUND = files(*KINDS)
+ALL = [pytest.param(path, id=name_of(path)) for path in FOUND] or [pytest.param(None)]
+needs_data = pytest.mark.skipif(not FOUND, reason=f"there are no real problems in {folder()}")
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,7 @@ def test_most_3d_problems_are_solved_and_every_error_is_true(real_data: Path) ->
     solved = []
     for path in paths:
         problem = fclib.read(path)
-        result = fclib.solve(problem, "nsgs", 1e-8, time_limit=TIME_LIMIT)
+        result = fclib.solve(problem, "nsgs", 1e-8, max_iterations=SWEEPS)
         assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
         assert result.converged == (result.error <= 1e-8)
         if result.converged:
@@ -127,7 +128,7 @@ def test_2d_problems_are_solved_and_every_error_is_true(real_data: Path) -> None
     solved = 0
     for path in paths:
         problem = fclib.read(path)
-        result = fclib.solve(problem, "nsgs", 1e-8, time_limit=TIME_LIMIT)
+        result = fclib.solve(problem, "nsgs", 1e-8, max_iterations=SWEEPS)
         assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
         solved += result.converged
     assert solved >= 0.8 * len(paths)

@@ -85,7 +85,7 @@ def build(folder: Path, jobs: int, tests: bool) -> None:
         f"-DCMAKE_CXX_LINKER_LAUNCHER={launcher}",
         f"-DPython_EXECUTABLE={sys.executable}",
         f"-Dnanobind_DIR={nanobind}",
-        "-DFCLIB_FORTRAN=OFF",
+        "-DFCLIB_C=OFF",  # as in make setup
         f"-DFCLIB_TESTS={'ON' if tests else 'OFF'}",
     ]
     subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)

@@ -7,23 +7,23 @@ BUILD := build
 SECONDS := 60
 JOBS ?= auto
 
-# what the installed package is made of
-SOURCES := CMakeLists.txt pyproject.toml README.md \
-           $(wildcard campaigns/*.toml) \
-           $(shell find core bindings cmake python include -type f \
-             \( -name '*.[ch]pp' -o -name '*.[ch]' -o -name '*.in' -o -name '*.map' -o -name '*.py' \
-                -o -name '*.js' -o -name '*.css' -o -name '*.html' -o -name '*.json' -o -name '*.hdf5' \
-                -o -name py.typed \))
+# the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
+NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
-.PHONY: setup demo test docs fuzz lint tidy format man sdist wheel deb clean help
+.PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels deb \
+        clean help
 
 help:
-	@echo "make setup   install what is missing, build, install fclib into $(VENV)"
+	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
 	@echo "make docs    set up, then build the documentation into $(BUILD)/site"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
+	@echo "make asan    the C++ tests under the sanitizers of addresses and of undefined behaviour"
+	@echo "make tsan    the C++ tests under the sanitizer of threads"
+	@echo "make coverage  all tests once more, and the lines of C++ and Python that they do not run"
+	@echo "make build-cost  CPU seconds of a whole build, and of touching each header"
 	@echo "make lint    check style and types (ruff, mypy, clang-format)"
 	@echo "make tidy    clang-tidy over the C++ sources, which takes minutes"
 	@echo "make format  put the sources into the style that lint checks"
@@ -31,10 +31,13 @@ help:
 	@echo "make sdist   the source distribution, into dist/"
 	@echo "make wheel   a wheel of it with an HDF5 of its own, installed and tried (HDF5_SOURCE=FOLDER:"
 	@echo "             sources of HDF5, which are downloaded otherwise)"
+	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
 	@echo "make deb     the C library as Debian packages, into dist/"
 	@echo "make clean   remove what was built (not $(VENV))"
 
+# ninja knows what was edited; Python is imported from where it lies
 setup: $(VENV)/.installed
+	@cmake --build $(BUILD)
 
 demo: setup
 	$(BIN)/fclib demo
@@ -49,6 +52,19 @@ docs: setup $(VENV)/.docs-tools
 
 fuzz:
 	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)
+
+asan tsan: $(VENV)/.system
+	cmake --preset $@
+	cmake --build --preset $@
+	$(NO_RANDOM_ADDRESSES) ctest --preset $@ --parallel 2
+
+coverage: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.coverage-tools $(VENV)/.test-system
+	cmake --preset coverage
+	cmake --build --preset coverage
+	$(BIN)/python scripts/coverage_report.py build/coverage
+
+build-cost: setup
+	$(BIN)/python scripts/build_cost.py
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
 	$(BIN)/ruff check python tests benchmarks examples scripts
@@ -82,6 +98,11 @@ wheel: sdist
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/auditwheel repair --wheel-dir dist $(BUILD)/wheel/*.whl
 	$(BIN)/python scripts/check_wheel.py dist/*.whl
 
+# for every Python there is from 3.10 to 3.14, and each tried; CHROOTS: folders of scripts/try_on.sh
+wheels: sdist
+	HDF5_SOURCE="$(HDF5_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
+	$(BIN)/python scripts/try_wheels.py --build $(BUILD)/bundled $(CHROOTS:%=--chroot %)
+
 deb:
 	cmake -S . -B $(BUILD)/deb -G Ninja -DFCLIB_PYTHON=OFF -DCMAKE_INSTALL_PREFIX=/usr
 	cmake --build $(BUILD)/deb
@@ -92,7 +113,7 @@ deb:
 	sh scripts/check_c_library.sh $(BUILD)/deb/unpacked/usr
 
 clean:
-	rm -rf $(BUILD) demo dist man $(VENV)/.installed
+	rm -rf $(BUILD) demo dist man $(VENV)/.installed python/fclib/_core.*
 
 $(VENV)/.system: scripts/system-packages.sh
 	@PYTHON=$(PYTHON) sh scripts/system-packages.sh
@@ -108,12 +129,13 @@ $(VENV)/.build-tools: $(VENV)/.system pyproject.toml
 	@$(BIN)/python scripts/requirements.py build-system | xargs $(BIN)/pip install --quiet
 	@touch $@
 
-# --no-build-isolation keeps one build folder, so that only what changed is compiled again
-$(VENV)/.installed: $(VENV)/.build-tools $(SOURCES)
-	@echo "== building and installing fclib into $(VENV) (eight minutes of CPU time the first time)"
+# --no-build-isolation keeps one build folder, so that only what changed is compiled again. The package
+# is imported from python/ (cmake/inplace.cmake): only what its metadata is made of installs it anew.
+$(VENV)/.installed: $(VENV)/.build-tools CMakeLists.txt pyproject.toml
+	@echo "== building fclib and installing it into $(VENV) (minutes of CPU time the first time)"
 	@$(BIN)/pip install --no-build-isolation \
 	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
-	  '.[analysis,collection,bench,report,solvers]'
+	  --editable '.[analysis,collection,bench,report,solvers]'
 	@touch $@
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml

@@ -12,9 +12,10 @@ pc=$(find "$prefix" -name fclib.pc)
 [ -n "$pc" ] || { echo "$prefix has no fclib.pc" >&2; exit 1; }
 libraries=$(dirname "$(dirname "$pc")")
 static=
-[ -e "$libraries/libfclib.so" ] || static=--static
+[ -e "$libraries/libfclib.so" ] || [ -e "$libraries/libfclib.dylib" ] || static=--static
 export PKG_CONFIG_PATH="$(dirname "$pc")${PKG_CONFIG_PATH:+:$PKG_CONFIG_PATH}"
 export LD_LIBRARY_PATH="$libraries${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}"
+export DYLD_LIBRARY_PATH="$libraries${DYLD_LIBRARY_PATH:+:$DYLD_LIBRARY_PATH}"  # of macOS
 
 for program in write solve; do
   # shellcheck disable=SC2046

@@ -74,7 +74,7 @@ def look_into(wheel: Path) -> None:
     wanted = {
         f"fclib/{path.relative_to(PACKAGE)}"
         for path in PACKAGE.rglob("*")
-        if path.is_file() and path.suffix != ".pyc"
+        if path.is_file() and path.suffix != ".pyc" and not path.name.startswith("_core.")
     }
     wanted |= {f"fclib/bench/campaigns/{path.name}" for path in (ROOT / "campaigns").glob("*.toml")}
     wanted |= {

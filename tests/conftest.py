@@ -10,6 +10,9 @@ import pytest
 
 TESTS = Path(__file__).parent
 sys.path.insert(0, str(TESTS))  # for helpers.py, which --import-mode=importlib does not find
+
+import rebuild  # noqa: E402
+
 pytest.register_assert_rewrite("helpers")
 
 # one thread for linear algebra: tests run side by side, and threads that wait for others burn time
@@ -23,6 +26,12 @@ hypothesis.settings.load_profile("fclib")
 # a shell's job in the background ignores Ctrl-C, and so would all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """What was just edited is what is tested."""
+    if not hasattr(config, "workerinput"):  # a process that pytest-xdist has started
+        rebuild.rebuild()
 
 
 @pytest.fixture(scope="session")

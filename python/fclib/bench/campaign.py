@@ -28,6 +28,8 @@ from fclib.bench.modules import load_modules
 from fclib.bench.store import Store
 
 PUBLISHED = Path(__file__).with_name("campaigns")
+if not PUBLISHED.is_dir():  # in the repository, from which a development install is imported
+    PUBLISHED = Path(__file__).resolve().parents[3] / "campaigns"
 NUMBERS = ("time_limit", "wall_limit", "memory")  # that a group of problems may set for itself
 KNOWN = {
     "name",

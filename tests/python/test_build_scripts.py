@@ -1,0 +1,203 @@
+"""What the scripts around the build make of what the tools print; the development install."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import rebuild
+
+DEPENDENCIES = """\
+core/a.o: #deps 3, deps mtime 1700000000000000000 (VALID)
+    ../core/solvers/a.cpp
+    ../core/methods/m.hpp
+    /usr/include/hdf5.h
+
+core/b.o: #deps 2, deps mtime 1700000000000000000 (VALID)
+    ../core/solvers/b.cpp
+    ../core/methods/../methods/m.hpp
+
+core/gone.o: #deps 1, deps mtime 1 (STALE)
+    ../core/methods/m.hpp
+
+"""
+
+
+@pytest.fixture(scope="module")
+def build_cost(root: Path) -> ModuleType:
+    return script(root, "build_cost")
+
+
+@pytest.fixture(scope="module")
+def coverage_report(root: Path) -> ModuleType:
+    return script(root, "coverage_report")
+
+
+def script(root: Path, name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, root / "scripts" / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look for it there
+    spec.loader.exec_module(module)
+    return module
+
+
+# ---- what a build costs
+
+
+def test_touching_a_header_costs_the_objects_that_include_it(
+    build_cost: ModuleType, tmp_path: Path
+) -> None:
+    objects = {"core/a.o": 3.0, "core/b.o": 4.0}
+    includes = build_cost.dependencies(DEPENDENCIES)
+    assert set(includes) == set(objects), "an entry that ninja calls stale is none"
+    costs = build_cost.touching(objects, includes, tmp_path / "build", tmp_path)
+    assert [(one.name, one.seconds, one.objects) for one in costs] == [
+        ("core/methods/m.hpp", 7.0, 2),
+        ("core/solvers/b.cpp", 4.0, 1),
+        ("core/solvers/a.cpp", 3.0, 1),
+    ]
+
+
+def test_goals_are_judged_by_the_dearest_file(build_cost: ModuleType) -> None:
+    def judged(whole: float, method: float, solver: float) -> list[str]:
+        cost = build_cost.Cost
+        return list(
+            build_cost.goals(
+                [
+                    cost("total", build_cost.WHOLE, whole, 60),
+                    cost("touch", "core/methods/a.hpp", method, 9),
+                    cost("touch", "core/methods/b.hpp", 1.0, 1),
+                    cost("touch", "core/solvers/a.cpp", solver, 1),
+                    cost("object", "core/solvers/a.cpp.o", 1000.0, 1),
+                ]
+            )
+        )
+
+    assert all(line.partition(": ")[2].count(": reached") for line in judged(240, 40, 15))
+    wrong = judged(241, 41, 16)
+    assert len(wrong) == 3
+    assert all("NOT reached" in line for line in wrong)
+    assert "core/methods/a.hpp" in wrong[1]
+
+
+def test_costs_are_kept_and_compared(build_cost: ModuleType, tmp_path: Path) -> None:
+    costs = [
+        build_cost.Cost("total", build_cost.WHOLE, 10.0, 2),
+        build_cost.Cost("touch", "core/field.hpp", 7.25, 2),
+    ]
+    build_cost.write_csv(tmp_path / "costs.csv", costs)
+    assert build_cost.read_csv(tmp_path / "costs.csv") == costs
+    now = [build_cost.Cost("total", build_cost.WHOLE, 5.0, 2), costs[1]]
+    lines = build_cost.table(now, costs, 10)
+    assert any(line.split()[:2] == ["10.0", "5.0"] for line in lines)
+
+
+def test_only_what_two_objects_define_is_duplicate(build_cost: ModuleType) -> None:
+    first = """\
+0000000000000000 0000000000000010 W _Z4bothv
+0000000000000000 0000000000000020 T _Z3onev
+0000000000000000 0000000000000100 V _ZTI4data
+                 U malloc
+"""
+    second = """\
+0000000000000000 0000000000000010 W _Z4bothv
+0000000000000000 0000000000000004 t local
+"""
+    assert build_cost.duplicate_share([first]) == (0, 0x30)
+    assert build_cost.duplicate_share([first, second]) == (0x10, 0x44)
+
+
+def test_what_a_compiler_took_is_recorded(build_cost: ModuleType, tmp_path: Path) -> None:
+    work = "import sys; open(sys.argv[2], 'w'); sum(range(10**6))"
+    output = str(tmp_path / "a.o")
+    assert build_cost.record(tmp_path, [sys.executable, "-c", work, "-o", output]) == 0
+    assert build_cost.record(tmp_path, [sys.executable, "-c", "raise SystemExit(3)"]) == 3
+    objects, linking = build_cost.recorded(tmp_path)
+    assert list(objects) == [output]
+    assert objects[output] > 0
+    assert linking == 0
+
+
+# ---- lines that no test runs
+
+
+def test_a_line_that_one_instance_runs_is_run(coverage_report: ModuleType) -> None:
+    lines = [
+        {"line_number": 1, "count": 0},
+        {"line_number": 1, "count": 2},
+        {"line_number": 2, "count": 0},
+        {"line_number": 3, "count": 0, "gcovr/noncode": True},
+    ]
+    assert coverage_report.merged([{"file": "a.hpp", "lines": lines}]) == {
+        "a.hpp": {1: True, 2: False}
+    }
+
+
+def test_lines_that_no_test_runs_are_named(coverage_report: ModuleType) -> None:
+    good = dict.fromkeys(range(1, 97), True)
+    bad = {1: True, 2: False, 3: False, 5: False}
+    lines, enough = coverage_report.report({"C++": {"good.cpp": good, "bad.cpp": bad}}, 92.0)
+    assert enough, "97 of 100"
+    assert any("bad.cpp: 2-3, 5" in line for line in lines)
+    assert not any("good.cpp" in line for line in lines)
+
+
+@pytest.mark.parametrize("missed", [9, 100])
+def test_too_few_lines_of_one_language_are_too_few(
+    coverage_report: ModuleType, missed: int
+) -> None:
+    good = {"a.py": dict.fromkeys(range(100), True)}
+    bad = {"a.cpp": {number: number >= missed for number in range(100)}}
+    assert coverage_report.report({"Python": good}, 92.0)[1]
+    assert not coverage_report.report({"C++": bad, "Python": good}, 92.0)[1]
+    assert not coverage_report.report({"C++": {}, "Python": good}, 92.0)[1], "nothing was counted"
+
+
+# ---- the development install
+
+
+def cache(build: Path, *lines: str) -> Path:
+    build.mkdir(exist_ok=True)
+    (build / "CMakeCache.txt").write_text("\n".join(["# made by CMake", *lines, ""]))
+    return build
+
+
+def test_only_a_development_build_of_this_python_is_built_before_tests(tmp_path: Path) -> None:
+    build = tmp_path / "build"
+    ours = f"Python_EXECUTABLE:PATH={sys.executable}"
+    assert not rebuild.is_development_build(build)
+    assert not rebuild.is_development_build(cache(build, "SKBUILD_STATE:STRING=wheel", ours))
+    assert rebuild.is_development_build(cache(build, "SKBUILD_STATE:STRING=editable", ours))
+    assert rebuild.is_development_build(cache(build, "FCLIB_INPLACE:BOOL=ON", ours))
+    theirs = "Python_EXECUTABLE:PATH=/opt/other/bin/python"
+    assert not rebuild.is_development_build(cache(build, "SKBUILD_STATE:STRING=editable", theirs))
+
+
+def test_a_build_that_fails_ends_the_tests(tmp_path: Path) -> None:
+    inplace = "SKBUILD_STATE:STRING=editable"
+    build = cache(tmp_path / "build", inplace, f"Python_EXECUTABLE:PATH={sys.executable}")
+    with pytest.raises(pytest.exit.Exception, match="does not build"):
+        rebuild.rebuild(build)  # a folder with nothing to build
+
+
+# ---- wheels
+
+
+def test_a_python_takes_the_wheel_of_its_tags(root: Path) -> None:
+    try_wheels = script(root, "try_wheels")
+    names = ("cp310-cp310", "cp311-cp311", "cp312-abi3")
+    wheels = [Path(f"fclib-0.1.0-{name}-manylinux_2_28_x86_64.whl") for name in names]
+    taken = {minor: try_wheels.wheel_for(minor, wheels) for minor in range(9, 15)}
+    assert taken == {
+        9: None,
+        10: wheels[0],
+        11: wheels[1],
+        12: wheels[2],
+        13: wheels[2],
+        14: wheels[2],
+    }
+    assert try_wheels.wheel_for(11, wheels[:1]) is None, "without abi3 it is for one version"

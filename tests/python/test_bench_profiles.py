@@ -8,6 +8,7 @@ import json
 import math
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -280,7 +281,9 @@ def test_some_solvers_share_the_instances_that_all_of_them_have_run() -> None:
     assert [instance.problem for instance in some.instances] == ["problem1"]
     assert some.values.tolist() == [[4, 3]]
     assert some.left_out == 1
-    with pytest.raises(profiles.ProfileError, match="there is no problem that all of these"):
+    with pytest.raises(
+        profiles.ProfileError, match=r"^there is no problem that all of these solvers have run$"
+    ):
         profiles.costs(rows)
 
 
@@ -427,10 +430,19 @@ def test_the_columns_of_the_summary() -> None:
     assert [line["fastest"] for line in found] == [2, 2, 0, 1, 0]
 
 
-def test_what_costs_nothing_has_no_ratio_to_the_best() -> None:
-    costs = profiles.costs([row("A", 0, 1.0)])
-    free = dataclasses.replace(costs, values=np.zeros((1, 1)))
-    assert math.isnan(profiles.summary(free)[1]["to best"])
+def test_ratios_to_the_best_mean() -> None:
+    costs = profiles.costs([row("A", 0, 0.25), row("B", 0, 0.5)])
+    assert [line["to best"] for line in profiles.summary(costs)] == pytest.approx([1, 1, 2])
+    # there is none to what costs nothing
+    free = dataclasses.replace(costs, values=np.array([[1.0, 0.0]]))
+    with np.errstate(divide="ignore"):
+        assert all(math.isnan(line["to best"]) for line in profiles.summary(free))
+
+
+def test_what_nobody_solves_is_no_cause_for_warnings() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert profiles.ratios(np.full((1, 2), math.inf)).tolist() == [[math.inf, math.inf]]
 
 
 def test_the_columns_of_families() -> None:
@@ -577,6 +589,7 @@ def test_what_campaigns_quote_is_found_by_family_and_tolerance(tmp_path: Path) -
     with bench.Store(tmp_path / "quotes.sqlite") as store:
         store.begin("quotes", text, 0, 0, "here")
         store.begin("nothing", "", 0, 0, "here")
+        store.begin("undecided", "[[problems]]\npublished_mean = 1.0", 0, 0, "here")
     assert profiles.published(tmp_path / "quotes.sqlite") == {
         ("few", 1e-4): 2.0,
         ("few", 1e-8): 2.0,

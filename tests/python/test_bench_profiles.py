@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 import math
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +38,7 @@ def fill(
     tol: float = 1e-6,
     repeat: int = 0,
     node: str = "here",
+    version: str = "1.0",
 ) -> None:
     """A store, made by hand."""
     with bench.Store(path) as store:
@@ -58,7 +61,7 @@ def fill(
                 )
                 job = Job(
                     problem,
-                    bench.SolverChoice(solver, {}),
+                    bench.SolverChoice(solver, {}, version),
                     tol,
                     bench.Limits(LIMIT, LIMIT, 1000),
                     repeat,
@@ -236,6 +239,373 @@ def test_the_mean_agrees_with_the_definition(values: Any, shift: float) -> None:
     whole = np.where(np.isfinite(values), values, 1e7)
     expected = [math.exp(sum(math.log(x + shift) for x in c) / len(c)) - shift for c in whole.T]
     np.testing.assert_allclose(means, expected, rtol=1e-6, atol=1e-9 * shift)
+
+
+# ---- edges: rows made by hand, without a store
+
+
+def row(solver: str, problem: int, time: float | None, **other: Any) -> dict[str, Any]:
+    """A run, as a store has it: solved where there is a time."""
+    made = {
+        "solver": solver,
+        "hash": f"hash{problem}",
+        "problem": f"problem{problem}",
+        "family": "family",
+        "nc": 10,
+        "tol": 1e-6,
+        "time_limit": LIMIT,
+        "status": "cpu_limit" if time is None else "converged",
+        "solved": int(time is not None),
+        "error": None if time is None else 1e-7,
+        **dict.fromkeys(profiles.METRICS, time),
+    }
+    return {**made, **other}
+
+
+def test_instances_without_contacts_have_no_cost_by_contact() -> None:
+    rows = [row("A", 0, 1.0, nc=0), row("A", 1, 6.0, nc=2), row("A", 2, 3.0, nc=3)]
+    by_contact = profiles.costs(rows).per_contact()
+    assert [instance.problem for instance in by_contact.instances] == ["problem1", "problem2"]
+    assert by_contact.values.tolist() == [[3], [1]]
+
+
+def test_some_solvers_share_the_instances_that_all_of_them_have_run() -> None:
+    rows = [row("A", 0, 1.0), row("B", 0, 2.0), row("B", 1, 3.0), row("C", 1, 4.0)]
+    every = profiles.gather(rows)
+    np.testing.assert_array_equal(
+        every.values,
+        [[1, 2, math.nan], [math.nan, 3, 4]],  # nan where it has not run
+    )
+    some = every.shared(["C", "B"])
+    assert some.solvers == ("C", "B")
+    assert [instance.problem for instance in some.instances] == ["problem1"]
+    assert some.values.tolist() == [[4, 3]]
+    assert some.left_out == 1
+    with pytest.raises(
+        profiles.ProfileError, match=r"^there is no problem that all of these solvers have run$"
+    ):
+        profiles.costs(rows)
+
+
+def test_a_part_has_the_instances_it_is_of() -> None:
+    part = profiles.costs([row("A", k, k + 1.0) for k in range(3)]).of([2, 0])
+    assert [instance.problem for instance in part.instances] == ["problem2", "problem0"]
+    assert part.values.tolist() == [[3], [1]]
+
+
+def test_each_metric_has_its_own_costs_and_its_least() -> None:
+    rows = [row("A", 0, 1.0, iterations=0, memory_mb=7.0), row("A", 1, 1e-9, iterations=5)]
+    assert profiles.costs(rows).values.tolist() == [[1], [1e-6]]
+    assert profiles.costs(rows, "iterations").values.tolist() == [[1], [5]]
+    assert profiles.costs(rows, "memory_mb").values[0].tolist() == [7]
+    with pytest.raises(profiles.ProfileError, match="no metric luck; there is: cpu_s, total_cpu_s"):
+        profiles.costs(rows, "luck")
+
+
+def test_a_failure_is_charged_the_limit_or_the_largest_cost() -> None:
+    rows = [
+        *(row("A", 0, 2.0), row("B", 0, 8.0), row("C", 0, None)),
+        *(row("A", 1, None), row("B", 1, None), row("C", 1, None)),
+        *(row("A", 2, 3.0), row("B", 2, 20.0), row("C", 2, 1.0)),
+    ]
+    assert profiles.costs(rows).charges.tolist() == [LIMIT, LIMIT, LIMIT]
+    # where nobody solves it, the largest of all
+    assert profiles.costs(rows, "iterations").charges.tolist() == [8, 20, 20]
+    assert profiles.costs(rows).best.tolist() == [2, math.inf, 1]
+    nothing = profiles.costs([row("A", 0, None)], "iterations")
+    assert nothing.charges.tolist() == [1]
+
+
+def test_a_failure_costs_nothing_less_than_everything() -> None:
+    # a run that stopped at its limit has a time, and one without a time is not solved by its status
+    rows = [row("A", 0, 5.0, solved=0), row("A", 1, None, solved=1), row("A", 2, 5.0)]
+    assert profiles.costs(rows).values.tolist() == [[math.inf], [math.inf], [5]]
+
+
+def test_an_unreadable_problem_is_no_instance() -> None:
+    rows = [row("A", 0, None, status="unreadable"), row("A", 1, 1.0), row("A", 2, 2.0)]
+    found = profiles.gather(rows)
+    assert [instance.problem for instance in found.instances] == ["problem1", "problem2"]
+    assert profiles.gather(rows[:1]).solvers == ("A",)
+    assert profiles.gather(rows[:1]).values.shape == (0, 1)
+
+
+def test_an_even_number_of_repeats_counts_by_the_two_in_the_middle() -> None:
+    for times, median in [
+        ([4.0, 1.0], 2.5),
+        ([9.0, 1.0, 3.0, 2.0], 2.5),
+        ([8.0, None, 1.0, 3.0], 5.5),
+        ([1.0, None], math.inf),
+        ([2.0, None, 1.0, None], math.inf),
+        ([7.0, 1.0, 3.0, None, 2.0, 5.0], 4.0),
+    ]:
+        rows = [row("A", 0, time) for time in times]
+        assert profiles.costs(rows).values.tolist() == [[median]]
+
+
+def test_instances_are_in_order_of_family_problem_and_growing_accuracy() -> None:
+    rows = [
+        row("A", 0, 1.0, family="b"),
+        *(row("A", 2, 1.0, tol=tol) for tol in (1e-8, 1e-4, 1e-6)),
+        row("A", 1, 1.0, time_limit=7.0),
+        row("A", 1, 1.0, time_limit=3.0),
+    ]
+    found = [(i.family, i.problem, i.tol, i.limit) for i in profiles.costs(rows).instances]
+    assert found == [
+        ("b", "problem0", 1e-6, LIMIT),
+        ("family", "problem1", 1e-6, 3),
+        ("family", "problem1", 1e-6, 7),
+        ("family", "problem2", 1e-4, LIMIT),
+        ("family", "problem2", 1e-6, LIMIT),
+        ("family", "problem2", 1e-8, LIMIT),
+    ]
+
+
+def test_profiles_of_no_instance_are_zero() -> None:
+    assert profiles.share_within(np.zeros((0, 2)), np.array([1.0])).tolist() == [[0], [0]]
+
+
+def test_the_shifted_mean_by_hand() -> None:
+    values = np.array([[3.0, math.inf], [15.0, 7.0]])
+    means = profiles.shifted_geometric_mean(values, np.array([10.0, 1e9]), 5, shift=1.0)
+    assert means == pytest.approx([math.sqrt(4 * 16) - 1, math.sqrt(51 * 8) - 1])
+    means = profiles.shifted_geometric_mean(values[:, :1], np.zeros(2), shift=100.0)
+    assert means == pytest.approx([math.sqrt(103 * 115) - 100])
+    # ten times the limit, a shift of 1 ms
+    failed = profiles.shifted_geometric_mean(np.array([[math.inf], [0.0]]), np.array([0.3, 1.0]))
+    assert failed == pytest.approx([math.sqrt(3.001 * 0.001) - 0.001])
+
+
+def test_the_interval_of_a_pair_is_drawn_from_its_seed() -> None:
+    random = np.random.default_rng(3)
+    rows = [row(s, k, float(t)) for s in "AB" for k, t in enumerate(random.uniform(1, 9, 12))]
+    costs = profiles.costs(rows)
+    (pair,) = profiles.pairs(costs)
+    assert profiles.pairs(costs) == profiles.pairs(costs, seed=0) == [pair]
+    (other,) = profiles.pairs(costs, seed=1)
+    assert (other.low, other.high) != (pair.low, pair.high)
+    assert pair.low < pair.ratio < pair.high
+
+
+def test_a_pair_that_solves_nothing_together_has_no_ratio() -> None:
+    (pair,) = profiles.pairs(
+        profiles.costs([row("A", 0, 1.0), row("B", 0, None), row("A", 1, None), row("B", 1, 1.0)])
+    )
+    assert (pair.both, pair.only_first, pair.only_second) == (0, 1, 1)
+    assert all(math.isnan(x) for x in (pair.ratio, pair.low, pair.high))
+
+
+def test_the_columns_of_the_summary() -> None:
+    rows = [
+        *(row("slow", 0, 3.0), row("slow", 1, 15.0), row("slow", 2, None)),
+        *(row("quick", 0, 1.0), row("quick", 1, 7.0), row("quick", 2, None)),
+        *(row("none", k, None) for k in range(3)),
+        *(row("once", 0, 1.0), row("once", 1, None), row("once", 2, None)),
+    ]
+    found = profiles.summary(profiles.costs(rows), penalty=1, shift=1.0)
+    assert [line["solver"] for line in found] == ["virtual best", "quick", "slow", "once", "none"]
+    best = (2 * 8 * 101) ** (1 / 3) - 1
+    slow = (4 * 16 * 101) ** (1 / 3) - 1
+    assert found[0] == {
+        "solver": "virtual best",
+        "solved": 2,
+        "of": 3,
+        "fastest": 2,
+        "mean": pytest.approx(best),
+        "to best": pytest.approx(1),
+        "median ratio": 1,
+        "worst ratio": 1,
+    }
+    assert found[2] == {
+        "solver": "slow",
+        "solved": 2,
+        "of": 3,
+        "fastest": 0,
+        "mean": pytest.approx(slow),
+        "to best": pytest.approx(slow / best),
+        "median ratio": pytest.approx((3 + 15 / 7) / 2),
+        "worst ratio": 3,
+    }
+    assert (found[4]["median ratio"], found[4]["worst ratio"]) == (None, None)
+    assert [line["fastest"] for line in found] == [2, 2, 0, 1, 0]
+
+
+def test_ratios_to_the_best_mean() -> None:
+    costs = profiles.costs([row("A", 0, 0.25), row("B", 0, 0.5)])
+    assert [line["to best"] for line in profiles.summary(costs)] == pytest.approx([1, 1, 2])
+    # there is none to what costs nothing
+    free = dataclasses.replace(costs, values=np.array([[1.0, 0.0]]))
+    with np.errstate(divide="ignore"):
+        assert all(math.isnan(line["to best"]) for line in profiles.summary(free))
+
+
+def test_what_nobody_solves_is_no_cause_for_warnings() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert profiles.ratios(np.full((1, 2), math.inf)).tolist() == [[math.inf, math.inf]]
+
+
+def test_the_columns_of_families() -> None:
+    rows = [
+        *(row("A", 0, 1.0, nc=5), row("B", 0, 2.0, nc=5)),
+        *(row("A", 1, 9.0, nc=70), row("B", 1, 3.0, nc=70)),
+        *(row("A", 2, 4.0), row("B", 2, 2.0)),
+        *(row(s, k, None, family="hard", nc=3, time_limit=7.0) for s in "AB" for k in (3, 4)),
+    ]
+    few, hard = profiles.families(profiles.costs(rows))
+    assert few == {
+        "family": "family",
+        "problems": 3,
+        "contacts": "5-70",
+        "tol": 1e-6,
+        "limit": LIMIT,
+        "mean of fastest": 2,
+        "std": pytest.approx(math.sqrt(2 / 3)),
+        "unsolved": 0,
+        "most often fastest": "B",
+    }
+    assert hard == {
+        "family": "hard",
+        "problems": 2,
+        "contacts": "3-3",
+        "tol": 1e-6,
+        "limit": 7,
+        "mean of fastest": None,
+        "std": None,
+        "unsolved": 2,
+        "most often fastest": "-",
+    }
+
+
+def test_failures_are_counted_by_status() -> None:
+    rows = [
+        *(row("A", k, None) for k in range(3)),
+        *(row("A", 3, 1.0), row("B", 3, 1.0)),
+        row("B", 4, None, status="crashed"),
+    ]
+    found = profiles.failures(rows)
+    assert found == [
+        {"solver": "A", "cpu_limit": 3, "converged": 1, "crashed": 0},
+        {"solver": "B", "cpu_limit": 0, "converged": 1, "crashed": 1},
+    ]
+    # the most frequent status first
+    assert list(found[0]) == ["solver", "cpu_limit", "converged", "crashed"]
+
+
+def test_work_and_precision_of_each_solver_where_they_compare() -> None:
+    rows = [
+        *(row("A", 0, 4.0, error=1e-8, iterations=3), row("B", 0, 9.0, error=1e-7, iterations=8)),
+        *(row("A", 1, 4.0, error=1e-10, iterations=3), row("B", 1, None, error=1.0)),
+        *(row("A", 0, None, tol=1e-9), row("B", 0, 1.0, tol=1e-9, error=0.0, iterations=8)),
+        # no problem that both have run
+        *(row("A", 0, 1.0, tol=1e-3), row("B", 1, 1.0, tol=1e-3)),
+    ]
+    found = profiles.work_precision(rows, "iterations", penalty=2, shift=1.0)
+    assert [(line["solver"], line["tol"]) for line in found] == [
+        *(("A", 1e-6), ("B", 1e-6)),
+        *(("A", 1e-9), ("B", 1e-9)),
+    ]
+    assert found[0] == {
+        "solver": "A",
+        "tol": 1e-6,
+        "mean": pytest.approx(3),
+        "error": pytest.approx(1e-9),
+        "solved": 2,
+        "of": 2,
+    }
+    # B fails where A takes 3 iterations
+    assert found[1]["mean"] == pytest.approx(math.sqrt(9 * 7) - 1)
+    assert found[1]["error"] == pytest.approx(1e-7)
+    assert found[2]["error"] is None
+    assert found[3]["error"] == pytest.approx(1e-17)
+
+
+# ---- edges: stores
+
+
+def test_a_store_that_is_not_there_is_not_made(tmp_path: Path) -> None:
+    absent = tmp_path / "absent.sqlite"
+    for read in (
+        lambda: profiles.load(absent),
+        lambda: profiles.published(absent),
+        lambda: profiles.convergence(absent, [], np.zeros(1)),
+    ):
+        with pytest.raises(bench.StoreError, match="there is no such store"):
+            read()
+        assert not absent.exists()
+
+
+def test_a_store_without_runs_has_nothing_to_compare(tmp_path: Path) -> None:
+    with bench.Store(tmp_path / "empty.sqlite"):
+        pass
+    with pytest.raises(profiles.ProfileError, match="there are no runs"):
+        profiles.load(tmp_path / "empty.sqlite")
+
+
+def test_runs_are_chosen_by_what_they_are_of(store: Path) -> None:
+    fill(store, tol=1e-9)
+    assert len(profiles.load(store)) == 24
+    assert len(profiles.load(store, campaign="hand")) == 24
+    assert {row["family"] for row in profiles.load(store, families=["many"])} == {"many"}
+    assert {row["tol"] for row in profiles.load(store, tolerances=[1e-9])} == {1e-9}
+    # in the order in which they are asked for
+    chosen = [row["solver"] for row in profiles.load(store, solvers=["C", "A"])]
+    assert chosen == ["C"] * 8 + ["A"] * 8
+    with pytest.raises(profiles.ProfileError, match="with campaign other; there is: hand"):
+        profiles.load(store, campaign="other")
+    with pytest.raises(profiles.ProfileError, match="no run with solver Y, Z; there is: A, B, C"):
+        profiles.load(store, solvers=["Y", "Z"])
+
+
+def test_runs_of_an_unknown_machine_are_of_another_one(store: Path) -> None:
+    fill(store, node="", tol=1e-7)
+    with pytest.raises(profiles.ProfileError, match=r"choose one: \?, here"):
+        profiles.load(store)
+
+
+def test_two_versions_of_a_solver_are_two_solvers(store: Path) -> None:
+    fill(store, {"A": [1.0, 1.0, 1.0, 1.0]}, version="2.0")
+    assert {row["solver"] for row in profiles.load(store)} == {
+        *("A (1.0)", "A (2.0)"),
+        *("B", "C"),
+    }
+
+
+def test_what_campaigns_quote_is_found_by_family_and_tolerance(tmp_path: Path) -> None:
+    text = """
+    tolerances = [1e-3]
+    [[problems]]
+    family = "few"
+    tolerances = [1e-4, 1e-8]
+    published_mean = 2
+    [[problems]]
+    family = "many"
+    published_mean = 0.5
+    [[problems]]
+    published_mean = 7.0
+    [[problems]]
+    family = "silent"
+    """
+    with bench.Store(tmp_path / "quotes.sqlite") as store:
+        store.begin("quotes", text, 0, 0, "here")
+        store.begin("nothing", "", 0, 0, "here")
+        store.begin("undecided", "[[problems]]\npublished_mean = 1.0", 0, 0, "here")
+    assert profiles.published(tmp_path / "quotes.sqlite") == {
+        ("few", 1e-4): 2.0,
+        ("few", 1e-8): 2.0,
+        ("many", 1e-3): 0.5,
+        ("", 1e-3): 7.0,
+    }
+
+
+def test_convergence_counts_what_was_reached_at_the_time_itself(store: Path) -> None:
+    # A's runs have arrived at 1, 2 and 4 s; its run that failed has no history
+    times = np.array([-1.0, 0.0, 1.0, 2.0, 4.0])
+    rows = profiles.load(store, solvers=["A"])
+    curves = profiles.convergence(store, rows[::-1], times)
+    assert curves["A"].tolist() == [math.inf, 1, 1, 0.5e-6, 0.5e-6]
+    assert curves["A"].dtype == float
+    assert profiles.convergence(store, rows[3:], times) == {}
 
 
 # ---- the command

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "cones/coulomb.hpp"
 #include "random_data.hpp"
 
 namespace fclib {
@@ -54,6 +55,69 @@ TEST(RollingCone, natural_map_is_zero_for_each_status) {
   EXPECT_LT(natural_map(cone, u, r).norm(), 1e-14);
   r[4] = 0.2;  // pushed the wrong way
   EXPECT_GT(natural_map(cone, u, r).norm(), 0.1);
+}
+
+TEST(RollingCone, modified_velocity_by_hand) {
+  ContactVector<5> u;
+  u << 1, 3, -4, 0.6, -0.8;
+  ContactVector<5> expected = u;
+  expected[0] = 1 + 0.5 * 5 + 2 * 1;
+  EXPECT_LT((Rolling<5>(0.5, 2).modified(u) - expected).norm(), 1e-15);
+  const ContactVector<3> planar(1, -4, 3);
+  EXPECT_LT((Rolling<3>(0.5, 2).modified(planar) - ContactVector<3>(9, -4, 3)).norm(), 1e-15);
+}
+
+TEST(RollingCone, projection_by_hand) {
+  const Rolling<3> cone(0.5, 2);
+  using Vec = ContactVector<3>;
+  // both limits bind: n = (1 + 0.5 * 6 + 2 * 14) / (1 + 0.25 + 4)
+  const double n = 32 / 5.25;
+  EXPECT_LT((cone.project(Vec(1, -6, 14)) - Vec(n, -0.5 * n, 2 * n)).norm(), 1e-14);
+  // sliding alone: n = (1 + 0.5 * 6) / 1.25
+  EXPECT_LT((cone.project(Vec(1, -6, 3)) - Vec(3.2, -1.6, 3)).norm(), 1e-15);
+  // rolling alone: n = (1 + 2 * 7) / 5
+  EXPECT_LT((cone.project(Vec(1, 0.5, 7)) - Vec(3, 0.5, 6)).norm(), 1e-14);
+}
+
+TEST(RollingCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
+  const Rolling<3> cone(0.5, 2);
+  using Vec = ContactVector<3>;
+  for (const Vec& x : {Vec(2, -1, 4), Vec(2, 1, 0), Vec(2, 0, -4), Vec(0, 0, 0)}) {
+    EXPECT_EQ(cone.project(x), x);
+  }
+  // and on that of the polar cone there is nothing left
+  EXPECT_EQ(cone.project(Vec(-5, 2, -2)), Vec::Zero());
+}
+
+TEST(RollingCone, the_coefficients_are_those_of_the_contact) {
+  const Friction friction{Eigen::Vector2d(0.2, 0.7), Eigen::Vector2d(0.01, 0.02)};
+  const Rolling<5> cone(friction, 1);
+  EXPECT_EQ(cone.coefficient(0), 0.7);
+  EXPECT_EQ(cone.coefficient(1), 0.02);
+}
+
+TEST(RollingCone, without_rolling_friction_is_the_cone_of_Coulomb_and_bears_no_rolling) {
+  testing::RandomData random(15);
+  const Rolling<5> rolling(0.6, 0);
+  const Coulomb<3> plain(0.6);
+  for (int k = 0; k < 100; ++k) {
+    ContactVector<5> x = random.vector(5);
+    const ContactVector<3> expected = plain.project(ContactVector<3>(x.head<3>()));
+    const ContactVector<5> found = rolling.project(x);
+    EXPECT_LT((found.head<3>() - expected).norm(), 1e-15);
+    EXPECT_EQ(found.tail<2>().norm(), 0);
+  }
+}
+
+TEST(RollingCone, with_huge_friction_keeps_what_is_in_it) {
+  const Rolling<5> cone(1e7, 1e7);
+  ContactVector<5> x;
+  x << 1, 3e6, -4e6, 6e6, 8e6;
+  EXPECT_EQ(cone.project(x), x);
+  x << 0, 0.6, -0.8, 0, 1;
+  const ContactVector<5> y = cone.project(x);
+  EXPECT_NEAR(y[0], 1e-7, 1e-20);
+  EXPECT_LT((y.tail<4>() - x.tail<4>()).norm(), 1e-13);
 }
 
 }  // namespace

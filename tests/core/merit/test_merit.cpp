@@ -3,6 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
+
+#include "by_definition.hpp"
+#include "cones/coulomb.hpp"
+#include "cones/rolling.hpp"
+#include "linalg/factorization.hpp"
 
 namespace fclib {
 namespace {
@@ -84,6 +90,199 @@ TEST(Merit, what_is_not_a_solution_of_the_right_size_is_an_error) {
   solution = three_reactions();
   solution.r[0] = std::nan("");
   EXPECT_THROW(merit(three_statuses(), solution), Error);
+}
+
+using testing::RandomData;
+
+/// Agreement with the formulas, each term of each equation being the largest in turn.
+template <class Cone, class P>
+void expect_the_formulas(const P& problem, const Solution& solution) {
+  const Merit found = merit(problem, solution);
+  const ContactMerits found_each = contact_merits(problem, solution);
+  ContactMerits each;
+  const Merit expected = testing::by_definition<Cone>(problem, solution, each);
+  for_each_field<Merit>([&]<class Member>(const Field<Merit, Member>& field) {
+    const auto value = static_cast<double>(expected.*field.member);
+    EXPECT_NEAR(static_cast<double>(found.*field.member), value, 1e-9 * (1e-3 + value))
+        << field.name;
+  });
+  const double size = each.u.norm();
+  EXPECT_EQ(found_each.status, each.status);
+  EXPECT_LT((found_each.u - each.u).norm(), 1e-10 * size);
+  EXPECT_LT((found_each.natural - each.natural).norm(), 1e-10 * size);
+  EXPECT_LT((found_each.cone - each.cone).norm(), 1e-10 * size);
+  EXPECT_LT((found_each.dual_cone - each.dual_cone).norm(), 1e-10 * size);
+}
+
+constexpr double loud = 1e3;
+
+template <class Cone, class P>
+void expect_the_formulas_of_local_problems(RandomData& random) {
+  for (const Index p : {0, 3}) {
+    for (const bool with_u : {false, true}) {
+      const P problem = testing::random_local<P>(random, Cone::dim, 5, p);
+      const Solution solution = testing::random_solution(random, problem, with_u, false);
+      expect_the_formulas<Cone>(problem, solution);
+      for (int term = 0; term < 5; ++term) {
+        P other = problem;
+        Solution given = solution;
+        if (term == 0) given.r *= loud;
+        if (term == 1) given.l *= loud;
+        if (term == 2) other.q *= loud;
+        if (term == 3) given.u *= loud;
+        if (term == 4) other.s *= loud;
+        expect_the_formulas<Cone>(other, given);
+      }
+    }
+  }
+}
+
+template <class Cone, class P>
+void expect_the_formulas_of_global_problems(RandomData& random) {
+  for (const Index p : {0, 3}) {
+    for (const int members : {0, 1, 2, 3}) {
+      const P problem = testing::random_global<P>(random, 15, Cone::dim, 4, p);
+      const Solution solution =
+          testing::random_solution(random, problem, members % 2 == 1, members >= 2);
+      expect_the_formulas<Cone>(problem, solution);
+      for (int term = 0; term < 7; ++term) {
+        P other = problem;
+        Solution given = solution;
+        if (term == 0) given.r *= loud;
+        if (term == 1) given.l *= loud;
+        if (term == 2) other.f *= loud;
+        if (term == 3) other.w *= loud;
+        if (term == 4) given.u *= loud;
+        if (term == 5) given.v *= loud;
+        if (term == 6) other.b *= loud;
+        expect_the_formulas<Cone>(other, given);
+      }
+    }
+  }
+}
+
+TEST(Merit, every_figure_of_a_local_problem_is_what_its_formula_says) {
+  RandomData random(31);
+  expect_the_formulas_of_local_problems<Coulomb<2>, LocalProblem>(random);
+  expect_the_formulas_of_local_problems<Coulomb<3>, LocalProblem>(random);
+  expect_the_formulas_of_local_problems<Rolling<3>, LocalRollingProblem>(random);
+  expect_the_formulas_of_local_problems<Rolling<5>, LocalRollingProblem>(random);
+}
+
+TEST(Merit, every_figure_of_a_global_problem_is_what_its_formula_says) {
+  RandomData random(32);
+  expect_the_formulas_of_global_problems<Coulomb<2>, GlobalProblem>(random);
+  expect_the_formulas_of_global_problems<Coulomb<3>, GlobalProblem>(random);
+  expect_the_formulas_of_global_problems<Rolling<3>, GlobalRollingProblem>(random);
+  expect_the_formulas_of_global_problems<Rolling<5>, GlobalRollingProblem>(random);
+}
+
+TEST(Merit, a_mass_that_is_factorised_already_changes_nothing) {
+  RandomData random(33);
+  const auto plain = testing::random_global<GlobalProblem>(random, 12, 3, 3, 2);
+  const auto rolling = testing::random_global<GlobalRollingProblem>(random, 12, 5, 2, 2);
+  const auto expect_same = [&](const auto& problem) {
+    const Solution solution = testing::random_solution(random, problem, true, false);
+    const Factorization mass(to_eigen(problem.M), "M");
+    const Merit own = merit(problem, solution);
+    const Merit given = merit(problem, solution, mass);
+    EXPECT_EQ(own.error, given.error);
+    EXPECT_EQ(own.scaled_natural, given.scaled_natural);
+    // it is this one that is used: with twice the mass the solution is another one
+    const SparseColumns twice = 2 * to_eigen(problem.M);
+    EXPECT_NE(merit(problem, solution, Factorization(twice, "M")).error, own.error);
+  };
+  expect_same(plain);
+  expect_same(rolling);
+}
+
+/// One contact in the plane, without friction.
+LocalProblem one_contact(const Eigen::Matrix2d& w, const Eigen::Vector2d& q) {
+  LocalProblem problem;
+  problem.spacedim = 2;
+  problem.W = Matrix::from_eigen(w.sparseView());
+  problem.q = q;
+  problem.mu = Vector::Zero(1);
+  return problem;
+}
+
+TEST(Merit, sums_are_made_in_extended_precision) {
+  if (std::numeric_limits<long double>::digits < 64) GTEST_SKIP() << "long double is double here";
+  // (1 + e)^2 - (1 + 2 e) = e^2, of which double precision keeps nothing
+  const double e = 0x1p-30;
+  const LocalProblem problem =
+      one_contact((1 + e) * Eigen::Matrix2d::Identity(), {-(1 + 2 * e), 0});
+  const Solution solution{.v = {}, .u = {}, .r = Eigen::Vector2d(1 + e, 0), .l = {}};
+  EXPECT_NEAR(merit(problem, solution).natural, 0x1p-60, 1e-3 * 0x1p-60);
+}
+
+TEST(Merit, the_size_of_a_term_does_not_vanish_where_the_term_does) {
+  // W r = 0 although r is large: u is wrong by the rounding of what cancels
+  Eigen::Matrix2d w;
+  w << 1, -1, -1, 1;
+  const LocalProblem problem = one_contact(w, {0, 0});
+  const Solution solution{
+      .v = {}, .u = Eigen::Vector2d(1e-3, 0), .r = Eigen::Vector2d(1e6, 1e6), .l = {}};
+  EXPECT_NEAR(merit(problem, solution).kinematics, 1e-3 / std::hypot(2e6, 2e6), 1e-14);
+}
+
+TEST(Merit, a_contact_whose_block_is_zero_is_scaled_by_one) {
+  const LocalProblem problem = one_contact(Eigen::Matrix2d::Zero(), {-2, 1});
+  const Solution solution{.v = {}, .u = {}, .r = Eigen::Vector2d::Zero(), .l = {}};
+  // F = -P_K(2, -1) = (-2, 0): nothing holds the contact back
+  EXPECT_NEAR(merit(problem, solution).natural, 2 / std::sqrt(5), 1e-15);
+  EXPECT_NEAR(merit(problem, solution).scaled_natural, 2 / std::sqrt(5), 1e-15);
+}
+
+TEST(Merit, mass_ratios_of_1e12_do_not_hide_a_mistake_from_the_scaled_error) {
+  // a body of 1e12 kg and one of 1 kg, each held by its contact
+  LocalProblem problem;
+  problem.spacedim = 2;
+  const Eigen::Vector4d inverse_masses(1e-12, 1e-12, 1, 1);
+  problem.W = Matrix::from_eigen(Eigen::MatrixXd(inverse_masses.asDiagonal()).sparseView());
+  problem.q = Eigen::Vector4d(-1, 0, -1, 0);
+  problem.mu = Vector::Constant(2, 0.5);
+  Solution solution{.v = {}, .u = {}, .r = Eigen::Vector4d(1e12, 0, 1, 0), .l = {}};
+  EXPECT_LT(merit(problem, solution).error, 1e-15);
+  EXPECT_LT(merit(problem, solution).scaled_natural, 1e-15);
+  EXPECT_EQ(merit(problem, solution).stick, 2);
+  solution.r[0] = 0.9e12;  // the heavy body sinks at 0.1 m/s
+  EXPECT_NEAR(merit(problem, solution).natural, 0.1 / std::sqrt(2), 1e-12);
+  EXPECT_NEAR(merit(problem, solution).scaled_natural, 0.1, 1e-12);
+}
+
+TEST(Merit, huge_and_absent_friction_have_exact_solutions) {
+  for (const double mu : {0.0, 1e7}) {
+    LocalProblem problem = one_contact(Eigen::Matrix2d::Identity(), {-1, 3});
+    problem.mu = Vector::Constant(1, mu);
+    // it slides freely, or it sticks
+    const Solution solution{.v = {}, .u = {}, .r = Eigen::Vector2d(1, mu > 0 ? -3 : 0), .l = {}};
+    const Merit result = merit(problem, solution);
+    EXPECT_LT(result.error, 1e-15);
+    EXPECT_LT(result.scaled_natural, 1e-15);
+    EXPECT_LT(result.dual_cone, 1e-15);
+    EXPECT_EQ(result.slide, mu > 0 ? 0 : 1);
+    EXPECT_EQ(result.stick, mu > 0 ? 1 : 0);
+  }
+}
+
+TEST(Merit, a_problem_without_contacts_is_judged_by_its_equations) {
+  RandomData random(34);
+  const auto problem = testing::random_global<GlobalProblem>(random, 6, 3, 0, 2);
+  Solution solution = testing::random_solution(random, problem, false, true);
+  const Merit result = merit(problem, solution);
+  EXPECT_EQ(result.natural, 0);
+  EXPECT_EQ(result.scaled_natural, 0);
+  EXPECT_EQ(result.error, std::max(result.dynamics, result.bilateral));
+  EXPECT_GT(result.dynamics, 0.01);
+  EXPECT_GT(result.bilateral, 0.01);
+}
+
+TEST(Merit, an_invalid_problem_is_an_error) {
+  LocalProblem problem = three_statuses();
+  problem.mu[1] = -0.5;
+  EXPECT_THROW(merit(problem, three_reactions()), Error);
+  EXPECT_THROW(contact_merits(problem, three_reactions()), Error);
 }
 
 }  // namespace

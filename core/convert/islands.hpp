@@ -19,9 +19,9 @@ namespace fclib {
 struct Islands {
   Index count = 0;
   Index spacedim = 3;
-  std::vector<Index> contact;
-  std::vector<Index> dof;
-  std::vector<Index> bilateral;
+  std::vector<Index> contact = {};
+  std::vector<Index> dof = {};
+  std::vector<Index> bilateral = {};
 
   /// The island of an entry of a field.
   [[nodiscard]] Index of(Dim dim, Index entry) const {

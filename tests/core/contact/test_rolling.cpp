@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "cones/coulomb.hpp"
+#include "contact/coulomb.hpp"
 #include "random_data.hpp"
 
 namespace fclib {

@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "by_definition.hpp"
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
+#include "contact/coulomb.hpp"
+#include "contact/rolling.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {

@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "by_definition.hpp"
-#include "cones/coulomb.hpp"
-#include "cones/rolling.hpp"
+#include "contact/coulomb.hpp"
+#include "contact/rolling.hpp"
 
 namespace fclib {
 namespace {

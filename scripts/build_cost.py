@@ -168,6 +168,7 @@ def text_of(folder: Path, objects: Iterable[str]) -> list[str]:
     return [
         subprocess.run([*command, folder / name], capture_output=True, text=True, check=True).stdout
         for name in objects
+        if name.endswith(".o")  # and no precompiled header
     ]
 
 

@@ -19,6 +19,7 @@
 
 #include "contact/alart_curnier.hpp"
 #include "contact/coulomb.hpp"
+#include "function_ref.hpp"
 
 namespace fclib {
 
@@ -27,9 +28,10 @@ namespace detail {
 /// Damped Newton on `function(r, jacobian)`, which returns Phi and, where jacobian is not null,
 /// fills in an element of its generalised Jacobian. Phi is zero to rounding at accuracy times
 /// `size`.
-template <int D, class Function>
-bool damped_newton(const Function& function, double size, double accuracy, int max_iterations,
-                   ContactVector<D>& r) {
+template <int D>
+bool damped_newton(
+    FunctionRef<ContactVector<D>(const ContactVector<D>&, ContactMatrix<D>*)> function, double size,
+    double accuracy, int max_iterations, ContactVector<D>& r) {
   constexpr int max_halvings = 12;
   constexpr double sufficient = 1e-4;  // of the decrease that the model promises
   constexpr double rounding = 1e-12;   // Phi that no step reduces is taken for zero below this

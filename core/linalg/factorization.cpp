@@ -1,5 +1,8 @@
 #include "linalg/factorization.hpp"
 
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCholesky>
+#include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
 
@@ -30,6 +33,16 @@ bool is_symmetric(const SparseColumns& a) {
 }
 
 }  // namespace
+
+struct Factorization::Cholesky
+    : Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<Index>> {
+  using SimplicialLLT::SimplicialLLT;
+};
+struct Factorization::LU : Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>> {};
+
+Factorization::Factorization(Factorization&&) noexcept = default;
+Factorization& Factorization::operator=(Factorization&&) noexcept = default;
+Factorization::~Factorization() = default;
 
 Factorization::Factorization(const SparseColumns& a, const std::string& name, bool definite) {
   if (a.rows() == 0) return;

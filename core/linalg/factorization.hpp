@@ -1,8 +1,6 @@
 // Solving with the matrices of a problem: M (n x n) and R (p x p), factorised once.
 #pragma once
 
-#include <Eigen/SparseCholesky>
-#include <Eigen/SparseLU>
 #include <memory>
 #include <string>
 
@@ -22,6 +20,9 @@ class Factorization {
   /// singular; `name` is what the message calls it. With `definite` false a symmetric indefinite
   /// matrix is accepted too.
   Factorization(const SparseColumns& a, const std::string& name, bool definite = true);
+  Factorization(Factorization&& other) noexcept;
+  Factorization& operator=(Factorization&& other) noexcept;
+  ~Factorization();
 
   /// A^-1 b.
   [[nodiscard]] Vector solve(ConstVectorRef b) const;
@@ -34,8 +35,10 @@ class Factorization {
   [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
 
  private:
-  using Cholesky = Eigen::SimplicialLLT<SparseColumns, Eigen::Lower, Eigen::AMDOrdering<Index>>;
-  using LU = Eigen::SparseLU<SparseColumns, Eigen::COLAMDOrdering<Index>>;
+  // Eigen's, which only the .cpp file sees
+  struct Cholesky;
+  struct LU;
+
   /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y, of the simplicial factors. Costs the non-zeros it
   /// makes, not n times the columns: bodies that do not touch stay apart.
   [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;

@@ -9,12 +9,19 @@
 //
 // a bracketed Newton method on h(alpha) = mu r_N / ||r_T|| - 1. The quartic of Bonnefon & Daviet,
 // "Quartic formulation of Coulomb 3D frictional contact" (2011), has the same roots.
+//
+// Fingers and legs of one or two joints have blocks of rank 1 or 2, whose S is singular but for
+// rounding. Its small eigenvalues are then zero, and so is the part of c along them, which no r_T
+// has an effect on: stick takes the least r_T. Where that part is more than rounding the contact
+// slides; of stick and slip the one is taken that leaves the smaller natural map.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "contact/cone.hpp"
+#include "contact/coulomb.hpp"
 
 namespace fclib {
 
@@ -39,6 +46,7 @@ class ExactContact {
       const double size = schur_.norm();
       sticks_ = std::abs(det) > tiny * (T == 1 ? trace_ : size * size) && size > tiny * trace_;
       if (sticks_) inverse_ = shifted_inverse(schur_, 0.0);
+      reveal_rank(a);
     }
   }
 
@@ -52,6 +60,7 @@ class ExactContact {
     if (!solvable_) return false;
     const TangentVec c = b.template tail<T>() - to_tangent_ * b[0];
     const double free_normal = -b[0] / normal_;  // r_N where r_T = 0
+    if (singular_ && mu_ != 0) return solve_singular(b, c, free_normal, r);
 
     if (mu_ == 0) {
       r.setZero();
@@ -72,6 +81,72 @@ class ExactContact {
 
  private:
   static constexpr double tiny = 1e-14;
+  /// Relative to A_TT, which S is a difference from: eigenvalues up to this are zero.
+  static constexpr double rounding = 1e-13;
+  /// Relative to the terms of c: so much of it is rounding, of b too, which is a difference.
+  static constexpr double rounding_of_c = 1e-12;
+
+  /// Sets the eigenvalues of S that are rounding to zero, where there are any.
+  void reveal_rank(const Mat& a) {
+    const double least = std::max(rounding * a.template block<T, T>(1, 1).trace(), tiny * trace_);
+    if constexpr (T == 1) {
+      singular_ = std::abs(schur_(0, 0)) <= least;
+      if (!singular_) return;
+      schur_.setZero();
+    } else {
+      const double mean = 0.5 * (schur_(0, 0) + schur_(1, 1));
+      const double half = 0.5 * (schur_(0, 0) - schur_(1, 1));
+      const double off = 0.5 * (schur_(0, 1) + schur_(1, 0));
+      const double radius = std::hypot(half, off);
+      const double large = mean < 0 ? mean - radius : mean + radius;
+      const double small = mean < 0 ? mean + radius : mean - radius;
+      singular_ = std::abs(small) <= least;
+      if (!singular_) return;
+      schur_.setZero();
+      if (std::abs(large) > least) {
+        // the eigenvector of `large`, from the longer column of S - small I
+        TangentVec along(mean + half - small, off);
+        if (mean - half > mean + half) along = TangentVec(off, mean - half - small);
+        along.normalize();
+        range_ = along * along.transpose();
+        schur_ = large * range_;
+        inverse_ = range_ / large;
+      }
+    }
+    if (schur_.isZero(0)) inverse_.setZero();
+    block_ = a;
+  }
+
+  /// As solve() does, where S is singular; b_N < 0 and mu > 0.
+  bool solve_singular(const Vec& b, const TangentVec& c, double free_normal, Vec& r) {
+    TangentVec within = range_ * c;
+    const TangentVec across = c - within;
+    const double terms = b.template tail<T>().norm() + to_tangent_.norm() * std::abs(b[0]);
+    const bool free = across.norm() > rounding_of_c * terms;
+
+    Vec stick;
+    stick.template tail<T>() = -inverse_ * c;
+    stick[0] = free_normal - to_normal_.dot(stick.template tail<T>());
+    const bool sticks =
+        stick[0] >= 0 && stick.template tail<T>().norm() <= mu_ * stick[0] && stick.allFinite();
+    if (sticks && !free) {
+      r = stick;
+      return true;
+    }
+    if (free) within = c;
+    Vec slides = r;
+    const bool slips = within.squaredNorm() > 0 && slip(within, free_normal, slides);
+    if (!sticks && !slips) return false;
+    const Vec& best = !slips || (sticks && !(left(b, slides) < left(b, stick))) ? stick : slides;
+    if (!(left(b, best) <= left(b, r))) return false;
+    r = best;
+    return true;
+  }
+
+  /// The natural map of this contact alone.
+  [[nodiscard]] double left(const Vec& b, const Vec& r) const {
+    return natural_map(Coulomb<D>(mu_), Vec(block_ * r + b), r).norm();
+  }
 
   static double determinant(const TangentMat& s) {
     if constexpr (T == 1) {
@@ -148,7 +223,11 @@ class ExactContact {
   TangentVec to_tangent_ = TangentVec::Zero();  // A_TN / A_NN
   TangentMat schur_ = TangentMat::Zero();       // S
   TangentMat inverse_ = TangentMat::Zero();     // S^-1
-  double alpha_ = 0;                            // root of the last slip, a warm start
+  // where S is singular but for rounding
+  bool singular_ = false;
+  TangentMat range_ = TangentMat::Zero();  // the projection on what is left of S
+  Mat block_ = Mat::Zero();                // A
+  double alpha_ = 0;                       // root of the last slip, a warm start
 };
 
 }  // namespace fclib

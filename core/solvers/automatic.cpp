@@ -20,6 +20,10 @@
 // 4 to 6 are for Coulomb's cone alone. Every stage returns to the best iterate so far, and most
 // start from it; each island is held to its share of the tolerance. What a stage may cost is
 // counted in operations, not in time: the same problem takes the same path on every machine.
+//
+// An iterate that is not finite ends the stage that made it, never the chain. A guess that is no
+// better than r = 0 is left out, and where the chain does not solve the problem from a guess it
+// starts again from r = 0.
 
 #include <algorithm>
 #include <chrono>
@@ -170,15 +174,20 @@ class Tracker {
   /// The squared error of all contacts but those worked on now.
   void set_others(double squared) { others_ = squared; }
 
-  /// Counts iterations and tells of the error that is left. Whether to stop.
+  /// Counts iterations and tells of the error that is left. Whether to end the stage: because
+  /// everything stops, or because the iterate is not finite.
   bool report(std::int64_t iterations, double error) {
     const bool first = iterations_ == 0 && !reported_;
     iterations_ += iterations;
     reported_ = true;
+    const double all = std::sqrt(others_ + error * error);
+    const bool finite = std::isfinite(all);
     if (!stopped_ && (iterations > 0 || first)) {
-      stopped_ = monitor_.report(iterations_, std::sqrt(others_ + error * error));
+      // what has overflown is not an error to tell of, but its iterations count
+      if (finite) told_ = all;
+      stopped_ = monitor_.report(iterations_, told_);
     }
-    return stopped_.has_value();
+    return stopped_.has_value() || !finite;
   }
   /// Iterations that may still be made.
   [[nodiscard]] std::int64_t left() const { return monitor_.max_iterations() - iterations_; }
@@ -204,6 +213,7 @@ class Tracker {
  private:
   Monitor monitor_;
   double others_ = 0;
+  double told_ = std::numeric_limits<double>::max();  // the last error that was finite
   double others_cpu_ = 0;
   std::int64_t iterations_ = 0;
   bool reported_ = false;
@@ -223,8 +233,9 @@ class Island {
         options_(options),
         tracker_(tracker),
         tolerance_(tolerance),
-        guessed_(guessed),
-        gauss_seidel_(problem) {}
+        guessed_(guessed) {
+    gauss_seidel_.emplace(problem);
+  }
 
   /// From r; the best iterate ends in r. Its error relative to the problem's scale.
   double solve(Vector& r, std::int64_t sweeps, bool whole) {
@@ -232,6 +243,7 @@ class Island {
     problem_.velocity(r_, u_);
     best_ = r_;
     error_ = relative_error<Cone>(problem_, u_, r_);
+    if (!std::isfinite(error_)) error_ = endless;  // anything is better
     tracker_.report(0, error_);
     if (!whole && problem_.nc() >= 20)
       stage(stages::conjugate_gradients, [&] { conjugate_gradients(); });
@@ -253,14 +265,20 @@ class Island {
  private:
   [[nodiscard]] bool done() const { return error_ <= tolerance_ || tracker_.stopped(); }
 
-  /// Keeps r where it is the best so far. Whether to stop.
+  /// Keeps r where it is the best so far. Whether to end the stage.
   bool take(std::int64_t iterations, double error, const Vector& r) {
     if (error < error_) {
       error_ = error;
       best_ = r;
     }
-    tracker_.report(iterations, error);
-    return done();
+    return tracker_.report(iterations, error) || done();
+  }
+
+  /// Sweeps from the best iterate; what is kept of each contact is lost where it has overflown.
+  void return_to_best() {
+    r_ = best_;
+    problem_.velocity(r_, u_);
+    gauss_seidel_.emplace(problem_);
   }
 
   template <class F>
@@ -292,14 +310,17 @@ class Island {
                                   : k < interval ? (few ? k + 1 : interval - 1)
                                                  : interval;
       const std::int64_t count = std::min({wanted, limit - k, tracker_.left()});
-      for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
+      for (std::int64_t j = 0; j < count; ++j) gauss_seidel_->sweep(r_, u_);
       k += count;
       double error = relative_error<Cone>(problem_, u_, r_);
       if (error <= tolerance_) {
         problem_.velocity(r_, u_);
         error = relative_error<Cone>(problem_, u_, r_);
       }
-      if (take(count, error, r_)) return;
+      if (take(count, error, r_)) {
+        if (!std::isfinite(error)) return_to_best();
+        return;
+      }
       // on an island, only while the sweeps to go cost less than a dozen factorisations
       if (!whole && k >= 2 * interval && k >= limit / 4) {
         const double rate = std::log(last / error) / static_cast<double>(count);
@@ -326,10 +347,13 @@ class Island {
     double marked = least;                                   // ... and before it
     std::int64_t mark = 0;                                   // sweeps at the last look
     for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
-      for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_.sweep(r_, u_);
+      for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_->sweep(r_, u_);
       problem_.velocity(r_, u_);
       const double error = relative_error<Cone>(problem_, u_, r_);
-      if (take(interval, error, r_)) return;
+      if (take(interval, error, r_)) {
+        if (!std::isfinite(error)) return_to_best();
+        return;
+      }
       least = std::min(least, error);
       if (k < 2 * mark || k < 5 * interval) continue;
       const double rate = std::log(marked / least) / static_cast<double>(k - mark);
@@ -602,7 +626,7 @@ class Island {
   Tracker& tracker_;
   double tolerance_;
   bool guessed_;
-  GaussSeidel<Cone> gauss_seidel_;
+  std::optional<GaussSeidel<Cone>> gauss_seidel_;
   std::optional<CoupledSystem> system_;
   Vector r_, u_, best_;
   Vector start_;  // of the last resort
@@ -626,38 +650,23 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
   return part;
 }
 
+/// The chain from r, on the whole and then on each island that is left; what it reaches ends in r.
 template <class Cone>
-Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
-                Vector& r) {
+void chain(const ReducedProblem& problem, const Options& options, Tracker& tracker, bool guessed,
+           Vector& r) {
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
-  Tracker tracker(settings);
-  const double start = options.threads > 1 ? cpu_time() : 0.0;  // the clock takes 0.3 microseconds
-  const auto outcome = [&] {
-    Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
-                   std::move(tracker.stages()), std::move(tracker.certificate())};
-    if (options.threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
-    return result;
-  };
-  bool separating = true;
-  for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
-  if (separating) {
-    r.setZero();
-    tracker.report(0, 0.0);
-    return outcome();
-  }
-
   const double tolerance = tracker.tolerance();
+  tracker.set_others(0);
   std::optional<Island<Cone>> whole;
-  const bool guessed = (r.array() != 0).any();
   whole.emplace(problem, options, tracker, tolerance, guessed);
   whole->solve(r, nc <= 2 ? 5 : options.sweeps, true);
-  if (tracker.stopped()) return outcome();
+  if (tracker.stopped()) return;
   const std::vector<Index> group = problem.W.components();
   const Index count = 1 + *std::max_element(group.begin(), group.end());
   if (count == 1) {
     whole->solve(r, options.island_sweeps, false);
-    return outcome();
+    return;
   }
   whole.reset();
 
@@ -700,6 +709,49 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
     }
     for (Eigen::Index j = 0; j < size; ++j)
       r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);
+  }
+}
+
+template <class Cone>
+double error_at(const ReducedProblem& problem, const Vector& r) {
+  Vector u;
+  problem.velocity(r, u);
+  const double error = relative_error<Cone>(problem, u, r);
+  return std::isfinite(error) ? error : endless;
+}
+
+template <class Cone>
+Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
+                Vector& r) {
+  constexpr int D = Cone::dim;
+  const Index nc = problem.nc();
+  Tracker tracker(settings);
+  const double start = options.threads > 1 ? cpu_time() : 0.0;  // the clock takes 0.3 microseconds
+  const auto outcome = [&] {
+    Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
+                   std::move(tracker.stages()), std::move(tracker.certificate())};
+    if (options.threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
+    return result;
+  };
+  bool separating = true;
+  for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
+  if (separating) {
+    r.setZero();
+    tracker.report(0, 0.0);
+    return outcome();
+  }
+
+  const Vector zero = Vector::Zero(problem.m());
+  bool guessed = (r.array() != 0).any();
+  if (guessed && !(error_at<Cone>(problem, r) < error_at<Cone>(problem, zero))) {
+    r = zero;
+    guessed = false;
+  }
+  chain<Cone>(problem, options, tracker, guessed, r);
+  if (guessed && !tracker.stopped() && error_at<Cone>(problem, r) > tracker.tolerance()) {
+    Vector cold = zero;
+    chain<Cone>(problem, options, tracker, false, cold);
+    if (error_at<Cone>(problem, cold) < error_at<Cone>(problem, r)) r = cold;
   }
   return outcome();
 }

@@ -1,20 +1,234 @@
 #include "convert/eliminate.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
+#include <string>
+
+#include "linalg/dependent_columns.hpp"
 
 namespace fclib {
 
-Elimination::Elimination(const LocalProblem& problem)
-    : problem_(problem), bilateral_(to_eigen(problem.R), "R", false) {
+namespace {
+
+/// Of R with a diagonal of ones: W' loses as many digits.
+constexpr double ill_conditioned = 1e10;
+/// What is left of a constraint beside the others, relative to it, is rounding up to this.
+constexpr double dependent = 1e-12;
+/// Constraints that follow from others agree with them to this, relative to their terms.
+constexpr double agreement = 1e-9;
+
+/// A lower bound, and mostly a good one, of the condition number of R scaled to a diagonal of ones.
+double condition(const Factorization& factors, const SparseColumns& r) {
+  const Eigen::Index p = r.rows();
+  Vector scale = r.diagonal().cwiseAbs().cwiseSqrt();
+  for (double& x : scale) {
+    if (!(x > 0)) x = 1;
+  }
+  Vector sums = Vector::Zero(p);
+  for (Eigen::Index col = 0; col < p; ++col) {
+    for (SparseColumns::InnerIterator at(r, col); at; ++at) {
+      sums[col] += std::abs(at.value()) / (scale[at.row()] * scale[col]);
+    }
+  }
+  Vector x(p);
+  for (Eigen::Index k = 0; k < p; ++k) {  // in no symmetry with the constraints
+    x[k] = (k % 2 == 0 ? 1.0 : -1.0) * (1 + 0.7 * std::sin(static_cast<double>(k + 1)));
+  }
+  double growth = 0;
+  for (int k = 0; k < 4; ++k) {
+    x /= x.norm();
+    x = scale.cwiseProduct(factors.solve(Vector(scale.cwiseProduct(x))));
+    growth = x.norm();
+    if (!std::isfinite(growth)) return std::numeric_limits<double>::infinity();
+    if (growth == 0) break;
+  }
+  return growth * sums.maxCoeff();
+}
+
+SparseColumns selected(const SparseColumns& a, const std::vector<Index>& columns) {
+  SparseColumns result(a.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    result.col(static_cast<Eigen::Index>(k)) = a.col(columns[k]);
+  }
+  return result;
+}
+
+Vector selected(const Vector& a, const std::vector<Index>& places) {
+  Vector result(static_cast<Eigen::Index>(places.size()));
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    result[static_cast<Eigen::Index>(k)] = a[places[k]];
+  }
+  return result;
+}
+
+SparseColumns transposed(const SparseColumns& a) { return a.transpose(); }
+
+/// Throws where a constraint that follows from others differs from them by more than rounding.
+void require_agreement(const std::vector<Index>& dropped, const Vector& gap, const Vector& size) {
+  Eigen::Index worst = -1;
+  double most = agreement;
+  for (Eigen::Index k = 0; k < gap.size(); ++k) {
+    const double relative = std::abs(gap[k]) / (size[k] > 0 ? size[k] : 1.0);
+    if (!(relative <= most)) {
+      most = relative;
+      worst = k;
+    }
+  }
+  if (worst < 0) return;
+  throw Error(ErrorKind::unsuitable,
+              "contradicts the others, from which it follows: where they hold it is off by " +
+                  std::to_string(std::abs(gap[worst])) + ", " + std::to_string(most) +
+                  " of its terms",
+              "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
+}
+
+}  // namespace
+
+Elimination::Elimination(const LocalProblem& problem) : Elimination(problem, nullptr, nullptr) {}
+
+Elimination::Elimination(const GlobalProblem& problem, const Condensation& condensation)
+    : Elimination(condensation.local(), &problem, &condensation) {}
+
+Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodies,
+                         const Condensation* condensation)
+    : problem_(problem) {
   plain_.spacedim = problem.spacedim;
   plain_.mu = problem.mu;
   plain_.info = problem.info;
-  const SparseColumns v = to_eigen(problem.V);
-  const SparseColumns coupling = bilateral_.solve(SparseColumns(v.transpose()));
+  const SparseColumns r = to_eigen(problem.R);
+  v_ = to_eigen(problem.V);
+  s_ = problem.s;
+  try {
+    bilateral_.emplace(r, "R", false);
+  } catch (const Error&) {
+    bilateral_.reset();
+  }
+  if (!bilateral_ || condition(*bilateral_, r) > ill_conditioned) {
+    Vector size = problem.s.cwiseAbs();
+    if (bodies != nullptr) {  // s is a sum of these
+      const Vector velocity = condensation->mass().solve(bodies->f).cwiseAbs();
+      size = bodies->b.cwiseAbs() + to_eigen(bodies->G).cwiseAbs().transpose() * velocity;
+    }
+    const bool changed = (bodies != nullptr && orthonormalise(*bodies, *condensation)) ||
+                         leave_out_redundant(r, size);
+    if (!changed && !bilateral_) throw Error(ErrorKind::unsuitable, "R is singular");
+  }
+  reduce();
+}
+
+bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation& condensation) {
+  const Factorization& mass = condensation.mass();
+  const std::optional<SparseColumns> a = mass.half(to_eigen(bodies.G));
+  if (!a || !small_enough_for_dense(*a)) return false;
+  const OrthonormalColumns basis = orthonormal_columns(*a, dependent);
+  const auto rank = basis.Q.cols();
+  const auto count = static_cast<Eigen::Index>(basis.rows.size());
+
+  const Vector b = basis.scale.cwiseProduct(bodies.b);
+  const auto triangle = basis.T1.triangularView<Eigen::Upper>();
+  const Vector beta = triangle.transpose().solve(selected(b, basis.columns.kept));
+  const Vector dropped = selected(b, basis.columns.dropped);
+  const Vector size = dropped.cwiseAbs() + basis.T2.cwiseAbs().transpose() * beta.cwiseAbs();
+  // where b is rounding, it is that of velocities
+  const Vector free = *mass.half(SparseColumns(bodies.f.sparseView()));
+  require_agreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta,
+                    size.array() + std::numeric_limits<double>::epsilon() * free.norm());
+
+  Vector free_rows(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    free_rows[k] = free[basis.rows[static_cast<std::size_t>(k)]];
+  }
+  s_ = basis.Q.transpose() * free_rows + beta;
+  // V' by rows of Q; what is rounding of a contact's row would couple what is apart
+  std::vector<Index> place(static_cast<std::size_t>(a->rows()), -1);
+  for (std::size_t k = 0; k < basis.rows.size(); ++k) {
+    place[static_cast<std::size_t>(basis.rows[k])] = static_cast<Index>(k);
+  }
+  const SparseColumns h = *mass.half(to_eigen(bodies.H));
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  for (Eigen::Index col = 0; col < h.cols(); ++col) {
+    Vector row = Vector::Zero(rank);
+    double squared = 0;
+    for (SparseColumns::InnerIterator at(h, col); at; ++at) {
+      squared += at.value() * at.value();
+      const Index k = place[static_cast<std::size_t>(at.row())];
+      if (k >= 0) row += at.value() * basis.Q.row(k).transpose();
+    }
+    const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::sqrt(squared);
+    for (Eigen::Index k = 0; k < rank; ++k) {
+      if (std::abs(row[k]) > rounding) {
+        entries.emplace_back(static_cast<Index>(col), static_cast<Index>(k), row[k]);
+      }
+    }
+  }
+  v_ = SparseColumns(h.cols(), rank);
+  v_.setFromTriplets(entries.begin(), entries.end());
+
+  all_ = false;
+  bilateral_.reset();
+  kept_ = basis.columns.kept;
+  turn_ = basis.T1;
+  scale_ = selected(basis.scale, kept_);
+  const Eigen::MatrixXd combined = -triangle.solve(basis.T2);
+  idle_ = Eigen::MatrixXd::Zero(a->cols(), basis.T2.cols());
+  for (Eigen::Index k = 0; k < idle_.cols(); ++k) {
+    const double unit = 1 / basis.scale[basis.columns.dropped[static_cast<std::size_t>(k)]];
+    idle_(basis.columns.dropped[static_cast<std::size_t>(k)], k) = 1;
+    for (Eigen::Index row = 0; row < rank; ++row) {
+      idle_(kept_[static_cast<std::size_t>(row)], k) = scale_[row] * combined(row, k) * unit;
+    }
+  }
+  return true;
+}
+
+bool Elimination::leave_out_redundant(const SparseColumns& r, const Vector& size) {
+  SparseColumns both(r.rows() + v_.rows(), r.cols());  // what a multiplier does
+  both.reserve(r.nonZeros() + v_.nonZeros());
+  for (Eigen::Index col = 0; col < r.cols(); ++col) {
+    both.startVec(col);
+    for (SparseColumns::InnerIterator at(r, col); at; ++at) {
+      both.insertBack(at.row(), col) = at.value();
+    }
+    for (SparseColumns::InnerIterator at(v_, col); at; ++at) {
+      both.insertBack(r.rows() + at.row(), col) = at.value();
+    }
+  }
+  both.finalize();
+  const ColumnChoice columns = independent_columns(both, dependent);
+  if (columns.dropped.empty()) return false;
+  const SparseColumns of_kept = selected(r, columns.kept);
+  const SparseColumns left = transposed(selected(transposed(of_kept), columns.kept));
+  bilateral_.emplace(left, "R", false);
+  all_ = false;
+  kept_ = columns.kept;
+  v_ = selected(v_, kept_);
+  s_ = selected(problem_.s, kept_);
+
+  const Vector impulse = bilateral_->solve(s_);
+  const SparseColumns rows = transposed(selected(transposed(of_kept), columns.dropped));
+  const Vector gap = selected(problem_.s, columns.dropped) - rows * impulse;
+  require_agreement(columns.dropped, gap,
+                    selected(size, columns.dropped) + rows.cwiseAbs() * impulse.cwiseAbs());
+
+  const SparseColumns right = transposed(selected(transposed(selected(r, columns.dropped)), kept_));
+  const Eigen::MatrixXd combined = bilateral_->solve(right);
+  idle_ = Eigen::MatrixXd::Zero(r.cols(), right.cols());
+  for (Eigen::Index k = 0; k < idle_.cols(); ++k) {
+    idle_(columns.dropped[static_cast<std::size_t>(k)], k) = 1;
+    for (std::size_t row = 0; row < kept_.size(); ++row) {
+      idle_(kept_[row], k) = -combined(static_cast<Eigen::Index>(row), k);
+    }
+  }
+  return true;
+}
+
+void Elimination::reduce() {
+  const SparseColumns right = v_.transpose();
+  const SparseColumns coupling = bilateral_ ? bilateral_->solve(right) : right;
   // what the bilateral constraints hold entirely is zero, not the rounding of a difference
-  const SparseColumns full = to_eigen(problem.W);
-  const SparseColumns held = v * coupling;
+  const SparseColumns full = to_eigen(problem_.W);
+  const SparseColumns held = v_ * coupling;
   SparseColumns w = full - held;
   const SparseColumns size = SparseColumns(full.cwiseAbs()) + SparseColumns(held.cwiseAbs());
   constexpr double rounding = 16 * std::numeric_limits<double>::epsilon();
@@ -22,14 +236,33 @@ Elimination::Elimination(const LocalProblem& problem)
     return std::abs(value) > rounding * size.coeff(row, col);
   });
   plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
-  plain_.q = problem.q - v * bilateral_.solve(problem.s);
+  plain_.q = problem_.q - v_ * (bilateral_ ? bilateral_->solve(s_) : s_);
+}
+
+Vector Elimination::multipliers(const Vector& velocity) const {
+  Vector left = bilateral_ ? Vector(-bilateral_->solve(velocity)) : Vector(-velocity);
+  if (all_) return left;
+  if (turn_.size() > 0) {
+    left = scale_.cwiseProduct(turn_.triangularView<Eigen::Upper>().solve(left));
+  }
+  Vector result = Vector::Zero(problem_.s.size());
+  for (std::size_t k = 0; k < kept_.size(); ++k) {
+    result[kept_[k]] = left[static_cast<Eigen::Index>(k)];
+  }
+  if (idle_.cols() == 0) return result;
+  const Eigen::MatrixXd gram = idle_.transpose() * idle_;
+  return result - idle_ * gram.llt().solve(idle_.transpose() * result);
 }
 
 Solution Elimination::expand(const Solution& plain) const {
   Solution result = plain;
-  Vector velocity = problem_.s;
-  multiply_transposed_add(problem_.V, plain.r, velocity);
-  result.l = -bilateral_.solve(velocity);
+  Vector velocity = s_;
+  if (all_) {
+    multiply_transposed_add(problem_.V, plain.r, velocity);
+  } else {
+    velocity += v_.transpose() * plain.r;
+  }
+  result.l = multipliers(velocity);
   result.u = problem_.q;
   multiply_add(problem_.W, plain.r, result.u);
   multiply_add(problem_.V, result.l, result.u);

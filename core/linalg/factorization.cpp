@@ -110,6 +110,11 @@ Vector Factorization::gram_diagonal(const SparseColumns& b) const {
   return result;
 }
 
+std::optional<SparseColumns> Factorization::half(const SparseColumns& b) const {
+  if (!cholesky_) return std::nullopt;
+  return half_solve(b);
+}
+
 SparseColumns Factorization::half_solve(const SparseColumns& b) const {
   if (!cholesky_) return b;
   const SparseColumns& lower = cholesky_->matrixL().nestedExpression();

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "linalg/matrix.hpp"
@@ -33,6 +34,9 @@ class Factorization {
   [[nodiscard]] SparseColumns gram(const SparseColumns& b) const;
   /// Its diagonal.
   [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
+
+  /// Y with B^T A^-1 C = Y^T half(C) for any C, where A is factorised so.
+  [[nodiscard]] std::optional<SparseColumns> half(const SparseColumns& b) const;
 
  private:
   // Eigen's, which only the .cpp file sees

@@ -131,7 +131,7 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
     return run(local, friction_of(problem), local.q, request, guess, judge, &primal);
   }
-  const Elimination elimination(local);
+  const Elimination elimination(problem, condensation);
   return run(elimination.plain(), friction_of(problem), local.q, request, guess,
              [&](Solution& solution) {
                solution = elimination.expand(solution);

@@ -1,0 +1,103 @@
+#include "linalg/dependent_columns.hpp"
+
+#include <Eigen/OrderingMethods>
+#include <Eigen/QR>
+#include <Eigen/SparseQR>
+#include <algorithm>
+#include <cmath>
+
+namespace fclib {
+
+namespace {
+
+/// Entries and multiplications up to which a dense factorisation is the safe choice.
+constexpr double dense_entries = 4e7;
+constexpr double dense_flops = 2e10;
+
+std::vector<Index> filled_rows(const SparseColumns& a) {
+  std::vector<char> filled(static_cast<std::size_t>(a.rows()), 0);
+  for (Eigen::Index col = 0; col < a.outerSize(); ++col) {
+    for (SparseColumns::InnerIterator at(a, col); at; ++at) {
+      if (at.value() != 0) filled[static_cast<std::size_t>(at.row())] = 1;
+    }
+  }
+  std::vector<Index> rows;
+  for (std::size_t row = 0; row < filled.size(); ++row) {
+    if (filled[row]) rows.push_back(static_cast<Index>(row));
+  }
+  return rows;
+}
+
+Vector inverse_lengths(const SparseColumns& a) {
+  Vector scale(a.cols());
+  for (Eigen::Index col = 0; col < a.cols(); ++col) {
+    const double length = a.col(col).norm();
+    scale[col] = length > 0 ? 1 / length : 1;
+  }
+  return scale;
+}
+
+template <class Permutation>
+ColumnChoice choice(const Permutation& order, Eigen::Index rank) {
+  ColumnChoice result;
+  for (Eigen::Index k = 0; k < order.size(); ++k) {
+    (k < rank ? result.kept : result.dropped).push_back(static_cast<Index>(order.indices()[k]));
+  }
+  return result;
+}
+
+}  // namespace
+
+bool small_enough_for_dense(const SparseColumns& a) {
+  const auto rows = static_cast<double>(filled_rows(a).size());
+  const auto cols = static_cast<double>(a.cols());
+  return rows * cols <= dense_entries && 2 * rows * cols * cols <= dense_flops;
+}
+
+OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance) {
+  OrthonormalColumns result;
+  result.rows = filled_rows(a);
+  result.scale = inverse_lengths(a);
+  std::vector<Index> place(static_cast<std::size_t>(a.rows()), 0);
+  for (std::size_t k = 0; k < result.rows.size(); ++k) {
+    place[static_cast<std::size_t>(result.rows[k])] = static_cast<Index>(k);
+  }
+  const auto count = static_cast<Eigen::Index>(result.rows.size());
+  Eigen::MatrixXd dense = Eigen::MatrixXd::Zero(count, a.cols());
+  for (Eigen::Index col = 0; col < a.cols(); ++col) {
+    for (SparseColumns::InnerIterator at(a, col); at; ++at) {
+      if (at.value() == 0) continue;
+      dense(place[static_cast<std::size_t>(at.row())], col) = at.value() * result.scale[col];
+    }
+  }
+  if (count == 0) {
+    for (Index col = 0; col < static_cast<Index>(a.cols()); ++col) {
+      result.columns.dropped.push_back(col);
+    }
+    result.Q.resize(0, 0);
+    result.T1.resize(0, 0);
+    result.T2.resize(0, a.cols());
+    return result;
+  }
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(dense);
+  const auto diagonal = qr.matrixQR().diagonal();
+  Eigen::Index rank = 0;
+  while (rank < diagonal.size() && std::abs(diagonal[rank]) > tolerance) ++rank;
+  result.columns = choice(qr.colsPermutation(), rank);
+  result.Q = qr.householderQ() * Eigen::MatrixXd::Identity(count, rank);
+  result.T1 = qr.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
+  result.T2 = qr.matrixQR().topRightCorner(rank, a.cols() - rank);
+  return result;
+}
+
+ColumnChoice independent_columns(const SparseColumns& a, double tolerance) {
+  if (small_enough_for_dense(a)) return orthonormal_columns(a, tolerance).columns;
+  SparseColumns scaled = a * inverse_lengths(a).asDiagonal();
+  scaled.makeCompressed();
+  Eigen::SparseQR<SparseColumns, Eigen::COLAMDOrdering<Index>> qr;
+  qr.setPivotThreshold(tolerance);
+  qr.compute(scaled);
+  return choice(qr.colsPermutation(), qr.rank());
+}
+
+}  // namespace fclib

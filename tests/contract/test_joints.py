@@ -1,0 +1,137 @@
+"""Bilateral constraints of which some follow from others: solved where they agree, else refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import fclib
+from helpers import dense, judge, planted_global, planted_local
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+SOLVERS = ["auto", "nsgs", "nsn-ac"]
+
+
+def doubled(p: int) -> Array:
+    """Each constraint twice, as a parallel linkage has them, the second in other units."""
+    return np.hstack([np.eye(p), 3.0 * np.eye(p)])
+
+
+def closed(p: int) -> Array:
+    """The last constraint is the sum of the others: a loop that closes."""
+    return np.hstack([np.eye(p), np.ones((p, 1))])
+
+
+def with_nothing(p: int) -> Array:
+    """A constraint of nothing."""
+    return np.hstack([np.zeros((p, 1)), np.eye(p)])
+
+
+REPEATS: dict[str, Callable[[int], Array]] = {
+    "doubled": doubled,
+    "closed": closed,
+    "with_nothing": with_nothing,
+}
+
+
+def repeated_global(seed: int, repeats: Array, rolling: bool = False, d: int = 3) -> Any:
+    problem: Any = planted_global(seed, d=d, p=len(repeats), rolling=rolling).problem
+    return problem.replace(G=dense(problem.G) @ repeats, b=repeats.T @ problem.b)
+
+
+def repeated_local(seed: int, repeats: Array, rolling: bool = False, d: int = 3) -> Any:
+    problem: Any = planted_local(seed, d=d, p=len(repeats), rolling=rolling).problem
+    return problem.replace(
+        V=dense(problem.V) @ repeats,
+        R=repeats.T @ dense(problem.R) @ repeats,
+        s=repeats.T @ problem.s,
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("make", [repeated_global, repeated_local])
+@pytest.mark.parametrize("repeats", REPEATS)
+def test_consistent_constraints_are_solved_with_the_shortest_multiplier(
+    repeats: str, make: Any, solver: str
+) -> None:
+    pattern = REPEATS[repeats](4)
+    for rolling in (False, True):
+        if rolling and solver == "nsn-ac":
+            continue
+        problem = make(3, pattern, rolling)
+        result = fclib.solve(problem, solver=solver)
+        assert result.status == "converged", (result.status, result.error)
+        assert judge(problem, result.solution).error <= 1e-8
+        # shortest: without a part in what the multipliers may add up to without effect
+        lam = result.solution.l
+        assert lam is not None
+        idle = np.linalg.svd(pattern)[2][4:]
+        assert np.linalg.norm(idle @ lam) <= 1e-12 * np.linalg.norm(lam)
+
+
+@pytest.mark.parametrize("make", [repeated_global, repeated_local])
+@pytest.mark.parametrize("repeats", REPEATS)
+def test_constraints_that_contradict_others_are_refused_by_name(repeats: str, make: Any) -> None:
+    pattern = REPEATS[repeats](4)
+    problem = make(5, pattern)
+    name = "b" if isinstance(problem, fclib.GlobalProblem) else "s"
+    wrong = getattr(problem, name).copy()
+    row = 0 if repeats == "with_nothing" else 4
+    wrong[row] += 0.25
+    with pytest.raises(fclib.UnsuitableError, match="contradicts the others") as caught:
+        fclib.solve(problem.replace(**{name: wrong}))
+    named = int(str(caught.value).split("bilateral constraint ")[1].split(":")[0])
+    # one of those that the wrong one is a combination with
+    others = np.flatnonzero(np.linalg.svd(pattern)[2][4:].T.any(axis=1))
+    assert named in others
+    if repeats == "with_nothing":
+        assert named == 0
+
+
+@pytest.mark.parametrize("angle", [1e-5, 1e-6, 1e-7])
+def test_nearly_parallel_constraints_are_solved_where_the_bodies_are_known(angle: float) -> None:
+    """R = G^T M^-1 G has the square of their condition number, beyond any double."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        planted = planted_global(seed, p=2)
+        problem: Any = planted.problem
+        G = dense(problem.G)
+        G[:, 1] = G[:, 0] + angle * rng.standard_normal(len(G))
+        v = planted.solution.v
+        assert v is not None
+        lam = np.linalg.lstsq(G, dense(planted.problem.G) @ planted.solution.l, rcond=None)[0]
+        force = dense(problem.M) @ v - dense(problem.H) @ planted.solution.r - G @ lam
+        hard = problem.replace(G=G, b=-G.T @ v, f=force)
+        result = fclib.solve(hard)
+        assert result.status == "converged", (seed, result.status, result.error)
+        assert judge(hard, result.solution).error <= 1e-8
+
+
+def test_constraints_of_many_loops_are_solved() -> None:
+    """A frame of 40 bodies in a ring of rods, each held twice."""
+    rng = np.random.default_rng(1)
+    n, d = 120, 3
+    ring = np.zeros((n, 40))
+    for k in range(40):
+        ring[3 * k : 3 * k + 3, k] = rng.standard_normal(3)
+        other = 3 * ((k + 1) % 40)
+        ring[other : other + 3, k] = rng.standard_normal(3)
+    G = np.hstack([ring, ring])
+    H = np.zeros((n, d * 5))
+    for a in range(5):
+        H[24 * a : 24 * a + 3, d * a : d * a + d] = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    problem = fclib.GlobalProblem(
+        spacedim=d, M=np.eye(n), H=H, f=rng.standard_normal(n), w=np.zeros(d * 5),
+        mu=np.full(5, 0.5), G=G, b=np.zeros(80),
+    )  # fmt: skip
+    result = fclib.solve(problem)
+    assert result.status == "converged"
+    assert judge(problem, result.solution).error <= 1e-8
+    lam = result.solution.l
+    assert lam is not None
+    assert lam[:40] == pytest.approx(lam[40:], rel=1e-9, abs=1e-12)

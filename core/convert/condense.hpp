@@ -3,6 +3,7 @@
 //   W = H^T M^-1 H,   q = H^T M^-1 f + w,   V = H^T M^-1 G,   R = G^T M^-1 G,   s = G^T M^-1 f + b
 #pragma once
 
+#include "deadline.hpp"
 #include "linalg/factorization.hpp"
 #include "problem.hpp"
 
@@ -12,7 +13,12 @@ namespace fclib {
 class Condensation {
  public:
   /// Throws Error (unsuitable) where M is singular, or symmetric and not positive definite.
-  explicit Condensation(const GlobalProblem& problem);
+  ///
+  /// What is left after the factorisation of M is not done where the deadline has passed:
+  /// finished() says so, and local() is empty then.
+  explicit Condensation(const GlobalProblem& problem, const Deadline* deadline = nullptr);
+
+  [[nodiscard]] bool finished() const { return finished_; }
 
   [[nodiscard]] const LocalProblem& local() const { return local_; }
   [[nodiscard]] const Factorization& mass() const { return mass_; }
@@ -23,6 +29,7 @@ class Condensation {
   const GlobalProblem& problem_;
   Factorization mass_;
   LocalProblem local_;
+  bool finished_ = false;
 };
 
 /// The local form of a global problem (M3DFC from GM3DFC).

@@ -85,13 +85,15 @@ void require_agreement(const std::vector<Index>& dropped, const Vector& gap, con
 
 }  // namespace
 
-Elimination::Elimination(const LocalProblem& problem) : Elimination(problem, nullptr, nullptr) {}
+Elimination::Elimination(const LocalProblem& problem, const Deadline* deadline)
+    : Elimination(problem, nullptr, nullptr, deadline) {}
 
-Elimination::Elimination(const GlobalProblem& problem, const Condensation& condensation)
-    : Elimination(condensation.local(), &problem, &condensation) {}
+Elimination::Elimination(const GlobalProblem& problem, const Condensation& condensation,
+                         const Deadline* deadline)
+    : Elimination(condensation.local(), &problem, &condensation, deadline) {}
 
 Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodies,
-                         const Condensation* condensation)
+                         const Condensation* condensation, const Deadline* deadline)
     : problem_(problem) {
   plain_.spacedim = problem.spacedim;
   plain_.mu = problem.mu;
@@ -114,7 +116,9 @@ Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodie
                          leave_out_redundant(r, size);
     if (!changed && !bilateral_) throw Error(ErrorKind::unsuitable, "R is singular");
   }
+  if (deadline != nullptr && deadline->passed()) return;
   reduce();
+  finished_ = true;
 }
 
 bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation& condensation) {

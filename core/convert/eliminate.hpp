@@ -25,9 +25,15 @@ class Elimination {
  public:
   /// Throws Error (unsuitable) where R is singular though no constraint follows from the others,
   /// and where one that follows contradicts them; the message names it.
-  explicit Elimination(const LocalProblem& problem);
+  ///
+  /// What is left after the factorisation of R is not done where the deadline has passed:
+  /// finished() says so, and plain() is empty then.
+  explicit Elimination(const LocalProblem& problem, const Deadline* deadline = nullptr);
   /// Of condensation.local().
-  Elimination(const GlobalProblem& problem, const Condensation& condensation);
+  Elimination(const GlobalProblem& problem, const Condensation& condensation,
+              const Deadline* deadline = nullptr);
+
+  [[nodiscard]] bool finished() const { return finished_; }
 
   [[nodiscard]] const LocalProblem& plain() const { return plain_; }
   /// Completes lambda and u from r.
@@ -38,7 +44,7 @@ class Elimination {
 
  private:
   Elimination(const LocalProblem& problem, const GlobalProblem* bodies,
-              const Condensation* condensation);
+              const Condensation* condensation, const Deadline* deadline);
 
   /// With the constraints made orthonormal. False where the bodies do not allow it.
   bool orthonormalise(const GlobalProblem& bodies, const Condensation& condensation);
@@ -59,6 +65,7 @@ class Elimination {
   Vector scale_;             // ... with the scaling of their columns
   Eigen::MatrixXd idle_;     // combinations of multipliers that do nothing
   LocalProblem plain_;
+  bool finished_ = false;
 };
 
 /// The local problem without bilateral constraints; itself where it has none.

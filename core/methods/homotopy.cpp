@@ -31,6 +31,7 @@ void Homotopy<Cone>::solve(const HomotopyRules& rules, Report report) {
     int corrections = 0;
     for (;; step *= 0.5) {
       if (!(step > least_step) || system_.factorisations() >= stop_at) return;
+      if (problem_.out_of_time()) return;
       next_ = r_ + step * tangent_;
       next_lambda_ = lambda_ + step * tangent_lambda_;
       corrections = correct(step);

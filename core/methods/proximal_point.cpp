@@ -28,7 +28,7 @@ double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, 
   error_ = relative_error<Cone>(problem_, u_, r_);
   double best = error_;
   double share = 1;  // of what the law says, after failures
-  while (best > tolerance && system_.factorisations() < stop_at) {
+  while (best > tolerance && system_.factorisations() < stop_at && !problem_.out_of_time()) {
     if (rules.law == ProximalRules::Law::by_error) {
       kappa = std::min(share / (rules.sigma * std::pow(error_, rules.nu)), rules.kappa_max);
     }

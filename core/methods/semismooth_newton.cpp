@@ -52,7 +52,9 @@ NewtonEnd SemismoothNewton<Cone>::solve(const NewtonRules& rules, Vector& r,
   for (;;) {
     const double delta = rules.regularisation * size_ * std::min(error, 1.0);
     assemble(delta);
-    if (!system_.factorise()) return NewtonEnd::not_finite;
+    if (!system_.factorise()) {
+      return problem_.out_of_time() ? NewtonEnd::stalled : NewtonEnd::not_finite;
+    }
     dr_ = -f_;
     system_.solve(dr_);
     const double length = search(rules.line_search);

@@ -1,6 +1,7 @@
 // The problem in the form that solvers take: u = W r + q and the friction law of each contact.
 #pragma once
 
+#include "deadline.hpp"
 #include "friction.hpp"
 #include "linalg/block_matrix.hpp"
 
@@ -18,12 +19,16 @@ struct ReducedProblem {
   Vector q;
   Friction friction;
   double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
-  const Primal* primal = nullptr;  ///< where the problem is known by its bodies
+  const Primal* primal = nullptr;      ///< where the problem is known by its bodies
+  const Deadline* deadline = nullptr;  ///< of the solve, if it has one
 
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }
   [[nodiscard]] Eigen::Index m() const { return q.size(); }
   [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
+
+  /// No more factorisations then: they fail.
+  [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }
 
   /// u = W r + q.
   void velocity(const Vector& r, Vector& u) const { W.multiply_add(r, q, u); }

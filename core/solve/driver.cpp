@@ -1,7 +1,6 @@
 #include "solve/driver.hpp"
 
 #include <algorithm>
-#include <chrono>
 
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
@@ -12,8 +11,6 @@ namespace fclib {
 
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 /// How often the solver is sent back to work where its own error met the tolerance and the merit
 /// of the original problem did not (conversions round).
 constexpr int max_corrections = 4;
@@ -22,6 +19,7 @@ struct Request {
   const Solver& solver;
   const Settings& settings;
   const OptionValues& options;
+  const Deadline& deadline;  ///< of all, conversions included
 };
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
@@ -35,17 +33,17 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
                                .q = plain.q,
                                .friction = friction,
                                .scale = norm_q > 0 ? norm_q : 1.0,
-                               .primal = primal};
+                               .primal = primal,
+                               .deadline = &request.deadline};
   Result result;
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
-  const auto first_start = Clock::now();
-  const auto elapsed = [&] {
-    return std::chrono::duration<double>(Clock::now() - first_start).count();
-  };
+  const double first_start = now(settings.clock);
+  const auto elapsed = [&] { return now(settings.clock) - first_start; };
+  settings.time_limit = std::max(0.0, request.deadline.left());
   if (settings.history) {
     result.history.emplace();
     settings.callback = [&](const Progress& progress) {
@@ -64,6 +62,11 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     result.status = outcome.status;
     result.stages = outcome.stages;
     result.certificate = outcome.certificate;
+    // factorisations fail where the time is over, and solvers have nothing left to try
+    if ((result.status == Status::stalled || result.status == Status::diverged) &&
+        request.deadline.passed()) {
+      result.status = Status::time_limit;
+    }
     if (!r.allFinite()) {
       result.status = Status::diverged;
       r.setZero();
@@ -77,13 +80,28 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     if (result.status != Status::converged) return result;
     // the limits hold for all the attempts together
     settings.max_iterations = max_iterations - result.iterations;
-    settings.time_limit = request.settings.time_limit - elapsed();
+    settings.time_limit = request.deadline.left();
     result.status = settings.max_iterations <= 0 ? Status::iteration_limit
                     : settings.time_limit <= 0   ? Status::time_limit
                                                  : Status::inaccurate;
     if (correction == max_corrections || result.status != Status::inaccurate) return result;
     settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
   }
+}
+
+/// What there is where the time is over before the solver starts: the guess.
+template <class Judge>
+Result out_of_time(Eigen::Index m, Eigen::Index p, const Request& request, const Solution& guess,
+                   const Judge& judge) {
+  Result result;
+  result.solver = request.solver.name;
+  result.solution.r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(m));
+  if (p > 0) result.solution.l = Vector::Zero(p);
+  result.error = judge(result.solution);
+  result.status =
+      result.error <= request.settings.tolerance ? Status::converged : Status::time_limit;
+  if (request.settings.history) result.history.emplace();
+  return result;
 }
 
 template <class P>
@@ -105,7 +123,15 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
   if (is_mixed(problem)) {
-    const Elimination elimination(problem);
+    const Elimination elimination(problem, &request.deadline);
+    if (!elimination.finished()) {
+      return out_of_time(problem.q.size(), problem.s.size(), request, guess,
+                         [&](Solution& solution) {
+                           solution.u.resize(0);
+                           solution = complete(problem, solution);
+                           return merit(problem, solution).error;
+                         });
+    }
     return run(elimination.plain(), friction_of(problem), problem.q, request, guess,
                [&](Solution& solution) {
                  solution = elimination.expand(solution);
@@ -121,17 +147,22 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
 
 template <class P>
 Result solve_global(const P& problem, const Request& request, const Solution& guess) {
-  const Condensation condensation(problem);
+  const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
     return merit(problem, solution, condensation.mass()).error;
   };
+  const auto stop = [&] {
+    return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
+  };
+  if (!condensation.finished()) return stop();
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
     return run(local, friction_of(problem), local.q, request, guess, judge, &primal);
   }
-  const Elimination elimination(problem, condensation);
+  const Elimination elimination(problem, condensation, &request.deadline);
+  if (!elimination.finished()) return stop();
   return run(elimination.plain(), friction_of(problem), local.q, request, guess,
              [&](Solution& solution) {
                solution = elimination.expand(solution);
@@ -144,7 +175,8 @@ template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
   const double start = cpu_time();
-  const Request request{solver, settings, options};
+  const Deadline deadline(settings.time_limit, settings.clock);
+  const Request request{solver, settings, options, deadline};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
   result.setup_s += cpu_time() - start;  // what the thread spent in the solver is taken off already

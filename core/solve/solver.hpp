@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "deadline.hpp"
 #include "reduced/reduced_problem.hpp"
 #include "solve/options.hpp"
 
@@ -65,27 +66,26 @@ struct Progress {
 struct Settings {
   double tolerance = 1e-8;                                      ///< on Merit::error
   std::int64_t max_iterations = 0;                              ///< 0: the solver's own default
-  double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s]
+  double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s], conversions
+                                                                ///< included
   std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
   std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or
                                                   ///< iterations; false stops the solver
+  Clock clock;                                    ///< another than the steady one, for tests
   bool history = false;                           ///< whether the result keeps all reports
 };
 
 /// Watches over a solver: it reports its iterates, and learns whether to stop.
 class Monitor {
-  using Clock = std::chrono::steady_clock;
-
  public:
-  explicit Monitor(const Settings& settings) : settings_(settings) {}
+  explicit Monitor(const Settings& settings)
+      : settings_(settings), start_(now(settings.clock)), last_poll_(start_) {}
 
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
   [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
 
   /// Wall clock since the solver started [s].
-  [[nodiscard]] double elapsed() const {
-    return std::chrono::duration<double>(Clock::now() - start_).count();
-  }
+  [[nodiscard]] double elapsed() const { return now(settings_.clock) - start_; }
 
   /// Names the stage of the reports to come.
   void enter(std::string_view stage) { stage_ = stage; }
@@ -103,7 +103,7 @@ class Monitor {
       return Status::time_limit;
     }
     if (due()) {
-      last_poll_ = Clock::now();
+      last_poll_ = now(settings_.clock);
       if (settings_.poll && !settings_.poll()) return Status::interrupted;
     }
     return std::nullopt;
@@ -112,16 +112,17 @@ class Monitor {
   /// Whether a report is wanted now, between those that the solver makes of its own accord. To be
   /// asked every few iterations by solvers that report seldom.
   [[nodiscard]] bool due() const {
-    return Clock::now() - last_poll_ > poll_interval || elapsed() > settings_.time_limit;
+    const double time = now(settings_.clock);
+    return time - last_poll_ > poll_interval || time - start_ > settings_.time_limit;
   }
 
  private:
-  static constexpr std::chrono::milliseconds poll_interval{100};
+  static constexpr double poll_interval = 0.1;  // [s]
 
   const Settings& settings_;
   std::string_view stage_;
-  Clock::time_point start_ = Clock::now();
-  Clock::time_point last_poll_ = start_;
+  double start_;
+  double last_poll_;
 };
 
 /// A part of a solve, by a method of its own.

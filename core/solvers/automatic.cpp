@@ -636,8 +636,11 @@ class Island {
 /// The part of a problem that these contacts are.
 ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index>& contacts) {
   const int d = problem.d();
-  ReducedProblem part{
-      .W = problem.W.restricted(contacts), .q = {}, .friction = {}, .scale = problem.scale};
+  ReducedProblem part{.W = problem.W.restricted(contacts),
+                      .q = {},
+                      .friction = {},
+                      .scale = problem.scale,
+                      .deadline = problem.deadline};
   const auto count = static_cast<Eigen::Index>(contacts.size());
   part.q.resize(d * count);
   part.friction.mu.resize(count);

@@ -12,8 +12,6 @@
 // function of Alart & Curnier in the variable r - rho u (methods/proximal_point.hpp), until their
 // residual is a fraction of the error; and, by default, alpha follows the steps that Newton takes
 // rather than the error. It is not a monotone operator: no step is proved to approach the solution.
-//
-// The clock is looked at between proximal steps: one takes up to 20 factorisations.
 
 #include <array>
 

@@ -194,6 +194,7 @@ void CoupledSystem::fill_bodies() {
 }
 
 bool CoupledSystem::factorise() {
+  if (problem_.out_of_time()) return false;
   ++factorisations_;
   if (on_bodies_) {
     fill_bodies();

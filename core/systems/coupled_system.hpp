@@ -39,7 +39,7 @@ class CoupledSystem {
   /// Those of B where it is general, likewise; zero at first.
   [[nodiscard]] std::vector<double>& own_blocks() { return B_; }
 
-  /// False where the blocks are not finite.
+  /// False where the blocks are not finite, and where the time is over.
   bool factorise();
 
   /// x <- (B + D W)^-1 x.

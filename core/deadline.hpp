@@ -1,0 +1,35 @@
+// When a solve has to end: made before the conversions, looked at before each factorisation.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <limits>
+
+namespace fclib {
+
+/// Of the time since some moment [s]; the steady clock where it is empty.
+using Clock = std::function<double()>;
+
+inline double now(const Clock& clock) {
+  if (clock) return clock();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+class Deadline {
+ public:
+  /// `seconds` from now; infinite: never.
+  explicit Deadline(double seconds, Clock clock = {})
+      : clock_(std::move(clock)),
+        at_(seconds < std::numeric_limits<double>::infinity() ? now(clock_) + seconds : seconds) {}
+
+  [[nodiscard]] bool passed() const { return left() <= 0; }
+  [[nodiscard]] double left() const {
+    return at_ < std::numeric_limits<double>::infinity() ? at_ - now(clock_) : at_;
+  }
+
+ private:
+  Clock clock_;
+  double at_;
+};
+
+}  // namespace fclib

@@ -30,6 +30,15 @@ std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
   };
 }
 
+/// Another clock, for tests of what looks at it.
+Clock make_clock(const nb::object& clock) {
+  if (clock.is_none()) return {};
+  return [&clock] {
+    const nb::gil_scoped_acquire gil;
+    return nb::cast<double>(clock());
+  };
+}
+
 /// Lets Ctrl-C through.
 bool poll_signals() {
   const nb::gil_scoped_acquire gil;
@@ -43,18 +52,19 @@ void bind_solve(nb::module_& m) {
       "solve",
       [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
          double time_limit, const OptionValues& options, const Solution* guess,
-         const nb::object& callback, bool history) {
+         const nb::object& callback, bool history, const nb::object& clock) {
         Settings settings{.tolerance = tolerance,
                           .max_iterations = max_iterations,
                           .time_limit = time_limit,
                           .callback = make_callback(callback),
                           .poll = poll_signals,
+                          .clock = make_clock(clock),
                           .history = history};
         const Unlocked unlocked;
         return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
-      "guess"_a.none(), "callback"_a.none(), "history"_a);
+      "guess"_a.none(), "callback"_a.none(), "history"_a, "clock"_a.none() = nb::none());
 }
 
 nb::object history_of(const Result& result) {

@@ -1,0 +1,145 @@
+"""Data at the edges of mechanics: `auto` solves what has a solution, and every solver is honest."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import fclib
+from helpers import judge, planted_law
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from planted_judge import verdict
+
+Array: TypeAlias = npt.NDArray[np.float64]
+
+SOLVERS = [solver.name for solver in fclib.solvers() if solver.origin == "fclib"]
+FORMS = [(2, False), (3, False), (3, True), (5, True)]
+
+
+def of_rank(
+    rank: int, d: int, rolling: bool, seed: int, mu: float | None = None, twice: bool = False
+) -> Any:
+    """Contacts that move their bodies in `rank` directions each, and r = 0 solves none of them."""
+    rng = np.random.default_rng(seed)
+    nc, n = 5, 40
+    law, (u, r, _) = planted_law(rng, d, nc, mu, rolling)
+    H = np.zeros((n, d * nc))
+    for a in range(nc):
+        rows = slice(6 * a, 6 * a + 10)
+        H[rows, d * a : d * a + d] = rng.standard_normal((10, rank)) @ rng.standard_normal(
+            (rank, d)
+        )
+    if twice:
+        H, u, r = np.hstack([H, H]), np.vstack([u, u]), np.vstack([r, r])
+        law = {name: np.tile(values, 2) for name, values in law.items()}
+    kind: Any = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
+    W = H.T @ H
+    return kind(spacedim=d, W=W, q=u.ravel() - W @ r.ravel(), **law)
+
+
+def fits(name: str, d: int, rolling: bool) -> bool:
+    (entry,) = (solver for solver in fclib.solvers() if solver.name == name)
+    return d in (entry.rolling_dimensions if rolling else entry.dimensions)
+
+
+@pytest.mark.parametrize(("d", "rolling"), FORMS)
+def test_contacts_of_any_rank_are_solved(d: int, rolling: bool) -> None:
+    for rank in range(d + 1):
+        for seed in range(6):
+            for twice in (False, True):
+                problem = of_rank(rank, d, rolling, seed, twice=twice)
+                result = fclib.solve(problem)
+                assert result.status == "converged", (rank, seed, twice, result.status)
+                assert judge(problem, result.solution).error <= 1e-8
+
+
+@pytest.mark.parametrize("rank", [1, 2])
+@pytest.mark.parametrize("solver", ["nsgs", "psor"])
+def test_sweeps_do_not_diverge_on_contacts_of_rank_one_and_two(solver: str, rank: int) -> None:
+    for seed in range(10):
+        result = fclib.solve(of_rank(rank, 3, False, seed, mu=0.8), solver=solver, time_limit=20)
+        assert result.status != "diverged", seed
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_every_solver_is_honest_on_contacts_of_low_rank(solver: str) -> None:
+    for d, rolling in FORMS:
+        if not fits(solver, d, rolling):
+            continue
+        for rank in range(d):
+            problem = of_rank(rank, d, rolling, 3)
+            result = fclib.solve(problem, solver=solver, max_iterations=300)
+            error = judge(problem, result.solution).error
+            assert np.isfinite(error)
+            assert result.converged == (error <= 1.0001e-8 and result.error <= 1e-8)
+            assert result.status != "infeasible"
+
+
+@pytest.mark.parametrize("mu", [0.0, 1e-9, 1.0, 1e3, 1e7])
+def test_any_friction_is_solved_or_said_not_to_be(mu: float) -> None:
+    for seed in range(5):
+        problem = of_rank(3, 3, False, seed, mu=mu)
+        result = fclib.solve(problem)
+        assert result.status not in {"diverged", "infeasible"}
+        assert result.converged == (result.error <= 1e-8)
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 1e6, 1e100, 1e300])
+def test_a_guess_never_makes_a_solvable_problem_unsolved(size: float) -> None:
+    for seed in range(8):
+        for d, rolling in FORMS:
+            problem = of_rank(d, d, rolling, seed)
+            guess = size * np.random.default_rng(seed).standard_normal(problem.m)
+            result = fclib.solve(problem, guess=fclib.Solution(r=guess))
+            assert result.status == "converged", (seed, d, rolling, result.status)
+
+
+@pytest.mark.parametrize("mass", [1e-9, 1e-3, 1e3, 1e9])
+def test_units_of_mass_do_not_matter(mass: float) -> None:
+    for seed in range(5):
+        problem = of_rank(2, 3, False, seed)
+        result = fclib.solve(problem.replace(W=problem.W / mass))
+        assert result.status == "converged"
+
+
+def test_planted_problems_of_every_formulation_get_no_false_word() -> None:
+    for number in range(300):
+        word = verdict(number)
+        assert not word.startswith("false"), (number, word)
+
+
+class Looks:
+    """A clock that ticks when it is looked at."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self) -> float:
+        self.count += 1
+        return float(self.count)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: str) -> None:
+    from fclib import _core
+
+    rng = np.random.default_rng(0)
+    nc = 50
+    root = rng.standard_normal((3 * nc, 2 * nc))
+    W = root @ root.T / nc
+    problem = fclib.LocalProblem(
+        spacedim=3, W=W, q=rng.standard_normal(3 * nc) - 1, mu=np.full(nc, 0.9)
+    )
+    (entry,) = (s for s in fclib.solvers() if s.name == solver)
+    for limit in (1.0, 5.0, 40.0):
+        clock = Looks()
+        result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, clock=clock)
+        assert result.status == "time_limit", (limit, result.status)
+        assert sum(stage.factorisations for stage in result.stages) <= limit
+        assert clock.count <= limit + 40

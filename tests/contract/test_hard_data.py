@@ -11,7 +11,8 @@ import numpy.typing as npt
 import pytest
 
 import fclib
-from helpers import judge, planted_law
+from fclib import _core
+from helpers import judge, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from planted_judge import verdict
@@ -125,21 +126,50 @@ class Looks:
         return float(self.count)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: str) -> None:
-    from fclib import _core
-
+def dense_contacts() -> fclib.LocalProblem:
     rng = np.random.default_rng(0)
     nc = 50
     root = rng.standard_normal((3 * nc, 2 * nc))
-    W = root @ root.T / nc
-    problem = fclib.LocalProblem(
-        spacedim=3, W=W, q=rng.standard_normal(3 * nc) - 1, mu=np.full(nc, 0.9)
-    )
+    q = rng.standard_normal(3 * nc) - 1
+    return fclib.LocalProblem(spacedim=3, W=root @ root.T / nc, q=q, mu=np.full(nc, 0.9))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: str) -> None:
+    problem = dense_contacts()
     (entry,) = (s for s in fclib.solvers() if s.name == solver)
-    for limit in (1.0, 5.0, 40.0):
+    for limit in (1.0, 4.0, 12.0):
         clock = Looks()
         result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, clock=clock)
         assert result.status == "time_limit", (limit, result.status)
         assert sum(stage.factorisations for stage in result.stages) <= limit
         assert clock.count <= limit + 40
+
+
+def test_the_clock_is_looked_at_before_each_factorisation_between_reports() -> None:
+    (entry,) = (s for s in fclib.solvers() if s.name == "ppa-nsn")
+    clock = Looks()
+    counts: list[int] = []
+
+    def follow(*_: object) -> bool:
+        counts.append(clock.count)
+        return len(counts) < 6
+
+    _core.solve(dense_contacts(), entry, 1e-15, 0, 1e9, {}, None, follow, False, clock=clock)
+    # a report looks four times at most, and a proximal step takes several factorisations
+    assert max(np.diff(counts)) > 6, counts
+
+
+def test_conversions_are_held_to_the_limit() -> None:
+    """The clock has passed when M is factorised: nothing else is done, and the guess is judged."""
+    planted = planted_global(3, p=2)
+    problem: Any = planted.problem
+    (entry,) = (s for s in fclib.solvers() if s.name == "auto")
+    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, clock=Looks())
+    assert result.status == "time_limit"
+    assert result.iterations == 0
+    assert judge(problem, result.solution).error == pytest.approx(result.error)
+    result = _core.solve(
+        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, clock=Looks()
+    )
+    assert judge(problem, result.solution).error == pytest.approx(result.error)

@@ -33,7 +33,7 @@ def bodies_of(rng: np.random.Generator, n: int, ratio: float) -> Array:
 
 def directions(rng: np.random.Generator, n: int, d: int, nc: int) -> Array:
     """H of contacts, whose blocks have ranks from 0 to d; some contacts are there twice."""
-    columns = []
+    columns: list[Array] = []
     for _ in range(nc):
         if columns and rng.uniform() < 0.15:
             columns.append(columns[rng.integers(len(columns))])
@@ -66,7 +66,7 @@ def planted(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     p = int(rng.integers(0, min(4, n // 3) + 1))
     ratio = 10.0 ** rng.choice([0, 0, 3, 6])
     unit = 10.0 ** rng.choice([0, 0, -9, -3, 3, 9])
-    friction = rng.choice([None, 0.0, 0.3, 1.0, 100.0])
+    friction = (None, 0.0, 0.3, 1.0, 100.0)[rng.integers(5)]
     law, (u, r, _) = planted_law(rng, d, nc, friction, rolling)
     mass = unit * bodies_of(rng, n, ratio)
     H, G = directions(rng, n, d, nc), joints(rng, n, p)
@@ -117,8 +117,8 @@ def verdict(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> st
     start = None if guess is None else fclib.Solution(r=guess)
     try:
         result = solve(problem, guess=start, max_iterations=20000)
-    except fclib.UnsuitableError as error:
-        return f"false refusal: {error}"
+    except fclib.UnsuitableError as refusal:
+        return f"false refusal: {refusal}"
     if result.status in FALSE:
         return f"false {result.status}"
     error = judge(problem, result.solution).error

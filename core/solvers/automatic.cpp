@@ -347,10 +347,11 @@ class Island {
     double marked = least;                                   // ... and before it
     std::int64_t mark = 0;                                   // sweeps at the last look
     for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
-      for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_->sweep(r_, u_);
+      const std::int64_t count = std::min(interval, tracker_.left());
+      for (std::int64_t j = 0; j < count; ++j) gauss_seidel_->sweep(r_, u_);
       problem_.velocity(r_, u_);
       const double error = relative_error<Cone>(problem_, u_, r_);
-      if (take(interval, error, r_)) {
+      if (take(count, error, r_)) {
         if (!std::isfinite(error)) return_to_best();
         return;
       }

@@ -61,6 +61,7 @@ def test_the_table_has_every_solver_and_formulation() -> None:
         (TENTH, replace(TENTH, stages="sweeps 1/90/0"), True, True),
         (TENTH, replace(TENTH, status="stalled"), True, True),
         (FREE, replace(FREE, status="stalled", iterations=7), False, True),
+        (EXACT, replace(EXACT, iterations=7, may_differ="clock"), False, False),
         (EXACT, None, True, True),
         (FREE, None, True, True),
         (None, EXACT, True, True),

@@ -61,6 +61,7 @@ def valgrind(*command: object) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.slow
 def test_the_library_is_clean_under_valgrind(checks: Path, tmp_path: Path) -> None:
     valgrind(checks, tmp_path)
 
@@ -128,6 +129,7 @@ def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
     assert "no_such_solver" in done.stderr
 
 
+@pytest.mark.slow
 def test_the_examples_are_clean_under_valgrind(examples: dict[str, Path], tmp_path: Path) -> None:
     valgrind(examples["write"], tmp_path / "ball.hdf5")
     valgrind(examples["solve"], tmp_path / "ball.hdf5")

@@ -110,6 +110,7 @@ def two_turns(writer: Path, path: Path) -> float:
     return time.monotonic() - start
 
 
+@pytest.mark.slow
 def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_path: Path) -> None:
     writer, reader = programs
     random.seed(1)

@@ -23,7 +23,7 @@ from fclib.bench.campaign import parse_solver
 from fclib.bench.job import MERITS, Job
 from helpers import planted_global, planted_local
 
-KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "6"))
+KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
 RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "400"))
 
 

@@ -326,10 +326,11 @@ class Island {
     double marked = least;                                   // ... and before it
     std::int64_t mark = 0;                                   // sweeps at the last look
     for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
-      for (std::int64_t j = 0; j < interval; ++j) gauss_seidel_.sweep(r_, u_);
+      const std::int64_t count = std::min(interval, tracker_.left());
+      for (std::int64_t j = 0; j < count; ++j) gauss_seidel_.sweep(r_, u_);
       problem_.velocity(r_, u_);
       const double error = relative_error<Cone>(problem_, u_, r_);
-      if (take(interval, error, r_)) return;
+      if (take(count, error, r_)) return;
       least = std::min(least, error);
       if (k < 2 * mark || k < 5 * interval) continue;
       const double rate = std::log(marked / least) / static_cast<double>(k - mark);
@@ -399,8 +400,9 @@ class Island {
   /// On W r = -q from the guess, or from nothing, preconditioned by tr(W_aa); given up where r
   /// leaves the cones for good.
   void conjugate_gradients() {
-    constexpr std::int64_t limit = 400;
+    constexpr std::int64_t most = 400;
     constexpr std::int64_t trial = 15;
+    const std::int64_t limit = std::min(most, tracker_.left());
     Vector inverse(problem_.nc());
     for (Index a = 0; a < problem_.nc(); ++a) {
       const double trace = problem_.W.template diagonal_block<D>(a).trace();
@@ -454,6 +456,7 @@ class Island {
       direction = z + (next / rz) * direction;
       rz = next;
     }
+    if (limit < most) tracker_.report(limit % trial, error_);
   }
 
   void project(Vector& r) const {

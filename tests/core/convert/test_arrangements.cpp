@@ -50,6 +50,7 @@ TEST(Islands, split_and_merge_are_inverse) {
   EXPECT_EQ(parts[2].mu.size(), 0);
   const GlobalProblem again = merge(parts, found);
   EXPECT_EQ(again.M, problem.M);
+  EXPECT_TRUE(again.G.empty());
   EXPECT_EQ(again.H, problem.H);
   EXPECT_EQ(again.f, problem.f);
 }
@@ -207,6 +208,15 @@ TEST(Islands, are_linked_by_joints_and_not_by_stored_zeros) {
   EXPECT_EQ(found.of(Dim::nc, 3), 2);
   EXPECT_EQ(found.of(Dim::p, 1), 3);
   EXPECT_EQ(islands(three_bodies()).of(Dim::n, 4), 1);
+  // and where their entries stand in the whole
+  const Arrangement first = places_of(found).front();
+  EXPECT_EQ(first.nc.to, (std::vector<Index>{0, 2}));
+  EXPECT_EQ(first.m.to, (std::vector<Index>{0, 1, 4, 5}));
+  EXPECT_EQ(first.p.to, (std::vector<Index>{0}));
+  EXPECT_EQ(first.nc.count, 4);
+  EXPECT_EQ(first.m.count, 8);
+  EXPECT_EQ(first.p.count, 2);
+  EXPECT_EQ(places_of(islands(three_bodies())).front().n.count, 6);
 }
 
 TEST(Islands, are_linked_through_bodies_and_their_joints) {
@@ -589,7 +599,7 @@ TEST(Storage, of_all_matrices_of_a_problem_is_one) {
     }
   }
   const auto plain = testing::random_local<LocalProblem>(random, 3, 2, 0);
-  EXPECT_TRUE(with_storage(plain, Storage::dense).V.empty());
+  EXPECT_EQ(with_storage(plain, Storage::dense).V, Matrix{});
 }
 
 TEST(Storage, a_matrix_too_large_to_be_dense_is_refused) {

@@ -77,6 +77,9 @@ TEST(RollingCone, projection_by_hand) {
   EXPECT_LT((cone.project(Vec(1, -6, 3)) - Vec(3.2, -1.6, 3)).norm(), 1e-15);
   // rolling alone: n = (1 + 2 * 7) / 5
   EXPECT_LT((cone.project(Vec(1, 0.5, 7)) - Vec(3, 0.5, 6)).norm(), 1e-14);
+  // and where the other part is nothing
+  EXPECT_LT((cone.project(Vec(0.1, -0.4, 0)) - Vec(0.24, -0.12, 0)).norm(), 1e-15);
+  EXPECT_LT((cone.project(Vec(0.1, 0, 0.4)) - Vec(0.18, 0, 0.36)).norm(), 1e-15);
 }
 
 TEST(RollingCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {

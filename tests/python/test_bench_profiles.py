@@ -331,15 +331,15 @@ def test_an_unreadable_problem_is_no_instance() -> None:
 
 
 def test_an_even_number_of_repeats_counts_by_the_two_in_the_middle() -> None:
-    for times, median in [
+    cases: list[tuple[list[float | None], float]] = [
         ([4.0, 1.0], 2.5),
         ([9.0, 1.0, 3.0, 2.0], 2.5),
         ([8.0, None, 1.0, 3.0], 5.5),
         ([1.0, None], math.inf),
         ([2.0, None, 1.0, None], math.inf),
         ([7.0, 1.0, 3.0, None, 2.0, 5.0], 4.0),
-    ]:
-        assert isinstance(times, list)
+    ]
+    for times, median in cases:
         rows = [row("A", 0, time) for time in times]
         assert profiles.costs(rows).values.tolist() == [[median]]
 

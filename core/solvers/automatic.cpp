@@ -438,7 +438,7 @@ class Island {
         // at this rate, is it done within the limit?
         const double rate = std::log(last / size) / trial;
         const double left = std::log(size / (tolerance_ * problem_.scale)) / rate;
-        if (violation(r) > 1e-2 || !(rate > 0) || left > limit) return;
+        if (violation(r) > 1e-2 || !(rate > 0) || left > static_cast<double>(limit)) return;
         if (tracker_.report(trial, error_)) return;
         last = size;
       }

@@ -11,10 +11,10 @@
 #include <type_traits>
 #include <variant>
 
-#include "friction.hpp"
 #include "error.hpp"
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/
+#include "friction.hpp"
 #include "solution.hpp"
 
 namespace fclib {

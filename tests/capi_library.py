@@ -1,5 +1,6 @@
 """The C library that the tests of the C interface use, and C programs that are linked to it."""
 
+import fcntl
 import functools
 import os
 import shutil
@@ -31,7 +32,9 @@ def library_folder() -> Path:
         configure = [cmake, "-S", str(ROOT), "-B", str(folder), "-DFCLIB_PYTHON=OFF"]
         subprocess.run(configure, check=True, stdout=subprocess.DEVNULL)
     build = [cmake, "--build", str(folder), "--target", "fclib"]
-    subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
+    with (folder / "fclib-tests.lock").open("w") as lock:  # of tests that run side by side
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
     return folder
 
 

@@ -52,27 +52,27 @@ def sliding_and_rolling(x: Array) -> tuple[Array, Array]:
 
 
 def project_rolling(x: Array, mu: Array, mu_r: Array) -> Array:
-    """The projection of each row on { ||x_T|| <= mu x_N, ||x_R|| <= mu_r x_N }.
+    """The projection of each row on { ||x_T|| <= mu x_N, ||x_R|| <= mu_r x_N }: x where inside.
 
     The normal part n is the root of n - x_N - mu (||x_T|| - mu n)+ - mu_r (||x_R|| - mu_r n)+,
     which is the least of four increasing lines: n is the largest of their roots.
     """
     half = (x.shape[1] - 1) // 2
     slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(x))
-    normal = np.zeros(len(x))
+    result = x.copy()
+    result[:, 0] = 0
     for a in (0 * mu, mu):
         for b in (0 * mu_r, mu_r):
             root = (x[:, 0] + a * slides + b * rolls) / (1 + a**2 + b**2)
-            normal = np.maximum(normal, root)
-    result = x.copy()
-    result[:, 0] = normal
+            result[:, 0] = np.maximum(result[:, 0], root)
     for part, size, limit in (
-        (slice(1, 1 + half), slides, mu * normal),
-        (slice(1 + half, None), rolls, mu_r * normal),
+        (slice(1, 1 + half), slides, mu * result[:, 0]),
+        (slice(1 + half, None), rolls, mu_r * result[:, 0]),
     ):
         beyond = size > limit
         result[beyond, part] *= (limit[beyond] / size[beyond])[:, None]
-    return result
+    inside = (x[:, 0] >= 0) & (slides <= mu * x[:, 0]) & (rolls <= mu_r * x[:, 0])
+    return np.where(inside[:, None], x, result)
 
 
 def modified_rolling(u: Array, mu: Array, mu_r: Array) -> Array:
@@ -99,8 +99,10 @@ def natural_map(r: Array, hat: Array, mu: Array) -> Array:
 
 
 def natural_map_rolling(r: Array, hat: Array, mu: Array, mu_r: Array) -> Array:
-    """The map r - P_K(r - u^) of each row."""
-    return r - project_rolling(r - hat, mu, mu_r)
+    """The map r - P_K(r - u^) of each row, as u^ + (y - P_K(y)) where it is not r."""
+    y = r - hat
+    projected = project_rolling(y, mu, mu_r)
+    return np.where((projected[:, 0] == 0)[:, None], r, hat + (y - projected))
 
 
 @dataclass(frozen=True)

@@ -54,10 +54,10 @@ struct Matrix {
   Storage storage = Storage::csr;
   Index rows = 0;
   Index cols = 0;
-  std::vector<Index> p;
-  std::vector<Index> i;
-  std::vector<double> x;
-  std::optional<MatrixInfo> info;
+  std::vector<Index> p = {};
+  std::vector<Index> i = {};
+  std::vector<double> x = {};
+  std::optional<MatrixInfo> info = {};
 
   /// An empty 0 x 0 matrix stands for "not given".
   [[nodiscard]] bool empty() const { return rows == 0 && cols == 0 && x.empty(); }

@@ -424,8 +424,9 @@ class Island {
   /// On W r = -q from the guess, or from nothing, preconditioned by tr(W_aa); given up where r
   /// leaves the cones for good.
   void conjugate_gradients() {
-    constexpr std::int64_t limit = 400;
+    constexpr std::int64_t most = 400;
     constexpr std::int64_t trial = 15;
+    const std::int64_t limit = std::min(most, tracker_.left());
     Vector inverse(problem_.nc());
     for (Index a = 0; a < problem_.nc(); ++a) {
       const double trace = problem_.W.template diagonal_block<D>(a).trace();
@@ -461,7 +462,7 @@ class Island {
         // at this rate, is it done within the limit?
         const double rate = std::log(last / size) / trial;
         const double left = std::log(size / (tolerance_ * problem_.scale)) / rate;
-        if (violation(r) > 1e-2 || !(rate > 0) || left > limit) return;
+        if (violation(r) > 1e-2 || !(rate > 0) || left > static_cast<double>(limit)) return;
         if (tracker_.report(trial, error_)) return;
         last = size;
       }
@@ -479,6 +480,7 @@ class Island {
       direction = z + (next / rz) * direction;
       rz = next;
     }
+    if (limit < most) tracker_.report(limit % trial, error_);
   }
 
   void project(Vector& r) const {

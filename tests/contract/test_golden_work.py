@@ -41,6 +41,7 @@ def test_the_table_has_every_solver_and_formulation() -> None:
         for d in dimensions:
             assert {(local, d), (on_bodies, d)} <= plain
             assert (on_bodies, d, True) in kinds
+    assert max(row.iterations for row in table.values()) == golden_work.ITERATIONS
     # the table is of use where nearly all of it is compared to the last iteration
     marks = [row.may_differ for row in table.values()]
     assert set(marks) == {"", "10 %", "free"}
@@ -61,6 +62,7 @@ def test_the_table_has_every_solver_and_formulation() -> None:
         (TENTH, replace(TENTH, stages="sweeps 1/90/0"), True, True),
         (TENTH, replace(TENTH, status="stalled"), True, True),
         (FREE, replace(FREE, status="stalled", iterations=7), False, True),
+        (EXACT, replace(EXACT, iterations=7, may_differ="clock"), False, False),
         (EXACT, None, True, True),
         (FREE, None, True, True),
         (None, EXACT, True, True),

@@ -7,22 +7,29 @@
 
 namespace fclib::testing {
 
+/// Positive definite; not symmetric where `skew` is not 0, as iteration matrices in files.
+inline Matrix random_definite(RandomData& random, Eigen::Index size, double share, double skew) {
+  const SparseColumns a = random.definite(size, share);
+  return Matrix::from_eigen(skew == 0 ? a
+                                      : SparseColumns(a + skew * random.sparse(size, size, share)));
+}
+
 /// Coefficients from 0.1 to 1.
 inline Vector random_friction(RandomData& random, Eigen::Index nc) {
   return Vector::Constant(nc, 0.55) + 0.45 * random.vector(nc);
 }
 
 template <class P>
-P random_local(RandomData& random, Index d, Eigen::Index nc, Eigen::Index p) {
+P random_local(RandomData& random, Index d, Eigen::Index nc, Eigen::Index p, double skew = 0) {
   P problem;
   problem.spacedim = d;
-  problem.W = Matrix::from_eigen(random.definite(d * nc, 0.5));
+  problem.W = random_definite(random, d * nc, 0.5, skew);
   problem.q = random.vector(d * nc);
   problem.mu = random_friction(random, nc);
   if constexpr (P::rolling) problem.mu_r = random_friction(random, nc);
   if (p > 0) {
     problem.V = Matrix::from_eigen(random.sparse(d * nc, p, 0.8));
-    problem.R = Matrix::from_eigen(random.definite(p, 0.8));
+    problem.R = random_definite(random, p, 0.8, skew);
     problem.s = random.vector(p);
   }
   validate(problem);
@@ -30,10 +37,11 @@ P random_local(RandomData& random, Index d, Eigen::Index nc, Eigen::Index p) {
 }
 
 template <class P>
-P random_global(RandomData& random, Eigen::Index n, Index d, Eigen::Index nc, Eigen::Index p) {
+P random_global(RandomData& random, Eigen::Index n, Index d, Eigen::Index nc, Eigen::Index p,
+                double skew = 0) {
   P problem;
   problem.spacedim = d;
-  problem.M = Matrix::from_eigen(random.definite(n, 0.2));
+  problem.M = random_definite(random, n, 0.2, skew);
   problem.H = Matrix::from_eigen(random.sparse(n, d * nc, 0.5));
   problem.f = random.vector(n);
   problem.w = random.vector(d * nc);

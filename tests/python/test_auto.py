@@ -5,6 +5,8 @@ Problems are made from bodies with a planted solution, so that each of them has 
 
 from __future__ import annotations
 
+from typing import Any
+
 import hypothesis
 import numpy as np
 import numpy.typing as npt
@@ -217,6 +219,22 @@ def test_the_stages_add_up() -> None:
     assert fclib.solve(case.problem, "nsgs").stages == []
 
 
+@pytest.mark.parametrize("hard", [False, True])
+def test_the_limit_of_iterations_holds_in_every_stage(hard: bool) -> None:
+    # conjugate gradients on what rests, and all that comes before the homotopy
+    problem: Any = (
+        bodies(1, 20, mu=10, hyperstatic=True, boundary=True)
+        if hard
+        else fclib.load("tiny/KaplasTower/0030")
+    )
+    whole = fclib.solve(problem).iterations
+    assert whole > 50
+    for limit in range(1, whole, 7):
+        result = fclib.solve(problem, max_iterations=limit)
+        assert result.iterations <= limit
+        assert result.status == "iteration_limit"
+
+
 def test_the_same_call_takes_the_same_path() -> None:
     problem = bodies(11, nc=30, hyperstatic=True)
     first, second = fclib.solve(problem), fclib.solve(problem)
@@ -304,6 +322,6 @@ def test_a_jammed_packing(size: int, seed: int, push: float) -> None:
     """The path folds where nearly all rests: rounding the shift's kink unfolds it."""
     problem = Packing().of_size(size, push, seed)
     assert not fclib.solve(problem, solver="nsip").converged
-    result = fclib.solve(problem, solver="nsip", rounding=3)
+    result = fclib.solve(problem, solver="nsip", smoothing=3)
     assert result.converged, result
     assert judge(problem, result.solution).error <= 1.01e-8

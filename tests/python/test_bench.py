@@ -23,7 +23,7 @@ from fclib.bench.campaign import parse_solver
 from fclib.bench.job import MERITS, Job
 from helpers import planted_global, planted_local
 
-KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "6"))
+KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
 RUNS = int(os.environ.get("FCLIB_TEST_RUNS", "400"))
 
 
@@ -204,6 +204,7 @@ def marked(mark: str) -> list[int]:
     return found
 
 
+@pytest.mark.slow
 def test_no_run_is_lost_or_doubled_by_kill_9(tmp_path: Path) -> None:
     repeats = RUNS // 8
     (tmp_path / "killed.toml").write_text(TABLE.format(repeats=repeats))
@@ -270,6 +271,7 @@ def test_no_run_is_lost_or_doubled_by_kill_9(tmp_path: Path) -> None:
     assert not marked(mark)
 
 
+@pytest.mark.slow
 def test_two_campaigns_write_one_store(tmp_path: Path) -> None:
     (tmp_path / "two.toml").write_text(TABLE.format(repeats=20))
     path = tmp_path / "store.sqlite"

@@ -68,6 +68,7 @@ def rows(path: Path) -> list[tuple[Any, ...]]:
         return sorted(tuple(row[name] for name in SAME) for row in store.results())
 
 
+@pytest.mark.slow
 def test_the_same_rows_as_on_one_machine_while_a_worker_dies(
     scheduler: Any, tmp_path: Path
 ) -> None:

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from fclib import bench
-from fclib.bench import profiles
+from fclib.bench import campaign, profiles
 from fclib.bench.job import MERITS, Job, ProblemFacts, Record
 
 # CPU times of three solvers on four problems; None: failed
@@ -331,14 +331,15 @@ def test_an_unreadable_problem_is_no_instance() -> None:
 
 
 def test_an_even_number_of_repeats_counts_by_the_two_in_the_middle() -> None:
-    for times, median in [
+    cases: list[tuple[list[float | None], float]] = [
         ([4.0, 1.0], 2.5),
         ([9.0, 1.0, 3.0, 2.0], 2.5),
         ([8.0, None, 1.0, 3.0], 5.5),
         ([1.0, None], math.inf),
         ([2.0, None, 1.0, None], math.inf),
         ([7.0, 1.0, 3.0, None, 2.0, 5.0], 4.0),
-    ]:
+    ]
+    for times, median in cases:
         rows = [row("A", 0, time) for time in times]
         assert profiles.costs(rows).values.tolist() == [[median]]
 
@@ -527,7 +528,7 @@ def test_a_store_that_is_not_there_is_not_made(tmp_path: Path) -> None:
     absent = tmp_path / "absent.sqlite"
     for read in (
         lambda: profiles.load(absent),
-        lambda: profiles.published(absent),
+        lambda: campaign.published_means(absent),
         lambda: profiles.convergence(absent, [], np.zeros(1)),
     ):
         with pytest.raises(bench.StoreError, match="there is no such store"):
@@ -590,7 +591,7 @@ def test_what_campaigns_quote_is_found_by_family_and_tolerance(tmp_path: Path) -
         store.begin("quotes", text, 0, 0, "here")
         store.begin("nothing", "", 0, 0, "here")
         store.begin("undecided", "[[problems]]\npublished_mean = 1.0", 0, 0, "here")
-    assert profiles.published(tmp_path / "quotes.sqlite") == {
+    assert campaign.published_means(tmp_path / "quotes.sqlite") == {
         ("few", 1e-4): 2.0,
         ("few", 1e-8): 2.0,
         ("many", 1e-3): 0.5,

@@ -22,6 +22,8 @@ pytest.importorskip("sphinx", reason="the documentation's tools are not installe
 pytest.importorskip("mujoco")
 pytest.importorskip("matplotlib")
 
+pytestmark = pytest.mark.slow
+
 PHONE = {"width": 390, "height": 800}
 
 

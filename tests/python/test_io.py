@@ -815,7 +815,7 @@ def test_what_is_no_file_is_neither_read_nor_replaced(fifo: Path, call: str) -> 
         "except fclib.FileError as error:\n    print(error)\n"
     )
     run = subprocess.run(
-        [sys.executable, "-c", code, fifo], capture_output=True, text=True, timeout=10
+        [sys.executable, "-c", code, fifo], capture_output=True, text=True, timeout=300
     )
     assert run.returncode == 0, run.stderr
     assert str(fifo) in run.stdout

@@ -11,8 +11,8 @@ import pytest
 
 from capi_library import compile_program
 
-KILLS = 300
-TIME_LIMIT = 25.0  # seconds for all of them
+KILLS = 150
+TIME_LIMIT = 600.0  # seconds for all of them, on a machine however busy
 SIZES = (30, 900)  # contacts of the problems that take turns, of one chunk and of several
 
 # writes problems in turn, for ever: replaces the problem, then its solution, of a file
@@ -110,6 +110,7 @@ def two_turns(writer: Path, path: Path) -> float:
     return time.monotonic() - start
 
 
+@pytest.mark.slow
 def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_path: Path) -> None:
     writer, reader = programs
     random.seed(1)
@@ -130,14 +131,14 @@ def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_pa
         # the file as it is now, under a name of its own
         kept.append(tmp_path / f"after-{len(kept)}.hdf5")
         os.link(path, kept[-1])
-    assert len(kept) >= 100, "the machine is too slow for this test"
+    assert len(kept) == KILLS
     if unnamed_files(tmp_path):
         # a kill may still come between the naming of a new file and its renaming
         left = set(tmp_path.iterdir()) - {path, *kept}
         assert len(left) <= len(kept) // 20, left
 
     done = subprocess.run(
-        [reader], input="\n".join(map(str, kept)), capture_output=True, text=True, timeout=60
+        [reader], input="\n".join(map(str, kept)), capture_output=True, text=True, timeout=300
     )
     assert done.returncode == 0, done.stderr
     found = [line.split() for line in done.stdout.splitlines()]

@@ -97,13 +97,13 @@ def test_a_slightly_wrong_solution_has_a_slight_error(
         assert merit.error == pytest.approx(judge(case.problem, solution).error, abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["local", "global"])
-@pytest.mark.parametrize("part", ["v", "u", "r", "l"])
+@pytest.mark.parametrize(
+    ("kind", "part"),
+    [(k, p) for k in ("local", "global") for p in "vurl" if (k, p) != ("local", "v")],
+)
 def test_each_member_that_is_there_is_judged(kind: str, part: str) -> None:
     case = planted(kind, 5, 3, 2, "csr")
     members = {name: getattr(case.solution, name) for name in ("v", "u", "r", "l")}
-    if members[part] is None:
-        pytest.skip("a local problem has no v")
     members[part] = members[part] + 1e-3
     merit = fclib.merit(case.problem, fclib.Solution(**members))
     assert merit.error > 1e-5

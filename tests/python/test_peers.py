@@ -186,7 +186,7 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
 
     def run(*arguments: object) -> str:
         done = subprocess.run(
-            [program, *map(str, arguments)], capture_output=True, text=True, timeout=60
+            [program, *map(str, arguments)], capture_output=True, text=True, timeout=300
         )
         assert done.returncode == 0, done.stdout[-500:] + done.stderr[-500:]
         return done.stdout

@@ -174,7 +174,9 @@ def test_stored_solutions_are_not_believed(real_data: Path) -> None:
 
 
 def test_texts_are_those_of_the_file_and_end_where_they_end(real_data: Path) -> None:
-    for path in files(*KINDS):
+    paths = files(*KINDS)
+    assert paths
+    for path in paths:
         problem = fclib.read(path)
         with h5py.File(path) as file:
             group = file[f"fclib_{problem.kind}"].get("info", {})
@@ -183,10 +185,21 @@ def test_texts_are_those_of_the_file_and_end_where_they_end(real_data: Path) -> 
                 assert getattr(problem.info, name) == stored.decode(errors="replace"), path.name
 
 
-def test_layouts_that_are_not_known_yet_are_refused_in_one_line(real_data: Path) -> None:
-    for path in files("rolling", "rolling_local"):
-        if any(kind != "solution" for kind in fclib.contents(path)):
-            continue
-        with pytest.raises(fclib.FileError, match="holds no problem") as caught:
-            fclib.read(path)
-        assert str(path) in str(caught.value)
+def test_rolling_problems_are_solved_and_every_error_is_true(real_data: Path) -> None:
+    paths = files("rolling", "rolling_local")
+    assert len(paths) >= 5
+    for path in paths:
+        problem = fclib.read(path)
+        result = fclib.solve(problem, "auto", 1e-8, max_iterations=SWEEPS)
+        assert abs(result.error - judge(problem, result.solution).error) <= EXACT, path.name
+        assert result.converged, path.name
+
+
+def test_a_layout_that_is_not_known_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "problem.hdf5"
+    with h5py.File(path, "w") as file:
+        file.create_group("fclib_bouncing/vectors")
+    with pytest.raises(fclib.FileError, match="holds no problem") as caught:
+        fclib.read(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)

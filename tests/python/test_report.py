@@ -219,7 +219,9 @@ def test_nothing_is_lost_and_nothing_foreign_replaced(
 
 
 def test_no_path_of_this_machine_is_on_the_site(site: Path, collection: Path) -> None:
-    for path in (site / "data").rglob("*.js"):
+    scripts = list((site / "data").rglob("*.js"))
+    assert scripts
+    for path in scripts:
         assert str(collection) not in path.read_text(), path
 
 
@@ -442,7 +444,9 @@ def test_a_matrix_that_is_not_of_rigid_bodies_gives_a_graph(collection: Path) ->
 
 
 def test_a_view_counts_as_the_merit_does(collection: Path) -> None:
-    for file in sorted(collection.rglob("*.hdf5"))[-4:]:
+    files = sorted(collection.rglob("*.hdf5"))[-4:]
+    assert len(files) == 4
+    for file in files:
         problem, solution = read(file), read_solution(file)
         view = view_of(problem, solution)
         merit = fclib.merit(problem, solution)

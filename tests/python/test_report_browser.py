@@ -25,6 +25,8 @@ api = pytest.importorskip("playwright.sync_api")
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution
+pytestmark = pytest.mark.slow
+
 PHONE = {"width": 390, "height": 800}
 PAGES = {
     "overview": "#/overview",

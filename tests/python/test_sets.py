@@ -149,6 +149,7 @@ def close(first: Any, second: Any) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_tiny_is_regenerated(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     plans = [collections.plan_of(folder) for folder in collections.folders(["tiny"])]

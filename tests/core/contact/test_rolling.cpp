@@ -77,6 +77,9 @@ TEST(RollingCone, projection_by_hand) {
   EXPECT_LT((cone.project(Vec(1, -6, 3)) - Vec(3.2, -1.6, 3)).norm(), 1e-15);
   // rolling alone: n = (1 + 2 * 7) / 5
   EXPECT_LT((cone.project(Vec(1, 0.5, 7)) - Vec(3, 0.5, 6)).norm(), 1e-14);
+  // and where the other part is nothing
+  EXPECT_LT((cone.project(Vec(0.1, -0.4, 0)) - Vec(0.24, -0.12, 0)).norm(), 1e-15);
+  EXPECT_LT((cone.project(Vec(0.1, 0, 0.4)) - Vec(0.18, 0, 0.36)).norm(), 1e-15);
 }
 
 TEST(RollingCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
@@ -84,6 +87,16 @@ TEST(RollingCone, a_point_on_the_boundary_is_its_own_projection_to_the_bit) {
   using Vec = ContactVector<3>;
   for (const Vec& x : {Vec(2, -1, 4), Vec(2, 1, 0), Vec(2, 0, -4), Vec(0, 0, 0)}) {
     EXPECT_EQ(cone.project(x), x);
+  }
+  testing::RandomData random(16);
+  for (int k = 0; k < 100; ++k) {
+    const double mu = random.uniform(0, 2);
+    const double mu_r = random.uniform(0, 2);
+    const double normal = random.uniform(0, 9);
+    for (const Vec& x : {Vec(normal, mu * normal, 0), Vec(normal, 0, mu_r * normal),
+                         Vec(normal, -mu * normal, mu_r * normal)}) {
+      EXPECT_EQ(Rolling<3>(mu, mu_r).project(x), x);
+    }
   }
   // and on that of the polar cone there is nothing left
   EXPECT_EQ(cone.project(Vec(-5, 2, -2)), Vec::Zero());

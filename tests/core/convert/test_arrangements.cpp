@@ -50,6 +50,7 @@ TEST(Islands, split_and_merge_are_inverse) {
   EXPECT_EQ(parts[2].mu.size(), 0);
   const GlobalProblem again = merge(parts, found);
   EXPECT_EQ(again.M, problem.M);
+  EXPECT_TRUE(again.G.empty());
   EXPECT_EQ(again.H, problem.H);
   EXPECT_EQ(again.f, problem.f);
 }
@@ -207,6 +208,38 @@ TEST(Islands, are_linked_by_joints_and_not_by_stored_zeros) {
   EXPECT_EQ(found.of(Dim::nc, 3), 2);
   EXPECT_EQ(found.of(Dim::p, 1), 3);
   EXPECT_EQ(islands(three_bodies()).of(Dim::n, 4), 1);
+  // and where their entries stand in the whole
+  const Arrangement first = places_of(found).front();
+  EXPECT_EQ(first.nc.to, (std::vector<Index>{0, 2}));
+  EXPECT_EQ(first.m.to, (std::vector<Index>{0, 1, 4, 5}));
+  EXPECT_EQ(first.p.to, (std::vector<Index>{0}));
+  EXPECT_EQ(first.nc.count, 4);
+  EXPECT_EQ(first.m.count, 8);
+  EXPECT_EQ(first.p.count, 2);
+  EXPECT_EQ(places_of(islands(three_bodies())).front().n.count, 6);
+}
+
+TEST(Islands, are_linked_through_bodies_and_their_joints) {
+  GlobalProblem problem = three_bodies();
+  // the first joint links the two bodies that touch something, the second holds the third
+  Eigen::MatrixXd g = Eigen::MatrixXd::Zero(6, 2);
+  g(2, 0) = 1;
+  g(4, 0) = -1;
+  g(0, 1) = 1;
+  problem.G = Matrix::from_eigen(g.sparseView());
+  problem.b = Vector::Zero(2);
+  const Islands found = islands(problem);
+  EXPECT_EQ(found.count, 2);
+  EXPECT_EQ(found.contact, (std::vector<Index>{0, 0, 0}));
+  EXPECT_EQ(found.dof, (std::vector<Index>{1, 1, 0, 0, 0, 0}));
+  EXPECT_EQ(found.bilateral, (std::vector<Index>{0, 1}));
+}
+
+TEST(Islands, a_solution_without_velocities_stays_without_them) {
+  const Islands one{.count = 1, .spacedim = 3, .contact = {}, .dof = {0}, .bilateral = {}};
+  const Solution whole = merge(std::vector<Solution>(1), one);
+  EXPECT_EQ(whole.v.size(), 0);
+  EXPECT_EQ(whole.r.size(), 0);
 }
 
 TEST(Islands, of_what_all_touches_contacts_have_no_rest) {
@@ -292,13 +325,19 @@ TEST(Islands, what_does_not_fit_is_an_error) {
   EXPECT_TRUE(says(split_fails(linked), "W: entry (2, 6) links two islands"));
   LocalProblem shorter = problem;
   shorter.q.conservativeResize(7);
-  EXPECT_TRUE(says(split_fails(shorter), "q: has 7 entries, expected"));
+  EXPECT_TRUE(says(split_fails(shorter), "q: has 7 entries, expected m = 8"));
   LocalProblem narrow = problem;
   narrow.W.cols = 7;
-  EXPECT_TRUE(says(split_fails(narrow), "W: has 7 columns, expected"));
+  EXPECT_TRUE(says(split_fails(narrow), "W: has 7 columns, expected m = 8"));
   LocalProblem flat = problem;
   flat.V.rows = 7;
-  EXPECT_TRUE(says(split_fails(flat), "V: has 7 rows, expected"));
+  EXPECT_TRUE(says(split_fails(flat), "V: has 7 rows, expected m = 8"));
+  LocalProblem wide = problem;
+  wide.V.cols = 3;
+  EXPECT_TRUE(says(split_fails(wide), "V: has 3 columns, expected p = 2"));
+  LocalProblem unjoined = problem;
+  unjoined.s.conservativeResize(1);
+  EXPECT_TRUE(says(split_fails(unjoined), "s: has 1 entries, expected p = 2"));
 
   const auto merge_fails = [&](const std::vector<LocalProblem>& wrong) {
     return error_of(ErrorKind::problem, [&] { merge(wrong, found); });
@@ -306,6 +345,9 @@ TEST(Islands, what_does_not_fit_is_an_error) {
   std::vector<LocalProblem> parts = split(problem, found);
   parts[2].q.conservativeResize(1);
   EXPECT_TRUE(says(merge_fails(parts), "part 2: q: has 1 entries, expected"));
+  parts = split(problem, found);
+  for (LocalProblem& part : parts) part.q.resize(0);
+  EXPECT_TRUE(says(merge_fails(parts), "part 0: q: has 0 entries, expected m = 4"));
   parts = split(problem, found);
   parts[1].W.rows = 3;
   EXPECT_TRUE(says(merge_fails(parts), "part 1: W: has 3 rows, expected"));
@@ -347,6 +389,7 @@ TEST(Islands, independent_problems_beside_each_other_are_one) {
 TEST(Embedding, new_rows_of_a_local_problem_hold_the_mean_of_their_contact) {
   RandomData random(46);
   auto planar = testing::random_local<LocalProblem>(random, 2, 3, 2);
+  for (double& value : planar.W.x) value *= 0.1;
   // the last contact has no inertia of its own
   Eigen::MatrixXd w = dense(planar.W);
   w.bottomRows(2).setZero();
@@ -408,6 +451,35 @@ TEST(Embedding, a_global_problem_gets_bodies_at_rest_of_the_mean_mass) {
   for (Index contact = 0; contact < 3; ++contact) h(6 + contact, 3 * contact + 2) = 1;
   EXPECT_EQ(dense(spatial.H), h);
   EXPECT_TRUE(spatial.G.empty());
+}
+
+TEST(Embedding, of_one_velocity_and_of_none) {
+  RandomData random(55);
+  const auto one = testing::random_global<GlobalProblem>(random, 1, 2, 1, 0);
+  const GlobalProblem spatial = embed(one);
+  validate(spatial);
+  EXPECT_EQ(dense(spatial.M), Eigen::MatrixXd(dense(one.M)(0, 0) * Eigen::Matrix2d::Identity()));
+  GlobalProblem none;
+  none.spacedim = 2;
+  none.M =
+      Matrix{.storage = Storage::csr, .rows = 0, .cols = 0, .p = {0}, .i = {}, .x = {}, .info = {}};
+  none.H =
+      Matrix{.storage = Storage::csr, .rows = 0, .cols = 2, .p = {0}, .i = {}, .x = {}, .info = {}};
+  none.w = Vector::Ones(2);
+  none.mu = Vector::Ones(1);
+  validate(none);
+  const GlobalProblem still = embed(none);
+  validate(still);
+  EXPECT_EQ(still.M.rows, 0);
+  EXPECT_EQ(still.w, Eigen::Vector3d(1, 1, 0));
+}
+
+TEST(Embedding, the_mean_mass_is_that_of_the_diagonal) {
+  RandomData random(56);
+  const auto planar = testing::random_global<GlobalProblem>(random, 6, 2, 2, 1);
+  const Eigen::MatrixXd mass = dense(embed(planar).M);
+  EXPECT_NEAR(mass(7, 7), dense(planar.M).trace() / 6, 1e-14);
+  EXPECT_EQ(mass(6, 7), 0);
 }
 
 TEST(Embedding, refuses_what_is_not_planar) {
@@ -527,7 +599,7 @@ TEST(Storage, of_all_matrices_of_a_problem_is_one) {
     }
   }
   const auto plain = testing::random_local<LocalProblem>(random, 3, 2, 0);
-  EXPECT_TRUE(with_storage(plain, Storage::dense).V.empty());
+  EXPECT_EQ(with_storage(plain, Storage::dense).V, Matrix{});
 }
 
 TEST(Storage, a_matrix_too_large_to_be_dense_is_refused) {
@@ -540,6 +612,21 @@ TEST(Storage, a_matrix_too_large_to_be_dense_is_refused) {
   EXPECT_TRUE(says(error_of(ErrorKind::unsuitable, [&] { with_storage(problem, Storage::dense); }),
                    "W: is 60000 x 60000, too large to be dense"));
   EXPECT_EQ(with_storage(problem, Storage::csc).W.storage, Storage::csc);
+  // it is the product of both sizes that counts
+  GlobalProblem wide;
+  const auto zeros = [](Index rows, Index cols) {
+    Matrix a{
+        .storage = Storage::csr, .rows = rows, .cols = cols, .p = {}, .i = {}, .x = {}, .info = {}};
+    a.p.assign(static_cast<std::size_t>(rows) + 1, 0);
+    return a;
+  };
+  wide.M = zeros(2, 2);
+  wide.H = zeros(2, 60000);
+  EXPECT_EQ(with_storage(wide, Storage::dense).H.nnz(), 120000U);
+  wide.M = zeros(1000, 1000);
+  wide.H = zeros(1000, 2200002);
+  EXPECT_TRUE(says(error_of(ErrorKind::unsuitable, [&] { with_storage(wide, Storage::dense); }),
+                   "H: is 1000 x 2200002, too large to be dense"));
 }
 
 }  // namespace

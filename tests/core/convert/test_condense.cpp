@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "convert/complete.hpp"
 #include "convert/eliminate.hpp"
 #include "random_problems.hpp"
@@ -133,7 +131,7 @@ TEST(Condensation, a_mass_that_is_not_definite_is_refused_by_name) {
 
 TEST(Elimination, agrees_with_dense_algebra) {
   testing::RandomData random(18);
-  auto problem = testing::random_local<LocalRollingProblem>(random, 5, 3, 4);
+  auto problem = testing::random_local<LocalRollingProblem>(random, 5, 3, 4, 0.1);
   problem.info.title = "a title";
   const LocalRollingProblem plain = eliminate(problem);
   validate(plain);
@@ -164,11 +162,11 @@ TEST(Elimination, leaves_a_problem_without_joints_as_it_is) {
   EXPECT_EQ(eliminate(problem).q, problem.q);
 }
 
-/// Contacts in the plane without coupling, whose normals one joint holds.
-LocalProblem held_by_a_joint(const Eigen::Vector4d& w, const Eigen::Vector4d& v, double r) {
+/// Two contacts in the plane, and one joint.
+LocalProblem held_by_a_joint(const Eigen::Matrix4d& w, const Eigen::Vector4d& v, double r) {
   LocalProblem problem;
   problem.spacedim = 2;
-  problem.W = Matrix::from_eigen(Eigen::MatrixXd(w.asDiagonal()).sparseView());
+  problem.W = Matrix::from_eigen(w.sparseView());
   problem.V = Matrix::from_eigen(Eigen::MatrixXd(v).sparseView());
   problem.R = Matrix::from_eigen(Eigen::MatrixXd::Constant(1, 1, r).sparseView());
   problem.q = Vector::Zero(4);
@@ -180,22 +178,38 @@ LocalProblem held_by_a_joint(const Eigen::Vector4d& w, const Eigen::Vector4d& v,
 
 TEST(Elimination, what_a_joint_holds_entirely_is_zero_and_not_rounding) {
   // 0.1 - 0.7 (0.7 / 4.9) is 1e-17 in double precision; an entry of W' that is 0 is not stored
-  const LocalProblem plain = eliminate(held_by_a_joint({0.1, 1, 1, 1}, {0.7, 0, 0, 0}, 4.9));
   EXPECT_NE(0.1 - 0.7 * (0.7 / 4.9), 0);
-  EXPECT_EQ(dense(plain.W)(0, 0), 0);
-  EXPECT_EQ(plain.W.nnz(), 3U);
+  Eigen::Matrix4d w = Eigen::Matrix4d::Identity();
+  w(0, 0) = w(2, 2) = 0.1;
+  w(0, 2) = w(2, 0) = -0.1;
+  const LocalProblem plain = eliminate(held_by_a_joint(w, {0.7, 0, -0.7, 0}, 4.9));
+  EXPECT_EQ(dense(plain.W), Eigen::MatrixXd(Eigen::Vector4d(0, 1, 0, 1).asDiagonal()));
+  EXPECT_EQ(plain.W.nnz(), 2U);
+  // nor is one that was stored as 0
+  LocalProblem problem = held_by_a_joint(Eigen::Matrix4d::Identity(), {0, 1, 0, 0}, 2);
+  problem.W = converted(problem.W, Storage::triplet);
+  problem.W.i.push_back(0);
+  problem.W.p.push_back(2);
+  problem.W.x.push_back(0);
+  EXPECT_EQ(eliminate(problem).W.nnz(), 4U);
 }
 
 TEST(Elimination, what_a_joint_leaves_is_kept_even_if_it_is_little) {
+  const Eigen::Matrix4d identity = Eigen::Matrix4d::Identity();
   for (const double left : {1e-6, 1e-12, -1e-12}) {
-    const LocalProblem plain = eliminate(held_by_a_joint({1, 1, 1, 1}, {1, 0, 0, 0}, 1 + left));
+    const LocalProblem plain = eliminate(held_by_a_joint(identity, {1, 0, 0, 0}, 1 + left));
     EXPECT_NEAR(dense(plain.W)(0, 0) / left, 1, 1e-3);
   }
-  // one that is small beside others, but large beside what it is the difference of
-  const LocalProblem plain = eliminate(held_by_a_joint({1e-20, 1, 1, 1}, {0, 1, 0, 0}, 2));
-  EXPECT_EQ(dense(plain.W)(0, 0), 1e-20);
-  // and one that the joint alone makes
-  const LocalProblem coupled = eliminate(held_by_a_joint({1, 1, 1, 1}, {1, 0, 1, 0}, 4));
+  // entries that are small beside others, but large beside what they are the difference of
+  Eigen::Matrix4d w = identity;
+  w(0, 2) = w(2, 0) = 1e-20;
+  w(3, 3) = 1e-20;
+  const LocalProblem plain = eliminate(held_by_a_joint(w, {0, 1, 0, 0}, 2));
+  EXPECT_EQ(dense(plain.W)(0, 2), 1e-20);
+  EXPECT_EQ(dense(plain.W)(2, 0), 1e-20);
+  EXPECT_EQ(dense(plain.W)(3, 3), 1e-20);
+  // and those that the joint alone makes
+  const LocalProblem coupled = eliminate(held_by_a_joint(identity, {1, 0, 1, 0}, 4));
   EXPECT_EQ(dense(coupled.W)(0, 2), -0.25);
   EXPECT_EQ(dense(coupled.W)(2, 0), -0.25);
 }
@@ -221,7 +235,7 @@ TEST(Elimination, redundant_joints_are_refused_and_indefinite_ones_are_not) {
 TEST(Complete, fills_in_what_follows_from_the_reactions_and_nothing_else) {
   testing::RandomData random(21);
   for (const Index p : {0, 3}) {
-    const auto local = testing::random_local<LocalProblem>(random, 3, 3, p);
+    const auto local = testing::random_local<LocalProblem>(random, 3, 3, p, 0.1);
     Solution solution = testing::random_solution(random, local, false, false);
     Vector u = dense(local.W) * solution.r + local.q;
     if (p > 0) u += dense(local.V) * solution.l;
@@ -229,7 +243,7 @@ TEST(Complete, fills_in_what_follows_from_the_reactions_and_nothing_else) {
     solution.u = Vector::Ones(9);
     EXPECT_EQ(complete(local, solution).u, solution.u);
 
-    const auto global = testing::random_global<GlobalProblem>(random, 12, 3, 3, p);
+    const auto global = testing::random_global<GlobalProblem>(random, 12, 3, 3, p, p > 0 ? 0.1 : 0);
     solution = testing::random_solution(random, global, false, false);
     Vector momentum = dense(global.H) * solution.r + global.f;
     if (p > 0) momentum += dense(global.G) * solution.l;

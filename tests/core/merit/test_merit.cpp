@@ -120,7 +120,7 @@ template <class Cone, class P>
 void expect_the_formulas_of_local_problems(RandomData& random) {
   for (const Index p : {0, 3}) {
     for (const bool with_u : {false, true}) {
-      const P problem = testing::random_local<P>(random, Cone::dim, 5, p);
+      const P problem = testing::random_local<P>(random, Cone::dim, 5, p, 0.1);
       const Solution solution = testing::random_solution(random, problem, with_u, false);
       expect_the_formulas<Cone>(problem, solution);
       for (int term = 0; term < 5; ++term) {
@@ -141,7 +141,7 @@ template <class Cone, class P>
 void expect_the_formulas_of_global_problems(RandomData& random) {
   for (const Index p : {0, 3}) {
     for (const int members : {0, 1, 2, 3}) {
-      const P problem = testing::random_global<P>(random, 15, Cone::dim, 4, p);
+      const P problem = testing::random_global<P>(random, 15, Cone::dim, 4, p, p > 0 ? 0.1 : 0);
       const Solution solution =
           testing::random_solution(random, problem, members % 2 == 1, members >= 2);
       expect_the_formulas<Cone>(problem, solution);
@@ -175,6 +175,14 @@ TEST(Merit, every_figure_of_a_global_problem_is_what_its_formula_says) {
   expect_the_formulas_of_global_problems<Coulomb<3>, GlobalProblem>(random);
   expect_the_formulas_of_global_problems<Rolling<3>, GlobalRollingProblem>(random);
   expect_the_formulas_of_global_problems<Rolling<5>, GlobalRollingProblem>(random);
+}
+
+TEST(Merit, one_contact_and_one_velocity_are_judged_like_many) {
+  RandomData random(37);
+  const auto rolling = testing::random_local<LocalRollingProblem>(random, 3, 1, 0);
+  expect_the_formulas<Rolling<3>>(rolling, testing::random_solution(random, rolling, true, false));
+  const auto global = testing::random_global<GlobalProblem>(random, 1, 2, 1, 0);
+  expect_the_formulas<Coulomb<2>>(global, testing::random_solution(random, global, true, true));
 }
 
 TEST(Merit, a_mass_that_is_factorised_already_changes_nothing) {
@@ -232,6 +240,10 @@ TEST(Merit, a_contact_whose_block_is_zero_is_scaled_by_one) {
   // F = -P_K(2, -1) = (-2, 0): nothing holds the contact back
   EXPECT_NEAR(merit(problem, solution).natural, 2 / std::sqrt(5), 1e-15);
   EXPECT_NEAR(merit(problem, solution).scaled_natural, 2 / std::sqrt(5), 1e-15);
+  // F = r where a contact that opens bears load
+  const LocalProblem opens = one_contact(Eigen::Matrix2d::Zero(), {3, 1});
+  const Solution loaded{.v = {}, .u = {}, .r = Eigen::Vector2d(1, 0), .l = {}};
+  EXPECT_NEAR(merit(opens, loaded).scaled_natural, 1 / std::sqrt(10), 1e-15);
 }
 
 TEST(Merit, mass_ratios_of_1e12_do_not_hide_a_mistake_from_the_scaled_error) {

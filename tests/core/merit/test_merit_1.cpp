@@ -63,10 +63,11 @@ double of_global(const P& problem, const Solution& solution) {
 template <class Cone, class Local, class Global>
 void expect_the_formula(RandomData& random) {
   for (const Index p : {0, 3}) {
-    const auto local = testing::random_local<Local>(random, Cone::dim, 4, p);
+    const auto local = testing::random_local<Local>(random, Cone::dim, 4, p, 0.1);
     const Solution of_it = testing::random_solution(random, local, false, false);
     EXPECT_NEAR(merit_1(local, of_it), of_local<Cone>(local, of_it), 1e-11);
-    const auto global = testing::random_global<Global>(random, 14, Cone::dim, 4, p);
+    const auto global =
+        testing::random_global<Global>(random, 14, Cone::dim, 4, p, p > 0 ? 0.1 : 0);
     for (const bool with_v : {false, true}) {
       const Solution solution = testing::random_solution(random, global, false, with_v);
       EXPECT_NEAR(merit_1(global, solution), of_global<Cone>(global, solution), 1e-9);
@@ -80,6 +81,18 @@ TEST(Merit1, is_what_its_formula_says_in_every_formulation) {
   expect_the_formula<Coulomb<3>, LocalProblem, GlobalProblem>(random);
   expect_the_formula<Rolling<3>, LocalRollingProblem, GlobalRollingProblem>(random);
   expect_the_formula<Rolling<5>, LocalRollingProblem, GlobalRollingProblem>(random);
+}
+
+TEST(Merit1, of_one_contact_and_one_velocity_is_what_its_formula_says) {
+  RandomData random(38);
+  for (int k = 0; k < 10; ++k) {
+    const auto local = testing::random_local<LocalRollingProblem>(random, 3, 1, 0);
+    const Solution of_it = testing::random_solution(random, local, false, false);
+    EXPECT_NEAR(merit_1(local, of_it), of_local<Rolling<3>>(local, of_it), 1e-13);
+  }
+  const auto global = testing::random_global<GlobalProblem>(random, 1, 2, 1, 0);
+  const Solution solution = testing::random_solution(random, global, false, true);
+  EXPECT_NEAR(merit_1(global, solution), of_global<Coulomb<2>>(global, solution), 1e-13);
 }
 
 TEST(Merit1, what_is_not_valid_is_an_error) {

@@ -21,9 +21,8 @@
 // start from it; each island is held to its share of the tolerance. What a stage may cost is
 // counted in operations, not in time: the same problem takes the same path on every machine.
 //
-// An iterate that is not finite ends the stage that made it, never the chain. A guess that is no
-// better than r = 0 is left out, and where the chain does not solve the problem from a guess it
-// starts again from r = 0.
+// An iterate that is not finite ends the stage that made it, never the chain. Where the chain does
+// not solve the problem from a guess it starts again from r = 0.
 
 #include <algorithm>
 #include <chrono>
@@ -749,7 +748,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
 
   const Vector zero = Vector::Zero(problem.m());
   bool guessed = (r.array() != 0).any();
-  if (guessed && !(error_at<Cone>(problem, r) < error_at<Cone>(problem, zero))) {
+  if (guessed && error_at<Cone>(problem, r) == endless) {
     r = zero;
     guessed = false;
   }

@@ -31,7 +31,10 @@ void bind_conversions(nb::module_& m) {
       method(
           "eliminate", [](const P& p) { return eliminate(p); },
           "The problem without bilateral constraints: W - V R^-1 V^T, q - V R^-1 s.\n\n"
-          "Raises UnsuitableError where R is singular.");
+          "Constraints that follow from others are left out.\n\n"
+          "Raises UnsuitableError where one contradicts the others, which the message names, or "
+          "where "
+          "R is singular though none follows from the others.");
     }
     const std::string signature = "def with_storage(self, storage: str) -> " + class_name(P::kind);
     nb::cpp_function_def(

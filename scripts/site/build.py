@@ -38,7 +38,15 @@ MENU = {
     "The solvers": ["choosing", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
     "Interfaces": ["command-line", "python", "compiled", "c-api"],
-    "Around it": ["comparison", "migrating", "citing", "architecture", "contributing", "testing", "changelog"],
+    "Around it": [
+        "comparison",
+        "migrating",
+        "citing",
+        "architecture",
+        "contributing",
+        "testing",
+        "changelog",
+    ],
 }
 STYLE = """\
 .content { width: 54em; }

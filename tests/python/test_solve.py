@@ -328,7 +328,7 @@ def test_invalid_problems_are_not_solved() -> None:
             fclib.solve(problem)
 
 
-def test_singular_bilateral_constraints_are_unsuitable() -> None:
+def test_contradicting_bilateral_constraints_are_unsuitable() -> None:
     G = np.ones((9, 2))  # the same constraint twice
     rng = np.random.default_rng(1)
     problem = fclib.GlobalProblem(
@@ -340,8 +340,12 @@ def test_singular_bilateral_constraints_are_unsuitable() -> None:
         mu=[0.5],
         b=[0, 0],
     )
-    with pytest.raises(fclib.UnsuitableError, match="R"):
-        fclib.solve(problem)
+    result = fclib.solve(problem)
+    assert result.converged
+    assert result.solution.l is not None
+    np.testing.assert_allclose(result.solution.l[0], result.solution.l[1])  # the shortest
+    with pytest.raises(fclib.UnsuitableError, match=r"bilateral constraint \d: contradicts"):
+        fclib.solve(problem.replace(b=[0, 1]))
 
 
 # ---- options

@@ -106,7 +106,7 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
     """The problem in another form, with what its solution and its guesses still mean there.
 
     Raises:
-        fclib.UnsuitableError: M or R is singular.
+        fclib.UnsuitableError: M is singular, or bilateral constraints contradict each other.
     """
     problem = stored.problem
     if form is not None and isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):

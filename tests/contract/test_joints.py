@@ -102,9 +102,10 @@ def test_nearly_parallel_constraints_are_solved_where_the_bodies_are_known(angle
         problem: Any = planted.problem
         G = dense(problem.G).copy()
         G[:, 1] = G[:, 0] + angle * rng.standard_normal(len(G))
-        v = planted.solution.v
+        v, multiplier = planted.solution.v, planted.solution.l
         assert v is not None
-        lam = np.linalg.lstsq(G, dense(problem.G) @ planted.solution.l, rcond=None)[0]
+        assert multiplier is not None
+        lam = np.linalg.lstsq(G, dense(problem.G) @ multiplier, rcond=None)[0]
         force = dense(problem.M) @ v - dense(problem.H) @ planted.solution.r - G @ lam
         hard = problem.replace(G=G, b=-G.T @ v, f=force)
         result = fclib.solve(hard)

@@ -1,6 +1,8 @@
 // The problem in the form that solvers take: u = W r + q and the friction law of each contact.
 #pragma once
 
+#include <functional>
+
 #include "friction.hpp"
 #include "linalg/block_matrix.hpp"
 
@@ -19,6 +21,9 @@ struct ReducedProblem {
   Friction friction;
   double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
   const Primal* primal = nullptr;  ///< where the problem is known by its bodies
+  /// Whether something near y (nc) proves that the problem as it was given has no solution: what
+  /// solvers find here may be the rounding of conversions. Without it nothing is proven.
+  const std::function<bool(const Vector& y)>* proves_no_solution = nullptr;
 
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }

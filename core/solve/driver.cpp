@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
@@ -25,18 +26,24 @@ struct Request {
 };
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
-/// `q` is the one that the merit is relative to.
+/// `q` is the one that the merit is relative to; `prove` looks for a proof near y that the problem
+/// as it was given has no solution.
 template <class Judge>
 Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
            const Request& request, const Solution& guess, const Judge& judge,
-           const Primal* primal = nullptr) {
+           const std::function<NoSolution(const Vector&)>& prove, const Primal* primal = nullptr) {
+  Result result;
+  const std::function<bool(const Vector&)> proves = [&](const Vector& y) {
+    result.certificate = prove(y);
+    return result.certificate.proven();
+  };
   const double norm_q = q.norm();
   const ReducedProblem reduced{.W = BlockMatrix(plain.W, plain.spacedim),
                                .q = plain.q,
                                .friction = friction,
                                .scale = norm_q > 0 ? norm_q : 1.0,
-                               .primal = primal};
-  Result result;
+                               .primal = primal,
+                               .proves_no_solution = &proves};
   result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
@@ -63,7 +70,9 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = outcome.stages;
-    result.certificate = outcome.certificate;
+    // a word that nothing stands behind is not passed on
+    if (result.status == Status::infeasible && !result.certificate.proven())
+      result.status = Status::stalled;
     if (!r.allFinite()) {
       result.status = Status::diverged;
       r.setZero();
@@ -72,6 +81,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
     result.error = judge(result.solution);
     if (result.error <= request.settings.tolerance) {
       result.status = Status::converged;
+      result.certificate = {};
       return result;
     }
     if (result.status != Status::converged) return result;
@@ -104,23 +114,26 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
   if (is_mixed(problem)) {
     const Elimination elimination(problem);
-    return run(elimination.plain(), friction_of(problem), problem.q, request, guess,
-               [&](Solution& solution) {
-                 solution = elimination.expand(solution);
-                 return merit(problem, solution).error;
-               });
+    const auto judge = [&](Solution& solution) {
+      solution = elimination.expand(solution);
+      return merit(problem, solution).error;
+    };
+    return run(elimination.plain(), friction_of(problem), problem.q, request, guess, judge, prove);
   }
-  return run(problem, friction_of(problem), problem.q, request, guess, [&](Solution& solution) {
+  const auto judge = [&](Solution& solution) {
     solution.u.resize(0);
     solution = complete(problem, solution);
     return merit(problem, solution).error;
-  });
+  };
+  return run(problem, friction_of(problem), problem.q, request, guess, judge, prove);
 }
 
 template <class P>
 Result solve_global(const P& problem, const Request& request, const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
   const Condensation condensation(problem);
   const LocalProblem& local = condensation.local();
   const auto judge = [&](Solution& solution) {
@@ -129,14 +142,15 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   };
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction_of(problem), local.q, request, guess, judge, &primal);
+    return run(local, friction_of(problem), local.q, request, guess, judge, prove, &primal);
   }
   const Elimination elimination(local);
-  return run(elimination.plain(), friction_of(problem), local.q, request, guess,
-             [&](Solution& solution) {
-               solution = elimination.expand(solution);
-               return judge(solution);
-             });
+  const auto judge_expanded = [&](Solution& solution) {
+    solution = elimination.expand(solution);
+    return judge(solution);
+  };
+  return run(elimination.plain(), friction_of(problem), local.q, request, guess, judge_expanded,
+             prove);
 }
 
 /// What every solve does: checks, times.

@@ -8,7 +8,10 @@ namespace fclib {
 template <class Cone>
 double no_solution_bound(const ReducedProblem& problem, const Vector& y) {
   constexpr int D = Cone::dim;
-  constexpr double rounding = 1e-8;  // relative to the terms that cancel
+  constexpr double least_gain = 1e-8;  // relative to its terms
+  // relative to the terms that cancel: their last digits. A body a million times lighter than its
+  // neighbours leaves more, and such a problem has solutions.
+  constexpr double rounding = 1e-14;
   double gain = 0;
   double terms = 0;
   for (Index a = 0; a < problem.nc(); ++a) {
@@ -16,7 +19,7 @@ double no_solution_bound(const ReducedProblem& problem, const Vector& y) {
     gain -= y[a] * problem.q[D * a];
     terms += y[a] * std::abs(problem.q[D * a]);
   }
-  if (!(gain > rounding * terms)) return 0;
+  if (!(gain > least_gain * terms)) return 0;
   Vector image = Vector::Zero(problem.m());  // -W^T E y
   Vector size = Vector::Zero(problem.nc());
   problem.W.template for_each_block<D>([&](Index row, Index col, const auto& block) {

@@ -12,7 +12,7 @@ import pytest
 
 import fclib
 from fclib import _core
-from helpers import judge, planted_global, planted_law
+from helpers import judge, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from planted_judge import verdict
@@ -173,3 +173,14 @@ def test_conversions_are_held_to_the_limit() -> None:
         problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, clock=Looks()
     )
     assert judge(problem, result.solution).error == pytest.approx(result.error)
+
+
+@pytest.mark.parametrize("k", [20, 25, 28, 40])
+@pytest.mark.parametrize("d", [2, 3])
+def test_a_light_body_under_a_heavy_one_is_never_infeasible(k: int, d: int) -> None:
+    # W is positive definite: what closes the contacts has a small velocity, and not none
+    W = np.kron([[1, -1], [-1, 1 + 2.0**-k]], np.eye(d))
+    q = ([-1.0] + [0.1] * (d - 1)) * 2
+    problem = local_problem(W, q, [0.5, 0.5])
+    result = fclib.solve(problem, max_iterations=3000)
+    assert result.status != "infeasible"

@@ -1,10 +1,10 @@
 // Functions F(u, r) of one contact that vanish exactly where the contact law holds, with elements
 // A = dF/du and B = dF/dr of their generalised Jacobians: what semismooth Newton methods solve.
 //
-//   AlartCurnier        r - alart_curnier_projection(r - rho u): disks of radius mu max(r_N - rho_N
-//   u_N, 0) JeanMoreau          the same with disks of radius mu max(r_N, 0) NaturalMap          r
-//   - P_K(r - rho u^) FischerBurmeister   x + y - (x o x + y o y)^(1/2), x = (mu r_N, r_T), y = rho
-//   (u^_N / mu, u_T),
+//   AlartCurnier        r - its projection of r - rho u: disks of radius mu max(r_N - rho_N u_N, 0)
+//   JeanMoreau          the same with disks of radius mu max(r_N, 0)
+//   NaturalMap          r - P_K(r - rho u^)
+//   FischerBurmeister   x + y - (x o x + y o y)^(1/2), x = (mu r_N, r_T), y = rho (u^_N / mu, u_T),
 //                       o the product of the Lorentz cone's Jordan algebra
 //
 // rho (1/[W]) has an entry for each component: where a function is not `split`, only the first

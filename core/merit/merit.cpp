@@ -2,75 +2,62 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <optional>
 
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
-#include "linalg/factorization.hpp"
+#include "merit/equations.hpp"
 
 namespace fclib {
 
 namespace {
 
-// A referee is more precise than what it judges: with r = 4e5 and q = 0.8, as in granular packings
-// under load, the rounding of W r alone is worth 1e-11 in double precision.
-using Real = long double;
-using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
-
-RealVector product(const Matrix& a, const RealVector& x) {
-  RealVector y = RealVector::Zero(a.rows);
-  multiply_add(a, x, y);
-  return y;
-}
-
-RealVector product_transposed(const Matrix& a, const RealVector& x) {
-  RealVector y = RealVector::Zero(a.cols);
-  multiply_transposed_add(a, x, y);
-  return y;
-}
-
-/// || |A| |x| ||: the size of what the product adds up, however much of it cancels. A velocity that
-/// vanishes is a sum of terms that do not, and its rounding is relative to them.
-Real size_of_product(const Matrix& a, const RealVector& x, bool transposed = false) {
-  Matrix sizes = a;
-  for (double& value : sizes.x) value = std::abs(value);
-  return (transposed ? product_transposed(sizes, x.cwiseAbs()) : product(sizes, x.cwiseAbs()))
-      .norm();
-}
-
-double relative(Real residual, std::initializer_list<Real> terms) {
-  const Real largest = std::max(terms);
-  return static_cast<double>(largest > 0 ? residual / largest : residual);
+/// ||F|| over ||q||, or over what rounding leaves of q where that is larger; absolute without
+/// either.
+double relative(Real squares, Real q_squares, Real rounding_squares) {
+  const Real scale = std::sqrt(std::max(q_squares, rounding_squares));
+  const Real norm = std::sqrt(squares);
+  return static_cast<double>(scale > 0 ? norm / scale : norm);
 }
 
 void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
 
-/// The parts that depend on one contact at a time. `scale` is tr(W_aa) / d of each contact.
+/// The natural map of a contact beyond what the rounding of its q explains.
+Real square_beyond(Real norm, Real rounding) {
+  const Real left = std::max(Real(0), norm - rounding);
+  return left * left;
+}
+
+/// The parts that depend on one contact at a time.
 template <class Cone>
-void judge_contacts(const Friction& friction, const RealVector& q, const RealVector& u,
-                    const RealVector& r, const RealVector& scale, Merit& result,
-                    ContactMerits& each) {
+void judge_contacts(const Friction& friction, const RealVector& r, const Equations& equations,
+                    Merit& result, ContactMerits& each) {
   constexpr int D = Cone::dim;
   Real squares = 0;
+  Real q_squares = 0;
+  Real rounding_squares = 0;
   Real scaled_squares = 0;
   Real scaled_q = 0;
-  each = {.status = {},
-          .u = u.cast<double>(),
-          .natural = Vector(friction.mu.size()),
-          .cone = Vector(friction.mu.size()),
-          .dual_cone = Vector(friction.mu.size())};
+  Real scaled_rounding = 0;
+  each.u = equations.u.cast<double>();
+  for (Vector* figures : {&each.natural, &each.cone, &each.dual_cone}) {
+    figures->resize(friction.mu.size());
+  }
   for (Eigen::Index contact = 0; contact < friction.mu.size(); ++contact) {
     const Cone cone(friction, contact);
-    const ContactVector<D, Real> ua = u.segment<D>(D * contact);
+    const ContactVector<D, Real> ua = equations.u.segment<D>(D * contact);
     const ContactVector<D, Real> ra = r.segment<D>(D * contact);
     const ContactVector<D, Real> modified = cone.modified(ua);
-    const Real square = natural_map(cone, ua, ra).squaredNorm();
-    squares += square;
-    const Real rho = scale[contact] > 0 ? 1 / scale[contact] : Real(1);
-    scaled_squares += natural_map(cone, ua, ra, rho).squaredNorm();
-    scaled_q += rho * rho * q.segment<D>(D * contact).squaredNorm();
-    each.natural[contact] = static_cast<double>(std::sqrt(square));
+    const Real q_square = equations.q.segment<D>(D * contact).squaredNorm();
+    const Real rounding = equations.rounding.segment<D>(D * contact).norm();
+    const Real norm = natural_map(cone, ua, ra).norm();
+    squares += square_beyond(norm, rounding);
+    q_squares += q_square;
+    rounding_squares += rounding * rounding;
+    const Real rho = equations.scale[contact] > 0 ? 1 / equations.scale[contact] : Real(1);
+    scaled_squares += square_beyond(natural_map(cone, ua, ra, rho).norm(), rho * rounding);
+    scaled_q += rho * rho * q_square;
+    scaled_rounding += rho * rho * rounding * rounding;
+    each.natural[contact] = static_cast<double>(norm);
     each.cone[contact] = static_cast<double>(cone_violation(cone, ra));
     each.dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
     raise(result.cone, each.cone[contact]);
@@ -89,106 +76,42 @@ void judge_contacts(const Friction& friction, const RealVector& q, const RealVec
         break;
     }
   }
-  result.natural = relative(std::sqrt(squares), {q.norm()});
-  result.scaled_natural = relative(std::sqrt(scaled_squares), {std::sqrt(scaled_q)});
+  result.natural = relative(squares, q_squares, rounding_squares);
+  result.scaled_natural = relative(scaled_squares, scaled_q, scaled_rounding);
 }
 
-void judge_contacts(Index spacedim, const Friction& friction, const RealVector& q,
-                    const RealVector& u, const RealVector& r, const RealVector& scale,
-                    Merit& result, ContactMerits& each) {
-  const bool rolling = friction.mu_r.size() > 0;
+Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
+            const Equations& equations, ContactMerits& each) {
+  Merit result;
+  for (const Mismatch& mismatch : equations.mismatches) {
+    double& member = mismatch.part == "v"   ? result.dynamics
+                     : mismatch.part == "u" ? result.kinematics
+                                            : result.bilateral;
+    member = mismatch.error;
+  }
+  const RealVector r = solution.r.cast<Real>();
   if (spacedim == 2) {
-    judge_contacts<Coulomb<2, Real>>(friction, q, u, r, scale, result, each);
+    judge_contacts<Coulomb<2, Real>>(friction, r, equations, result, each);
   } else if (spacedim == 5) {
-    judge_contacts<Rolling<5, Real>>(friction, q, u, r, scale, result, each);
-  } else if (rolling) {
-    judge_contacts<Rolling<3, Real>>(friction, q, u, r, scale, result, each);
+    judge_contacts<Rolling<5, Real>>(friction, r, equations, result, each);
+  } else if (friction.mu_r.size() > 0) {
+    judge_contacts<Rolling<3, Real>>(friction, r, equations, result, each);
   } else {
-    judge_contacts<Coulomb<3, Real>>(friction, q, u, r, scale, result, each);
+    judge_contacts<Coulomb<3, Real>>(friction, r, equations, result, each);
   }
   result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
-}
-
-Merit judge(const LocalProblem& problem, const Friction& friction, const Solution& solution,
-            ContactMerits& each, const Factorization*) {
-  Merit result;
-  const RealVector q = problem.q.cast<Real>();
-  const RealVector r = solution.r.cast<Real>();
-
-  // u = W r + V lambda + q
-  RealVector u = product(problem.W, r) + q;
-  Real largest = std::max(size_of_product(problem.W, r), q.norm());
-  if (is_mixed(problem)) {
-    const RealVector l = solution.l.cast<Real>();
-    const RealVector s = problem.s.cast<Real>();
-    u += product(problem.V, l);
-    largest = std::max(largest, size_of_product(problem.V, l));
-    result.bilateral =
-        relative((product_transposed(problem.V, r) + product(problem.R, l) + s).norm(),
-                 {size_of_product(problem.V, r, true), size_of_product(problem.R, l), s.norm()});
-  }
-  if (solution.u.size() > 0) {
-    const RealVector given = solution.u.cast<Real>();
-    result.kinematics = relative((given - u).norm(), {given.norm(), largest});
-  }
-
-  RealVector scale = RealVector::Zero(problem.mu.size());
-  for_each_entry(problem.W, [&](Index row, Index col, double value) {
-    if (row == col) scale[row / problem.spacedim] += Real(value) / problem.spacedim;
-  });
-  judge_contacts(problem.spacedim, friction, q, u, r, scale, result, each);
   return result;
 }
 
-Merit judge(const GlobalProblem& problem, const Friction& friction, const Solution& solution,
-            ContactMerits& each, const Factorization* known) {
-  Merit result;
-  std::optional<Factorization> made;
-  const Factorization& mass = known ? *known : made.emplace(to_eigen(problem.M), "M");
-  const RealVector f = problem.f.cast<Real>();
-  const RealVector w = problem.w.cast<Real>();
-  const RealVector r = solution.r.cast<Real>();
+Equations equations_of(const LocalProblem& problem, const Solution& solution,
+                       const Factorization* /*mass*/) {
+  return equations(problem, solution);
+}
 
-  // M v = H r + G lambda + f
-  RealVector momentum = product(problem.H, r) + f;
-  Real largest = std::max(size_of_product(problem.H, r), f.norm());
-  if (is_mixed(problem)) {
-    const RealVector l = solution.l.cast<Real>();
-    momentum += product(problem.G, l);
-    largest = std::max(largest, size_of_product(problem.G, l));
-  }
-  RealVector v = solution.v.cast<Real>();
-  if (v.size() == 0) {
-    v = mass.solve(momentum.cast<double>()).cast<Real>();
-  } else {
-    result.dynamics = relative((product(problem.M, v) - momentum).norm(),
-                               {size_of_product(problem.M, v), largest});
-  }
-  // of the condensed problem, whose terms do not vanish with v where bodies come to rest
-  const RealVector free = mass.solve(problem.f).cast<Real>();
-  if (is_mixed(problem)) {
-    const RealVector b = problem.b.cast<Real>();
-    result.bilateral = relative(
-        (product_transposed(problem.G, v) + b).norm(),
-        {size_of_product(problem.G, v, true), size_of_product(problem.G, free, true), b.norm()});
-  }
-
-  // u = H^T v + w
-  const RealVector u = product_transposed(problem.H, v) + w;
-  if (solution.u.size() > 0) {
-    const RealVector given = solution.u.cast<Real>();
-    result.kinematics =
-        relative((given - u).norm(), {given.norm(), size_of_product(problem.H, v, true), w.norm()});
-  }
-
-  const RealVector q = product_transposed(problem.H, free) + w;
-  RealVector scale = RealVector::Zero(problem.mu.size());
-  const Vector diagonal = mass.gram_diagonal(to_eigen(problem.H));
-  for (Eigen::Index col = 0; col < diagonal.size(); ++col) {
-    scale[col / problem.spacedim] += Real(diagonal[col]) / problem.spacedim;
-  }
-  judge_contacts(problem.spacedim, friction, q, u, r, scale, result, each);
-  return result;
+Equations equations_of(const GlobalProblem& problem, const Solution& solution,
+                       const Factorization* known) {
+  if (known) return equations(problem, solution, *known);
+  return equations(problem, solution, Factorization(to_eigen(problem.M), "M"));
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
@@ -197,7 +120,9 @@ Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& eac
                   const Factorization* mass = nullptr) {
   validate(problem);
   validate(solution, problem);
-  return judge(problem, friction_of(problem), solution, each, mass);
+  const Equations found = equations_of(problem, solution, mass);
+  each.mismatches = found.mismatches;
+  return judge(problem.spacedim, friction_of(problem), solution, found, each);
 }
 
 template <class P>

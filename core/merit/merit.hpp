@@ -14,11 +14,10 @@
 #include <vector>
 
 #include "contact/cone.hpp"
+#include "merit/equations.hpp"
 #include "problem.hpp"
 
 namespace fclib {
-
-class Factorization;
 
 struct Merit {
   double error = 0;
@@ -85,13 +84,14 @@ struct Merit {
   }
 };
 
-/// The same for each contact.
+/// The same for each contact, and where the equations fail most.
 struct ContactMerits {
   std::vector<ContactStatus> status;
-  Vector u;          ///< velocity, recomputed (m) [m/s]
-  Vector natural;    ///< ||r - P_K(r - u^)|| (nc), not relative to anything
-  Vector cone;       ///< distance of r from K (nc) [N s]
-  Vector dual_cone;  ///< distance of u^ from K* (nc) [m/s]
+  Vector u;                          ///< velocity, recomputed (m) [m/s]
+  Vector natural;                    ///< ||r - P_K(r - u^)|| (nc), not relative to anything
+  Vector cone;                       ///< distance of r from K (nc) [N s]
+  Vector dual_cone;                  ///< distance of u^ from K* (nc) [m/s]
+  std::vector<Mismatch> mismatches;  ///< of each of v, u and l that is stored: its worst component
 };
 
 /// The merit of (solution, problem). r is required, and l where there are bilateral constraints;

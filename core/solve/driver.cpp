@@ -22,21 +22,44 @@ struct Request {
   const Deadline& deadline;  ///< of all, conversions included
 };
 
+/// What the merit is relative to.
+struct Measure {
+  double q = 0;         ///< ||q||
+  double rounding = 0;  ///< ... and what rounding leaves of it
+
+  Measure(const Vector& given, const Vector& rounding_of_given)
+      : q(given.stableNorm()), rounding(rounding_of_given.stableNorm()) {}
+
+  /// That of a solver: it need not go below what rounding leaves.
+  [[nodiscard]] double scale(double tolerance) const {
+    const double least = tolerance > 0 ? rounding / (2 * tolerance) : rounding;
+    return std::max(q, least) > 0 ? std::max(q, least) : 1.0;
+  }
+};
+
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
-/// `q` is the one that the merit is relative to.
 template <class Judge>
-Result run(const LocalProblem& plain, const Friction& friction, const Vector& q,
+Result run(const LocalProblem& plain, const Friction& friction, const Measure& measure,
            const Request& request, const Solution& guess, const Judge& judge,
            const Primal* primal = nullptr) {
-  const double norm_q = q.norm();
+  Result result;
+  result.solver = request.solver.name;
+  if (measure.q <= measure.rounding) {
+    // what is left of q is rounding: no reaction is one where that suffices
+    result.solution.r = Vector::Zero(plain.q.size());
+    result.error = judge(result.solution);
+    if (result.error <= request.settings.tolerance) {
+      result.status = Status::converged;
+      if (request.settings.history) result.history.emplace();
+      return result;
+    }
+  }
   const ReducedProblem reduced{.W = BlockMatrix(plain.W, plain.spacedim),
                                .q = plain.q,
                                .friction = friction,
-                               .scale = norm_q > 0 ? norm_q : 1.0,
+                               .scale = measure.scale(request.settings.tolerance),
                                .primal = primal,
                                .deadline = &request.deadline};
-  Result result;
-  result.solver = request.solver.name;
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -122,6 +145,7 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
+  const Measure measure(problem.q, rounding_of_q(problem));
   if (is_mixed(problem)) {
     const Elimination elimination(problem, &request.deadline);
     if (!elimination.finished()) {
@@ -132,13 +156,13 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
                            return merit(problem, solution).error;
                          });
     }
-    return run(elimination.plain(), friction_of(problem), problem.q, request, guess,
+    return run(elimination.plain(), friction_of(problem), measure, request, guess,
                [&](Solution& solution) {
                  solution = elimination.expand(solution);
                  return merit(problem, solution).error;
                });
   }
-  return run(problem, friction_of(problem), problem.q, request, guess, [&](Solution& solution) {
+  return run(problem, friction_of(problem), measure, request, guess, [&](Solution& solution) {
     solution.u.resize(0);
     solution = complete(problem, solution);
     return merit(problem, solution).error;
@@ -149,6 +173,7 @@ template <class P>
 Result solve_global(const P& problem, const Request& request, const Solution& guess) {
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
+  const Measure measure(local.q, rounding_of_q(problem, condensation.mass()));
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
     return merit(problem, solution, condensation.mass()).error;
@@ -159,11 +184,11 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   if (!condensation.finished()) return stop();
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction_of(problem), local.q, request, guess, judge, &primal);
+    return run(local, friction_of(problem), measure, request, guess, judge, &primal);
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
-  return run(elimination.plain(), friction_of(problem), local.q, request, guess,
+  return run(elimination.plain(), friction_of(problem), measure, request, guess,
              [&](Solution& solution) {
                solution = elimination.expand(solution);
                return judge(solution);

@@ -1,0 +1,314 @@
+#include "merit/equations.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+
+namespace fclib {
+
+namespace {
+
+/// What rounding leaves of a sum, over the sizes of its terms: some roundings each.
+constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
+
+RealVector product(const Matrix& a, const RealVector& x) {
+  RealVector y = RealVector::Zero(a.rows);
+  multiply_add(a, x, y);
+  return y;
+}
+
+RealVector product_transposed(const Matrix& a, const RealVector& x) {
+  RealVector y = RealVector::Zero(a.cols);
+  multiply_transposed_add(a, x, y);
+  return y;
+}
+
+/// |A| |x|: the sizes of what the product adds up.
+RealVector sizes(const Matrix& a, const RealVector& x) {
+  RealVector y = RealVector::Zero(a.rows);
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[row] += std::abs(Real(value)) * std::abs(x[col]);
+  });
+  return y;
+}
+
+/// |A|^T |x|
+RealVector sizes_transposed(const Matrix& a, const RealVector& x) {
+  RealVector y = RealVector::Zero(a.cols);
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[col] += std::abs(Real(value)) * std::abs(x[row]);
+  });
+  return y;
+}
+
+RealVector solved(const Factorization& mass, const RealVector& b) {
+  return mass.solve(Vector(b.cast<double>())).cast<Real>();
+}
+
+/// M^-1 b, refined: the velocity that belongs to an impulse, not the one that rounding leaves.
+RealVector solved_precisely(const GlobalProblem& problem, const Factorization& mass,
+                            const RealVector& b) {
+  RealVector x = solved(mass, b);
+  for (int step = 0; step < 2; ++step) x += solved(mass, b - product(problem.M, x));
+  return x;
+}
+
+/// Errors of these sizes with signs drawn at random (from the same seed every time), brought to
+/// velocities by M^-1: a few of them say how errors spread, where |M^-1| would be dense.
+class Spread {
+ public:
+  Spread(const Factorization& mass, const RealVector& size) {
+    std::uint64_t state = 1;
+    for (RealVector& velocity : velocities_) {
+      RealVector signed_size = size;
+      for (Real& value : signed_size) {
+        state = state * 6364136223846793005U + 1442695040888963407U;
+        if ((state >> 63U) != 0) value = -value;
+      }
+      velocity = solved(mass, signed_size);
+    }
+  }
+
+  /// The root of the mean square of A^T x over these velocities x.
+  [[nodiscard]] RealVector along(const Matrix& a) const {
+    RealVector sum = RealVector::Zero(a.cols);
+    for (const RealVector& velocity : velocities_) {
+      sum += product_transposed(a, velocity).cwiseAbs2();
+    }
+    return (sum / Real(velocities_.size())).cwiseSqrt();
+  }
+
+ private:
+  std::array<RealVector, 4> velocities_;
+};
+
+/// The norm of each contact's part of x, at each of its components.
+RealVector contact_norms(const RealVector& x, Index d) {
+  RealVector result(x.size());
+  for (Eigen::Index at = 0; at < x.size(); at += d) {
+    result.segment(at, d).setConstant(x.segment(at, d).norm());
+  }
+  return result;
+}
+
+/// Impulses that stop these velocities of the contacts, each alone.
+RealVector stopping(const RealVector& velocity, const RealVector& scale, Index d) {
+  RealVector result = contact_norms(velocity, d);
+  for (Eigen::Index k = 0; k < result.size(); ++k) {
+    const Real w = scale[k / d];
+    result[k] = w > 0 ? result[k] / w : Real(0);
+  }
+  return result;
+}
+
+/// x over y by components, 0 where y is.
+RealVector quotient(const RealVector& x, const RealVector& y) {
+  RealVector result(x.size());
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    result[k] = y[k] != 0 ? std::abs(x[k] / y[k]) : Real(0);
+  }
+  return result;
+}
+
+Real root_mean_square(const RealVector& x) {
+  return x.size() > 0 ? x.norm() / std::sqrt(Real(x.size())) : Real(0);
+}
+
+/// What is left of each component beyond its rounding.
+RealVector beyond(const RealVector& x, const RealVector& rounding) {
+  RealVector result(x.size());
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const Real left = std::abs(x[k]) - rounding[k];
+    result[k] = left > 0 ? std::copysign(left, x[k]) : Real(0);
+  }
+  return result;
+}
+
+/// The component where `difference` is worst: `left` of it beyond rounding, over `scale`.
+Mismatch worst(std::string_view part, const Vector& stored, const RealVector& difference,
+               const RealVector& left, const RealVector& scale) {
+  Mismatch result{.part = part};
+  for (Eigen::Index k = 0; k < left.size(); ++k) {
+    const Real size = std::abs(left[k]);
+    const auto error = static_cast<double>(scale[k] > 0 ? size / scale[k] : size);
+    if (k > 0 && !(error > result.error)) continue;
+    result.index = static_cast<Index>(k);
+    result.stored = stored[k];
+    result.difference = static_cast<double>(difference[k]);
+    result.error = error;
+  }
+  return result;
+}
+
+RealVector largest(const RealVector& x, const RealVector& y) {
+  return x.cwiseAbs().cwiseMax(y.cwiseAbs());
+}
+
+/// What reactions of a problem's own size are, and what they leave of the precision of q.
+struct Sizes {
+  RealVector l;  ///< that stop the joints, each alone (p)
+  RealVector q;  ///< of the terms of u without reactions (m)
+  RealVector rounding;
+};
+
+Sizes sizes_of(const LocalProblem& problem) {
+  Sizes result{.l = {}, .q = problem.q.cast<Real>().cwiseAbs(), .rounding = {}};
+  result.rounding = RealVector::Zero(problem.q.size());
+  if (!is_mixed(problem)) return result;
+  RealVector diagonal = RealVector::Zero(problem.s.size());
+  for_each_entry(problem.R, [&](Index row, Index col, double value) {
+    if (row == col) diagonal[row] += value;
+  });
+  result.l = quotient(problem.s.cast<Real>(), diagonal);
+  const RealVector moved = sizes(problem.V, result.l);
+  result.q += moved;
+  result.rounding = rounding_unit * moved;
+  return result;
+}
+
+/// With the free velocity M^-1 f.
+Sizes sizes_of(const GlobalProblem& problem, const Factorization& mass, const RealVector& free) {
+  Sizes result;
+  RealVector impulse = sizes(problem.M, free) + problem.f.cast<Real>().cwiseAbs();
+  if (is_mixed(problem)) {
+    const RealVector velocity =
+        sizes_transposed(problem.G, free) + problem.b.cast<Real>().cwiseAbs();
+    result.l = quotient(velocity, mass.gram_diagonal(to_eigen(problem.G)).cast<Real>());
+    impulse += sizes(problem.G, result.l);
+  }
+  result.q = sizes_transposed(problem.H, free) + problem.w.cast<Real>().cwiseAbs();
+  result.rounding = rounding_unit * (result.q + Spread(mass, impulse).along(problem.H));
+  return result;
+}
+
+}  // namespace
+
+Vector rounding_of_q(const LocalProblem& problem) {
+  return sizes_of(problem).rounding.cast<double>();
+}
+
+Vector rounding_of_q(const GlobalProblem& problem, const Factorization& mass) {
+  const RealVector free = solved(mass, problem.f.cast<Real>());
+  return sizes_of(problem, mass, free).rounding.cast<double>();
+}
+
+Equations equations(const LocalProblem& problem, const Solution& solution) {
+  const Index d = problem.spacedim;
+  Equations result;
+  const RealVector r = solution.r.cast<Real>();
+  Sizes own = sizes_of(problem);
+  result.q = problem.q.cast<Real>();
+  result.rounding = std::move(own.rounding);
+  result.scale = RealVector::Zero(problem.mu.size());
+  for_each_entry(problem.W, [&](Index row, Index col, double value) {
+    if (row == col) result.scale[row / d] += Real(value) / d;
+  });
+  const RealVector stop = stopping(own.q, result.scale, d);
+
+  // u = W r + V lambda + q
+  result.u = product(problem.W, r) + result.q;
+  RealVector terms = sizes(problem.W, r) + result.q.cwiseAbs();
+  if (is_mixed(problem)) {
+    const RealVector l = solution.l.cast<Real>();
+    const RealVector s = problem.s.cast<Real>();
+    result.u += product(problem.V, l);
+    terms += sizes(problem.V, l);
+    // V^T r + R lambda + s = 0
+    const RealVector residual = product_transposed(problem.V, r) + product(problem.R, l) + s;
+    const RealVector parts = sizes_transposed(problem.V, r) + sizes(problem.R, l) + s.cwiseAbs();
+    const RealVector velocity =
+        sizes_transposed(problem.V, stop) + sizes(problem.R, own.l) + s.cwiseAbs();
+    const RealVector least = RealVector::Constant(s.size(), root_mean_square(s));
+    result.mismatches.push_back(worst("l", solution.l, residual,
+                                      beyond(residual, rounding_unit * parts),
+                                      largest(velocity, least)));
+  }
+  if (solution.u.size() > 0) {
+    const RealVector difference = solution.u.cast<Real>() - result.u;
+    const RealVector velocity =
+        largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
+    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
+    result.mismatches.push_back(worst("u", solution.u, difference,
+                                      beyond(difference, rounding_unit * terms),
+                                      largest(velocity, least)));
+  }
+  return result;
+}
+
+Equations equations(const GlobalProblem& problem, const Solution& solution,
+                    const Factorization& mass) {
+  const Index d = problem.spacedim;
+  const bool mixed = is_mixed(problem);
+  Equations result;
+  const RealVector f = problem.f.cast<Real>();
+  const RealVector w = problem.w.cast<Real>();
+  const RealVector r = solution.r.cast<Real>();
+  const RealVector free = solved(mass, f);
+  Sizes own = sizes_of(problem, mass, free);
+  result.q = product_transposed(problem.H, free) + w;
+  result.rounding = std::move(own.rounding);
+  result.scale = RealVector::Zero(problem.mu.size());
+  const Vector diagonal = mass.gram_diagonal(to_eigen(problem.H));
+  for (Eigen::Index col = 0; col < diagonal.size(); ++col) {
+    result.scale[col / d] += Real(diagonal[col]) / d;
+  }
+
+  // M v = H r + G lambda + f
+  RealVector momentum = product(problem.H, r) + f;
+  RealVector terms = sizes(problem.H, r) + f.cwiseAbs();
+  RealVector stop = sizes(problem.H, stopping(own.q, result.scale, d));
+  if (mixed) {
+    const RealVector l = solution.l.cast<Real>();
+    momentum += product(problem.G, l);
+    terms += sizes(problem.G, l);
+    stop += sizes(problem.G, own.l);
+  }
+  const bool given_v = solution.v.size() > 0;
+  const RealVector v =
+      given_v ? RealVector(solution.v.cast<Real>()) : solved_precisely(problem, mass, momentum);
+  terms += sizes(problem.M, v);
+  const RealVector fastest = largest(v, free);
+  if (given_v) {
+    const RealVector residual = product(problem.M, v) - momentum;
+    const RealVector left = beyond(residual, rounding_unit * terms);
+    const RealVector velocity = largest(fastest, solved(mass, stop));
+    const Real all = velocity.size() > 0 ? velocity.maxCoeff() : Real(0);
+    const RealVector least =
+        RealVector::Constant(v.size(), all * std::numeric_limits<double>::epsilon());
+    result.mismatches.push_back(worst("v", solution.v, solved(mass, residual), solved(mass, left),
+                                      largest(velocity, least)));
+  }
+
+  // u = H^T v + w
+  result.u = product_transposed(problem.H, v) + w;
+  const bool given_u = solution.u.size() > 0;
+  std::optional<Spread> spread;
+  if (mixed || (given_u && !given_v)) spread.emplace(mass, terms);
+  if (given_u) {
+    const RealVector difference = solution.u.cast<Real>() - result.u;
+    const RealVector parts = sizes_transposed(problem.H, fastest) + w.cwiseAbs();
+    RealVector rounding = parts;
+    if (!given_v) rounding += spread->along(problem.H);
+    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
+    result.mismatches.push_back(worst("u", solution.u, difference,
+                                      beyond(difference, rounding_unit * rounding),
+                                      largest(contact_norms(parts, d), least)));
+  }
+
+  // G^T v + b = 0
+  if (mixed) {
+    const RealVector b = problem.b.cast<Real>();
+    const RealVector residual = product_transposed(problem.G, v) + b;
+    const RealVector parts = sizes_transposed(problem.G, fastest) + b.cwiseAbs();
+    const RealVector rounding = parts + spread->along(problem.G);
+    result.mismatches.push_back(
+        worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding), parts));
+  }
+  return result;
+}
+
+}  // namespace fclib

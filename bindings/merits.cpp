@@ -14,6 +14,17 @@ using namespace nb::literals;
 void bind_merits(nb::module_& m) {
   nb::class_<Merit> merit_class(m, "Merit", "How good a solution is, judged from the data alone.");
   def_fields(merit_class);
+  merit_class.def(
+      "error_by",
+      [](const Merit& merit, const std::string& kind) {
+        if (kind != "both" && kind != "natural") {
+          throw Error(ErrorKind::option, "'" + kind + "' is neither both nor natural", "merit");
+        }
+        return merit.error_by(kind == "both" ? MeritKind::both : MeritKind::natural);
+      },
+      "merit"_a,
+      "error, where merit is 'both'; where it is 'natural' the same without scaled_natural.\n\n"
+      "Raises OptionError for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
         "merit_1", [](const P& p, const Solution& s) { return merit_1(p, s); }, "problem"_a,
@@ -42,14 +53,28 @@ void bind_merits(nb::module_& m) {
           result["natural"] = array(merits.natural);
           result["cone"] = array(merits.cone);
           result["dual_cone"] = array(merits.dual_cone);
+          nb::list mismatches;
+          for (const Mismatch& one : merits.mismatches) {
+            nb::dict row;
+            row["part"] = std::string(one.part);
+            row["index"] = one.index;
+            row["stored"] = one.stored;
+            row["difference"] = one.difference;
+            row["error"] = one.error;
+            mismatches.append(row);
+          }
+          result["mismatches"] = mismatches;
           return result;
         },
         "problem"_a, "solution"_a,
         nb::sig(("def contact_merits(problem: " + class_name(P::kind) +
-                 ", solution: Solution) -> dict[str, numpy.typing.NDArray[typing.Any]]")
+                 ", solution: Solution) -> dict[str, typing.Any]")
                     .c_str()),
         "The merit contact by contact: status (open, stick, slide), u (m,) recomputed, natural "
-        "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,).\n\n"
+        "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,); and "
+        "mismatches: of each of v, u and l that is stored the component that is worst, a dict of "
+        "part, index, stored, difference (of l the velocity left at its joint) and error, the "
+        "difference beyond rounding over the velocity of its component.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,

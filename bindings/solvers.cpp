@@ -52,8 +52,9 @@ void bind_solve(nb::module_& m) {
       "solve",
       [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
          double time_limit, const OptionValues& options, const Solution* guess,
-         const nb::object& callback, bool history, const nb::object& clock) {
+          const nb::object& callback, bool history, bool natural, const nb::object& clock) {
         Settings settings{.tolerance = tolerance,
+                          .merit = natural ? MeritKind::natural : MeritKind::both,
                           .max_iterations = max_iterations,
                           .time_limit = time_limit,
                           .callback = make_callback(callback),
@@ -64,7 +65,8 @@ void bind_solve(nb::module_& m) {
         return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
-      "guess"_a.none(), "callback"_a.none(), "history"_a, "clock"_a.none() = nb::none());
+       "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
+       "clock"_a.none() = nb::none());
 }
 
 nb::object history_of(const Result& result) {
@@ -154,7 +156,10 @@ void bind_solvers(nb::module_& m) {
           "infeasible")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
-      .def_ro("error", &Result::error, "Merit.error of the solution, on the problem as given")
+      .def_ro("error", &Result::error,
+              "Merit.error of the solution (Merit.error_by where `solve` was asked for a merit), "
+              "on the "
+              "problem as given")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)

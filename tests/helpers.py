@@ -125,13 +125,25 @@ class Verdict:
     @property
     def error(self) -> float:
         """The bound of every tolerance."""
-        return max(self.natural, self.dynamics, self.bilateral, self.kinematics)
+        return max(
+            self.natural, self.scaled_natural, self.dynamics, self.bilateral, self.kinematics
+        )
 
 
-def relative(residual: Array, *terms: Array) -> float:
-    """The norm of a residual over that of its largest term."""
-    largest = max(float(np.linalg.norm(term)) for term in terms)
-    return float(np.linalg.norm(residual)) / (largest or 1.0)
+def worst(residual: Array, velocity: Array) -> float:
+    """The largest quotient of a residual and the velocity of its component."""
+    size = np.abs(residual)
+    return float(np.where(velocity > 0, size / np.where(velocity > 0, velocity, 1), size).max())
+
+
+def by_contact(x: Array, d: int) -> Array:
+    """The norm of each contact's part of x, at each of its components."""
+    return np.repeat(np.linalg.norm(x.reshape(-1, d), axis=1), d)
+
+
+def mean(x: Array) -> float:
+    """The root of the mean square."""
+    return float(np.linalg.norm(x) / np.sqrt(max(1, x.size)))
 
 
 def columns(a: Any) -> Any:
@@ -147,47 +159,60 @@ def sizes(a: Any, x: Array) -> Array:
 
 
 def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
-    """Judge a solution by the equations of its formulation."""
+    """Judge a solution by the equations of its formulation; nothing is left to rounding."""
     d, mu, r = problem.spacedim, problem.mu, solution.r
     dynamics = bilateral = kinematics = 0.0
+
+    def stopping(velocity: Array) -> Array:
+        """Impulses that stop velocities of the contacts, each alone."""
+        w = np.repeat(diagonal.reshape(-1, d).mean(axis=1), d)
+        return np.where(w > 0, by_contact(velocity, d) / np.where(w > 0, w, 1), 0)
+
     if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         q = problem.q
         W = columns(problem.W)
+        diagonal = W.diagonal()
         u = W @ r + q
-        velocity_terms = [sizes(W, r), q]
+        own = abs(q)
         if problem.V is not None:
             V, R, lam, s = columns(problem.V), columns(problem.R), solution.l, problem.s
             assert lam is not None
             assert s is not None
             u = u + V @ lam
-            velocity_terms.append(sizes(V, lam))
-            bilateral = relative(V.T @ r + R @ lam + s, sizes(V.T, r), sizes(R, lam), s)
-        diagonal = W.diagonal()
+            held = abs(s / R.diagonal())
+            own = own + sizes(V, held)
+            velocity = sizes(V.T, stopping(own)) + sizes(R, held) + abs(s)
+            bilateral = worst(V.T @ r + R @ lam + s, np.maximum(velocity, mean(s)))
+        moved = by_contact(sizes(W, stopping(own)) + own, d)
+        terms = np.maximum(moved, by_contact(u, d))
     else:
         M, H, f, w = columns(problem.M), columns(problem.H), problem.f, problem.w
         solve = splu(M).solve if problem.n else np.copy
+        y = solve(H.toarray()) if problem.n and problem.m else np.zeros(H.shape)
+        diagonal = np.sum(H.toarray() * y, axis=0)
         impulse = H @ r + f
-        impulse_terms = [sizes(H, r), f]
+        free = solve(f)
+        q = H.T @ free + w
+        stop = sizes(H, stopping(sizes(H.T, free) + abs(w)))
         if problem.G is not None:
             assert solution.l is not None
-            impulse = impulse + columns(problem.G) @ solution.l
-            impulse_terms.append(sizes(columns(problem.G), solution.l))
+            assert problem.b is not None
+            G, b = columns(problem.G), problem.b
+            impulse = impulse + G @ solution.l
+            inertia = np.sum(G.toarray() * solve(G.toarray()), axis=0)
+            stop = stop + sizes(G, (sizes(G.T, free) + abs(b)) / inertia)
         v = solution.v
         if v is None:
             v = solve(impulse)
-        else:
-            dynamics = relative(M @ v - impulse, sizes(M, v), *impulse_terms)
+        fastest = np.maximum(abs(v), abs(free))
+        if solution.v is not None:
+            dynamics = worst(v - solve(impulse), np.maximum(fastest, abs(solve(stop))))
         if problem.G is not None:
-            G, b = columns(problem.G), problem.b
-            assert b is not None
-            bilateral = relative(G.T @ v + b, sizes(G.T, v), sizes(G.T, solve(f)), b)
+            bilateral = worst(G.T @ v + b, sizes(G.T, fastest) + abs(b))
         u = H.T @ v + w
-        velocity_terms = [sizes(H.T, v), w]
-        q = H.T @ solve(f) + w
-        y = solve(H.toarray()) if problem.n and problem.m else np.zeros(H.shape)
-        diagonal = np.sum(H.toarray() * y, axis=0)
-    if solution.u is not None:
-        kinematics = relative(solution.u - u, solution.u, *velocity_terms)
+        terms = by_contact(sizes(H.T, fastest) + abs(w), d)
+    if solution.u is not None and u.size:
+        kinematics = worst(solution.u - u, np.maximum(terms, mean(q)))
 
     contacts, reactions = u.reshape(-1, d), r.reshape(-1, d)
     mu_r = getattr(problem, "mu_r", None)

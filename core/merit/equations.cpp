@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <utility>
 
 namespace fclib {
@@ -148,15 +147,10 @@ RealVector largest(const RealVector& x, const RealVector& y) {
   return x.cwiseAbs().cwiseMax(y.cwiseAbs());
 }
 
-/// What reactions of a problem's own size are, and what they leave of the precision of q.
-struct Sizes {
-  RealVector l;  ///< that stop the joints, each alone (p)
-  RealVector q;  ///< of the terms of u without reactions (m)
-  RealVector rounding;
-};
+}  // namespace
 
-Sizes sizes_of(const LocalProblem& problem) {
-  Sizes result{.l = {}, .q = problem.q.cast<Real>().cwiseAbs(), .rounding = {}};
+OwnSizes own_sizes(const LocalProblem& problem) {
+  OwnSizes result{.free = {}, .l = {}, .q = problem.q.cast<Real>().cwiseAbs(), .rounding = {}};
   result.rounding = RealVector::Zero(problem.q.size());
   if (!is_mixed(problem)) return result;
   RealVector diagonal = RealVector::Zero(problem.s.size());
@@ -170,9 +164,10 @@ Sizes sizes_of(const LocalProblem& problem) {
   return result;
 }
 
-/// With the free velocity M^-1 f.
-Sizes sizes_of(const GlobalProblem& problem, const Factorization& mass, const RealVector& free) {
-  Sizes result;
+OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass) {
+  OwnSizes result;
+  result.free = solved(mass, problem.f.cast<Real>());
+  const RealVector& free = result.free;
   RealVector impulse = sizes(problem.M, free) + problem.f.cast<Real>().cwiseAbs();
   if (is_mixed(problem)) {
     const RealVector velocity =
@@ -185,28 +180,23 @@ Sizes sizes_of(const GlobalProblem& problem, const Factorization& mass, const Re
   return result;
 }
 
-}  // namespace
-
-Vector rounding_of_q(const LocalProblem& problem) {
-  return sizes_of(problem).rounding.cast<double>();
-}
-
-Vector rounding_of_q(const GlobalProblem& problem, const Factorization& mass) {
-  const RealVector free = solved(mass, problem.f.cast<Real>());
-  return sizes_of(problem, mass, free).rounding.cast<double>();
+RealVector mean_diagonals(const LocalProblem& problem) {
+  const Index d = problem.spacedim;
+  RealVector result = RealVector::Zero(problem.mu.size());
+  for_each_entry(problem.W, [&](Index row, Index col, double value) {
+    if (row == col) result[row / d] += Real(value) / d;
+  });
+  return result;
 }
 
 Equations equations(const LocalProblem& problem, const Solution& solution) {
   const Index d = problem.spacedim;
   Equations result;
   const RealVector r = solution.r.cast<Real>();
-  Sizes own = sizes_of(problem);
+  OwnSizes own = own_sizes(problem);
   result.q = problem.q.cast<Real>();
   result.rounding = std::move(own.rounding);
-  result.scale = RealVector::Zero(problem.mu.size());
-  for_each_entry(problem.W, [&](Index row, Index col, double value) {
-    if (row == col) result.scale[row / d] += Real(value) / d;
-  });
+  result.scale = mean_diagonals(problem);
   const RealVector stop = stopping(own.q, result.scale, d);
 
   // u = W r + V lambda + q
@@ -240,17 +230,16 @@ Equations equations(const LocalProblem& problem, const Solution& solution) {
 }
 
 Equations equations(const GlobalProblem& problem, const Solution& solution,
-                    const Factorization& mass) {
+                    const Factorization& mass, const OwnSizes& own) {
   const Index d = problem.spacedim;
   const bool mixed = is_mixed(problem);
   Equations result;
   const RealVector f = problem.f.cast<Real>();
   const RealVector w = problem.w.cast<Real>();
   const RealVector r = solution.r.cast<Real>();
-  const RealVector free = solved(mass, f);
-  Sizes own = sizes_of(problem, mass, free);
+  const RealVector& free = own.free;
   result.q = product_transposed(problem.H, free) + w;
-  result.rounding = std::move(own.rounding);
+  result.rounding = own.rounding;
   result.scale = RealVector::Zero(problem.mu.size());
   const Vector diagonal = mass.gram_diagonal(to_eigen(problem.H));
   for (Eigen::Index col = 0; col < diagonal.size(); ++col) {
@@ -260,12 +249,10 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   // M v = H r + G lambda + f
   RealVector momentum = product(problem.H, r) + f;
   RealVector terms = sizes(problem.H, r) + f.cwiseAbs();
-  RealVector stop = sizes(problem.H, stopping(own.q, result.scale, d));
   if (mixed) {
     const RealVector l = solution.l.cast<Real>();
     momentum += product(problem.G, l);
     terms += sizes(problem.G, l);
-    stop += sizes(problem.G, own.l);
   }
   const bool given_v = solution.v.size() > 0;
   const RealVector v =
@@ -275,24 +262,27 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   if (given_v) {
     const RealVector residual = product(problem.M, v) - momentum;
     const RealVector left = beyond(residual, rounding_unit * terms);
-    const RealVector velocity = largest(fastest, solved(mass, stop));
-    const Real all = velocity.size() > 0 ? velocity.maxCoeff() : Real(0);
-    const RealVector least =
-        RealVector::Constant(v.size(), all * std::numeric_limits<double>::epsilon());
-    result.mismatches.push_back(worst("v", solution.v, solved(mass, residual), solved(mass, left),
-                                      largest(velocity, least)));
+    Mismatch mismatch{.part = "v", .stored = v.size() > 0 ? solution.v[0] : 0};
+    if (!left.isZero(0)) {
+      RealVector stop = sizes(problem.H, stopping(own.q, result.scale, d));
+      if (mixed) stop += sizes(problem.G, own.l);
+      const RealVector velocity = largest(fastest, solved(mass, stop));
+      const RealVector least = RealVector::Constant(
+          v.size(), velocity.maxCoeff() * std::numeric_limits<double>::epsilon());
+      mismatch = worst("v", solution.v, solved(mass, residual), solved(mass, left),
+                       largest(velocity, least));
+    }
+    result.mismatches.push_back(mismatch);
   }
 
   // u = H^T v + w
   result.u = product_transposed(problem.H, v) + w;
   const bool given_u = solution.u.size() > 0;
-  std::optional<Spread> spread;
-  if (mixed || (given_u && !given_v)) spread.emplace(mass, terms);
   if (given_u) {
     const RealVector difference = solution.u.cast<Real>() - result.u;
     const RealVector parts = sizes_transposed(problem.H, fastest) + w.cwiseAbs();
     RealVector rounding = parts;
-    if (!given_v) rounding += spread->along(problem.H);
+    if (!given_v) rounding += Spread(mass, terms).along(problem.H);
     const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
     result.mismatches.push_back(worst("u", solution.u, difference,
                                       beyond(difference, rounding_unit * rounding),
@@ -304,7 +294,10 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
     const RealVector b = problem.b.cast<Real>();
     const RealVector residual = product_transposed(problem.G, v) + b;
     const RealVector parts = sizes_transposed(problem.G, fastest) + b.cwiseAbs();
-    const RealVector rounding = parts + spread->along(problem.G);
+    RealVector rounding = parts;
+    if (!beyond(residual, rounding_unit * parts).isZero(0)) {
+      rounding += Spread(mass, terms).along(problem.G);  // the impulses are rounded too
+    }
     result.mismatches.push_back(
         worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding), parts));
   }

@@ -39,12 +39,22 @@ struct Equations {
   std::vector<Mismatch> mismatches;  ///< one of each part that is stored
 };
 
+/// What the equations are judged by that depends on the problem alone.
+struct OwnSizes {
+  RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
+  RealVector l;         ///< reactions that stop the joints, each alone (p)
+  RealVector q;         ///< of the terms of u without reactions (m) [m/s]
+  RealVector rounding;  ///< Equations::rounding
+};
+
+OwnSizes own_sizes(const LocalProblem& problem);
+OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass);
+
 Equations equations(const LocalProblem& problem, const Solution& solution);
 Equations equations(const GlobalProblem& problem, const Solution& solution,
-                    const Factorization& mass);
+                    const Factorization& mass, const OwnSizes& own);
 
-/// Equations::rounding, which depends on the problem alone.
-Vector rounding_of_q(const LocalProblem& problem);
-Vector rounding_of_q(const GlobalProblem& problem, const Factorization& mass);
+/// Equations::scale of a local problem.
+RealVector mean_diagonals(const LocalProblem& problem);
 
 }  // namespace fclib

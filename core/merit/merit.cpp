@@ -99,36 +99,39 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
   } else {
     judge_contacts<Coulomb<3, Real>>(friction, r, equations, result, each);
   }
-  result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
+  result.error = std::max(result.error_by(MeritKind::natural), result.scaled_natural);
   return result;
 }
 
 Equations equations_of(const LocalProblem& problem, const Solution& solution,
-                       const Factorization* /*mass*/) {
+                       const Factorization* /*mass*/, const OwnSizes* /*own*/) {
   return equations(problem, solution);
 }
 
 Equations equations_of(const GlobalProblem& problem, const Solution& solution,
-                       const Factorization* known) {
-  if (known) return equations(problem, solution, *known);
-  return equations(problem, solution, Factorization(to_eigen(problem.M), "M"));
+                       const Factorization* known, const OwnSizes* own) {
+  if (known && own) return equations(problem, solution, *known, *own);
+  if (known) return equations(problem, solution, *known, own_sizes(problem, *known));
+  const Factorization mass(to_eigen(problem.M), "M");
+  return equations(problem, solution, mass, own_sizes(problem, mass));
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
 template <class P>
 Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each,
-                  const Factorization* mass = nullptr) {
+                  const Factorization* mass = nullptr, const OwnSizes* own = nullptr) {
   validate(problem);
   validate(solution, problem);
-  const Equations found = equations_of(problem, solution, mass);
+  const Equations found = equations_of(problem, solution, mass, own);
   each.mismatches = found.mismatches;
   return judge(problem.spacedim, friction_of(problem), solution, found, each);
 }
 
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution, const Factorization* mass = nullptr) {
+Merit judge_valid(const P& problem, const Solution& solution, const Factorization* mass = nullptr,
+                  const OwnSizes* own = nullptr) {
   ContactMerits each;
-  return judge_valid(problem, solution, each, mass);
+  return judge_valid(problem, solution, each, mass, own);
 }
 
 template <class P>
@@ -156,9 +159,17 @@ Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
 Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass) {
   return judge_valid(problem, solution, &mass);
 }
+Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass,
+            const OwnSizes& own) {
+  return judge_valid(problem, solution, &mass, &own);
+}
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
             const Factorization& mass) {
   return judge_valid(problem, solution, &mass);
+}
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
+            const Factorization& mass, const OwnSizes& own) {
+  return judge_valid(problem, solution, &mass, &own);
 }
 
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {

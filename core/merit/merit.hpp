@@ -1,20 +1,23 @@
 // How good a solution is, judged from the data of the problem alone.
 //
 // The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
-// error = ||F||_2 / ||q||_2, absolute where q is zero. u is recomputed: W r + V lambda + q, or
-// H^T v + w, never taken from the solution. All sums are made in extended precision.
+// error = ||F||_2 / ||q||_2; scaled, the same with rho u^, which does not change with the units. u
+// is recomputed: W r + V lambda + q, or H^T v + w, never taken from the solution. All sums are made
+// in extended precision. What rounding leaves of q, by the sizes of its terms, is no error, and
+// errors are not relative to less.
 //
-// The residual of an equation is relative to its largest term, and the size of a term A x is
-// || |A| |x| ||: where the term itself vanishes (contacts at rest), its norm would compare rounding
-// with rounding.
+// The other equations are judged by components (merit/equations.hpp). docs/mathematics.md has the
+// definitions with their reasons.
 #pragma once
 
+#include <algorithm>
 #include <string_view>
 #include <tuple>
 #include <vector>
 
 #include "contact/cone.hpp"
 #include "merit/equations.hpp"
+#include "merit_kind.hpp"
 #include "problem.hpp"
 
 namespace fclib {
@@ -33,31 +36,40 @@ struct Merit {
   Index stick = 0;
   Index slide = 0;
 
+  /// `error`, or the same without the scaled map.
+  [[nodiscard]] double error_by(MeritKind kind) const {
+    return kind == MeritKind::both ? error : std::max({natural, dynamics, bilateral, kinematics});
+  }
+
   static constexpr auto fields() {
     using M = Merit;
     return std::tuple{
         Field<M, double>{.name = "error",
                          .member = &M::error,
-                         .doc = "what a tolerance bounds: the largest of natural, dynamics, "
-                                "bilateral and kinematics"},
+                         .doc = "what a tolerance bounds: the largest of natural, scaled_natural, "
+                                "dynamics, bilateral and kinematics"},
         Field<M, double>{.name = "natural",
                          .member = &M::natural,
-                         .doc = "||r - P_K(r - u^)|| / ||q||, q condensed for a global problem"},
+                         .doc = "||r - P_K(r - u^)|| / ||q||, q condensed for a global problem, "
+                                "beyond rounding"},
         Field<M, double>{.name = "scaled_natural",
                          .member = &M::scaled_natural,
                          .doc = "||r - P_K(r - rho u^)|| / ||rho q||, rho = d / tr(W_aa): the same "
                                 "in all units"},
         Field<M, double>{.name = "dynamics",
                          .member = &M::dynamics,
-                         .doc = "||M v - H r - G lambda - f|| over its largest term"},
+                         .doc =
+                             "largest error of a component of v, M^-1 (M v - H r - G lambda - f) "
+                             "beyond rounding, over its own velocity"},
         Field<M, double>{.name = "bilateral",
                          .member = &M::bilateral,
-                         .doc = "||G^T v + b|| or ||V^T r + R lambda + s|| over its largest term, "
-                                "G^T M^-1 f among them"},
+                         .doc = "largest component of G^T v + b or V^T r + R lambda + s beyond "
+                                "rounding, over the velocities of its joint"},
         Field<M, double>{.name = "kinematics",
                          .member = &M::kinematics,
-                         .doc = "distance of the solution's u from the recomputed one, over the "
-                                "largest term of its equation"},
+                         .doc = "largest difference of a component of the solution's u from the "
+                                "recomputed one beyond rounding, over the velocities of its "
+                                "contact"},
         Field<M, double>{.name = "cone",
                          .member = &M::cone,
                          .unit = "N s",
@@ -108,6 +120,10 @@ Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass);
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
             const Factorization& mass);
+Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass,
+            const OwnSizes& own);
+Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
+            const Factorization& mass, const OwnSizes& own);
 
 /// As merit(), and throws as it does.
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);

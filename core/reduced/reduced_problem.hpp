@@ -19,6 +19,8 @@ struct ReducedProblem {
   Vector q;
   Friction friction;
   double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
+  Vector rho;        ///< of the scaled natural map (nc); empty: errors are by the plain one alone
+  double scaled_scale = 1;             ///< errors by the scaled map are relative to this: ||rho q||
   const Primal* primal = nullptr;      ///< where the problem is known by its bodies
   const Deadline* deadline = nullptr;  ///< of the solve, if it has one
 

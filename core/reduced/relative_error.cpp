@@ -17,7 +17,19 @@ double natural_map_squared(const Vector& u, const Vector& r, const Friction& fri
 
 template <class Cone>
 double relative_error(const ReducedProblem& problem, const Vector& u, const Vector& r) {
-  return std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  const double natural =
+      std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
+  if (problem.rho.size() == 0) return natural;
+  constexpr int d = Cone::dim;
+  double sum = 0;
+  for (Eigen::Index contact = 0; contact < problem.rho.size(); ++contact) {
+    const Cone cone(problem.friction, contact);
+    sum += natural_map(cone, u.segment<d>(d * contact), r.segment<d>(d * contact),
+                       problem.rho[contact])
+               .squaredNorm();
+  }
+  const double scaled = std::sqrt(sum) / problem.scaled_scale;
+  return scaled <= natural ? natural : scaled;  // of a NaN the NaN
 }
 
 #define FCLIB_INSTANTIATE(Cone)                                                             \

@@ -26,14 +26,29 @@ struct Request {
 struct Measure {
   double q = 0;         ///< ||q||
   double rounding = 0;  ///< ... and what rounding leaves of it
+  Vector rho;           ///< of the scaled map, for the merit that bounds both
+  double scaled_q = 0;  ///< ||rho q||
+  double scaled_rounding = 0;
 
-  Measure(const Vector& given, const Vector& rounding_of_given)
-      : q(given.stableNorm()), rounding(rounding_of_given.stableNorm()) {}
+  /// Of a problem without conversion or condensed, before bilateral constraints left it.
+  Measure(const LocalProblem& problem, const RealVector& rounding_of_q, MeritKind kind)
+      : q(problem.q.norm()), rounding(static_cast<double>(rounding_of_q.norm())) {
+    if (kind == MeritKind::natural) return;
+    const Index d = problem.spacedim;
+    rho = mean_diagonals(problem).cast<double>();
+    for (double& value : rho) value = value > 0 ? 1 / value : 1;
+    const auto scaled = [&](Vector x) {
+      for (Eigen::Index k = 0; k < x.size(); ++k) x[k] *= rho[k / d];
+      return x.stableNorm();
+    };
+    scaled_q = scaled(problem.q);
+    scaled_rounding = scaled(rounding_of_q.cast<double>());
+  }
 
-  /// That of a solver: it need not go below what rounding leaves.
-  [[nodiscard]] double scale(double tolerance) const {
-    const double least = tolerance > 0 ? rounding / (2 * tolerance) : rounding;
-    return std::max(q, least) > 0 ? std::max(q, least) : 1.0;
+  /// That of a solver, which need not go below what rounding leaves.
+  static double scale(double q, double rounding, double tolerance) {
+    const double largest = std::max(q, tolerance > 0 ? rounding / (2 * tolerance) : rounding);
+    return largest > 0 ? largest : 1.0;
   }
 };
 
@@ -54,12 +69,16 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return result;
     }
   }
-  const ReducedProblem reduced{.W = BlockMatrix(plain.W, plain.spacedim),
-                               .q = plain.q,
-                               .friction = friction,
-                               .scale = measure.scale(request.settings.tolerance),
-                               .primal = primal,
-                               .deadline = &request.deadline};
+  const double tolerance = request.settings.tolerance;
+  const ReducedProblem reduced{
+      .W = BlockMatrix(plain.W, plain.spacedim),
+      .q = plain.q,
+      .friction = friction,
+      .scale = Measure::scale(measure.q, measure.rounding, tolerance),
+      .rho = measure.rho,
+      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding, tolerance),
+      .primal = primal,
+       .deadline = &request.deadline};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -145,7 +164,8 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
-  const Measure measure(problem.q, rounding_of_q(problem));
+  const MeritKind kind = request.settings.merit;
+  const Measure measure(problem, own_sizes(problem).rounding, kind);
   if (is_mixed(problem)) {
     const Elimination elimination(problem, &request.deadline);
     if (!elimination.finished()) {
@@ -159,13 +179,13 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
     return run(elimination.plain(), friction_of(problem), measure, request, guess,
                [&](Solution& solution) {
                  solution = elimination.expand(solution);
-                 return merit(problem, solution).error;
+                 return merit(problem, solution).error_by(kind);
                });
   }
   return run(problem, friction_of(problem), measure, request, guess, [&](Solution& solution) {
     solution.u.resize(0);
     solution = complete(problem, solution);
-    return merit(problem, solution).error;
+    return merit(problem, solution).error_by(kind);
   });
 }
 
@@ -173,10 +193,12 @@ template <class P>
 Result solve_global(const P& problem, const Request& request, const Solution& guess) {
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
-  const Measure measure(local.q, rounding_of_q(problem, condensation.mass()));
+  const MeritKind kind = request.settings.merit;
+  const OwnSizes own = own_sizes(problem, condensation.mass());
+  const Measure measure(local, own.rounding, kind);
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
-    return merit(problem, solution, condensation.mass()).error;
+    return merit(problem, solution, condensation.mass(), own).error_by(kind);
   };
   const auto stop = [&] {
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);

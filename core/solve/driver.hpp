@@ -24,8 +24,8 @@ struct Result {
   Solution solution;
   Status status = Status::diverged;
   std::int64_t iterations = 0;
-  double error = 0;    ///< Merit::error of the solution, on the problem as it was given
-  double cpu_s = 0;    ///< CPU time of the solver alone [s]
+  double error = 0;  ///< Merit::error_by(Settings::merit) of the solution, on the problem as given
+  double cpu_s = 0;  ///< CPU time of the solver alone [s]
   double setup_s = 0;  ///< CPU time of conversions, validation and merit [s]
   /// y >= 0 (nc) which proves that there is no solution, where the status is infeasible: on the
   /// condensed problem without bilateral constraints, -W^T E y is in K* and y . q_N < 0, with E y

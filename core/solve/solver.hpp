@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "deadline.hpp"
+#include "merit_kind.hpp"
 #include "reduced/reduced_problem.hpp"
 #include "solve/options.hpp"
 
@@ -65,6 +66,7 @@ struct Progress {
 /// What a caller asks of any solver.
 struct Settings {
   double tolerance = 1e-8;                                      ///< on Merit::error
+  MeritKind merit = MeritKind::both;                            ///< ... by this
   std::int64_t max_iterations = 0;                              ///< 0: the solver's own default
   double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s], conversions
                                                                 ///< included

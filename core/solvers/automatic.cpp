@@ -642,8 +642,11 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
                       .q = {},
                       .friction = {},
                       .scale = problem.scale,
+                      .rho = {},
+                      .scaled_scale = problem.scaled_scale,
                       .deadline = problem.deadline};
   const auto count = static_cast<Eigen::Index>(contacts.size());
+  if (problem.rho.size() > 0) part.rho = problem.rho(contacts);
   part.q.resize(d * count);
   part.friction.mu.resize(count);
   if (problem.rolling()) part.friction.mu_r.resize(count);
@@ -680,15 +683,26 @@ void chain(const ReducedProblem& problem, const Options& options, Tracker& track
   Vector u;
   problem.velocity(r, u);
   std::vector<double> squared(islands.size(), 0.0);
+  std::vector<double> scaled(islands.size(), 0.0);
   double sum = 0;
   for (Index a = 0; a < nc; ++a) {
     const Cone cone(problem.friction, a);
-    const double error = natural_map(cone, typename Cone::Vec(u.template segment<D>(D * a)),
-                                     typename Cone::Vec(r.template segment<D>(D * a)))
-                             .squaredNorm() /
-                         (problem.scale * problem.scale);
+    const typename Cone::Vec ua = u.template segment<D>(D * a);
+    const typename Cone::Vec ra = r.template segment<D>(D * a);
+    const double error = natural_map(cone, ua, ra).squaredNorm() / (problem.scale * problem.scale);
     squared[group[a]] += error;
     sum += error;
+    if (problem.rho.size() > 0) {
+      scaled[group[a]] += natural_map(cone, ua, ra, problem.rho[a]).squaredNorm() /
+                          (problem.scaled_scale * problem.scaled_scale);
+    }
+  }
+  if (problem.rho.size() > 0) {  // of each island the larger error
+    sum = 0;
+    for (std::size_t k = 0; k < islands.size(); ++k) {
+      squared[k] = std::max(squared[k], scaled[k]);
+      sum += squared[k];
+    }
   }
   for (std::size_t k = 0; k < islands.size() && !tracker.stopped(); ++k) {
     const std::vector<Index>& contacts = islands[k];

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,8 @@ Problem: TypeAlias = (
     | _core.GlobalRollingProblem
 )
 
+MeritKind: TypeAlias = Literal["both", "natural"]
+
 
 def solve(
     problem: Problem,
@@ -29,6 +31,7 @@ def solve(
     guess: _core.Solution | None = None,
     callback: Callable[[int, float, float, str], bool | None] | None = None,
     history: bool = False,
+    merit: MeritKind = "both",
     **options: bool | int | float | str,
 ) -> _core.Result:
     """Solve a frictional contact problem of any formulation.
@@ -36,7 +39,7 @@ def solve(
     Args:
         problem: a local or a global problem, with or without bilateral constraints.
         solver: a name of ``fclib.solvers()``.
-        tol: bound on ``Merit.error``, the relative natural-map error.
+        tol: bound on ``Merit.error``.
         max_iterations: limit of the solver's iterations, its own default where None.
         time_limit: [s] limit of wall-clock time.
         guess: a starting point; of it ``r`` is used.
@@ -44,6 +47,8 @@ def solve(
             evaluates its error; returning False stops it. ``stage`` is empty but for solvers that
             chain others, as ``auto`` does.
         history: whether ``Result.history`` keeps all that a callback is told.
+        merit: what ``tol`` bounds: ``both`` the natural map and the scaled one, which is the same
+            in any units, or ``natural`` alone, to compare with the literature.
         **options: the solver's own options, see ``fclib solvers``.
 
     Returns:
@@ -62,6 +67,8 @@ def solve(
         raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
     if time_limit is not None and not time_limit > 0:
         raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    if merit not in ("both", "natural"):
+        raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
     values = {name: _plain(name, value) for name, value in options.items()}
     return _core.solve(
         problem,
@@ -73,6 +80,7 @@ def solve(
         guess,
         callback,
         history,
+        merit == "natural",
     )
 
 

@@ -27,6 +27,8 @@ SOLVE_KEYS = [
     "iterations",
     "cpu_s",
     "error",
+    "natural",
+    "scaled_natural",
     "stages",
 ]
 

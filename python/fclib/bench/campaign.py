@@ -22,6 +22,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
+from fclib._solve import MeritKind
 from fclib.bench import made, problems
 from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
 from fclib.bench.modules import load_modules
@@ -35,6 +36,7 @@ KNOWN = {
     "name",
     "title",
     "tolerances",
+    "merit",
     *NUMBERS,
     "repeats",
     "threads",
@@ -84,6 +86,7 @@ class Campaign:
     seed: int = 0
     history: bool = False
     modules: tuple[str, ...] = ()
+    merit: MeritKind = "both"
     base: Path = field(default_factory=Path.cwd)  # what paths are relative to
     text: str = ""  # as it was written
     missing: tuple[str, ...] = ()  # optional solvers that are not here, and why
@@ -159,6 +162,7 @@ class Campaign:
             seed=seed,
             history=bool(entries.get("history", False)),
             modules=modules,
+            merit=_merit(entries.get("merit", "both")),
             base=base,
             text=text,
             missing=missing,
@@ -206,6 +210,7 @@ class Campaign:
                     threads=self.threads,
                     history=self.history,
                     modules=self.modules,
+                    merit=self.merit,
                 )
                 for facts, group in found
                 for choice in self.solvers
@@ -311,6 +316,14 @@ def _made(recipe: Mapping[str, Any], where: str) -> None:
         raise CampaignError(f"{where}seed: {recipe['seed']!r} is not a whole number")
     if not isinstance(recipe.get("parameters", {}), Mapping):
         raise CampaignError(f"{where}parameters: is no table")
+
+
+def _merit(value: object) -> MeritKind:
+    if value == "both":
+        return "both"
+    if value == "natural":
+        return "natural"
+    raise CampaignError(f"merit: {value!r} is neither 'both' nor 'natural'")
 
 
 def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:

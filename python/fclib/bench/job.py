@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
+from fclib._solve import MeritKind
+
 # how a run may end; the first group is said by the solver and confirmed by the merit
 STATUSES: Mapping[str, str] = MappingProxyType(
     {
@@ -119,6 +121,7 @@ class Job:
     threads: int
     history: bool = False
     modules: tuple[str, ...] = ()  # files of Python to be imported before, with users' solvers
+    merit: MeritKind = "both"  # what the tolerance bounds
 
     @property
     def key(self) -> str:
@@ -132,6 +135,7 @@ class Job:
             [repr(float(x)) for x in (self.limits.time, self.limits.wall, self.limits.memory)],
             self.threads,
             self.repeat,
+            *([self.merit] if self.merit != "natural" else []),  # once it was the only one
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
@@ -144,6 +148,7 @@ class Job:
             "solver": self.solver.name,
             "options": dict(self.solver.options),
             "tol": self.tol,
+            "merit": self.merit,
             "limits": asdict(self.limits),
             "history": self.history,
             "modules": list(self.modules),

@@ -12,7 +12,7 @@ from fclib import _core, _solve
 
 @dataclass(frozen=True)
 class Run:
-    """One run, as it is printed and stored; the first nine columns are its record."""
+    """One run, as it is printed and stored; the first eleven columns are its record."""
 
     problem: str
     formulation: str
@@ -22,7 +22,9 @@ class Run:
     status: str
     iterations: int
     cpu_s: float  # [s] CPU time of the solver alone
-    error: float  # Merit.error, recomputed from the returned solution
+    error: float  # what the tolerance bounds, recomputed from the returned solution
+    natural: float
+    scaled_natural: float
     result: _core.Result = field(repr=False, compare=False)
 
     @property
@@ -41,6 +43,8 @@ COLUMNS = (
     "iterations",
     "cpu_s",
     "error",
+    "natural",
+    "scaled_natural",
 )
 
 
@@ -52,6 +56,7 @@ def run(
     time_limit: float | None = None,
     options: Mapping[str, Any] = MappingProxyType({}),
     callback: Callable[[int, float, float, str], bool | None] | None = None,
+    merit: _solve.MeritKind = "both",
 ) -> Run:
     """Solve a problem and judge the solution.
 
@@ -63,12 +68,16 @@ def run(
         time_limit: [s] wall clock.
         options: the solver's own.
         callback: as ``fclib.solve`` has it.
+        merit: what ``tol`` bounds, as ``fclib.solve`` has it.
 
     Raises:
         fclib.Error: as ``fclib.solve`` does.
     """
-    result = _solve.solve(problem, solver, tol, time_limit=time_limit, callback=callback, **options)
-    error = _core.merit(problem, result.solution).error
+    result = _solve.solve(
+        problem, solver, tol, time_limit=time_limit, callback=callback, merit=merit, **options
+    )
+    judged = _core.merit(problem, result.solution)
+    error = judged.error_by(merit)
     status = result.status
     if status == "converged" and not error <= tol:
         status = "inaccurate"
@@ -83,5 +92,7 @@ def run(
         iterations=result.iterations,
         cpu_s=result.cpu_s,
         error=error,
+        natural=judged.natural,
+        scaled_natural=judged.scaled_natural,
         result=result,
     )

@@ -281,7 +281,7 @@ class Supervisor:
         if record.status != "converged":
             return
         limits = order["limits"]
-        if not merit.error <= order["tol"]:
+        if not merit.error_by(order["merit"]) <= order["tol"]:
             record.status = "inaccurate"
         elif (record.cpu_s or 0.0) > limits["time"] or (record.wall_s or 0.0) > limits["wall"]:
             record.status, record.message = "time_limit", "solved, but too late"

@@ -147,6 +147,7 @@ def answer(
             order["tol"],
             time_limit=order["limits"]["wall"],
             history=order["history"],
+            merit=order["merit"],
             **order["options"],
         )
         status, message = result.status, ""

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -33,6 +34,14 @@ if not out.is_terminal:
     out = Console(width=240, markup=False, emoji=False)
 err = Console(stderr=True, soft_wrap=True, markup=False, emoji=False)
 
+
+class MeritKind(StrEnum):
+    """What a tolerance bounds."""
+
+    both = "both"
+    natural = "natural"
+
+
 WRAPPED = (
     "problem",
     "title",
@@ -42,8 +51,14 @@ WRAPPED = (
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
-Tolerance = Annotated[
-    float, typer.Option("--tol", help="Bound on the relative natural-map error.", min=0.0)
+Tolerance = Annotated[float, typer.Option("--tol", help="Bound on the error.", min=0.0)]
+Merit = Annotated[
+    MeritKind,
+    typer.Option(
+        "--merit",
+        help="What the tolerance bounds: both the natural map and the scaled one, which is the same"
+        " in any units, or the natural one alone, as in the literature.",
+    ),
 ]
 
 

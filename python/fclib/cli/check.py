@@ -8,7 +8,18 @@ import typer
 
 import fclib
 from fclib.cli._files import read_owner
-from fclib.cli._output import Files, Json, Report, Tolerance, each_file, make_table, out
+from fclib.cli._output import (
+    Files,
+    Json,
+    Merit,
+    MeritKind,
+    Report,
+    Tolerance,
+    each_file,
+    err,
+    make_table,
+    out,
+)
 
 PARTS = (
     "natural",
@@ -34,9 +45,21 @@ def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, 
     return [dict(zip(names, row.tolist(), strict=True)) for row in table]
 
 
+def told_of(mismatch: dict[str, Any]) -> str:
+    """The stored number that disagrees with the rest of the solution: which, where, how much."""
+    name = f"{mismatch['part']}[{mismatch['index']}] = {mismatch['stored']:.6g}"
+    size = f"{abs(mismatch['difference']):.2g}"
+    if mismatch["part"] == "l":
+        return f"{name}: its joint is left with a velocity of {size}"
+    source = "r" if mismatch["part"] == "v" else "the solution"
+    value = mismatch["stored"] - mismatch["difference"]
+    return f"{name} is wrong by {size}: from {source} follows {value:.6g}"
+
+
 def command(
     files: Files,
     tol: Tolerance = 1e-8,
+    merit: Merit = MeritKind.both,
     contacts: Annotated[
         bool, typer.Option("--contacts", help="Show each contact too: status, r, u, error.")
     ] = False,
@@ -47,7 +70,7 @@ def command(
     Of several problems in a file, it is the global one's. The last columns count the contacts that
     are open, stick and slide.
     """
-    report = Report(as_json, hidden=("n", "formulation", "scaled_natural", "says"))
+    report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))
     for path in each_file(files, "checking"):
         try:
             problem = read_owner(path)
@@ -55,22 +78,28 @@ def command(
             if solution is None:
                 raise fclib.FileError(f"{path}: /solution: there is no solution to check")
             try:
-                merit = fclib.merit(problem, solution)
+                judged = fclib.merit(problem, solution)
+                found = fclib.contact_merits(problem, solution)["mismatches"]
             except fclib.Error as error:
                 raise fclib.FileError(f"{path}: {error}") from None
         except fclib.Error as error:
             report.error(path, error)
             continue
-        good = merit.error <= tol
+        size = judged.error_by(merit.value)
+        good = size <= tol
+        mismatches = [one for one in found if not one["error"] <= tol]
         record: dict[str, Any] = {
             "problem": str(path),
             "formulation": problem.formulation,
             "n": problem.n,
             "nc": problem.nc,
             "status": "ok" if good else "wrong",
-            "error": merit.error,
+            "error": size,
         }
-        record |= {name: getattr(merit, name) for name in PARTS}
+        record |= {name: getattr(judged, name) for name in PARTS}
+        record["mismatches"] = mismatches
+        for one in mismatches:
+            err.print(f"{path.name}: {told_of(one)}", highlight=False)
         # what the file says of it is shown, and not believed
         if told := fclib.read_attributes(path, "solution"):
             record["says"] = told

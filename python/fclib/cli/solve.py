@@ -12,6 +12,8 @@ from fclib.cli._files import read_owner
 from fclib.cli._output import (
     Files,
     Json,
+    Merit,
+    MeritKind,
     Report,
     Tolerance,
     each_file,
@@ -50,6 +52,7 @@ def command(
     files: Files,
     solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "auto",
     tol: Tolerance = 1e-8,
+    merit: Merit = MeritKind.both,
     time_limit: Annotated[
         float | None, typer.Option(help="Wall clock for each problem, in seconds.", min=0.0)
     ] = None,
@@ -85,7 +88,9 @@ def command(
         try:
             trace = Trace(path.name) if verbose else None
             problem = fclib.read(path, kind) if kind else read_owner(path)
-            run = bench.run(str(path), problem, solver, tol, time_limit, options, trace)
+            run = bench.run(
+                str(path), problem, solver, tol, time_limit, options, trace, merit.value
+            )
             stages = [{key: getattr(stage, key) for key in STAGE} for stage in run.result.stages]
             if trace is not None:
                 trace.finish(stages)

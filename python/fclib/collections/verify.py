@@ -58,7 +58,8 @@ def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) 
         return Verdict(name, path, "unreadable", None, str(reason))
     if solution is None:
         return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
-    error = _core.merit(problem, solution).error
+    # the sets were made by this merit
+    error = _core.merit(problem, solution).error_by("natural")
     if problem.formulation == row["formulation"] and _digest.digest(problem) != row["digest"]:
         return Verdict(name, path, "wrong digest", error, f"{file}: holds another problem")
     stored = float(row["error"])

@@ -68,6 +68,9 @@ def simulate(
     warm_start     begin from the impulses that the same pairs of bodies had in the step before
     stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
 
+    The tolerance bounds the natural map alone (merit="natural" of `fclib.solve`) unless the options
+    say otherwise: the published sets were made so, and each step depends on those before it.
+
     A step whose solver misses the tolerance goes on with what it reached, and says so in
     `step.result`: later problems then depend on it.
 
@@ -116,7 +119,7 @@ def _march(
         part = scheme.problem(scheme.assemble(model), model.velocity, info)
         problem, contacts = part.problem, part.contacts
 
-        options = dict(settings["options"])
+        options: dict[str, Any] = {"merit": "natural"} | settings["options"]
         if settings["warm_start"] and problem.nc and len(state.r):
             options["guess"] = _core.Solution(r=carry_over(state, contacts))
         result = _solve.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)

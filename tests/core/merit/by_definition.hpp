@@ -3,20 +3,33 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 
 #include "merit/merit.hpp"
 #include "random_problems.hpp"
 
 namespace fclib::testing {
 
-/// || |A| |x| ||
-inline double sum_of_sizes(const Eigen::MatrixXd& a, const Vector& x) {
-  return (a.cwiseAbs() * x.cwiseAbs()).norm();
+/// |A| |x|
+inline Vector sizes(const Eigen::MatrixXd& a, const Vector& x) {
+  return a.cwiseAbs() * x.cwiseAbs();
 }
 
-inline double over_largest(const Vector& residual, std::initializer_list<double> terms) {
-  return residual.norm() / std::max(terms);
+/// The largest quotient of a residual and the velocity of its component.
+inline double worst(const Vector& residual, const Vector& velocity) {
+  return residual.cwiseQuotient(velocity).cwiseAbs().maxCoeff();
+}
+
+/// The norm of each contact's part of x, at each of its components.
+inline Vector by_contact(const Vector& x, Index d) {
+  Vector result(x.size());
+  for (Eigen::Index k = 0; k < x.size(); k += d) {
+    result.segment(k, d).setConstant(x.segment(k, d).norm());
+  }
+  return result;
+}
+
+inline Vector at_least(const Vector& x, const Vector& mean_of) {
+  return x.cwiseAbs().cwiseMax(mean_of.norm() / std::sqrt(static_cast<double>(mean_of.size())));
 }
 
 /// u^ of a contact, by groups of components with one coefficient each.
@@ -40,58 +53,76 @@ struct Reduced {
   Vector scale;
 };
 
-/// Dynamics, bilateral and kinematics; the rest follows from `Reduced`.
+/// Dynamics, bilateral and kinematics but for what they leave to rounding; the rest follows from
+/// `Reduced`.
 template <class P>
 Merit equations(const P& problem, const Solution& given, Reduced& reduced) {
   Merit result;
   const bool mixed = is_mixed(problem);
+  const Index d = problem.spacedim;
   const Vector l = mixed ? given.l : Vector::Zero(1);
-  Eigen::MatrixXd w;
-  double largest_of_u = 0;
+  reduced.scale.resize(problem.mu.size());
+  // impulses that stop velocities of the contacts, each alone
+  const auto stopping = [&](const Vector& velocity) {
+    Vector impulse = by_contact(velocity, d);
+    for (Eigen::Index k = 0; k < impulse.size(); ++k) impulse[k] /= reduced.scale[k / d];
+    return impulse;
+  };
+  const auto set_scale = [&](const Eigen::MatrixXd& w) {
+    for (Eigen::Index a = 0; a < reduced.scale.size(); ++a) {
+      reduced.scale[a] = w.block(d * a, d * a, d, d).trace() / d;
+    }
+  };
   if constexpr (requires { problem.W; }) {
-    w = dense(problem.W);
-    const Eigen::Index m = w.rows();
-    const Eigen::MatrixXd v = mixed ? dense(problem.V) : Eigen::MatrixXd::Zero(m, 1);
+    const Eigen::MatrixXd w = dense(problem.W);
+    const Eigen::MatrixXd v = mixed ? dense(problem.V) : Eigen::MatrixXd::Zero(w.rows(), 1);
+    const Eigen::MatrixXd r = mixed ? dense(problem.R) : Eigen::MatrixXd::Identity(1, 1);
+    const Vector s = mixed ? problem.s : Vector::Zero(1);
+    set_scale(w);
     reduced.q = problem.q;
     reduced.u = w * given.r + v * l + problem.q;
-    largest_of_u = std::max({sum_of_sizes(w, given.r), sum_of_sizes(v, l), problem.q.norm()});
+    const Vector held = s.cwiseQuotient(r.diagonal()).cwiseAbs();
+    const Vector own = problem.q.cwiseAbs() + sizes(v, held);
+    const Vector stop = stopping(own);
     if (mixed) {
-      const Eigen::MatrixXd r = dense(problem.R);
-      result.bilateral = over_largest(
-          v.transpose() * given.r + r * l + problem.s,
-          {sum_of_sizes(v.transpose(), given.r), sum_of_sizes(r, l), problem.s.norm()});
+      result.bilateral =
+          worst(v.transpose() * given.r + r * l + s,
+                at_least(sizes(v.transpose(), stop) + sizes(r, held) + s.cwiseAbs(), s));
+    }
+    if (given.u.size() > 0) {
+      const Vector velocity =
+          by_contact(sizes(w, stop) + own, d).cwiseMax(by_contact(reduced.u, d));
+      result.kinematics = worst(given.u - reduced.u, at_least(velocity, problem.q));
     }
   } else {
     const Eigen::MatrixXd mass = dense(problem.M);
     const Eigen::MatrixXd h = dense(problem.H);
     const Eigen::Index n = mass.rows();
     const Eigen::MatrixXd g = mixed ? dense(problem.G) : Eigen::MatrixXd::Zero(n, 1);
+    const Vector b = mixed ? problem.b : Vector::Zero(1);
     const Eigen::MatrixXd inverse = mass.inverse();
-    const Vector momentum = h * given.r + g * l + problem.f;
-    const Vector v = given.v.size() > 0 ? given.v : Vector(inverse * momentum);
-    if (given.v.size() > 0) {
-      result.dynamics = over_largest(
-          mass * v - momentum,
-          {sum_of_sizes(mass, v), sum_of_sizes(h, given.r), sum_of_sizes(g, l), problem.f.norm()});
-    }
+    set_scale(h.transpose() * inverse * h);
+    const Vector follows = inverse * (h * given.r + g * l + problem.f);
     const Vector free = inverse * problem.f;
-    if (mixed) {
-      result.bilateral = over_largest(
-          g.transpose() * v + problem.b,
-          {sum_of_sizes(g.transpose(), v), sum_of_sizes(g.transpose(), free), problem.b.norm()});
-    }
-    w = h.transpose() * inverse * h;
+    const Vector v = given.v.size() > 0 ? given.v : follows;
+    const Vector fastest = v.cwiseAbs().cwiseMax(free.cwiseAbs());
     reduced.q = h.transpose() * free + problem.w;
     reduced.u = h.transpose() * v + problem.w;
-    largest_of_u = std::max(sum_of_sizes(h.transpose(), v), problem.w.norm());
-  }
-  if (given.u.size() > 0) {
-    result.kinematics = over_largest(given.u - reduced.u, {given.u.norm(), largest_of_u});
-  }
-  const Index d = problem.spacedim;
-  reduced.scale.resize(problem.mu.size());
-  for (Eigen::Index a = 0; a < reduced.scale.size(); ++a) {
-    reduced.scale[a] = w.block(d * a, d * a, d, d).trace() / d;
+    if (given.v.size() > 0) {
+      Vector stop = sizes(h, stopping(sizes(h.transpose(), free) + problem.w.cwiseAbs()));
+      if (mixed) {
+        const Vector inertia = (g.transpose() * inverse * g).diagonal();
+        stop += sizes(g, (sizes(g.transpose(), free) + b.cwiseAbs()).cwiseQuotient(inertia));
+      }
+      result.dynamics = worst(v - follows, fastest.cwiseMax((inverse * stop).cwiseAbs()));
+    }
+    if (mixed) {
+      result.bilateral = worst(g.transpose() * v + b, sizes(g.transpose(), fastest) + b.cwiseAbs());
+    }
+    if (given.u.size() > 0) {
+      const Vector velocity = by_contact(sizes(h.transpose(), fastest) + problem.w.cwiseAbs(), d);
+      result.kinematics = worst(given.u - reduced.u, at_least(velocity, reduced.q));
+    }
   }
   return result;
 }
@@ -112,11 +143,8 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
   Reduced reduced;
   Merit result = equations(problem, given, reduced);
   const Eigen::Index nc = problem.mu.size();
-  each = {.status = {},
-          .u = reduced.u,
-          .natural = Vector(nc),
-          .cone = Vector(nc),
-          .dual_cone = Vector(nc)};
+  each.u = reduced.u;
+  for (Vector* figures : {&each.natural, &each.cone, &each.dual_cone}) figures->resize(nc);
   double squares = 0;
   double scaled_squares = 0;
   double scaled_q = 0;
@@ -149,7 +177,8 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
   result.scaled_natural = std::sqrt(scaled_squares / scaled_q);
   result.cone = each.cone.maxCoeff();
   result.dual_cone = each.dual_cone.maxCoeff();
-  result.error = std::max({result.natural, result.dynamics, result.bilateral, result.kinematics});
+  result.error = std::max({result.natural, result.scaled_natural, result.dynamics,
+                           result.bilateral, result.kinematics});
   return result;
 }
 

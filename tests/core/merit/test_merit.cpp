@@ -224,14 +224,66 @@ TEST(Merit, sums_are_made_in_extended_precision) {
   EXPECT_NEAR(merit(problem, solution).natural, 0x1p-60, 1e-3 * 0x1p-60);
 }
 
-TEST(Merit, the_size_of_a_term_does_not_vanish_where_the_term_does) {
-  // W r = 0 although r is large: u is wrong by the rounding of what cancels
+TEST(Merit, rounding_is_no_mistake_and_a_self_stress_hides_none) {
+  // W r = 0 although r is large: its rounding is worth 1e-9 m/s
   Eigen::Matrix2d w;
   w << 1, -1, -1, 1;
   const LocalProblem problem = one_contact(w, {0, 0});
-  const Solution solution{
-      .v = {}, .u = Eigen::Vector2d(1e-3, 0), .r = Eigen::Vector2d(1e6, 1e6), .l = {}};
-  EXPECT_NEAR(merit(problem, solution).kinematics, 1e-3 / std::hypot(2e6, 2e6), 1e-14);
+  Solution solution{
+      .v = {}, .u = Eigen::Vector2d(1e-9, 0), .r = Eigen::Vector2d(1e6, 1e6), .l = {}};
+  EXPECT_EQ(merit(problem, solution).kinematics, 0);
+  solution.u[0] = 1e-3;
+  EXPECT_GT(merit(problem, solution).kinematics, 0.9e-3);
+}
+
+/// A light and a heavy body, free but for a contact of the heavy one.
+GlobalProblem light_beside_heavy(double ratio) {
+  GlobalProblem problem;
+  problem.spacedim = 2;
+  const Eigen::Vector4d masses(1, 1, ratio, ratio);
+  problem.M = Matrix::from_eigen(Eigen::MatrixXd(masses.asDiagonal()).sparseView());
+  Eigen::MatrixXd h = Eigen::MatrixXd::Zero(4, 2);
+  h(2, 0) = h(3, 1) = 1;
+  problem.H = Matrix::from_eigen(h.sparseView());
+  problem.f = Eigen::Vector4d(-10, 0, -10 * ratio, 0);
+  problem.w = Vector::Zero(2);
+  problem.mu = Vector::Constant(1, 0.5);
+  return problem;
+}
+
+TEST(Merit, a_heavy_neighbour_hides_no_velocity) {
+  for (const double ratio : {1.0, 1e6, 1e12}) {
+    const GlobalProblem problem = light_beside_heavy(ratio);
+    Solution solution{.v = Eigen::Vector4d(-10, 0, 0, 0),
+                      .u = Vector::Zero(2),
+                      .r = Eigen::Vector2d(10 * ratio, 0),
+                      .l = {}};
+    EXPECT_EQ(merit(problem, solution).error, 0);
+    solution.v[0] = 40;
+    const Merit result = merit(problem, solution);
+    EXPECT_NEAR(result.dynamics, 50.0 / 40, 1e-9);
+    EXPECT_GE(result.error, result.dynamics);
+    const ContactMerits each = contact_merits(problem, solution);
+    ASSERT_EQ(each.mismatches.size(), 2U);
+    EXPECT_EQ(each.mismatches[0].part, "v");
+    EXPECT_EQ(each.mismatches[0].index, 0);
+    EXPECT_EQ(each.mismatches[0].stored, 40);
+    EXPECT_NEAR(each.mismatches[0].difference, 50, 1e-9);
+  }
+}
+
+TEST(Merit, an_error_is_not_relative_to_less_than_the_rounding_of_q) {
+  // in free flight: the base alone moves, what a joint at its limit feels of it is rounding
+  GlobalProblem problem = light_beside_heavy(1);
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  m(0, 2) = m(2, 0) = 0.25;
+  problem.M = Matrix::from_eigen(m.sparseView());
+  problem.f = m * Eigen::Vector4d(-10, 3, 0, 0);
+  problem.f[2] -= 1e-15;
+  const Solution nothing{.v = {}, .u = {}, .r = Vector::Zero(2), .l = {}};
+  EXPECT_EQ(merit(problem, nothing).error, 0);
+  problem.f[2] -= 1e-9;  // more than rounding, and no reaction against it
+  EXPECT_GT(merit(problem, nothing).natural, 0.5);
 }
 
 TEST(Merit, a_contact_whose_block_is_zero_is_scaled_by_one) {

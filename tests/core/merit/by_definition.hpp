@@ -177,8 +177,8 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
   result.scaled_natural = std::sqrt(scaled_squares / scaled_q);
   result.cone = each.cone.maxCoeff();
   result.dual_cone = each.dual_cone.maxCoeff();
-  result.error = std::max({result.natural, result.scaled_natural, result.dynamics,
-                           result.bilateral, result.kinematics});
+  result.error = std::max({result.natural, result.scaled_natural, result.dynamics, result.bilateral,
+                           result.kinematics});
   return result;
 }
 

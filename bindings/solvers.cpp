@@ -1,8 +1,10 @@
+#include <nanobind/eigen/dense.h>
 #include <nanobind/stl/function.h>
 #include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/variant.h>
 #include <nanobind/stl/vector.h>
 
@@ -48,6 +50,22 @@ bool poll_signals() {
 
 template <class P>
 void bind_solve(nb::module_& m) {
+  m.def(
+      "prove_no_solution",
+      [](const P& problem, const Vector& y) -> std::optional<std::tuple<Vector, Vector, double>> {
+        if (y.size() != problem.size(Dim::nc)) {
+          throw Error(ErrorKind::problem,
+                      "has " + std::to_string(y.size()) +
+                          " entries, expected nc = " + std::to_string(problem.size(Dim::nc)),
+                      "y");
+        }
+        NoSolution found = prove_no_solution(problem, y);
+        if (!found.proven()) return std::nullopt;
+        return std::tuple(std::move(found.y), std::move(found.z), found.bound);
+      },
+      "problem"_a, "y"_a,
+      "y, z and the bound of a proof near y (nc) that the problem has no solution (see\n"
+      "Result.certificate), or None.");
   m.def(
       "solve",
       [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
@@ -167,13 +185,32 @@ void bind_solvers(nb::module_& m) {
           "certificate",
           [](nb::handle self) -> nb::object {
             const auto& r = nb::cast<const Result&>(self);
-            return r.certificate.size() > 0 ? to_python(r.certificate, self) : nb::none();
+            return r.certificate.proven() ? to_python(r.certificate.y, self) : nb::none();
           },
           nb::for_getter(
               nb::sig("def certificate(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
-          "y >= 0 (nc) which proves that there is no solution where the status is infeasible: of\n"
-          "the local problem without bilateral constraints, -W^T E y is in K* and y . q_N < 0,\n"
-          "with E y the vector whose normal parts are y. Else None.")
+          "y >= 0 (nc) which proves that there is no solution, where the status is infeasible, on\n"
+          "the problem as it was given: -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and\n"
+          "y . q_N + z . s < 0, or H E y + G z = 0 and y . w_N + z . b < 0, with E y the vector\n"
+          "whose normal parts are y. Else None.")
+      .def_prop_ro(
+          "certificate_z",
+          [](nb::handle self) -> nb::object {
+            const auto& r = nb::cast<const Result&>(self);
+            return r.certificate.z.size() > 0 ? to_python(r.certificate.z, self) : nb::none();
+          },
+          nb::for_getter(
+              nb::sig("def certificate_z(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
+          "z (p) of the certificate, where the problem has bilateral constraints")
+      .def_prop_ro(
+          "certificate_bound",
+          [](const Result& r) -> std::optional<double> {
+            if (!r.certificate.proven()) return std::nullopt;
+            return r.certificate.bound;
+          },
+          "reactions of a norm below this are no solution, where the status is infeasible: inf\n"
+          "where the proof is exact, finite where the last digits of W are all that is left of\n"
+          "W^T E y. Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
       .def_prop_ro("history", history_of,
                    nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),

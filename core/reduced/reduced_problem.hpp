@@ -1,6 +1,8 @@
 // The problem in the form that solvers take: u = W r + q and the friction law of each contact.
 #pragma once
 
+#include <functional>
+
 #include "deadline.hpp"
 #include "friction.hpp"
 #include "linalg/block_matrix.hpp"
@@ -23,6 +25,9 @@ struct ReducedProblem {
   double scaled_scale = 1;             ///< errors by the scaled map are relative to this: ||rho q||
   const Primal* primal = nullptr;      ///< where the problem is known by its bodies
   const Deadline* deadline = nullptr;  ///< of the solve, if it has one
+  /// Whether something near y (nc) proves that the problem as it was given has no solution: what
+  /// solvers find here may be the rounding of conversions. Without it nothing is proven.
+  const std::function<bool(const Vector& y)>* proves_no_solution = nullptr;
 
   [[nodiscard]] int d() const { return W.block_size(); }
   [[nodiscard]] Index nc() const { return W.block_count(); }

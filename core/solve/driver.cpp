@@ -1,6 +1,7 @@
 #include "solve/driver.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include "convert/complete.hpp"
 #include "convert/condense.hpp"
@@ -53,11 +54,16 @@ struct Measure {
 };
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
+/// `prove` looks for a proof near y that the problem as it was given has no solution.
 template <class Judge>
 Result run(const LocalProblem& plain, const Friction& friction, const Measure& measure,
            const Request& request, const Solution& guess, const Judge& judge,
-           const Primal* primal = nullptr) {
+           const std::function<NoSolution(const Vector&)>& prove, const Primal* primal = nullptr) {
   Result result;
+  const std::function<bool(const Vector&)> proves = [&](const Vector& y) {
+    result.certificate = prove(y);
+    return result.certificate.proven();
+  };
   result.solver = request.solver.name;
   if (measure.q <= measure.rounding) {
     // what is left of q is rounding: no reaction is one where that suffices
@@ -78,7 +84,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       .rho = measure.rho,
       .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding, tolerance),
       .primal = primal,
-       .deadline = &request.deadline};
+      .deadline = &request.deadline};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -103,7 +109,9 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = outcome.stages;
-    result.certificate = outcome.certificate;
+    // a word that nothing stands behind is not passed on
+    if (result.status == Status::infeasible && !result.certificate.proven())
+      result.status = Status::stalled;
     // factorisations fail where the time is over, and solvers have nothing left to try
     if ((result.status == Status::stalled || result.status == Status::diverged) &&
         request.deadline.passed()) {
@@ -117,6 +125,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
     result.error = judge(result.solution);
     if (result.error <= request.settings.tolerance) {
       result.status = Status::converged;
+      result.certificate = {};
       return result;
     }
     if (result.status != Status::converged) return result;
@@ -164,33 +173,32 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
 
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
   const MeritKind kind = request.settings.merit;
   const Measure measure(problem, own_sizes(problem).rounding, kind);
-  if (is_mixed(problem)) {
-    const Elimination elimination(problem, &request.deadline);
-    if (!elimination.finished()) {
-      return out_of_time(problem.q.size(), problem.s.size(), request, guess,
-                         [&](Solution& solution) {
-                           solution.u.resize(0);
-                           solution = complete(problem, solution);
-                           return merit(problem, solution).error;
-                         });
-    }
-    return run(elimination.plain(), friction_of(problem), measure, request, guess,
-               [&](Solution& solution) {
-                 solution = elimination.expand(solution);
-                 return merit(problem, solution).error_by(kind);
-               });
-  }
-  return run(problem, friction_of(problem), measure, request, guess, [&](Solution& solution) {
+  const auto judge = [&](Solution& solution) {
     solution.u.resize(0);
     solution = complete(problem, solution);
     return merit(problem, solution).error_by(kind);
-  });
+  };
+  if (is_mixed(problem)) {
+    const Elimination elimination(problem, &request.deadline);
+    if (!elimination.finished()) {
+      return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
+    }
+    const auto judge_expanded = [&](Solution& solution) {
+      solution = elimination.expand(solution);
+      return merit(problem, solution).error_by(kind);
+    };
+    return run(elimination.plain(), friction_of(problem), measure, request, guess, judge_expanded,
+               prove);
+  }
+  return run(problem, friction_of(problem), measure, request, guess, judge, prove);
 }
 
 template <class P>
 Result solve_global(const P& problem, const Request& request, const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
@@ -206,15 +214,16 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   if (!condensation.finished()) return stop();
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction_of(problem), measure, request, guess, judge, &primal);
+    return run(local, friction_of(problem), measure, request, guess, judge, prove, &primal);
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
-  return run(elimination.plain(), friction_of(problem), measure, request, guess,
-             [&](Solution& solution) {
-               solution = elimination.expand(solution);
-               return judge(solution);
-             });
+  const auto judge_expanded = [&](Solution& solution) {
+    solution = elimination.expand(solution);
+    return judge(solution);
+  };
+  return run(elimination.plain(), friction_of(problem), measure, request, guess, judge_expanded,
+             prove);
 }
 
 /// What every solve does: checks, times.

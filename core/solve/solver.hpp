@@ -30,7 +30,7 @@ enum class Status {
   inaccurate,       ///< the solver was content, the merit of the original problem is not
   stalled,          ///< the solver has nothing left to try; its best iterate is returned
   interrupted,      ///< the callback asked to stop
-  infeasible,       ///< there is no solution, and a certificate proves it
+  infeasible,       ///< there is no solution: ReducedProblem::proves_no_solution has said so
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -142,7 +142,6 @@ struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
   std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
-  Vector certificate = {};           ///< y (nc) of reduced/no_solution.hpp, where infeasible
   std::optional<double> cpu_s = {};  ///< [s] where it is not that of the calling thread
 };
 

@@ -12,7 +12,8 @@
 //      with shorter steps, and with the shift's kink smoothed
 //   5  interior point on the associated problem: packings without a Slater point, where u = 0
 //   6  semismooth Newton on the natural map
-//   7  a proof that there is no solution (reduced/no_solution.hpp)
+//   7  a proof that there is no solution (reduced/no_solution.hpp finds it, proof/no_solution.hpp
+//      judges it on the data as they were given)
 //   8  proximal point with an accurate inner solution, for some steps
 //   9  homotopy: the path by its arclength, around its folds
 //  10  proximal point to the end, the last resort
@@ -27,6 +28,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 
@@ -159,12 +161,8 @@ class Tracker {
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
   [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
 
-  /// There is no solution: y (one for each contact of the island) proves it.
-  void prove(const Vector& y) {
-    certificate_ = y;
-    stopped_ = Status::infeasible;
-  }
-  [[nodiscard]] Vector& certificate() { return certificate_; }
+  /// There is no solution.
+  void refuse() { stopped_ = Status::infeasible; }
 
   /// CPU time of other threads than the caller's [s].
   void add_cpu(double seconds) { others_cpu_ += seconds; }
@@ -217,7 +215,6 @@ class Tracker {
   std::int64_t iterations_ = 0;
   bool reported_ = false;
   std::optional<Status> stopped_;
-  Vector certificate_;
   std::vector<Stage> stages_;
 };
 
@@ -226,13 +223,15 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
+  /// `proves` says whether y (nc of the island) proves that there is no solution.
   Island(const ReducedProblem& problem, const Options& options, Tracker& tracker, double tolerance,
-         bool guessed)
+         bool guessed, std::function<bool(const Vector&)> proves)
       : problem_(problem),
         options_(options),
         tracker_(tracker),
         tolerance_(tolerance),
-        guessed_(guessed) {
+        guessed_(guessed),
+        proves_(std::move(proves)) {
     gauss_seidel_.emplace(problem);
   }
 
@@ -591,8 +590,9 @@ class Island {
         for (Index a = 0; a < problem_.nc(); ++a) {
           y[a] = step[D * a] > least * largest ? step[D * a] / largest : 0;
         }
-        if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual) {
-          tracker_.prove(y);
+        // here it may be rounding of what was eliminated: the data as they were given decide
+        if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual && proves_(y)) {
+          tracker_.refuse();
           return true;
         }
       }
@@ -628,6 +628,7 @@ class Island {
   Tracker& tracker_;
   double tolerance_;
   bool guessed_;
+  std::function<bool(const Vector&)> proves_;
   std::optional<GaussSeidel<Cone>> gauss_seidel_;
   std::optional<CoupledSystem> system_;
   Vector r_, u_, best_;
@@ -667,7 +668,10 @@ void chain(const ReducedProblem& problem, const Options& options, Tracker& track
   const double tolerance = tracker.tolerance();
   tracker.set_others(0);
   std::optional<Island<Cone>> whole;
-  whole.emplace(problem, options, tracker, tolerance, guessed);
+  const auto proves = [&](const Vector& y) {
+    return problem.proves_no_solution != nullptr && (*problem.proves_no_solution)(y);
+  };
+  whole.emplace(problem, options, tracker, tolerance, guessed, proves);
   whole->solve(r, nc <= 2 ? 5 : options.sweeps, true);
   if (tracker.stopped()) return;
   const std::vector<Index> group = problem.W.components();
@@ -716,16 +720,14 @@ void chain(const ReducedProblem& problem, const Options& options, Tracker& track
       x.template segment<D>(D * j) = r.template segment<D>(D * contacts[j]);
     sum = std::max(0.0, sum - squared[k]);
     tracker.set_others(sum);
-    const double error =
-        Island<Cone>(part, options, tracker, share, guessed).solve(x, options.island_sweeps, false);
+    const auto proves_island = [&](const Vector& y) {
+      Vector padded = Vector::Zero(nc);
+      for (Eigen::Index j = 0; j < size; ++j) padded[contacts[static_cast<std::size_t>(j)]] = y[j];
+      return proves(padded);
+    };
+    const double error = Island<Cone>(part, options, tracker, share, guessed, proves_island)
+                             .solve(x, options.island_sweeps, false);
     sum += error * error;
-    if (tracker.certificate().size() > 0) {
-      Vector whole_certificate = Vector::Zero(nc);
-      for (Eigen::Index j = 0; j < size; ++j) {
-        whole_certificate[contacts[static_cast<std::size_t>(j)]] = tracker.certificate()[j];
-      }
-      tracker.certificate() = whole_certificate;
-    }
     for (Eigen::Index j = 0; j < size; ++j)
       r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);
   }
@@ -748,7 +750,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   const double start = options.threads > 1 ? cpu_time() : 0.0;  // the clock takes 0.3 microseconds
   const auto outcome = [&] {
     Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
-                   std::move(tracker.stages()), std::move(tracker.certificate())};
+                   std::move(tracker.stages())};
     if (options.threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
     return result;
   };

@@ -312,7 +312,13 @@ def test_what_proves_nothing_is_no_proof() -> None:
     assert isinstance(problem, fclib.LocalProblem)
     assert analysis.farkas(problem, np.array([1.0, 1, 0, 0])) is not None
     assert analysis.farkas(problem, np.array([1.0, 0, 0, 0])) is None
-    assert analysis.farkas(problem, np.array([1.0, 1, 1e-3, 0])) is None
+    # what is near a proof is brought to it, and is none itself
+    near = analysis.farkas(problem, np.array([1.0, 1, 1e-3, 0]))
+    assert near is not None
+    assert near.exact
+    assert near.exact_y == {0: 1, 1: 1}
+    with pytest.raises(analysis.CertificateError, match="contact 0: "):
+        analysis.check(problem, {0: 1, 1: 1, 2: 1e-3})
     assert analysis.farkas(problem, np.array([-1.0, -1, 0, 0])) is None
     assert analysis.farkas(problem, np.zeros(4)) is None
     with pytest.raises(fclib.ProblemError, match="nc = 4"):

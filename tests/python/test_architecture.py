@@ -27,7 +27,7 @@ LAYERS: list[set[str]] = [
     {"solution.hpp", "problems"},
     {"formulations.hpp"},
     {"problem.hpp"},
-    {"merit", "convert", "io"},
+    {"merit", "proof", "convert", "io"},
     {"reduced"},
     {"systems"},
     {"solve"},
@@ -38,11 +38,11 @@ LAYERS: list[set[str]] = [
 # and what it must not, not even by way of others
 FORBIDDEN = {
     # a solver sees neither file nor formulation, and does not judge itself
-    "solvers": {"io", "convert", "merit", "problems", "problem.hpp"},
+    "solvers": {"io", "convert", "merit", "proof", "problems", "problem.hpp"},
     # what solvers are made of knows no formulation
-    "methods": {"io", "convert", "merit", "problems", "problem.hpp", "solution.hpp"},
-    "systems": {"io", "convert", "merit", "problems", "problem.hpp", "solution.hpp"},
-    "reduced": {"io", "convert", "merit", "problems", "problem.hpp", "solution.hpp"},
+    "methods": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
+    "systems": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
+    "reduced": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
     "contact": {"linalg", "problems", "problem.hpp", "solution.hpp"},
     # files know no mathematics
     "io": {"contact", "reduced", "systems", "methods"},

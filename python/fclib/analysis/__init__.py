@@ -8,7 +8,8 @@ Existence is decided by conic programs, for which Clarabel is needed: ``pip inst
 "fclib[analysis]"``.
 
 _analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _existence.py
-_existence.py   whether there is a solution, with its proof. Needs _conic.py
+_existence.py   whether there is a solution. Needs _conic.py and _certificate.py
+_certificate.py a proof that there is none, checked in exact arithmetic
 _reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
 _least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
 _contacts.py    statuses and energies, contact by contact
@@ -18,6 +19,13 @@ _data.py        a problem's matrices and its local form, which all others start 
 """
 
 from fclib.analysis._analyze import Analysis, Definiteness, Uniqueness, Units, analyze
+from fclib.analysis._certificate import (
+    Certificate,
+    CertificateError,
+    check,
+    farkas,
+    read_certificate,
+)
 from fclib.analysis._contacts import Energy, contacts, energy
 from fclib.analysis._existence import (
     EXISTS_AT_HAND,
@@ -25,10 +33,8 @@ from fclib.analysis._existence import (
     PROVEN_NOT,
     UNDECIDED,
     VERDICTS,
-    Certificate,
     Existence,
     Slater,
-    farkas,
 )
 from fclib.analysis._reference import Confirmation, Reference, reference
 from fclib.analysis._spectrum import Spectrum
@@ -41,6 +47,7 @@ __all__ = [
     "VERDICTS",
     "Analysis",
     "Certificate",
+    "CertificateError",
     "Confirmation",
     "Definiteness",
     "Energy",
@@ -51,8 +58,10 @@ __all__ = [
     "Uniqueness",
     "Units",
     "analyze",
+    "check",
     "contacts",
     "energy",
     "farkas",
+    "read_certificate",
     "reference",
 ]

@@ -2,28 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse.csgraph import connected_components
 
 from fclib import _core, _digest, _solve
-from fclib.analysis._data import SYMMETRIC, Data, asymmetry, columns
-from fclib.analysis._existence import Certificate, Existence, Slater, existence, slater
-from fclib.analysis._spectrum import DENSE, EPS, Spectrum, lowest_eigenvalue, spectrum
+from fclib.analysis._certificate import Certificate
+from fclib.analysis._data import DENSE, EPS, SYMMETRIC, Data, Reduced, asymmetry, columns
+from fclib.analysis._existence import Existence, Slater, existence, slater
+from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
 DEFINITE = ("positive definite", "positive semidefinite", "indefinite")
+UNKNOWN = "not known"
 FAR = 1e4  # a size this many times above or below 1 is said to be far from the units
 SPREAD = 1e6  # the same of a ratio inside the problem
 
 
 @dataclass(frozen=True)
 class Definiteness:
-    """The sign of the symmetric part of W.
+    """The sign of the symmetric part of W; of W' = W - V R^-1 V^T with bilateral constraints.
 
     Attributes:
-        word: positive definite, positive semidefinite or indefinite.
+        word: positive definite, positive semidefinite, indefinite or not known.
         lowest, highest: its extreme eigenvalues.
         method: how they were found.
         threshold: up to which an eigenvalue counts as zero, absolute.
@@ -87,11 +91,13 @@ class Analysis:
         sparsity: the same over rows times columns.
         asymmetry: of W, M and R: max |A - A^T| / max |A|.
         definiteness: of the symmetric part of W.
-        spectra: rank and conditioning of H, W, M, R, where they are.
+        spectra: rank and conditioning of H, W, M, R, where they are. With bilateral constraints
+            "W" is W' = W - V R^-1 V^T, and is missing where that is rounding or too large.
         islands: how many have contacts; largest_island: contacts of the largest.
         contact_density: m / n, unknowns of the contacts a degree of freedom (RT-0444; nan for a
             local problem, which has lost n).
-        hyperstaticity: m - rank W, the dimension of the reactions that move nothing.
+        hyperstaticity: m - rank W, the dimension of the reactions that move nothing; None where
+            the rank is not known.
         hyperstaticity_ratio: m / rank W.
         units, slater, existence, uniqueness: see there.
     """
@@ -106,7 +112,7 @@ class Analysis:
     islands: int
     largest_island: int
     contact_density: float
-    hyperstaticity: int
+    hyperstaticity: int | None
     hyperstaticity_ratio: float
     units: Units
     slater: Slater
@@ -176,7 +182,7 @@ class Analysis:
         }
         if self.certificate is not None:
             record["certificate_bound"] = self.certificate.bound
-            record["certificate_contacts"] = np.flatnonzero(self.certificate.y).tolist()
+            record["certificate_contacts"] = sorted(self.certificate.exact_y)
         return {
             key: None if isinstance(value, float) and not np.isfinite(value) else value
             for key, value in record.items()
@@ -185,12 +191,15 @@ class Analysis:
     @property
     def words(self) -> str:
         """MATH_INFO of RT-0444: existence and uniqueness in words."""
-        w = self.spectra["W"]
+        name = "W" if self.problem.p == 0 else "W' = W - V R^-1 V^T"
+        sign = f"{name} is not known."
+        if (w := self.spectra.get("W")) is not None:
+            sign = f"{name} is {self.definiteness.word}, of rank {w.rank} of {self.problem.m}"
+            sign += "." if self.asymmetry["W"] <= SYMMETRIC else " and not symmetric."
         text = [
             f"Existence: {self.existence.verdict}: {self.existence.reason}.",
             f"Velocity: {self.uniqueness.verdict}: {self.uniqueness.reason}.",
-            f"W is {self.definiteness.word}, of rank {w.rank} of {self.problem.m}"
-            + ("." if self.asymmetry["W"] <= SYMMETRIC else " and not symmetric."),
+            sign,
         ]
         if self.units.trouble:
             text.append(f"Trouble: {'; '.join(self.units.trouble)}.")
@@ -200,6 +209,8 @@ class Analysis:
     def matrix_info(self) -> dict[str, _core.MatrixInfo]:
         """MATRIX_INFO of RT-0444, of the matrices that the problem has and that were looked at."""
         own = {name for name in self.nnz if getattr(self.problem, name, None) is not None}
+        if self.problem.p:
+            own.discard("W")  # what is known is of W'
         known = self.problem.matrix_info
         result = dict(known)
         for name in sorted(own & set(self.spectra)):
@@ -239,15 +250,24 @@ def analyze(
     problem.validate()
     data = Data.of(problem)
     matrices = data.matrices
+    nan = float("nan")
     spectra: dict[str, Spectrum] = {
-        name: spectrum(matrices[name], dense) for name in ("H", "W", "M", "R") if name in matrices
+        name: spectrum(matrices[name], dense) for name in ("H", "M", "R") if name in matrices
     }
-    sign = _definiteness(data, spectra["W"], dense)
-    rank = spectra["W"].rank
-    full = rank == problem.m
-    condition = slater(
-        data, sign.word != "indefinite", full and sign.word == DEFINITE[0], time_limit
-    )
+    reduced = data.reduced
+    if reduced is None:
+        sign = Definiteness(UNKNOWN, nan, nan, "too large or too close to singular", nan)
+        rank = None
+    else:
+        found = spectrum(reduced.W, dense, reduced.rounding)
+        sign = _definiteness(data, reduced, found, dense)
+        rank = None if found.doubtful else found.rank
+        if rank is not None:
+            spectra["W"] = found
+        elif sign.word == DEFINITE[1]:
+            sign = replace(sign, word=UNKNOWN)
+    full = rank == problem.m and sign.word == DEFINITE[0]
+    condition = slater(data, sign.word in DEFINITE[:2], full, time_limit)
     verdict = existence(data, condition, tol, time_limit)
     numbers = data.local.islands().contact
     return Analysis(
@@ -260,9 +280,9 @@ def analyze(
         spectra=spectra,
         islands=int(numbers.max(initial=-1)) + 1,
         largest_island=int(np.bincount(numbers).max(initial=0)),
-        contact_density=problem.m / problem.n if problem.n else float("nan"),
-        hyperstaticity=problem.m - rank,
-        hyperstaticity_ratio=problem.m / rank if rank else float("nan"),
+        contact_density=problem.m / problem.n if problem.n else nan,
+        hyperstaticity=None if rank is None else problem.m - rank,
+        hyperstaticity_ratio=problem.m / rank if rank else nan,
         units=_units(data, verdict),
         slater=condition,
         existence=verdict,
@@ -270,13 +290,14 @@ def analyze(
     )
 
 
-def _definiteness(data: Data, found: Spectrum, dense: int) -> Definiteness:
-    """Of the symmetric part of W."""
+def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:
+    """Of the symmetric part of W, or of W'."""
     if found.extremes is not None:
         (low, high), method = found.extremes, found.method
     else:
-        low, high, method = lowest_eigenvalue(columns((data.W + data.W.T) / 2), dense)
-    threshold = max(data.problem.m, 10) * EPS * max(high, -low)
+        low, high, method = lowest_eigenvalue(columns((reduced.W + reduced.W.T) / 2), dense)
+    size = max(data.problem.m, 10)
+    threshold = max(size * EPS * max(high, -low), size * reduced.rounding)
     if low < -threshold:
         word = DEFINITE[2]
     elif low <= threshold:
@@ -291,22 +312,31 @@ def _uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqu
     if data.problem.nc == 0:
         return Uniqueness("unique", "there is no contact", 0.0, True)
     constant = float("nan")
-    if data.symmetric and sign.word == DEFINITE[0]:
-        constant = _contraction(data, dense)
+    reduced = data.reduced
+    name = "W" if data.problem.p == 0 else "W' = W - V R^-1 V^T"
+    if reduced is None:
+        reason = f"{name} is not known"
+        return Uniqueness("undecided", reason, constant, full)
+    symmetric = asymmetry(reduced.W) <= SYMMETRIC
+    if symmetric and sign.word == DEFINITE[0]:
+        constant = _contraction(data, reduced, dense)
+        # from above: what the inverse may have lost to rounding
+        lost = 10 * sign.threshold / sign.lowest
+        constant = constant * (1 + lost) if lost < 0.1 else float("nan")
     if constant < 1:
         reason = f"the fixed point on mu ||u_T|| is a contraction, of {constant:.2g}"
         return Uniqueness("unique", reason, constant, full)
     frictionless = not any(mu.any() for mu, _ in data.friction)
-    if frictionless and data.symmetric and sign.word != DEFINITE[2]:
+    if frictionless and symmetric and sign.word in DEFINITE[:2]:
         return Uniqueness("unique", "the problem without friction is convex", constant, full)
     if np.isnan(constant):
-        reason = "W is not symmetric positive definite"
+        reason = f"{name} is not symmetric positive definite beyond rounding"
     else:
         reason = f"the fixed point on mu ||u_T|| need not be a contraction ({constant:.2g})"
     return Uniqueness("undecided", reason, constant, full)
 
 
-def _contraction(data: Data, dense: int) -> float:
+def _contraction(data: Data, reduced: Reduced, dense: int) -> float:
     """sqrt(lambda_max(D W_TT D) lambda_max((W^-1)_NN)), D the coefficients of friction.
 
     r(s) minimises 1/2 r.W r + (q + E s).r over K, so that ||r - r'||_W <= ||E (s - s')||_W^-1, and
@@ -320,8 +350,13 @@ def _contraction(data: Data, dense: int) -> float:
             weights[k::d] = mu
     normal = np.arange(data.problem.m) % d == 0
     worst = 0.0
-    numbers = data.local.islands().contact
-    W = data.W.tocsr()
+    W = reduced.W.tocsr()
+    label = connected_components(W, directed=False)[1].reshape(-1, d)
+    links = sp.coo_array(
+        (np.ones(label.size), (np.repeat(np.arange(len(label)), d), label.ravel())),
+        shape=(len(label), int(label.max()) + 1),
+    )
+    numbers = connected_components(links @ links.T, directed=False)[1]
     order = np.argsort(numbers, kind="stable")
     for island in np.split(order, np.cumsum(np.bincount(numbers))[:-1]):
         rows = (d * island[:, None] + np.arange(d)).ravel()

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from scipy.linalg import cholesky, solve_triangular
 
 from fclib import _core, _solve
 
@@ -16,6 +17,8 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 Global: TypeAlias = _core.GlobalProblem | _core.GlobalRollingProblem
 
+DENSE = 2000  # the side up to which a matrix is treated densely
+EPS = float(np.finfo(float).eps)
 SYMMETRIC = 1e-12  # max |A - A^T| / max |A| up to which a matrix counts as symmetric
 
 
@@ -36,6 +39,14 @@ def asymmetry(a: Any) -> float:
     """Max |A - A^T| / max |A|, 0 for the zero matrix."""
     size = largest(a)
     return largest(columns(a - a.T)) / size if size else 0.0
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """W' = W - V R^-1 V^T, and up to where its eigenvalues may be rounding."""
+
+    W: Any
+    rounding: float
 
 
 @dataclass(frozen=True)
@@ -68,6 +79,56 @@ class Data:
     def W(self) -> Any:
         """The Delassus matrix."""
         return self.matrices["W"]
+
+    @cached_property
+    def reduced(self) -> Reduced | None:
+        """W' = W - V R^-1 V^T, what W is without bilateral constraints; None where it is rounding.
+
+        Of a symmetric global problem it is A^T A, A what is left of M^-1/2 H beside the range of
+        M^-1/2 G: no difference of large terms, and joints may be redundant.
+        """
+        if self.problem.p == 0:
+            return Reduced(self.W, 0.0)
+        if max(self.problem.n, self.problem.m, self.problem.p) > DENSE:
+            return None
+        problem = self.problem
+        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)) and (
+            asymmetry(self.matrices["M"]) <= SYMMETRIC
+        ):
+            M = self.matrices["M"].toarray()
+            try:
+                factor = cholesky((M + M.T) / 2, lower=True)
+            except np.linalg.LinAlgError:
+                return None
+            H = self.matrices["H"].toarray()
+            A, B = (
+                solve_triangular(factor, a, lower=True) for a in (H, self.matrices["G"].toarray())
+            )
+            size = np.linalg.norm(B, axis=0)
+            U, sigma, _ = np.linalg.svd(B / np.where(size > 0, size, 1.0), full_matrices=False)
+            digits = max(B.shape) * EPS
+            # a direction that the joints may or may not hold, by rounding, is undecided
+            if ((sigma > digits) & (sigma < 1e6 * digits)).any():
+                return None
+            Q = U[:, sigma > digits]
+            left = A - Q @ (Q.T @ A)
+            left -= Q @ (Q.T @ left)
+            off = max(A.shape) * EPS * float(1 / sigma[sigma > digits].min(initial=1.0))
+            lengths = np.linalg.norm(A, axis=0)
+            # columns that the joints hold entirely are zero, not rounding
+            left[:, np.linalg.norm(left, axis=0) <= 16 * off * lengths] = 0
+            return Reduced(columns(left.T @ left), 16 * off * float(lengths.max(initial=0.0)) ** 2)
+        V, R = self.matrices["V"].toarray(), self.matrices["R"].toarray()
+        sigma = np.linalg.svd(R, compute_uv=False)
+        if not sigma[-1] > 1e-10 * sigma[0]:
+            return None
+        held = V @ np.linalg.solve(R, V.T)
+        W = self.W.toarray()
+        off = max(W.shape) * EPS * float(sigma[0] / sigma[-1])
+        rounding = 16 * off * (abs(W) + abs(held))
+        left = W - held
+        left[abs(left) <= rounding] = 0
+        return Reduced(columns(left), float(rounding.max(initial=0.0)))
 
     @cached_property
     def symmetric(self) -> bool:

@@ -6,12 +6,10 @@ the theorem of the alternative that is where some u = S x + q is strictly inside
 this is the criterion of Cadoux: a velocity strictly inside the dual cone exists (Acary, Cadoux,
 Lemarechal & Malick 2011, "A formulation of the linear discrete Coulomb friction problem via convex
 optimization"; Klarbring & Pang 1998, "Existence of solutions to discrete semicoercive frictional
-contact problems"). With bilateral constraints x has lambda too, and the constraints hold.
+contact problems").
 
-u^ is in K* exactly where u_N >= 0, so what proves that there is no solution is (Farkas) y >= 0 and
-z with
-
-    -(W^T E y + V z) in K*,   V^T E y + R^T z = 0,   y . q_N + z . s < 0.
+With bilateral constraints W is W' = W - V R^-1 V^T here: a W that is positive definite says nothing
+where W' is not. A proof that there is no solution is checked in exact arithmetic (_certificate.py).
 
 The lack of a Slater point proves nothing: jammed packings have solutions under prestress.
 """
@@ -25,12 +23,11 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
 from fclib import _core, _solve
+from fclib.analysis._certificate import Certificate, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
 
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
-ROUNDING = 1e-8  # of terms that cancel in a proof, relative to them
-SAFE = 1e4  # a proof must hold for reactions this many times the usual size ||q|| / mean W_kk
 
 EXISTS_SLATER = "exists by Slater"
 EXISTS_AT_HAND = "exists (a solution is at hand)"
@@ -57,77 +54,6 @@ class Slater:
     velocity: Array | None = field(repr=False, compare=False)
     method: str
     threshold: float = MARGIN
-
-
-@dataclass(frozen=True)
-class Certificate:
-    """A proof that there is no solution, of the local form of a problem.
-
-    Attributes:
-        y: (nc,) >= 0, z: (p,) such that -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and
-            y . q_N + z . s < 0. E y has the normal parts y.
-        gain: -(y . q_N + z . s), positive.
-        distance: of the two images from where they belong; what is left of rounding.
-        bound: the proof holds for all reactions (and lambda) of a norm below this.
-        usual: the norm that reactions usually have, ||q|| / mean W_kk.
-    """
-
-    y: Array = field(repr=False)
-    z: Array | None = field(repr=False)
-    gain: float
-    distance: float
-    bound: float
-    usual: float
-
-    @property
-    def contacts(self) -> int:
-        """How many contacts the proof speaks of."""
-        return int(np.count_nonzero(self.y))
-
-
-def farkas(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate | None:
-    """The proof that y (and z) are, judged from the data alone; None where they prove nothing.
-
-    Args:
-        problem: any formulation; a global one is condensed.
-        y: (nc,) as in Certificate.
-        z: (p,) likewise, zero where it is left out.
-
-    Raises:
-        fclib.ProblemError: y or z is not of this size.
-    """
-    data = Data.of(problem)
-    local, d, p = data.local, data.d, problem.p
-    y = np.asarray(y, dtype=float)
-    if y.shape != (problem.nc,) or (z is not None and np.shape(z) != (p,)):
-        raise _core.ProblemError(f"y must have nc = {problem.nc} entries, z p = {p}")
-    if not np.isfinite(y).all() or (y < 0).any():
-        return None
-    normal = np.zeros(problem.m)
-    normal[::d] = y
-    image, size = data.W.T @ normal, abs(data.W.T) @ normal
-    q = local.q[::d]
-    gain, terms = -float(y @ q), float(y @ abs(q))
-    rest = limit = np.zeros(0)
-    if local.V is not None and local.R is not None and local.s is not None:
-        z = np.zeros(p) if z is None else np.asarray(z, dtype=float)
-        V, R = data.matrices["V"], data.matrices["R"]
-        image, size = image + V @ z, size + abs(V) @ abs(z)
-        rest = V.T @ normal + R.T @ z
-        limit = ROUNDING * (abs(V.T) @ normal + abs(R.T) @ abs(z))
-        gain, terms = gain - float(z @ local.s), terms + float(abs(z) @ abs(local.s))
-    distances = np.maximum(0, -data.dual_margin(-image))
-    sizes = size.reshape(-1, d).sum(axis=1)
-    small = (distances <= ROUNDING * sizes).all() and (abs(rest) <= limit).all()
-    if not small or not gain > ROUNDING * terms:
-        return None
-    # the margin bounds the distance from K* from above
-    distance = float(np.hypot(np.linalg.norm(distances), np.linalg.norm(rest)))
-    usual = data.speed / abs(data.stiffness)
-    bound = gain / distance if distance else np.inf
-    if not bound > SAFE * usual:
-        return None
-    return Certificate(y, z, gain, distance, bound, usual)
 
 
 def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
@@ -197,8 +123,8 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
 
     Args:
         data: the problem.
-        semidefinite: whether the symmetric part of W is positive semidefinite; else the condition
-            says nothing of solutions, and is not looked at.
+        semidefinite: whether the symmetric part of W (W' with bilateral constraints) is positive
+            semidefinite; else the condition says nothing of solutions, and is not looked at.
         full: whether that part has full rank: each velocity can be reached.
         time_limit: [s] of the conic solver.
 
@@ -209,11 +135,15 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
     if nc == 0:
         return Slater(True, 1.0, np.zeros(0), "there is no contact")
     if not semidefinite:
-        return Slater(None, np.nan, None, "W is not positive semidefinite")
+        word = "W is not positive semidefinite"
+        if p:
+            word = "W' = W - V R^-1 V^T is not known to be positive semidefinite"
+        return Slater(None, np.nan, None, word)
     inside = np.zeros(data.problem.m)
     inside[::d] = data.speed
-    if full and p == 0:
-        return Slater(True, 1.0, inside, "W has full rank")
+    if full:
+        word = "W has full rank" if p == 0 else "W' = W - V R^-1 V^T has full rank"
+        return Slater(True, 1.0, inside, word)
     if p == 0 and data.dual_margin(data.local.q).min() > MARGIN * data.speed:
         margin = min(1.0, float(data.dual_margin(data.local.q).min() / data.speed))
         return Slater(True, margin, data.local.q, "the velocity without reactions")
@@ -328,19 +258,22 @@ def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> E
         error = result.error
         solution = result.solution if result.converged else None
         why = f"the default solver ended as {result.status}, with an error of {error:.1e}"
-        if result.certificate is not None and problem.p == 0:
-            proof = farkas(problem, result.certificate)
+        if result.certificate is not None:
+            proof = farkas(problem, result.certificate, result.certificate_z)
     if condition.holds:
-        reason = f"Slater's condition holds ({condition.method}), W is positive semidefinite"
+        name = "W'" if problem.p else "W"
+        reason = f"Slater's condition holds ({condition.method}), {name} is positive semidefinite"
         return Existence(EXISTS_SLATER, reason, None, solution, error)
     if solution is not None:
-        reason = f"solved, with an error of {error:.1e} (tolerance {tol:.0e})"
+        reason = (
+            f"solved to an error of {error:.1e} relative to ||q|| (tolerance {tol:.0e}), which is "
+            "no proof"
+        )
         return Existence(EXISTS_AT_HAND, reason, None, solution, error)
     proof = proof or prove(data, time_limit)
     if proof is not None:
-        reason = (
-            f"no reactions of a norm below {proof.bound:.1e} N s (usual: {proof.usual:.1e}) keep "
-            f"{proof.contacts} contacts from closing (Farkas)"
-        )
+        which = "no reactions" if proof.exact else f"no reactions of a norm below {proof.bound:.1e}"
+        how = "in exact arithmetic" if proof.exact else "W being rounded in its last digits"
+        reason = f"{which} keep {proof.contacts} contacts from closing (Farkas, {how})"
         return Existence(PROVEN_NOT, reason, proof, None, error)
     return Existence(UNDECIDED, f"{why}; no proof was found that there is no solution", None)

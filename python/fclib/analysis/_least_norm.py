@@ -18,8 +18,7 @@ from scipy.linalg import qr
 from fclib import _core
 from fclib.analysis._conic import Program
 from fclib.analysis._contacts import completed, velocity
-from fclib.analysis._data import Array, Data
-from fclib.analysis._spectrum import DENSE, EPS
+from fclib.analysis._data import DENSE, EPS, Array, Data
 
 MOVES = 1e-9  # a velocity above this, relative to max(||u||, ||q||), opens or slides
 

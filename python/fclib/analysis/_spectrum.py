@@ -18,13 +18,11 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import eigsh, splu
 
-from fclib.analysis._data import Array, asymmetry
+from fclib.analysis._data import DENSE, EPS, Array, asymmetry
 
-DENSE = 2000  # the shorter side of a block up to which it is treated densely
 SPARSE_SYMMETRIC = 1e-10  # threshold of the rank, relative to the largest singular value
 SPARSE_GRAM = 1e-6  # the same, where A^T A stands for A
 HALVINGS = 12  # of the decades between the threshold and the largest singular value
-EPS = float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
@@ -39,6 +37,7 @@ class Spectrum:
         threshold: what counts as zero, absolute.
         extremes: the lowest and the highest eigenvalue of a symmetric matrix that is treated
             densely, else None.
+        doubtful: singular values that the matrix has and that may be its rounding.
     """
 
     rank: int
@@ -47,6 +46,7 @@ class Spectrum:
     method: str
     threshold: float
     extremes: tuple[float, float] | None = None
+    doubtful: int = 0
 
     @property
     def conditioning(self) -> float:
@@ -117,10 +117,11 @@ def _places(label: Any, count: int) -> Any:
     return places
 
 
-def spectrum(a: Any, limit: int = DENSE) -> Spectrum:
+def spectrum(a: Any, limit: int = DENSE, rounding: float = 0.0) -> Spectrum:
     """Rank and conditioning of a csc_array; dense blocks have at most `limit` rows or columns.
 
-    The threshold is that of NumPy's matrix_rank, max(shape) eps sigma_1, where all is dense.
+    The threshold is that of NumPy's matrix_rank, max(shape) eps sigma_1, where all is dense, or
+    `rounding` where that is more.
     """
     square = a.shape[0] == a.shape[1] and asymmetry(a) <= max(a.shape) * EPS
     blocks = blocks_of(a, limit, square)
@@ -141,8 +142,9 @@ def spectrum(a: Any, limit: int = DENSE) -> Spectrum:
     top = max([*(counter.largest for counter in large), float(found.max(initial=0))])
     relative = max(a.shape, default=0) * EPS
     relative = max([relative, *(counter.threshold for counter in large)])
-    threshold = relative * top
+    threshold = max(relative * top, rounding)
     kept = found[found > threshold]
+    doubtful = int(((found > relative * top) & (found <= threshold)).sum())
     rank = int(kept.size) + sum(counter.above(threshold) for counter in large)
     smallest = [counter.smallest_above(threshold) for counter in large]
     if kept.size:
@@ -151,7 +153,7 @@ def spectrum(a: Any, limit: int = DENSE) -> Spectrum:
     words = blocks.method.replace("dense", dense)
     if values and len(blocks.dense) + len(blocks.sparse) > 1:
         words += " by blocks"
-    return Spectrum(rank, top, min(smallest, default=0.0), words, threshold, extremes)
+    return Spectrum(rank, top, min(smallest, default=0.0), words, threshold, extremes, doubtful)
 
 
 class _Counter:

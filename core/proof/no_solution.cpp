@@ -1,0 +1,386 @@
+#include "proof/no_solution.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "linalg/exact_sum.hpp"
+
+namespace fclib {
+
+namespace {
+
+using Dense = Eigen::MatrixXd;
+
+constexpr double unit = 0x1p-53;
+/// Of the last digits of W, how many times their rounding may be left.
+constexpr double last_digits = 8;
+/// A gain below this part of its terms is rounding.
+constexpr double least_gain = 1e-8;
+/// Beyond, what is found is not brought to where it is exact.
+constexpr Index most_unknowns = 96;
+constexpr Index most_rows = 4096;
+constexpr int most_rays = 200;
+constexpr double most_operations = 1e8;
+
+/// Calls cone(row, unknown, value) for the sums that must be in K*, zero(row, unknown, value) for
+/// those that must vanish; y are the first nc unknowns, z the others.
+template <class Cone, class Zero>
+void for_each_term(const LocalProblem& problem, const Cone& cone, const Zero& zero) {
+  const Index d = problem.spacedim;
+  const auto nc = static_cast<Index>(problem.mu.size());
+  for_each_entry(problem.W, [&](Index row, Index col, double value) {
+    if (row % d == 0) cone(col, row / d, -value);
+  });
+  for_each_entry(problem.V, [&](Index row, Index col, double value) {
+    cone(row, nc + col, -value);
+    if (row % d == 0) zero(col, row / d, value);
+  });
+  for_each_entry(problem.R,
+                 [&](Index row, Index col, double value) { zero(col, nc + row, value); });
+}
+template <class Cone, class Zero>
+void for_each_term(const GlobalProblem& problem, const Cone& /*cone*/, const Zero& zero) {
+  const Index d = problem.spacedim;
+  const auto nc = static_cast<Index>(problem.mu.size());
+  for_each_entry(problem.H, [&](Index row, Index col, double value) {
+    if (col % d == 0) zero(row, col / d, value);
+  });
+  for_each_entry(problem.G,
+                 [&](Index row, Index col, double value) { zero(row, nc + col, value); });
+}
+
+const Vector& normal_constants(const LocalProblem& problem) { return problem.q; }
+const Vector& normal_constants(const GlobalProblem& problem) { return problem.w; }
+const Vector& bilateral_constants(const LocalProblem& problem) { return problem.s; }
+const Vector& bilateral_constants(const GlobalProblem& problem) { return problem.b; }
+
+Index cone_rows(const LocalProblem& problem) { return static_cast<Index>(problem.q.size()); }
+Index cone_rows(const GlobalProblem& /*problem*/) { return 0; }
+Index zero_rows(const LocalProblem& problem) { return problem.size(Dim::p); }
+Index zero_rows(const GlobalProblem& problem) { return problem.size(Dim::n); }
+
+/// From above, of the part of a contact: its distance from K*; 0 only where it is inside.
+double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const Vector& image,
+                          Index a) {
+  // the parts are off by two units at most, the norms and products by some more
+  constexpr double more = 1 + 64 * unit;
+  const Index d = problem.spacedim;
+  const double normal = image[d * a];
+  double tangential = 0;
+  if (mu_r == nullptr) {
+    tangential = problem.mu[a] * image.segment(d * a + 1, d - 1).norm();
+  } else {
+    const Index half = (d + 1) / 2;
+    tangential = problem.mu[a] * image.segment(d * a + 1, half - 1).norm() +
+                 (*mu_r)[a] * image.segment(d * a + half, d - half).norm();
+  }
+  if (tangential == 0 && normal >= 0) {
+    // a product that underflows is no zero
+    const bool moves = (image.segment(d * a + 1, d - 1).array() != 0).any();
+    const bool resists = problem.mu[a] > 0 || (mu_r != nullptr && (*mu_r)[a] > 0);
+    if (!(moves && resists)) return 0;
+  }
+  if (normal > 0 && tangential > 1e-250 && normal >= more * tangential) return 0;
+  const double outside = std::max(0.0, more * tangential - normal);
+  const double size = image.segment(d * a, d).norm();
+  return more * std::max(std::min(size, more * outside), 1e-300);
+}
+
+/// The columns of those unknowns, dense; rows without an entry are left out.
+template <class P>
+void columns(const P& problem, const std::vector<Index>& place, Index count, Dense& all,
+             Dense& zeros) {
+  const Index shift = cone_rows(problem);
+  std::vector<Index> row_of(static_cast<std::size_t>(shift + zero_rows(problem)), -1);
+  Index rows = 0;
+  const auto touch = [&](Index row, Index unknown, double value) {
+    if (place[static_cast<std::size_t>(unknown)] < 0 || value == 0) return;
+    Index& at = row_of[static_cast<std::size_t>(row)];
+    if (at < 0) at = rows++;
+  };
+  for_each_term(
+      problem, [&](Index row, Index k, double value) { touch(row, k, value); },
+      [&](Index row, Index k, double value) { touch(shift + row, k, value); });
+  if (rows > most_rows) rows = 0;
+  all = Dense::Zero(rows, count);
+  zeros = Dense::Zero(rows, count);
+  if (rows == 0) return;
+  for_each_term(
+      problem,
+      [&](Index row, Index k, double value) {
+        const Index column = place[static_cast<std::size_t>(k)];
+        if (column >= 0 && value != 0) all(row_of[static_cast<std::size_t>(row)], column) += value;
+      },
+      [&](Index row, Index k, double value) {
+        const Index column = place[static_cast<std::size_t>(k)];
+        if (column < 0 || value == 0) return;
+        const Index at = row_of[static_cast<std::size_t>(shift + row)];
+        all(at, column) += value;
+        zeros(at, column) += value;
+      });
+}
+
+/// A basis of the kernel, up to rounding.
+Dense kernel(const Dense& a) {
+  if (a.rows() == 0) return Dense::Identity(a.cols(), a.cols());
+  Vector size = a.colwise().norm().transpose();
+  for (double& value : size) value = value > 0 ? value : 1.0;
+  Eigen::ColPivHouseholderQR<Dense> qr(a * size.cwiseInverse().asDiagonal());
+  qr.setThreshold(1e-10);
+  const Eigen::Index rank = qr.rank();
+  const Eigen::Index free = a.cols() - rank;
+  Dense basis(a.cols(), free);
+  if (free == 0) return basis;
+  const Dense r = qr.matrixQR().topRows(rank);
+  basis.topRows(rank) = -r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.rightCols(free));
+  basis.bottomRows(free).setIdentity();
+  return size.cwiseInverse().asDiagonal() * (qr.colsPermutation() * basis);
+}
+
+/// Whole numbers in the same ratios, or nothing.
+Vector whole_numbers(const Vector& x) {
+  const double largest = x.cwiseAbs().maxCoeff();
+  for (const double one : x) {
+    if (!(std::abs(one) > 1e-6 * largest)) continue;
+    for (int denominator = 1; denominator <= 12; ++denominator) {
+      const Vector scaled = x * (denominator / std::abs(one));
+      const Vector rounded = scaled.array().round();
+      const auto limit = 1e-8 * scaled.array().abs().max(1.0);
+      if (((scaled - rounded).array().abs() <= limit).all() && rounded.cwiseAbs().maxCoeff() < 1e12)
+        return rounded;
+    }
+  }
+  return {};
+}
+
+template <class P>
+class Search {
+ public:
+  Search(const P& problem, const Vector& y) : problem_(problem), y_(y) {}
+
+  NoSolution run() {
+    const auto nc = static_cast<Index>(y_.size());
+    const Index p = problem_.size(Dim::p);
+    if (p == 0 && tried(y_, {})) return best_;
+    std::vector<Index> place(static_cast<std::size_t>(nc + p), -1);
+    for (Index a = 0; a < nc; ++a) {
+      if (y_[a] > 0) contacts_.push_back(a);
+    }
+    unknowns_ = static_cast<Index>(contacts_.size()) + p;
+    if (contacts_.empty() || unknowns_ > most_unknowns) return best_;
+    Index at = 0;
+    for (const Index a : contacts_) place[static_cast<std::size_t>(a)] = at++;
+    for (Index k = 0; k < p; ++k) place[static_cast<std::size_t>(nc + k)] = at++;
+    columns(problem_, place, unknowns_, all_, zeros_);
+    if (all_.rows() == 0 && (p > 0 || cone_rows(problem_) > 0)) return best_;
+    const auto count = static_cast<Eigen::Index>(contacts_.size());
+    Vector x = Vector::Zero(unknowns_);
+    for (Eigen::Index k = 0; k < count; ++k) x[k] = y_[contacts_[static_cast<std::size_t>(k)]];
+    if (p > 0) {
+      // y as it is, with the z that keeps the constraints
+      const Vector rest = -zeros_.leftCols(count) * x.head(count);
+      x.tail(p) = zeros_.rightCols(p).completeOrthogonalDecomposition().solve(rest);
+      if (tried(x)) return best_;
+    }
+    std::vector<Index> active(contacts_.size());
+    std::iota(active.begin(), active.end(), 0);
+    reduce(x, active);
+    return best_;
+  }
+
+ private:
+  /// Whether x is a proof that holds for all reactions.
+  bool tried(const Vector& x) {
+    const auto count = static_cast<Eigen::Index>(contacts_.size());
+    const auto unfolded = [&](const Vector& from) {
+      Vector y = Vector::Zero(y_.size());
+      for (Eigen::Index k = 0; k < count; ++k) {
+        y[contacts_[static_cast<std::size_t>(k)]] = std::max(0.0, from[k]);
+      }
+      return y;
+    };
+    const Vector whole = whole_numbers(x);
+    if (whole.size() > 0 && tried(unfolded(whole), whole.tail(unknowns_ - count))) return true;
+    return tried(unfolded(x), x.tail(unknowns_ - count));
+  }
+  bool tried(const Vector& y, const Vector& z) {
+    NoSolution found = check_no_solution(problem_, y, z);
+    if (found.bound > best_.bound) best_ = std::move(found);
+    return best_.exact();
+  }
+
+  /// From x in the kernel to its rays on the fewest contacts, until one is a proof.
+  bool reduce(const Vector& from, const std::vector<Index>& active) {
+    const double cost = static_cast<double>(all_.rows()) * static_cast<double>(unknowns_) *
+                        static_cast<double>(unknowns_);
+    if (++visited_ > most_rays || visited_ * cost > most_operations + cost) return false;
+    const auto count = static_cast<Eigen::Index>(active.size());
+    const auto p = unknowns_ - static_cast<Eigen::Index>(contacts_.size());
+    Dense part(all_.rows(), count + p);
+    Vector x(count + p);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      part.col(k) = all_.col(active[static_cast<std::size_t>(k)]);
+      x[k] = from[active[static_cast<std::size_t>(k)]];
+    }
+    part.rightCols(p) = all_.rightCols(p);
+    x.tail(p) = from.tail(p);
+    const Dense basis = kernel(part);
+    if (basis.cols() == 0) return false;
+    x = basis * basis.colPivHouseholderQr().solve(x);
+    const auto whole = [&](const Vector& own) {
+      Vector result = Vector::Zero(unknowns_);
+      for (Eigen::Index k = 0; k < count; ++k) result[active[static_cast<std::size_t>(k)]] = own[k];
+      result.tail(p) = own.tail(p);
+      return result;
+    };
+    if (tried(whole(x))) return true;
+    // along the kernel, where y changes the most, until a contact is left
+    Eigen::Index way = -1;
+    double most = 1e-9;
+    for (Eigen::Index k = 0; k < basis.cols(); ++k) {
+      const Vector y = basis.col(k).head(count);
+      if (!(y.norm() > 0)) continue;
+      const Vector along = x.head(count);
+      const double off = (y - along * (along.dot(y) / along.squaredNorm())).norm() / y.norm();
+      if (off > most) {
+        most = off;
+        way = k;
+      }
+    }
+    if (way < 0) return false;
+    for (const double sign : {1.0, -1.0}) {
+      const Vector step = sign * basis.col(way);
+      double length = std::numeric_limits<double>::infinity();
+      Eigen::Index leaving = -1;
+      for (Eigen::Index k = 0; k < count; ++k) {
+        if (step[k] < 0 && x[k] / -step[k] < length) {
+          length = x[k] / -step[k];
+          leaving = k;
+        }
+      }
+      if (leaving < 0 || count == 1) continue;
+      const Vector next = x + length * step;
+      const double largest = next.head(count).maxCoeff();
+      std::vector<Index> kept;
+      for (Eigen::Index k = 0; k < count; ++k) {
+        if (k != leaving && next[k] > 1e-12 * largest)
+          kept.push_back(active[static_cast<std::size_t>(k)]);
+      }
+      if (!kept.empty() && reduce(whole(next), kept)) return true;
+    }
+    return false;
+  }
+
+  const P& problem_;
+  const Vector& y_;
+  std::vector<Index> contacts_;
+  Index unknowns_ = 0;
+  Dense all_, zeros_;
+  NoSolution best_;
+  int visited_ = 0;
+};
+
+/// The sums of a proof and its gain, exactly; whether y, z have the right form and a gain.
+template <class P>
+bool sums(const P& problem, const Vector& y, const Vector& z, std::vector<ExactSum>& cone,
+          std::vector<ExactSum>& zero, double& gain) {
+  const auto nc = static_cast<Index>(problem.mu.size());
+  const Index p = problem.size(Dim::p);
+  const Index d = problem.spacedim;
+  if (y.size() != nc || z.size() != p || !y.allFinite() || !z.allFinite()) return false;
+  if ((y.array() < 0).any()) return false;
+  ExactSum negative;
+  double terms = 0;
+  for (Index a = 0; a < nc; ++a) {
+    const double q = normal_constants(problem)[d * a];
+    negative.add_product(-y[a], q);
+    terms += std::abs(y[a] * q);
+  }
+  for (Index k = 0; k < p; ++k) {
+    negative.add_product(-z[k], bilateral_constants(problem)[k]);
+    terms += std::abs(z[k] * bilateral_constants(problem)[k]);
+  }
+  gain = negative.value();
+  if (!negative.exact() || !(gain > least_gain * terms)) return false;
+  const auto factor = [&](Index unknown) { return unknown < nc ? y[unknown] : z[unknown - nc]; };
+  cone.assign(static_cast<std::size_t>(cone_rows(problem)), {});
+  zero.assign(static_cast<std::size_t>(zero_rows(problem)), {});
+  for_each_term(
+      problem,
+      [&](Index row, Index k, double value) {
+        cone[static_cast<std::size_t>(row)].add_product(value, factor(k));
+      },
+      [&](Index row, Index k, double value) {
+        zero[static_cast<std::size_t>(row)].add_product(value, factor(k));
+      });
+  return std::all_of(zero.begin(), zero.end(), [](const ExactSum& sum) { return sum.zero(); }) &&
+         std::all_of(cone.begin(), cone.end(), [](const ExactSum& sum) { return sum.exact(); });
+}
+
+NoSolution check_local(const LocalProblem& problem, const Vector* mu_r, const Vector& y,
+                       const Vector& given) {
+  const Vector z = given.size() > 0 ? given : Vector(Vector::Zero(problem.size(Dim::p)));
+  std::vector<ExactSum> cone;
+  std::vector<ExactSum> zero;
+  double gain = 0;
+  if (!sums(problem, y, z, cone, zero, gain)) return {};
+  const Index d = problem.spacedim;
+  const auto nc = static_cast<Index>(problem.mu.size());
+  Vector image(problem.q.size());
+  for (Eigen::Index k = 0; k < image.size(); ++k)
+    image[k] = cone[static_cast<std::size_t>(k)].value();
+  Vector distance(nc);
+  for (Index a = 0; a < nc; ++a) distance[a] = distance_from_dual(problem, mu_r, image, a);
+  const double infinity = std::numeric_limits<double>::infinity();
+  if ((distance.array() == 0).all()) return {y, z, gain, 0, infinity};
+  if (z.size() > 0) return {};
+  // what is left must be the last digits of W, and show that W is a rounded one
+  Vector size = Vector::Zero(nc);
+  for_each_term(
+      problem, [&](Index row, Index k, double value) { size[row / d] += std::abs(value) * y[k]; },
+      [](Index, Index, double) {});
+  if (!(distance.array() <= last_digits * unit * size.array()).all()) return {};
+  double curvature = 0;
+  double terms = 0;
+  for (Index a = 0; a < nc; ++a) {
+    curvature -= y[a] * image[d * a];
+    terms += std::abs(y[a] * image[d * a]);
+  }
+  if (!(curvature < -16 * unit * static_cast<double>(nc) * terms)) return {};
+  const double all = distance.norm() * (1 + 64 * unit * static_cast<double>(nc));
+  return {y, z, gain, all, gain / all * (1 - 16 * unit)};
+}
+
+}  // namespace
+
+NoSolution check_no_solution(const LocalProblem& problem, const Vector& y, const Vector& z) {
+  return check_local(problem, nullptr, y, z);
+}
+
+NoSolution check_no_solution(const LocalRollingProblem& problem, const Vector& y, const Vector& z) {
+  return check_local(problem, &problem.mu_r, y, z);
+}
+
+NoSolution check_no_solution(const GlobalProblem& problem, const Vector& y, const Vector& given) {
+  const Vector z = given.size() > 0 ? given : Vector(Vector::Zero(problem.size(Dim::p)));
+  std::vector<ExactSum> cone;
+  std::vector<ExactSum> zero;
+  double gain = 0;
+  if (!sums(problem, y, z, cone, zero, gain)) return {};
+  return {y, z, gain, 0, std::numeric_limits<double>::infinity()};
+}
+
+NoSolution prove_no_solution(const LocalProblem& problem, const Vector& y) {
+  return Search<LocalProblem>(problem, y).run();
+}
+NoSolution prove_no_solution(const LocalRollingProblem& problem, const Vector& y) {
+  return Search<LocalRollingProblem>(problem, y).run();
+}
+NoSolution prove_no_solution(const GlobalProblem& problem, const Vector& y) {
+  return Search<GlobalProblem>(problem, y).run();
+}
+
+}  // namespace fclib

@@ -1,0 +1,386 @@
+"""Proofs that a problem has no solution, checked on its data as given, in rational arithmetic.
+
+u^ is in K* exactly where u_N >= 0, so what proves that there is no solution is (Farkas) y >= 0, one
+number a contact, and z, one a bilateral constraint, with
+
+    local    -(W^T E y + V z) in K*,  V^T E y + R^T z = 0,  y . q_N + z . s < 0
+    global   H E y + G z = 0,                               y . w_N + z . b < 0
+
+Every double is a rational number, and so are the sums. A W that was condensed carries the rounding
+of that; what of W^T E y is left then is accepted under the two conditions of `check`, with the norm
+of reactions up to which the proof holds.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import inf, isfinite, nextafter, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fclib import _core, _digest, _solve
+from fclib.analysis._data import Array
+
+LAST_DIGITS = 8  # of W's last digits, how many times their rounding may be left
+LEAST_GAIN = Fraction(1, 10**8)  # below this part of its terms a gain is rounding
+MOST = 60  # unknowns up to which a kernel is found in rational arithmetic
+FORMAT = "fclib certificate 1"
+
+Numbers = Mapping[int, Fraction]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """A proof that there is no solution, of a problem as it was given.
+
+    Attributes:
+        y: (nc,) >= 0 and z: (p,), or None without bilateral constraints, as doubles.
+        exact_y, exact_z: the same as rational numbers, zeros left out.
+        gain: -(y . q_N + z . s), or of w and b, positive.
+        distance: of -(W^T E y + V z) from K*, from above; 0 for an exact proof.
+        bound: no reactions of a norm below this are a solution; inf for an exact proof.
+    """
+
+    y: Array = field(repr=False)
+    z: Array | None = field(repr=False)
+    exact_y: Numbers = field(repr=False)
+    exact_z: Numbers = field(repr=False)
+    gain: float
+    distance: float
+    bound: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether it holds for all reactions."""
+        return self.bound == inf
+
+    @property
+    def contacts(self) -> int:
+        """How many contacts the proof speaks of."""
+        return len(self.exact_y)
+
+    def record(self, problem: _solve.Problem) -> dict[str, Any]:
+        """What a file of a certificate has; numbers are exact, as "3/7"."""
+        return {
+            "format": FORMAT,
+            "digest": _digest.digest(problem),
+            "y": {str(a): str(value) for a, value in self.exact_y.items()},
+            "z": {str(k): str(value) for k, value in self.exact_z.items()},
+            "gain": self.gain,
+            "bound": None if self.exact else self.bound,
+        }
+
+
+class CertificateError(_core.ProblemError):
+    """A certificate that does not prove what it says, with the contact that breaks it."""
+
+
+@dataclass(frozen=True)
+class _System:
+    """The terms of the sums, by unknown: y are the first nc, z the others."""
+
+    nc: int
+    p: int
+    d: int
+    cone: Mapping[int, list[tuple[int, Fraction]]]
+    zero: Mapping[int, list[tuple[int, Fraction]]]
+    constants: Sequence[Fraction]
+
+
+def _entries(a: Any) -> Iterable[tuple[int, int, float]]:
+    entries = sp.coo_array(a)
+    yield from zip(entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True)
+
+
+def _system(problem: _solve.Problem, used: set[int]) -> _System:
+    """The terms of the unknowns in use."""
+    d, nc, p = problem.spacedim, problem.nc, problem.p
+    cone: dict[int, list[tuple[int, Fraction]]] = defaultdict(list)
+    zero: dict[int, list[tuple[int, Fraction]]] = defaultdict(list)
+
+    def take(to: dict[int, list[tuple[int, Fraction]]], row: int, k: int, value: float) -> None:
+        if k in used and value:
+            to[k].append((row, Fraction(value)))
+
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        for row, col, value in _entries(problem.H):
+            if col % d == 0:
+                take(zero, row, col // d, value)
+        if problem.G is not None:
+            for row, col, value in _entries(problem.G):
+                take(zero, row, nc + col, value)
+        constants = [*problem.w[::d], *(problem.b if problem.b is not None else [])]
+    else:
+        for row, col, value in _entries(problem.W):
+            if row % d == 0:
+                take(cone, col, row // d, -value)
+        if problem.V is not None:
+            for row, col, value in _entries(problem.V):
+                take(cone, row, nc + col, -value)
+                if row % d == 0:
+                    take(zero, col, row // d, value)
+        if problem.R is not None:
+            for row, col, value in _entries(problem.R):
+                take(zero, col, nc + row, value)
+        constants = [*problem.q[::d], *(problem.s if problem.s is not None else [])]
+    return _System(nc, p, d, cone, zero, [Fraction(float(one)) for one in constants])
+
+
+def _sum(
+    terms: Mapping[int, list[tuple[int, Fraction]]], x: Numbers
+) -> tuple[dict[int, Fraction], dict[int, Fraction]]:
+    """The sums that are not zero, and those of the sizes of their terms."""
+    total: dict[int, Fraction] = defaultdict(Fraction)
+    size: dict[int, Fraction] = defaultdict(Fraction)
+    for k, value in x.items():
+        for row, entry in terms.get(k, []):
+            total[row] += entry * value
+            size[row] += abs(entry * value)
+    return {row: value for row, value in total.items() if value}, size
+
+
+def _outside(problem: _solve.Problem, a: int, part: Sequence[Fraction]) -> float:
+    """From above, how far the part of a contact is from K*; 0 exactly where it is inside."""
+    d = problem.spacedim
+    groups = [(problem.mu, slice(1, d))]
+    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
+        half = (d + 1) // 2
+        groups = [(problem.mu, slice(1, half)), (problem.mu_r, slice(half, d))]
+    normal = part[0]
+    squares = [
+        Fraction(float(mu[a])) ** 2 * sum((x * x for x in part[own]), Fraction())
+        for mu, own in groups
+    ]
+    if normal >= 0:
+        # n >= sqrt(s) + sqrt(t), without roots
+        rest = normal * normal - sum(squares)
+        if rest >= 0 and (len(squares) == 1 or rest * rest >= 4 * squares[0] * squares[1]):
+            return 0.0
+    size = _root(sum((x * x for x in part), Fraction()))
+    outside = nextafter(sum(map(_root, squares)) - float(normal), inf)
+    return max(5e-324, min(size, outside * (1 + 1e-12)) if outside > 0 else size)
+
+
+def _root(x: Fraction) -> float:
+    """The root from above."""
+    if x == 0:
+        return 0.0
+    shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
+    scaled = x * Fraction(4) ** shift
+    return sqrt(float(scaled)) * (1 + 1e-14) * 2.0**-shift
+
+
+def check(
+    problem: _solve.Problem, y: Mapping[int, Any], z: Mapping[int, Any] | None = None
+) -> Certificate:
+    """The proof that y and z are, in exact arithmetic.
+
+    Where W^T E y is not in K* the proof is accepted for a local problem without bilateral
+    constraints, up to a norm of reactions, if what is left is no more than the last digits of W,
+    and y . W_NN y < 0: this W is not positive semidefinite, so that it was rounded. Where W is,
+    what is left is a velocity that the contacts can have.
+
+    Args:
+        problem: any formulation.
+        y: by contact, anything that Fraction takes.
+        z: by bilateral constraint.
+
+    Raises:
+        CertificateError: it proves nothing, with the contact or the constraint that breaks it.
+    """
+    nc, p = problem.nc, problem.p
+    exact_y = _rationals(y, nc, "y", "contact")
+    exact_z = _rationals(z or {}, p, "z", "bilateral constraint")
+    for a, value in exact_y.items():
+        if value < 0:
+            raise CertificateError(f"y: contact {a}: {float(value):.3g} is negative")
+    x = {**exact_y, **{nc + k: value for k, value in exact_z.items()}}
+    system = _system(problem, set(x))
+    terms = [value * system.constants[k] for k, value in x.items()]
+    gain = -sum(terms, Fraction())
+    if not gain > LEAST_GAIN * sum(map(abs, terms)):
+        worst = min(exact_y, key=lambda a: -exact_y[a] * system.constants[a], default=None)
+        where = "" if worst is None else f", contact {worst} takes the most from it"
+        raise CertificateError(
+            f"-(y . q_N + z . s) is {float(gain):.3g}, which must be positive{where}"
+        )
+    rest, _ = _sum(system.zero, x)
+    if rest:
+        row, value = max(rest.items(), key=lambda item: abs(item[1]))
+        if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+            touching = [k for k in exact_y if any(one == row for one, _ in system.zero.get(k, []))]
+            where = f"contact {touching[0]}" if touching else "a bilateral constraint"
+            raise CertificateError(
+                f"{where}: H E y + G z = {float(value):.3g} at degree of freedom {row}, "
+                "which must be 0"
+            )
+        raise CertificateError(
+            f"bilateral constraint {row}: V^T E y + R^T z = {float(value):.3g}, which must be 0"
+        )
+    image, size = _sum(system.cone, x)
+    distance, broken, curvature = 0.0, -1, Fraction()
+    bounded = p == 0
+    for a in sorted({row // system.d for row in image}):
+        part = [image.get(system.d * a + k, Fraction()) for k in range(system.d)]
+        off = _outside(problem, a, part)
+        curvature -= exact_y.get(a, Fraction()) * part[0]
+        if off == 0:
+            continue
+        broken = a if broken < 0 else broken
+        distance = float(np.hypot(distance, off)) * (1 + 1e-15)
+        terms_of_a = sum(size.get(system.d * a + k, Fraction()) for k in range(system.d))
+        bounded = bounded and off <= LAST_DIGITS * 2.0**-53 * float(terms_of_a)
+    if broken >= 0 and not (bounded and curvature < 0):
+        raise CertificateError(
+            f"contact {broken}: -(W^T E y + V z) is not in K*, by {distance:.3g} in all"
+        )
+    bound = float(gain) / distance * (1 - 1e-14) if distance else inf
+    doubles = np.zeros(nc)
+    doubles[list(exact_y)] = [float(value) for value in exact_y.values()]
+    bilateral = np.zeros(p)
+    bilateral[list(exact_z)] = [float(value) for value in exact_z.values()]
+    return Certificate(
+        doubles, bilateral if p else None, exact_y, exact_z, float(gain), distance, bound
+    )
+
+
+def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dict[int, Fraction]:
+    result = {}
+    for key, value in values.items():
+        if not 0 <= key < count:
+            raise CertificateError(f"{name}: there is no {of} {key}, the problem has {count}")
+        try:
+            number = Fraction(value)
+        except (ValueError, TypeError, OverflowError, ZeroDivisionError):
+            raise CertificateError(f"{name}: {of} {key}: {value!r} is no number") from None
+        if number:
+            result[key] = number
+    return result
+
+
+def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None:
+    """The proof that y (and z) are, or one near them; None where none was found.
+
+    Args:
+        problem: any formulation.
+        y: (nc,) as in Certificate.
+        z: (p,) likewise; found from y where it is left out.
+
+    Raises:
+        fclib.ProblemError: y or z is not of this size.
+    """
+    nc, p = problem.nc, problem.p
+    y = np.asarray(y, dtype=float)
+    if y.shape != (nc,) or (z is not None and np.shape(z) != (p,)):
+        raise _core.ProblemError(f"y must have nc = {nc} entries, z p = {p}")
+    if not np.isfinite(y).all() or (y < 0).any() or not y.any():
+        return None
+    own = {int(a): Fraction(float(y[a])) for a in np.flatnonzero(y)}
+    near = {} if z is None else {int(k): float(z[k]) for k in np.flatnonzero(z) if isfinite(z[k])}
+    if z is not None or p == 0:
+        try:
+            found = check(problem, own, near)
+        except CertificateError:
+            pass
+        else:
+            if found.exact:
+                return found
+    best = None
+    if core := _core.prove_no_solution(problem, y):
+        other = {int(a): float(core[0][a]) for a in np.flatnonzero(core[0])}
+        try:
+            best = check(
+                problem, other, {int(k): float(core[1][k]) for k in np.flatnonzero(core[1])}
+            )
+        except CertificateError:
+            best = None
+        if best is not None and best.exact:
+            return best
+    # what doubles cannot say: the kernel in rational numbers
+    if len(own) + p <= MOST:
+        for rows in ("zero", "all"):
+            if (exact := _completed(problem, own, near, rows)) is None:
+                continue
+            try:
+                found = check(problem, *exact)
+            except CertificateError:
+                continue
+            if found.exact:
+                return found
+    return best
+
+
+def _completed(
+    problem: _solve.Problem, y: Numbers, z: Mapping[int, float], which: str
+) -> tuple[dict[int, Fraction], dict[int, Fraction]] | None:
+    """Y and z moved so that the sums vanish exactly: those that must, or all of them."""
+    nc, p = problem.nc, problem.p
+    # the bilateral multipliers and the smaller parts of y follow from the larger ones
+    unknowns = [*range(nc, nc + p), *sorted(y, key=lambda a: y[a])]
+    system = _system(problem, set(unknowns))
+    rows: dict[tuple[bool, int], dict[int, Fraction]] = defaultdict(dict)
+    for kind, terms in ((False, system.zero), (True, system.cone)):
+        if kind and which == "zero":
+            continue
+        for k, entries in terms.items():
+            for row, value in entries:
+                own = rows[kind, row]
+                own[k] = own.get(k, Fraction()) + value
+    if not rows:
+        return None
+    pivots: dict[int, dict[int, Fraction]] = {}
+    place = {k: number for number, k in enumerate(unknowns)}
+    for equation in rows.values():
+        left = {k: value for k, value in equation.items() if value}
+        while left:
+            k = min(left, key=lambda one: place[one])
+            if k not in pivots:
+                factor = left[k]
+                pivots[k] = {one: value / factor for one, value in left.items()}
+                break
+            factor = left[k]
+            for one, value in pivots[k].items():
+                rest = left.get(one, Fraction()) - factor * value
+                if rest:
+                    left[one] = rest
+                else:
+                    left.pop(one, None)
+        if len(pivots) == len(unknowns):
+            return None
+    x: dict[int, Fraction] = {}
+    for k in reversed(unknowns):
+        if k in pivots:
+            x[k] = -sum(
+                (value * x[one] for one, value in pivots[k].items() if one != k), Fraction()
+            )
+        else:
+            x[k] = y[k] if k in y else Fraction(z.get(k - nc, 0.0))
+    return {a: x[a] for a in y}, {k: x[nc + k] for k in range(p)}
+
+
+def read_certificate(path: str | Path) -> tuple[dict[int, Any], dict[int, Any], str | None]:
+    """Y, z and the digest of a file that `Certificate.record` went into, or that has its y and z.
+
+    Raises:
+        fclib.FileError: it is no certificate.
+    """
+    try:
+        record = json.loads(Path(path).read_text())
+        record = record.get("certificate") or record
+        y, z = record["y"], record.get("z") or {}
+        parts = [
+            {int(k): v for k, v in (x.items() if isinstance(x, dict) else enumerate(x)) if v}
+            for x in (y, z)
+        ]
+    except OSError as error:
+        raise _core.FileError(f"{path}: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise _core.FileError(f"{path}: no certificate: y and z are missing") from None
+    return parts[0], parts[1], record.get("digest")

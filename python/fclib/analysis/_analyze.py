@@ -158,6 +158,10 @@ class Analysis:
             record[f"conditioning_{name}"] = found.conditioning
             record[f"rank_{name}_method"] = found.method
             record[f"rank_{name}_threshold"] = found.threshold
+        if "W" not in self.spectra:
+            record |= dict.fromkeys(
+                ("rank_W", "conditioning_W", "rank_W_method", "rank_W_threshold")
+            )
         record |= {
             "contact_density": self.contact_density,
             "hyperstaticity": self.hyperstaticity,

@@ -27,6 +27,7 @@ from fclib.analysis._certificate import Certificate, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
 
+PAIRS = 500  # of contacts, that are tried as a proof at most
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
 
 EXISTS_SLATER = "exists by Slater"
@@ -95,6 +96,22 @@ def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
         for trial in (_refined(data, E, kept, y, z), (np.where(kept, y, 0), z)):
             if proof := farkas(data.problem, *trial):
                 return proof
+    if p:
+        return None
+    # contacts in pairs, where W has lost what they share: any of them may show it
+    normal = data.W.tocsr()[::d][:, ::d]
+    first, second = (one.astype(int) for one in sp.triu(normal, k=1).nonzero())
+    diagonal, between = normal.diagonal(), np.asarray(normal[first, second]).ravel()
+    parallel = (between < 0) & (
+        abs(diagonal[first] * diagonal[second] - between**2) <= 1e-14 * between**2
+    )
+    for a, b, shared in list(
+        zip(first[parallel], second[parallel], between[parallel], strict=True)
+    )[:PAIRS]:
+        pair = np.zeros(nc)
+        pair[a], pair[b] = diagonal[b], -shared
+        if pair @ local.q[::d] < 0 and (proof := farkas(data.problem, pair)):
+            return proof
     return None
 
 

@@ -127,6 +127,8 @@ def command(
             report.error(path, error if named else fclib.Error(f"{path}: {error}"))
             continue
         record["seconds"] = time.perf_counter() - start
+        if found.certificate is not None:
+            record["certificate"] = found.certificate.record(problem)
         shown = COLUMNS + tuple(key for key in record if key in REFERENCE)
         report.add(record if as_json else {key: record[key] for key in shown}, good)
         for line in [*found.units.trouble, *([] if good else [record["reference_reason"]])]:

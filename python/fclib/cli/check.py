@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -56,6 +57,39 @@ def told_of(mismatch: dict[str, Any]) -> str:
     return f"{name} is wrong by {size}: from {source} follows {value:.6g}"
 
 
+def check_certificate(report: Report, path: Path, certificate: Path) -> None:
+    """Judge a proof that the problem of a file has no solution."""
+    from fclib import analysis
+
+    try:
+        problem = read_owner(path)
+        y, z, digest = analysis.read_certificate(certificate)
+        try:
+            proof = analysis.check(problem, y, z)
+        except analysis.CertificateError as error:
+            other = ""
+            if digest is not None and digest != fclib.digest(problem):
+                other = ", which is of another problem"
+            raise fclib.FileError(
+                f"{path}: {certificate}{other}: it proves nothing: {error}"
+            ) from None
+    except fclib.Error as error:
+        report.error(path, error)
+        return
+    record = {
+        "problem": str(path),
+        "formulation": problem.formulation,
+        "nc": problem.nc,
+        "status": "no solution",
+        "contacts": sorted(proof.exact_y),
+        "exact": proof.exact,
+        "gain": proof.gain,
+        "distance": proof.distance,
+        "bound": proof.bound,
+    }
+    report.add(record)
+
+
 def command(
     files: Files,
     tol: Tolerance = 1e-8,
@@ -63,6 +97,13 @@ def command(
     contacts: Annotated[
         bool, typer.Option("--contacts", help="Show each contact too: status, r, u, error.")
     ] = False,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(
+            help="Check this proof that there is no solution instead: JSON, as `fclib solve "
+            "--json` and `fclib analyze --json` print it."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Judge the stored solutions from the data alone.
@@ -72,6 +113,9 @@ def command(
     """
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))
     for path in each_file(files, "checking"):
+        if certificate is not None:
+            check_certificate(report, path, certificate)
+            continue
         try:
             problem = read_owner(path)
             solution = fclib.read_solution(path)

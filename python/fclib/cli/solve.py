@@ -48,6 +48,16 @@ class Trace:
             err.print(make_table(stages))
 
 
+def proof_of(problem: fclib.Problem, result: fclib.Result) -> dict[str, Any]:
+    """The certificate of a result, as `fclib check --certificate` reads it."""
+    from fclib import analysis
+
+    y, z = result.certificate, result.certificate_z
+    assert y is not None
+    by_constraint = {} if z is None else dict(enumerate(z.tolist()))
+    return analysis.check(problem, dict(enumerate(y.tolist())), by_constraint).record(problem)
+
+
 def command(
     files: Files,
     solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "auto",
@@ -83,7 +93,7 @@ def command(
         fclib.find_solver(solver).check_options(options)
     except fclib.OptionError as error:
         usage_error(error)
-    report = Report(as_json, hidden=("stages",))
+    report = Report(as_json, hidden=("stages", "certificate"))
     for path in each_file(files, "solving"):
         try:
             trace = Trace(path.name) if verbose else None
@@ -100,5 +110,8 @@ def command(
             named = str(error).startswith(str(path))
             report.error(path, error if named else fclib.Error(f"{path}: {error}"))
         else:
-            report.add(run.record | {"stages": stages}, run.status == "converged")
+            record = run.record | {"stages": stages}
+            if run.result.certificate is not None:
+                record["certificate"] = proof_of(problem, run.result)
+            report.add(record, run.status == "converged")
     report.finish()

@@ -1,0 +1,139 @@
+"""Problems on which a verdict was wrong, and what is true of them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fclib
+from fclib import analysis
+
+FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
+CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
+
+
+def cases(*names: str) -> pytest.MarkDecorator:
+    found = [path for path in CASES if path.name.startswith(names)]
+    return pytest.mark.parametrize(
+        "path",
+        [pytest.param(path, id=path.stem) for path in found]
+        or [pytest.param(None, marks=pytest.mark.skip(reason="the cases are not there"))],
+    )
+
+
+def stacked(power: int, extra: bool = False) -> fclib.LocalProblem:
+    """A light body between the ground and a heavy one: W is positive definite."""
+    small = np.array([[1.0, -1.0], [-1.0, 1.0 + 2.0**-power]])
+    W = np.kron(small, np.eye(3))
+    q = np.kron([-1.0, 0.5], [1.0, 0, 0])
+    if extra:  # an open contact that has nothing to do with them, indefinite by rounding
+        W = np.block([[W, np.zeros((6, 3))], [np.zeros((3, 6)), np.diag([1.0, 1.0, -1e-9])]])
+        q = np.append(q, [1.0, 0, 0])
+    return fclib.LocalProblem(spacedim=3, W=W, q=q, mu=np.full(q.size // 3, 0.5))
+
+
+@pytest.mark.parametrize("extra", [False, True])
+@pytest.mark.parametrize("power", [25, 28, 40, 46, 50, 51, 52])
+def test_a_light_body_under_a_heavy_one_is_not_infeasible(power: int, extra: bool) -> None:
+    problem = stacked(power, extra)
+    y = np.ones(problem.nc)
+    y[2:] = 0
+    assert analysis.farkas(problem, y) is None
+    assert fclib.solve(problem, time_limit=5, last_resort=50).status != "infeasible"
+    # it would be, were it not for the last digit
+    W = np.array(problem.W.toarray() if hasattr(problem.W, "toarray") else problem.W)
+    W[3:6, 3:6] = np.eye(3)
+    proof = analysis.farkas(problem.replace(W=W), y)
+    assert proof is not None
+    assert proof.exact
+
+
+@cases("cx07", "cx08", "cx09", "cx10")
+def test_what_has_a_solution_is_not_called_infeasible(path: Path) -> None:
+    problem = fclib.read(path)
+    assert fclib.solve(problem, time_limit=10).status != "infeasible"
+    assert analysis.analyze(problem, time_limit=5).existence.verdict != analysis.PROVEN_NOT
+
+
+@cases("cx01")
+def test_joints_that_leave_no_solution(path: Path) -> None:
+    problem = fclib.read(path)
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert found.certificate is not None
+    assert found.certificate.exact
+    assert found.certificate.exact_y == {0: 1}
+    assert found.certificate.exact_z == {0: -2}
+    assert found.definiteness.word == "indefinite"
+    result = fclib.solve(problem)
+    assert result.status == "infeasible"
+    assert result.certificate_bound == np.inf
+
+
+@cases("cx02")
+def test_two_velocities_are_not_called_unique(path: Path) -> None:
+    found = analysis.analyze(fclib.read(path))
+    assert found.uniqueness.verdict == "undecided"
+    assert found.uniqueness.contraction > 1
+
+
+@cases("cx13")
+def test_a_welded_body_has_rank_0(path: Path) -> None:
+    found = analysis.analyze(fclib.read(path))
+    assert found.spectra["W"].rank == 0
+    assert found.hyperstaticity == 3
+
+
+@cases("cx14")
+def test_no_solution_with_its_proof(path: Path) -> None:
+    found = analysis.analyze(fclib.read(path), time_limit=5)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert found.certificate is not None
+    # W was rounded: the statement has a bound
+    assert 1e14 < found.certificate.bound < np.inf
+
+
+def ring(count: int = 3) -> fclib.GlobalProblem:
+    """Walls that close on a body from all sides: no doubles make their normals cancel."""
+    angles = 2 * np.pi * np.arange(count) / count + 0.1
+    frames = [np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles]
+    w = np.zeros(2 * count)
+    w[::2] = -1
+    return fclib.GlobalProblem(
+        spacedim=2, M=np.eye(2), H=np.hstack(frames), f=[0.3, -0.2], w=w, mu=np.full(count, 0.5)
+    )
+
+
+def test_a_proof_in_rational_numbers() -> None:
+    problem = ring()
+    proof = analysis.farkas(problem, np.ones(3))
+    assert proof is not None
+    assert proof.exact
+    H = np.asarray(problem.H.toarray() if hasattr(problem.H, "toarray") else problem.H)
+    for row in H:
+        assert sum(Fraction(float(row[2 * a])) * proof.exact_y[a] for a in range(3)) == 0
+
+
+def test_a_certificate_from_a_file(tmp_path: Path) -> None:
+    problem = ring()
+    fclib.write(tmp_path / "ring.hdf5", problem)
+    proof = analysis.farkas(problem, np.ones(3))
+    assert proof is not None
+    good = tmp_path / "good.json"
+    good.write_text(json.dumps(proof.record(problem)))
+    wrong = tmp_path / "wrong.json"
+    wrong.write_text(json.dumps({"y": {"0": 1, "1": 1}}))
+    command = [sys.executable, "-m", "fclib", "check", str(tmp_path / "ring.hdf5"), "--json"]
+    done = subprocess.run([*command, "--certificate", str(good)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["exact"] is True
+    done = subprocess.run([*command, "--certificate", str(wrong)], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "contact 0" in json.loads(done.stdout)["message"]

@@ -30,6 +30,7 @@ from fclib.analysis._data import Array
 
 LAST_DIGITS = 8  # of W's last digits, how many times their rounding may be left
 LEAST_GAIN = Fraction(1, 10**8)  # below this part of its terms a gain is rounding
+LEAST_SPEED = 1e-6  # of ||q||: what closes more slowly is within the tolerance of solutions
 MOST = 60  # unknowns up to which a kernel is found in rational arithmetic
 FORMAT = "fclib certificate 1"
 
@@ -211,6 +212,15 @@ def check(
         raise CertificateError(
             f"-(y . q_N + z . s) is {float(gain):.3g}, which must be positive{where}"
         )
+    if isinstance(problem, (_core.LocalProblem, _core.LocalRollingProblem)):
+        size = float(np.linalg.norm(problem.q)) * sqrt(
+            sum(float(one) ** 2 for one in exact_y.values())
+        )
+        if not float(gain) > LEAST_SPEED * size * (1 - 1e-9):
+            raise CertificateError(
+                f"-(y . q_N + z . s) is {float(gain):.3g}, which ||q|| hides: contact "
+                f"{max(exact_y, key=lambda a: exact_y[a])} closes within the tolerance"
+            )
     rest, _ = _sum(system.zero, x)
     if rest:
         row, value = max(rest.items(), key=lambda item: abs(item[1]))

@@ -100,8 +100,9 @@ def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
         return None
     # contacts in pairs, where W has lost what they share: any of them may show it
     normal = data.W.tocsr()[::d][:, ::d]
-    first, second = (one.astype(int) for one in sp.triu(normal, k=1).nonzero())
-    diagonal, between = normal.diagonal(), np.asarray(normal[first, second]).ravel()
+    upper = sp.coo_array(sp.triu(normal, k=1))
+    diagonal = normal.diagonal()
+    first, second, between = upper.row, upper.col, upper.data
     parallel = (between < 0) & (
         abs(diagonal[first] * diagonal[second] - between**2) <= 1e-14 * between**2
     )

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections import Counter
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from fclib import collections
-from fclib.cli._output import Report, fail, make_table, out
+from fclib import collections, scenes
+from fclib.cli._output import Report, err, fail, make_table, out
 from fclib.cli._progress import many_bars
 from fclib.collections.build import BuildError
-from fclib.collections.known import differing
 
 
 class Form(str, Enum):
@@ -48,6 +48,12 @@ def build_plans(
     plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
 ) -> None:
     """Build plans, and print what came of them; exit status 1 where a problem was not solved."""
+    told = [plan.name for plan in plans if plan.trajectory is None and simulated(plan)]
+    if told:
+        err.print(
+            f"No trajectory is stored of {', '.join(told)}: simulated here, hence your own data",
+            highlight=False,
+        )
     try:
         with many_bars() as bars:
             table = collections.build(
@@ -57,36 +63,38 @@ def build_plans(
                 progress=bars,
                 pictures=pictures,
             )
-    except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError) as error:
+    except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError, OSError) as error:
         fail(str(error))
     mine = {plan.name for plan in plans}
     rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
     report = Report(as_json)
     for row in ranges_of(rows):
-        report.add(row, row["solved"] == row["problems"])
+        report.add(row, row["solved"] in ("", row["problems"]))
     if not as_json:
         if report.records:
             out.print(make_table(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
-        unsolved = [row for row in rows if row["status"] != "converged"]
+        unsolved = [row for row in rows if row["status"] not in (None, "converged")]
         if unsolved:
             worst = max(unsolved, key=lambda row: float(row["error"]))
             out.print(
                 f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
-                f" {worst['id']}, error {worst['error']:.1e}. A simulation went on from there."
+                f" {worst['id']}, error {worst['error']:.1e}."
             )
-        for name in dict.fromkeys(plan.collection for plan in plans if plan.chosen):
-            own = [row for row in rows if row["collection"] == name]
-            built = {row["family"] for row in own}
-            other = [id for id in differing(name, own) if id.split("/")[1] in built]
+        other = [row["id"] for row in rows if collections.origin_of(row) == "differs"]
+        if other:
             out.print(
-                f"{len(own) - len(other)} of {len(own)} problems of the set {name} have the data"
-                " that its list says"
-                + (f"; not {', '.join(other[:3])}: another machine?" if other else "")
+                f"{len(other)} problems differ from the published ones, as {', '.join(other[:3])}:"
+                f" fclib collection verify {folder} says by how much"
             )
         out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
     raise typer.Exit(int(report.failed))
+
+
+def simulated(plan: collections.Plan) -> bool:
+    """Whether the problems of a plan come from a simulation."""
+    return isinstance(plan.scene, scenes.Scene)
 
 
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -94,6 +102,8 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     found = []
     for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
         own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
+        origins = Counter(collections.origin_of(row) for row in own)
+        errors = [row["error"] for row in own if row["error"] is not None]
 
         def span(key: str, own: list[dict[str, Any]] = own) -> str:
             values = [row[key] for row in own if row[key] is not None]
@@ -104,13 +114,17 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 "family": family,
                 "set": name,
                 "version": own[0]["version"] or "",
+                "data": ", ".join(
+                    origin if count == len(own) else f"{count} {origin}"
+                    for origin, count in sorted(origins.items())
+                ),
                 "problems": len(own),
-                "solved": sum(row["status"] == "converged" for row in own),
+                "solved": sum(row["status"] == "converged" for row in own) if errors else "",
                 "dof": span("n"),
                 "contacts": span("nc"),
                 "density": span("density"),
                 "mu": span("mu_max"),
-                "largest error": max(row["error"] for row in own),
+                "largest error": max(errors) if errors else "",
             }
         )
     return found

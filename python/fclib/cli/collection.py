@@ -1,8 +1,10 @@
-"""``fclib collection``: families of problems, built, checked, published and fetched."""
+"""``fclib collection``: families of problems, simulated, built, checked, published and fetched."""
 
 from __future__ import annotations
 
 import dataclasses
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +22,7 @@ from fclib.cli._build import (
     SelectOption,
     build_plans,
     ranges_of,
+    simulated,
 )
 from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
 from fclib.cli._progress import many_bars
@@ -171,10 +174,25 @@ def build(
     analyze: Analyze = False,
     jobs: Jobs = None,
     seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
+    version: Annotated[
+        str | None, typer.Option(help="A stored version; by default the newest.")
+    ] = None,
+    source: Annotated[
+        Path | None,
+        typer.Option("--from", help="Folder of trajectories, as fclib collection simulate writes."),
+    ] = None,
+    simulate: Annotated[
+        bool, typer.Option(help="Simulate what no trajectory is stored of; else an error.")
+    ] = True,
+    references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate families and store their problems, solutions and catalogue; goes on after a kill."""
+    """Assemble the problems of families from their stored trajectories, and solve them.
+
+    Problems, reference solutions and catalogue are stored; goes on after a kill. Families without
+    a stored trajectory are simulated first.
+    """
     if every == bool(names):
         raise typer.BadParameter("name sets or families, or say --all")
     try:
@@ -184,44 +202,133 @@ def build(
     try:
         plans = [
             collections.plan_of(
-                own, seed, form=form.value, count=count, select=select.value, analyze=analyze
+                own,
+                seed,
+                version,
+                form=form.value,
+                count=count,
+                select=select.value,
+                analyze=analyze,
+                references=references,
             )
             for own in folders
         ]
+        if source is not None:
+            plans = [collections.from_folder(plan, source) for plan in plans]
+    except collections.VersionError as error:
+        fail(str(error))
+    except (collections.TrajectoryError, FileNotFoundError) as error:
+        fail(str(error))
     except ValueError as error:
         usage_error(error)
+    missing = [plan.name for plan in plans if simulated(plan) and plan.trajectory is None]
+    if missing and not simulate:
+        fail(f"no trajectory is stored of {', '.join(missing)}: --simulate makes one")
     build_plans(plans, folder, jobs, pictures, as_json)
 
 
 @app.command()
-def verify(folder: Folder, as_json: Json = False) -> None:
-    """Hash all files again, and judge their solutions from the data alone."""
+def simulate(
+    names: Names,
+    folder: Annotated[Path, typer.Option("--out", help="Folder of trajectories.")] = Path(
+        "trajectories"
+    ),
+    version: Annotated[
+        str,
+        typer.Option(help="Name of the version; a published one is a number, higher than before."),
+    ] = "own",
+    solver: Annotated[str, typer.Option(help="Solves each step.")] = "auto",
+    tol: Annotated[float, typer.Option(help="Of each step, relative.", min=0.0)] = 1e-12,
+    seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
+    as_json: Json = False,
+) -> None:
+    """Make new trajectories of families, for fclib collection build --from; goes on after a kill.
+
+    A file SET/FAMILY-VERSION.trajectory is never rewritten: another one is another version.
+    """
     report = Report(as_json)
+    try:
+        plans = [
+            replace(
+                collections.fresh_plan(own, seed),
+                version=version,
+                simulation=collections.Simulation(solver=solver, tol=tol),
+            )
+            for own in collections.folders(names)
+        ]
+        plans = [plan for plan in plans if simulated(plan)]
+        if not plans:
+            fail(f"{', '.join(names)}: assembled directly, there is nothing to simulate")
+        with many_bars() as bars:
+            for plan in plans:
+                target = folder / collections.file_name(plan.name, version)
+                state = target.with_name(f".{target.name}.npz")
+                collections.record(plan, target, state, bars)
+                states = collections.read_trajectory(target)
+                report.add(
+                    {
+                        "family": plan.name,
+                        "version": version,
+                        "problems": len(states),
+                        "states": states.position.shape[1] + states.velocity.shape[1],
+                        "bytes": target.stat().st_size,
+                        "file": str(target),
+                    }
+                )
+    except KeyError as error:
+        usage_error(ValueError(error.args[0]))
+    except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
+        fail(str(error))
+    if not as_json:
+        out.print(make_table(report.records))
+        out.print(f"fclib collection build {' '.join(names)} --from {folder} takes them")
+
+
+@app.command()
+def verify(folder: Folder, as_json: Json = False) -> None:
+    """Hash all files again, judge their solutions from the data alone, and tell what is published.
+
+    A problem whose data differ from the published ones is named, with the relative difference of
+    each matrix: of rounding alone on another machine, of more where it is another problem.
+    """
+    report = Report(as_json)
+    origins: Counter[str] = Counter()
+    bad = 0
     try:
         rows = collections.read_catalog(folder).to_pylist()
         files = sum(len(collections.catalog.files_of(row)) for row in rows)
         with progress_bar(files) as bar:
             for verdict in collections.verify(folder, bar):
+                origins[verdict.origin] += 1
                 if not verdict.ok:
                     err.print(f"fclib: {verdict.message}", style="red")
-                if not verdict.ok or as_json:
-                    report.add(
-                        {
-                            "problem": verdict.path,
-                            "status": verdict.status,
-                            "error": verdict.error,
-                        },
-                        verdict.ok,
-                    )
+                if not verdict.ok or verdict.differences or as_json:
+                    apart = {name: f"{value:.1e}" for name, value in verdict.differences.items()}
+                    record: dict[str, Any] = {
+                        "problem": verdict.path,
+                        "status": verdict.status,
+                        "error": verdict.error,
+                        "data": verdict.origin,
+                        "differences": ", ".join(f"{name} {size}" for name, size in apart.items()),
+                    }
+                    report.add(record, verdict.ok)
+                    bad += not verdict.ok
     except (collections.CatalogError, ImportError) as error:
         fail(str(error))
     if not as_json:
         if report.records:
             out.print(make_table(report.records))
-        bad = len(report.records)
         out.print(
             f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
         )
+        said = {
+            "published": "have the data of the published version",
+            "differs": "differ from the published version",
+            "yours": "are yours: no published trajectory or list has them",
+        }
+        for origin, words in said.items():
+            if origins[origin]:
+                out.print(f"{origins[origin]} problems {words}")
     raise typer.Exit(int(report.failed))
 
 

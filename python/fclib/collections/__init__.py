@@ -2,7 +2,8 @@
 
     fclib.collection("rt444")[100]      a problem, from the user's folder; built if it is not there
     fclib.load("tiny/BoxesStack/0030")  one that comes with the package
-    collections.build(...)              scenes ──> problems, solutions, files ──> catalogue
+    collections.record(...)             scenes ──> trajectories: simulates, solves each step
+    collections.build(...)              trajectories ──> problems, solutions, files ──> catalogue
     collections.verify(...)             files again as the catalogue says, solutions judged anew
     collections.publish(...), get(...)  archives with their SHA-256 for any static web server
 
@@ -10,7 +11,10 @@ A problem is named SET/FAMILY/NUMBER, as rt444/KaplasTower/0100; its number coun
 the family's scene that have a contact, or the problems of a family assembled directly.
 
 plan.py       what is built of a family, and which of its problems are kept
+trajectory.py the states that problems are assembled from, and their files
+published.py  the trajectories of all published versions. Needs trajectory.py
 known.py      the sets, their versions and their families; lists of chosen problems in data/
+record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
 build.py      a family into files, gone on with after a kill. Needs plan.py, catalog.py, figures.py
 verify.py     files as the catalogue says, solutions judged anew
@@ -23,9 +27,21 @@ choose.py     the lists of chosen problems, by rules that anyone can repeat
 from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
-from fclib.collections.known import folders, plan_of, sets, version
+from fclib.collections.known import (
+    folders,
+    fresh_plan,
+    from_folder,
+    origin_of,
+    plan_of,
+    sets,
+    version,
+)
 from fclib.collections.library import Collection, load
-from fclib.collections.plan import Plan, Selection, families
+from fclib.collections.plan import Plan, Selection, Simulation, families
+from fclib.collections.published import VersionError, file_name
+from fclib.collections.record import record
+from fclib.collections.trajectory import Trajectory, TrajectoryError
+from fclib.collections.trajectory import read as read_trajectory
 from fclib.collections.verify import verify
 
 __all__ = [
@@ -33,14 +49,24 @@ __all__ = [
     "Collection",
     "Plan",
     "Selection",
+    "Simulation",
+    "Trajectory",
+    "TrajectoryError",
+    "VersionError",
     "build",
     "families",
+    "file_name",
     "folders",
+    "fresh_plan",
+    "from_folder",
     "get",
     "load",
+    "origin_of",
     "plan_of",
     "publish",
     "read_catalog",
+    "read_trajectory",
+    "record",
     "sets",
     "verify",
     "version",

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fclib.collections import catalog
+from fclib.collections import catalog, trajectory
 from fclib.collections.known import folders
 
 REGISTRY = "registry.txt"
@@ -70,8 +70,10 @@ def publish(folder: str | Path, site: str | Path) -> list[Path]:
         for path, digest in members:
             if not (folder / path).is_file() or catalog.sha256(folder / path) != digest:
                 raise FetchError(f"{folder / path}: is not the catalogue's file; build it anew")
-        part = f"{name}/{catalog.FILE}"
-        paths = [path for path, _ in members] + [part]
+        # and the states that they were assembled from, where those are in no package
+        parts = [f"{name}/{file}" for file in (trajectory.OWN, catalog.FILE)]
+        paths = [path for path, _ in members]
+        paths += [part for part in parts if (folder / part).is_file()]
 
         def pack(target: Path, paths: Sequence[str] = paths) -> None:
             # the files are compressed already

@@ -2,40 +2,40 @@
 
     OUT/SET/FAMILY/0100-global.hdf5     problem and solution
                    0100-local.hdf5
+                   states.trajectory    where the states were simulated for this build
                    catalog.parquet      of the family; there when it is finished
                    .state/              while it is not: where to go on
     OUT/catalog.parquet                 of all that is finished
 
-A build that was killed goes on from its last checkpoint, and ends with the same files.
+Problems are assembled from the states of a trajectory, each by itself. The reference solution of
+each is found from nothing, and no problem depends on it. A build that was killed goes on from its
+last checkpoint, and ends with the same files.
 """
 
 from __future__ import annotations
 
 import heapq
-import io
 import json
 import multiprocessing
 import os
 import shutil
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from multiprocessing import connection
 from multiprocessing.managers import SyncManager
 from pathlib import Path
 from queue import Empty
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog
+from fclib.collections import catalog, trajectory
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
-
-if TYPE_CHECKING:
-    from fclib.simulate import State, Step
+from fclib.collections.record import record
 
 CHECKPOINT = 5.0  # seconds between two checkpoints
 STATE = ".state"
@@ -187,42 +187,46 @@ class Kept:
 
 @dataclass(frozen=True)
 class Item:
-    """A problem of a plan with its solution, before it is stored."""
+    """A problem of a plan, before it is stored."""
 
     problem: Any
-    result: _core.Result
     step: int  # of the simulation, or the problem's number
     time: float | None = None  # at the start of the step [s]
     bodies: int | None = None
-    simulated: Step | None = None  # where it comes from
 
 
-def items(plan: Plan, kept: Kept, start: State | None) -> Iterator[Item]:
-    """The steps of a scene, those without contact too, or the wanted problems of a family.
+def states_of(plan: Plan, folder: Path, report: Progress) -> trajectory.Trajectory | None:
+    """The trajectory of a plan; simulated into the folder where there is none, and then told so.
 
-    Of the problems that are not wanted those of a simulation must be solved to go on.
+    None for a family that is assembled directly.
     """
     if isinstance(plan.scene, scenes.Assembled):
-        for number in range(kept.looked, plan.total):
-            if not kept.wants(number):
-                kept.looked += 1
-                continue
-            problem = plan.scene.problem(number)
-            # as the simulations do: the published sets were made so
-            options: dict[str, Any] = {"merit": "natural"} | dict(plan.options)
-            result = _solve.solve(problem, plan.solver, tol=plan.tol, **options)
-            yield Item(problem, result, number)
-        return
-    from fclib.simulate import simulate
+        return None
+    path = plan.trajectory or folder / trajectory.OWN
+    if plan.trajectory is None and not path.is_file():
 
-    # a scene that never touches anything would go on for ever
-    most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
-    done = start.index if start is not None else 0
-    for step in simulate(
-        plan.scene, most - done, solver=plan.solver, tol=plan.tol, start=start, **plan.options
-    ):
-        bodies = int(np.unique(step.model.trees[step.dofs]).size)
-        yield Item(step.problem, step.result, step.index, step.time, bodies, step)
+        def tell(name: str, done: int, total: int) -> None:
+            report(f"{name}, simulated", done, total)
+
+        record(plan, path, folder / STATE / "simulation.npz", tell)
+    states = trajectory.read(path)
+    if plan.problems is not None and plan.steps is None:
+        last = int(states.number.max(initial=-1))
+        if last + 1 < plan.problems:
+            raise BuildError(f"{path}: has {last + 1} problems, and {plan.problems} are asked for")
+    # a file on this machine may refer to others beside it
+    return replace(states, scene=replace(states.scene, path=plan.scene.path))
+
+
+def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> Item:
+    """A problem by its number: assembled from its state, or directly; nothing is solved."""
+    if states is None:
+        assert isinstance(plan.scene, scenes.Assembled)
+        return Item(plan.scene.problem(number), number)
+    place = states.index(number)
+    part = states.problem(place)
+    bodies = int(np.unique(states.model.trees[part.dofs]).size)
+    return Item(part.problem, int(states.step[place]), states.time(place), bodies)
 
 
 def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
@@ -231,28 +235,29 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
     state_folder = folder / STATE
     state_folder.mkdir(parents=True, exist_ok=True)
     write_text(state_folder / "plan.json", plan.fingerprint())
+    states = states_of(plan, folder, report)
     kept = Kept(plan)
-    start = read_checkpoint(state_folder, kept)
+    read_checkpoint(state_folder, kept)
 
     last = time.monotonic()
-    item = None
-    for item in items(plan, kept, start):
+    numbers = range(plan.total) if states is None else states.number.tolist()
+    for number in numbers:
+        if number < kept.looked or number >= plan.total:
+            continue
         if time.monotonic() - last > CHECKPOINT:
-            write_checkpoint(state_folder, kept, item.simulated.start if item.simulated else None)
+            write_checkpoint(state_folder, kept)
             last = time.monotonic()
-        if item.problem.nc:
-            if kept.wants(kept.looked):
-                store(plan, kept, item, out)
-            kept.looked += 1
-            report(plan.name, kept.looked, plan.total)
-            if kept.looked == plan.problems:
-                break
+        kept.looked = number
+        if kept.wants(number):
+            store(plan, kept, item_of(plan, states, number), out)
+        kept.looked += 1
+        report(plan.name, kept.looked, plan.total)
 
-    if pictures and item is not None:
+    if pictures:
         from fclib.collections import figures
 
-        if item.simulated is not None:
-            figures.draw_scene(item.simulated, folder)
+        if states is not None:
+            figures.draw_scene(states.model, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
     catalog.write_catalog(
         folder / catalog.FILE,
@@ -260,6 +265,15 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
         {catalog.FINGERPRINT: plan.fingerprint().encode()},
     )
     shutil.rmtree(state_folder)
+
+
+def reference(plan: Plan, problem: Any) -> _core.Result | None:
+    """The reference solution of a problem, which follows from it alone; None: not asked for."""
+    if not plan.references:
+        return None
+    # as the simulations do: the published sets were made so
+    options: dict[str, Any] = {"merit": "natural"} | dict(plan.options)
+    return _solve.solve(problem, plan.solver, tol=plan.tol, **options)
 
 
 def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
@@ -272,7 +286,10 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
             local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS, merit="natural"
         )
         sweeps = trial.iterations
+    result = reference(plan, item.problem)
     row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
+    if result is not None:
+        row |= judged(item.problem, result) | {"tol": plan.tol}
     if plan.analyze:
         from fclib.analysis import analyze
 
@@ -281,8 +298,8 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
     for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = item.problem if form == "global" else local
-        solution = item.result.solution
-        if form == "local":
+        solution = result.solution if result is not None else None
+        if solution is not None and form == "local":
             solution = _core.Solution(r=solution.r, u=solution.u, l=solution.l)
         _core.write(out / path, problem, solution)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
@@ -292,9 +309,8 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
 
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
-    """The row of a problem: all but its files."""
-    problem, result = item.problem, item.result
-    merit = _core.merit(problem, result.solution)
+    """The row of a problem: all but its solution and its files."""
+    problem = item.problem
     mu = np.asarray(problem.mu)
     return {
         "id": f"{plan.name}/{number:04d}",
@@ -317,14 +333,21 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "mu_max": float(mu.max()),
         "nnz_M": nnz(problem.M) if problem.n else None,
         "nnz_H": nnz(problem.H) if problem.n else None,
+        **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
+        "digest": _digest.digest(problem),
+    }
+
+
+def judged(problem: Any, result: _core.Result) -> dict[str, Any]:
+    """What a row says of a problem's solution."""
+    merit = _core.merit(problem, result.solution)
+    return {
         "open": merit.open,
         "stick": merit.stick,
         "slide": merit.slide,
         "solver": result.solver,
         "status": str(result.status),
-        "tol": plan.tol,
         "error": merit.error_by("natural"),
-        "digest": _digest.digest(problem),
     }
 
 
@@ -333,30 +356,19 @@ def nnz(matrix: Any) -> int:
     return int(getattr(matrix, "nnz", np.size(matrix)))
 
 
-def write_checkpoint(folder: Path, kept: Kept, start: State | None) -> None:
-    """Store where to go on: the start of a step, if there is one, and what was kept before it."""
-    content = io.BytesIO()
+def write_checkpoint(folder: Path, kept: Kept) -> None:
+    """Store where to go on: the problems that were looked at, and what was kept of them."""
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
-    state = {f.name: getattr(start, f.name) for f in fields(start)} if start is not None else {}
-    np.savez(content, known=known, **state)
-    catalog.replace_file(folder / "state.npz", lambda path: path.write_bytes(content.getvalue()))
+    write_text(folder / "kept.json", known)
 
 
-def read_checkpoint(folder: Path, kept: Kept) -> State | None:
-    """The state to go on from, None for the scene's start; `kept` takes what was stored."""
-    path = folder / "state.npz"
-    if not path.is_file():
-        return None
-    with np.load(path) as arrays:
-        values = {name: arrays[name] for name in arrays.files}
-    known = json.loads(str(values.pop("known")))
-    kept.looked = known["looked"]
-    kept.rows = {row["number"]: row for row in known["rows"]}
-    if not values:
-        return None
-    from fclib.simulate import State
-
-    return State(**(values | {"index": int(values["index"])}))
+def read_checkpoint(folder: Path, kept: Kept) -> None:
+    """Take what was stored, if anything was."""
+    path = folder / "kept.json"
+    if path.is_file():
+        known = json.loads(path.read_text(encoding="utf-8"))
+        kept.looked = known["looked"]
+        kept.rows = {row["number"]: row for row in known["rows"]}
 
 
 def write_text(path: Path, text: str) -> None:

@@ -8,6 +8,7 @@ tiny    one problem of each kind, from the list below
 from __future__ import annotations
 
 import json
+import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -17,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog
+from fclib.collections import catalog, trajectory
 from fclib.collections.known import Choice
-from fclib.collections.plan import source
+from fclib.collections.plan import Plan, source
+from fclib.collections.record import record
 
 Progress = Callable[[str, int, int], None]
 
@@ -53,21 +55,20 @@ def tiny() -> list[Choice]:
 
 
 def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int) -> Choice:
-    """A problem by its number. ValueError where the scene has not so many."""
+    """A problem by its number, from a simulation. ValueError where the scene has not so many."""
     scene = source(family, dict(parameters), seed)
     if isinstance(scene, scenes.Assembled):
         digest = _digest.digest(scene.problem(number))
         return Choice(family, scene.parameters, seed, number, number, digest)
-    from fclib.simulate import simulate
-
-    looked = 0
-    for step in simulate(scene, 20 * number + 5000):
-        if step.problem.nc:
-            if looked == number:
-                digest = _digest.digest(step.problem)
-                return Choice(family, dict(scene.parameters), seed, number, step.index, digest)
-            looked += 1
-    raise ValueError(f"{family}: has no problem {number}")
+    plan = Plan(scene=scene, collection="chosen", problems=number + 1, chosen=(number,))
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder) / f"{family}{trajectory.SUFFIX}"
+        record(plan, target, Path(folder) / "state.npz")
+        states = trajectory.read(target)
+    if not len(states):
+        raise ValueError(f"{family}: has no problem {number}")
+    step = int(states.step[0])
+    return Choice(family, dict(scene.parameters), seed, number, step, states.digest[0])
 
 
 # ---- hard

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fclib.simulate import Step
+    from fclib.simulate import Model
 
 BINS = 40
 # column, label
@@ -19,13 +19,13 @@ MEASURES = (
 )
 
 
-def draw_scene(step: Step, folder: Path) -> Path | None:
-    """Write scene.png, the state of a step; None where nothing can draw here."""
+def draw_scene(model: Model, folder: Path) -> Path | None:
+    """Write scene.png, the state of a model; None where nothing can draw here."""
     from fclib.simulate import NoRenderer, render
 
     target = folder / "scene.png"
     try:
-        render(step.model, target)
+        render(model, target)
     except NoRenderer:
         return None
     return target

@@ -6,7 +6,8 @@ others:
 extended      all the families that came after RT-0444
 hard, tiny    chosen problems, in folders of their own; `hard.json` and `tiny.json` list them
 
-A version changes when a problem of the set does, or when one comes or goes.
+A version changes when a problem of the set does, or when one comes or goes. Problems of a version
+whose trajectory is stored do not change (`published.py`).
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from fclib import scenes
+from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, families, source
 
 DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
@@ -67,8 +70,14 @@ def choices(name: str) -> tuple[Choice, ...]:
 
 
 def version(name: str) -> str:
-    """Of a set."""
+    """Of a set: the present one."""
     return KNOWN[name][0] if name in KNOWN else "1"
+
+
+def version_of(folder: str) -> str:
+    """Of SET/FAMILY: the newest that is stored; the set's where none is."""
+    stored = published.versions(folder)
+    return stored[-1] if stored else version(folder.split("/")[0])
 
 
 def sets() -> dict[str, list[str]]:
@@ -107,34 +116,97 @@ def folders(names: Sequence[str]) -> list[str]:
     return list(found)
 
 
-def plan_of(folder: str, seed: int = 0, **settings: Any) -> Plan:
+def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: Any) -> Plan:
     """The plan of a folder SET/FAMILY of `folders`; those of a list keep their own seeds.
 
+    Its problems are those of the stored trajectory, where there is one of this version and seed:
+    they no longer depend on what the family's file says. Otherwise they are simulated.
+
+    Args:
+        folder: SET/FAMILY.
+        seed: of the scene.
+        version: a stored one; by default the newest.
+        settings: of the plan.
+
     Raises:
+        VersionError: the version is not stored here.
         ValueError: settings that the plan does not take, or a list that contradicts itself.
+        OSError, TrajectoryError: the stored trajectory cannot be read.
+    """
+    wanted = version or version_of(folder)
+    stored = published.path_of(folder, wanted)
+    if version is not None and stored is None:
+        there = ", ".join(published.versions(folder)) or "none"
+        raise published.VersionError(
+            f"{folder}: version {version} is not stored here (stored: {there}); a release of"
+            " fclib-collection that has it builds it"
+        )
+    plan = fresh_plan(folder, seed, **{"version": wanted, **settings})
+    if stored is not None:
+        frozen, _ = trajectory.read_origin(stored)
+        if frozen.seed == plan.scene.seed:
+            return replace(plan, scene=frozen, trajectory=stored)
+    return plan
+
+
+def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
+    """The plan of a folder SET/FAMILY as its family's file has it now, whatever is stored.
+
+    Raises:
+        ValueError: as `plan_of`.
     """
     name, family = folder.split("/")
     own = [choice for choice in choices(name) if choice.family == family]
-    settings = {"collection": name, "version": version(name)} | settings
+    settings = {"collection": name, "version": version_of(folder), **settings}
     if not own:
         return Plan.of_family(family, seed, **settings)
     first = own[0]
     if any((c.parameters, c.seed) != (first.parameters, first.seed) for c in own):
         raise ValueError(f"{folder}: the list {name}.json has two scenes of one name")
     numbers = tuple(sorted({choice.number for choice in own}))
-    return Plan(
-        scene=source(family, dict(first.parameters), first.seed),
-        problems=numbers[-1] + 1,
-        chosen=numbers,
-        **settings,
-    )
+    settings = {"chosen": numbers, "problems": numbers[-1] + 1, **settings}
+    return Plan(scene=source(family, dict(first.parameters), first.seed), **settings)
 
 
-def differing(name: str, rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The problems of a set's list, by name, whose rows of a catalogue hold other data."""
-    found = {(row["family"], row["number"]): row["digest"] for row in rows}
-    return [
-        f"{name}/{choice.family}/{choice.number:04d}"
-        for choice in choices(name)
-        if choice.digest != found.get((choice.family, choice.number))
-    ]
+def from_folder(plan: Plan, folder: str | Path) -> Plan:
+    """A plan whose states are those of a trajectory in a folder: the only one of its family there.
+
+    A family that is assembled directly remains as it is.
+
+    Raises:
+        FileNotFoundError: there is none, or there are several versions.
+        OSError, TrajectoryError: it cannot be read.
+    """
+    if isinstance(plan.scene, scenes.Assembled):
+        return plan
+    found = sorted(Path(folder).glob(f"{plan.name}-*{trajectory.SUFFIX}"))
+    if len(found) != 1:
+        words = ", ".join(path.name for path in found) or "none"
+        raise FileNotFoundError(f"{folder}: needs one trajectory of {plan.name}, and has {words}")
+    scene, origin = trajectory.read_origin(found[0])
+    return replace(plan, scene=scene, version=origin["version"], trajectory=found[0])
+
+
+def origin_of(row: Mapping[str, Any]) -> str:
+    """What a row of a catalogue is: "published", "differs" from what is, or "yours".
+
+    A problem is published where a trajectory or a list of its version is stored here that has it.
+    """
+    known = published_digest(row)
+    if known is None:
+        return "yours"
+    return "published" if known == row["digest"] else "differs"
+
+
+def published_digest(row: Mapping[str, Any]) -> str | None:
+    """The digest that is published under a row's name, version and seed; None where none is."""
+    folder, number = f"{row['collection']}/{row['family']}", row["number"]
+    if row["version"] in published.versions(folder):
+        if published.seed(folder, row["version"]) != row["seed"]:
+            return None
+        return published.digests(folder, row["version"]).get(number)
+    if row["version"] != version(row["collection"]):
+        return None
+    listed = choices(row["collection"])
+    found = [c.digest for c in listed if (c.family, c.number) == (row["family"], number)]
+    return found[0] if found else None

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, overload
 
 from fclib import _core
-from fclib.collections import archives, catalog, known
+from fclib.collections import archives, catalog, known, published
 from fclib.collections.build import build
 
 FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
@@ -23,14 +23,34 @@ def default_folder() -> Path:
 
 
 def ensure(name: str, folder: Path) -> None:
-    """Make SET/FAMILY be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most."""
-    if (folder / name / catalog.FILE).is_file():
+    """Make SET/FAMILY be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most.
+
+    Raises:
+        VersionError: the folder has another version of it.
+    """
+    part = folder / name / catalog.FILE
+    if part.is_file():
+        wanted, found = known.version_of(name), version_in(part)
+        # a version of one's own has a name, and no number that could be older
+        if found is not None and found.isdecimal() and found != wanted:
+            raise published.VersionError(
+                f"{part.parent}: holds version {found} of {name}, and the present one is {wanted}:"
+                " remove it, or name another folder (FCLIB_COLLECTION); its problems are read from"
+                " there by their files, and fclib collection build"
+                f" {name} --version {found} makes them where that version is stored"
+            )
         return
     source = os.environ.get(SOURCE)
     if source:
         archives.get([name], source, folder)
     else:
         build([known.plan_of(name)], folder, pictures=False)
+
+
+def version_in(part: Path) -> str | None:
+    """The version of a family's part of a catalogue; None where it has none or no problem."""
+    found: list[str | None] = catalog.read_catalog(part)["version"].to_pylist()
+    return found[0] if found else None
 
 
 class Collection(Sequence[Any]):
@@ -125,7 +145,8 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
         folder: where the collection lies; by default the user's cache.
 
     Raises:
-        KeyError: there is no such problem.
+        KeyError: there is no such problem; VersionError, which is one: the folder has it in another
+            version than the present one.
         ValueError: a form that is neither.
     """
     if form not in (None, *FORMS):

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -38,8 +40,26 @@ def source(name: str, parameters: dict[str, Any] | None = None, seed: int = 0) -
 
 
 @dataclass(frozen=True, kw_only=True)
+class Simulation:
+    """How a scene is simulated where there is no trajectory of it."""
+
+    solver: str = "auto"
+    tol: float = 1e-12
+    stabilization: float = 0.2  # of `fclib.simulate.simulate`
+    options: dict[str, Any] = field(default_factory=dict)  # its further ones
+
+    def record(self) -> dict[str, Any]:
+        """In JSON's types."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """What is built of one scene, or of a family assembled directly.
+
+    The problems of a scene are assembled from a trajectory: a stored one, or one that is simulated
+    first. Solver, tolerance and options are those of the reference solutions, which no problem
+    depends on.
 
     With `count` below the number of problems, the rule of selection is
 
@@ -59,9 +79,12 @@ class Plan:
     select: Selection = "every"
     chosen: tuple[int, ...] | None = None  # the numbers that are kept, in order
     analyze: bool = False  # also figures of `fclib.analysis.analyze`; a second a problem, or more
+    trajectory: Path | None = None  # of the scene; None: it is simulated
+    simulation: Simulation = field(default_factory=Simulation)  # in that case
+    references: bool = True  # whether solutions are found and stored
     solver: str = "auto"
     tol: float = 1e-8
-    options: dict[str, Any] = field(default_factory=dict)  # of `fclib.simulate.simulate`
+    options: dict[str, Any] = field(default_factory=dict)  # of `fclib.solve`
 
     @classmethod
     def of_family(cls, name: str, seed: int = 0, **settings: Any) -> Plan:
@@ -108,6 +131,7 @@ class Plan:
                 "fclib": _core.version,
                 "version": self.version,
                 **origin(self.scene),
+                **self._states(),
                 "problems": self.problems,
                 "steps": self.steps,
                 "form": self.form,
@@ -115,12 +139,21 @@ class Plan:
                 "select": self.select,
                 "chosen": self.chosen,
                 "analyze": self.analyze,
+                "references": self.references,
                 "solver": self.solver,
                 "tol": self.tol,
                 "options": self.options,
             },
             sort_keys=True,
         )
+
+    def _states(self) -> dict[str, Any]:
+        """Where the states are from: a file, by its content, or a simulation."""
+        if isinstance(self.scene, scenes.Assembled):
+            return {}
+        if self.trajectory is None:
+            return {"simulation": self.simulation.record()}
+        return {"trajectory": hashlib.sha256(self.trajectory.read_bytes()).hexdigest()}
 
 
 def origin(scene: Source) -> dict[str, Any]:
@@ -135,6 +168,7 @@ def origin(scene: Source) -> dict[str, Any]:
         **engine(scene),
         "restitution": scene.restitution,
         "law": scene.law,
+        "activation": scene.activation,
         "theta": scene.theta,
         "time_step": scene.time_step,
         "ignore": list(scene.ignore),

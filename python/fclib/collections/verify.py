@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import functools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fclib import _core, _digest
-from fclib.collections import catalog
+from fclib.collections import catalog, known, published, trajectory
+
+ROUNDING = 1e-9  # relative difference of a matrix that another machine may make
 
 
 @dataclass(frozen=True)
@@ -20,6 +24,10 @@ class Verdict:
     status: str  # "ok", or what is wrong: missing, changed, unreadable, ...
     error: float | None  # of the stored solution, where it could be judged
     message: str = ""
+    # of the form that the digest is of: "published", "differs" from what is, or "yours"
+    origin: str = ""
+    # from the published one: of each matrix that differs, relative; see `distance`
+    differences: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -31,7 +39,8 @@ def verify(folder: str | Path, progress: Callable[[str], None] | None = None) ->
     """Hash each file of a folder again, read it, and judge its solution from the data alone.
 
     A stored solution must be as good as the catalogue says, and the data of the form that the
-    catalogue describes must have the digest that stands there.
+    catalogue describes must have the digest that stands there. A problem that has the name and
+    version of a published one must be that one, up to rounding on another machine (ROUNDING).
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -56,16 +65,54 @@ def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) 
         solution = _core.read_solution(file)
     except _core.Error as reason:
         return Verdict(name, path, "unreadable", None, str(reason))
+    origin, apart = "", dict[str, float]()
+    if problem.formulation == row["formulation"]:
+        if _digest.digest(problem) != row["digest"]:
+            return Verdict(name, path, "wrong digest", None, f"{file}: holds another problem")
+        origin = known.origin_of(row)
+        if origin == "differs":
+            apart = distance(problem, row)
+            worst = max(apart, key=apart.__getitem__) if apart else "all of it"
+            if not apart.get(worst, math.inf) <= ROUNDING:
+                message = (
+                    f"{file}: is not {name} of version {row['version']} as it is published; the"
+                    f" largest relative difference is {apart.get(worst, math.inf):.1e}, in {worst}"
+                )
+                return Verdict(name, path, "not published", None, message, origin, apart)
+    if solution is None and row["solver"] is None:
+        return Verdict(name, path, "ok", None, "", origin, apart)
     if solution is None:
         return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
     # the sets were made by this merit
     error = _core.merit(problem, solution).error_by("natural")
-    if problem.formulation == row["formulation"] and _digest.digest(problem) != row["digest"]:
-        return Verdict(name, path, "wrong digest", error, f"{file}: holds another problem")
     stored = float(row["error"])
     # the local form is another problem by rounding, and its error another number
     bound = max(2 * stored, float(row["tol"]))
     if not error <= bound:
         message = f"{file}: the solution's error is {error:.1e}, the catalogue says {stored:.1e}"
         return Verdict(name, path, "worse", error, message)
-    return Verdict(name, path, "ok", error)
+    return Verdict(name, path, "ok", error, "", origin, apart)
+
+
+def distance(problem: Any, row: Mapping[str, Any]) -> dict[str, float]:
+    """How far a problem is from the published one of its name, of each matrix that differs.
+
+    Of the shipped sets the largest difference of two entries over the largest entry; of others
+    ||A - A'|| / ||A||, as `Trajectory.differences` estimates it. Empty where only its digest is
+    known.
+    """
+    folder = f"{row['collection']}/{row['family']}"
+    if row["collection"] in known.SHIPPED:
+        shipped = known.DATA / f"{folder}/{row['number']:04d}"
+        for form in ("global", "local"):
+            path = shipped.with_name(f"{shipped.name}-{form}.hdf5")
+            if path.is_file():
+                return _digest.difference(_core.read(path), problem)
+    stored = published.path_of(folder, row["version"])
+    if stored is None:
+        return {}
+    states = _states(stored)
+    return states.differences(states.index(row["number"]), problem)
+
+
+_states = functools.lru_cache(maxsize=2)(trajectory.read)

@@ -25,7 +25,18 @@ from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, Syste
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
-from fclib.simulate.simulation import Model, State, Step, engine, model_of, provenance, simulate
+from fclib.simulate.simulation import (
+    Model,
+    State,
+    Step,
+    describe,
+    engine,
+    model_of,
+    problem_at,
+    provenance,
+    scheme_of,
+    simulate,
+)
 
 __all__ = [
     "ContactModel",
@@ -39,9 +50,12 @@ __all__ = [
     "Step",
     "System",
     "UnsupportedSceneError",
+    "describe",
     "engine",
     "model_of",
+    "problem_at",
     "provenance",
     "render",
+    "scheme_of",
     "simulate",
 ]

@@ -133,6 +133,11 @@ class DeformableModel:
         """The block of each degree of freedom (n)."""
         return np.repeat(self.body, 3)
 
+    @property
+    def smallest_size(self) -> float | None:
+        """None: displacements are small beside any body."""
+        return None
+
     def places(self, position: Vector | None = None) -> Vector:
         """Where the nodes are (nodes x 3) [m], in a configuration or now."""
         u = self._u if position is None else position[:-1]

@@ -20,9 +20,11 @@ theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the en
 
 Two unilateral laws:
 
-velocity (default)  a contact is active where g + h/2 u_N^- <= 0, with Newton's law of impact
+velocity (default)  a contact is active where g + h/2 u_N^- <= a, with Newton's law of impact
                     u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
-                    penetration (of order h u_N at an impact) is kept and not amplified.
+                    penetration (of order h u_N at an impact) is kept and not amplified. The
+                    activation a [m], 0 by default, keeps bodies at rest in contact where one of
+                    several points is open by less.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -49,6 +51,7 @@ V. Acary, B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, Sprin
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias
 
@@ -170,6 +173,7 @@ class MoreauJean:
     law: Law = "velocity"
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
+    activation: float = 0.0  # [m], of the velocity law: a contact within this is active
 
     def __post_init__(self) -> None:
         if not self.h > 0:
@@ -180,6 +184,8 @@ class MoreauJean:
             raise ValueError(f"stabilization must be in [0, 1], not {self.stabilization}")
         if not 0.5 <= self.theta <= 1:
             raise ValueError(f"theta must be in [1/2, 1], not {self.theta}")
+        if not self.activation >= 0:
+            raise ValueError(f"the activation must be >= 0 [m], not {self.activation}")
         if self.law not in ("velocity", "gap"):
             raise ValueError(f'the law must be "velocity" or "gap", not {self.law!r}')
         if self.law == "gap" and self.restitution:
@@ -198,7 +204,7 @@ class MoreauJean:
         d = contacts.dimension
         if self.law == "velocity":
             before = (H.T @ v)[0::d]
-            active = np.flatnonzero(contacts.gap + 0.5 * h * before <= 0)
+            active = np.flatnonzero(contacts.gap + 0.5 * h * before <= self.activation)
             contacts, H = contacts[active], H[:, block_columns(active, d)]
             w_n = self.restitution * before[active]
         else:
@@ -236,13 +242,17 @@ class MoreauJean:
             problem = _core.GlobalProblem(**fields)
         else:
             problem = _core.GlobalRollingProblem(**fields, mu_r=contacts.mu_r)
-        velocity = np.zeros_like(v)
-        if apart.size:
-            others = np.setdiff1d(np.arange(len(b)), rows)
-            velocity[apart] = free_velocity(
-                M[apart][:, apart], system.G[apart][:, others], f[apart], b[others]
-            )
-        return StepProblem(problem, contacts, inside, velocity)
+
+        def free() -> Vector:
+            velocity = np.zeros_like(v)
+            if apart.size:
+                others = np.setdiff1d(np.arange(len(b)), rows)
+                velocity[apart] = free_velocity(
+                    M[apart][:, apart], system.G[apart][:, others], f[apart], b[others]
+                )
+            return velocity
+
+        return StepProblem(problem, contacts, inside, free)
 
 
 @dataclass(frozen=True)
@@ -252,7 +262,7 @@ class StepProblem:
     problem: _core.GlobalProblem | _core.GlobalRollingProblem
     contacts: Contacts  # nc, the active ones
     dofs: npt.NDArray[np.int64]  # (n') degrees of freedom of the system that the problem has
-    free: Vector  # (n) velocity after the step of the others, 0 at `dofs`
+    free: Callable[[], Vector]  # (n) velocity after the step of the others, 0 at `dofs`; solves
 
 
 def linked(

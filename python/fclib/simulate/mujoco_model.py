@@ -94,6 +94,13 @@ class MujocoModel:
         trees: npt.NDArray[np.int64] = self.model.dof_treeid.astype(np.int64)
         return trees
 
+    @property
+    def smallest_size(self) -> float | None:
+        """Of the geometries that move, the smallest radius about its centre [m]; 1 without any."""
+        m = self.model
+        moving = (m.body_weldid[m.geom_bodyid] > 0) & (m.geom_rbound > 0)
+        return float(m.geom_rbound[moving].min()) if moving.any() else 1.0
+
     def assemble(self, h: float, *, shared_speed: bool = False) -> System:
         """The system at (q, v), with every contact that may close within h.
 

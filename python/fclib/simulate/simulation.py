@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,11 @@ from fclib import _core, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
-from fclib.simulate.moreau_jean import Contacts, MoreauJean, Vector
+from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, Vector
 from fclib.simulate.mujoco_model import MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
+STABILIZATION: Final = 0.2  # share of a violation undone in a step
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def simulate(
     solver: str = "auto",
     tol: float = 1e-8,
     warm_start: bool = True,
-    stabilization: float = 0.2,
+    stabilization: float = STABILIZATION,
     start: State | None = None,
     **options: Any,
 ) -> Iterator[Step]:
@@ -81,13 +82,7 @@ def simulate(
     if steps < 0:
         raise ValueError(f"the number of steps must be >= 0, not {steps}")
     model = model_of(scene)
-    scheme = MoreauJean(
-        h=model.time_step,
-        restitution=scene.restitution,
-        law=scene.law,
-        stabilization=stabilization,
-        theta=scene.theta,
-    )
+    scheme = scheme_of(model, stabilization)
     settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
     if start is not None:
         model.set_state(start.position, start.velocity)
@@ -97,6 +92,34 @@ def simulate(
 def model_of(scene: Scene) -> Model:
     """The model of a scene, at its start; raises as `simulate` does."""
     return MujocoModel(scene) if scene.solids is None else DeformableModel(scene)
+
+
+def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
+    """How the scene of a model is stepped. ValueError where a parameter makes no sense."""
+    scene = model.scene
+    return MoreauJean(
+        h=model.time_step,
+        restitution=scene.restitution,
+        law=scene.law,
+        stabilization=stabilization,
+        theta=scene.theta,
+        activation=scene.activation,
+    )
+
+
+def problem_at(
+    model: Model,
+    scheme: MoreauJean,
+    position: Vector,
+    velocity: Vector,
+    info: _core.ProblemInfo | None = None,
+) -> StepProblem:
+    """The problem of the step from q (nq) and v (n): it follows from these alone, without a solve.
+
+    Raises as `ContactModel.assemble` does.
+    """
+    model.set_state(position, velocity)
+    return scheme.problem(scheme.assemble(model), model.velocity, info)
 
 
 def _march(
@@ -124,7 +147,7 @@ def _march(
             options["guess"] = _core.Solution(r=carry_over(state, contacts))
         result = _solve.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
 
-        after = part.free
+        after = part.free()
         after[part.dofs] = result.solution.v
         if not np.isfinite(after).all():
             raise FloatingPointError(
@@ -194,6 +217,7 @@ def describe(
         "time_step": scheme.h,
         "restitution": scheme.restitution,
         "law": scheme.law,
+        **({"activation": scheme.activation} if scheme.activation else {}),
         "theta": scheme.theta,
         "stabilization": scheme.stabilization,
         **settings,

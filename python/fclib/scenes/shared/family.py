@@ -32,6 +32,7 @@ class Scene:
     time_step: float | None = None  # h [s]; None: the one of the MJCF file
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
+    activation: float = 0.0  # [m], distance within which the velocity law takes a contact
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
     seed: int | None = None

@@ -1,0 +1,76 @@
+"""The trajectories that are published: a file for each version of a family, never rewritten.
+
+    SET/FAMILY-VERSION.trajectory
+
+They lie in the package `fclib-collection`, installed beside this one, or in `collection/` of a
+checkout. Versions are counted 1, 2, ...; the newest one is meant where none is named.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib.util
+from pathlib import Path
+
+from fclib.collections import trajectory
+
+PACKAGE = "fclib_collection"
+IN_PLACE = Path(__file__).resolve().parents[3] / "collection" / PACKAGE
+FOLDER = "trajectories"
+
+
+class VersionError(KeyError):
+    """A version of a problem that is not the one asked for, or not stored here."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def root() -> Path | None:
+    """The folder of the published trajectories; None where the package is not installed."""
+    if IN_PLACE.is_dir():
+        return IN_PLACE / FOLDER
+    spec = importlib.util.find_spec(PACKAGE)
+    if spec is None or spec.origin is None:
+        return None
+    return Path(spec.origin).parent / FOLDER
+
+
+def versions(folder: str) -> list[str]:
+    """The stored versions of SET/FAMILY, the oldest first."""
+    base = root()
+    if base is None:
+        return []
+    name, family = folder.split("/")
+    found = [
+        path.stem.removeprefix(f"{family}-")
+        for path in (base / name).glob(f"{family}-*{trajectory.SUFFIX}")
+    ]
+    return sorted((version for version in found if version.isdecimal()), key=int)
+
+
+def path_of(folder: str, version: str) -> Path | None:
+    """The file of a version of SET/FAMILY; None where it is not stored here."""
+    base = root()
+    return base / file_name(folder, version) if version in versions(folder) and base else None
+
+
+def file_name(folder: str, version: str) -> str:
+    """Of a version of SET/FAMILY, below a folder of trajectories."""
+    return f"{folder}-{version}{trajectory.SUFFIX}"
+
+
+def digests(folder: str, version: str) -> dict[int, str]:
+    """The digest of each problem of a version of SET/FAMILY; none where it is not stored here."""
+    path = path_of(folder, version)
+    return _digests(path) if path is not None else {}
+
+
+def seed(folder: str, version: str) -> int | None:
+    """Of the scene of a version that is stored here."""
+    path = path_of(folder, version)
+    return _origin(path)[0].seed if path is not None else None
+
+
+_digests = functools.lru_cache(maxsize=64)(trajectory.read_digests)
+_origin = functools.lru_cache(maxsize=64)(trajectory.read_origin)

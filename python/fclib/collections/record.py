@@ -1,0 +1,159 @@
+"""A simulation into a trajectory: the act that makes new problems.
+
+Each step is solved to go on to the next one, as precisely as the plan says. What is stored is the
+state at its start, rounded, where the problem that is assembled from the rounded state has a
+contact: that problem, and no other one, is of the family. The simulation itself is not rounded.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fclib import _core, _digest, scenes
+from fclib.collections import catalog, trajectory
+from fclib.collections.plan import Plan
+
+if TYPE_CHECKING:
+    from fclib.simulate import State
+
+CHECKPOINT = 5.0  # seconds between two checkpoints
+
+Progress = Callable[[str, int, int], None]  # name, problems looked at, of how many
+
+
+@dataclass
+class Recorded:
+    """The states that are kept, and how many problems were looked at."""
+
+    looked: int = 0
+    number: list[int] = field(default_factory=list)
+    step: list[int] = field(default_factory=list)
+    position: list[Any] = field(default_factory=list)
+    velocity: list[Any] = field(default_factory=list)
+    digest: list[str] = field(default_factory=list)
+    structure: list[str] = field(default_factory=list)
+    sketch: list[Any] = field(default_factory=list)
+
+    def add(self, step: int, position: Any, velocity: Any, problem: Any) -> None:
+        """Keep a state as the problem of number `looked`."""
+        self.number.append(self.looked)
+        self.step.append(step)
+        self.position.append(position)
+        self.velocity.append(velocity)
+        self.digest.append(_digest.digest(problem))
+        self.structure.append(_digest.structure(problem))
+        self.sketch.append(_digest.sketch(problem))
+
+
+def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None = None) -> None:
+    """Simulate the scene of a plan, and write its trajectory; go on where a kill interrupted it.
+
+    Args:
+        plan: a scene, how many problems, and how it is simulated.
+        target: the file that is written. It must not be there.
+        checkpoint: a file to go on from; removed at the end.
+        report: called with the plan's name, the problems that were looked at and their number.
+
+    Raises:
+        TypeError: the plan is of a family that is assembled directly, which has no states.
+        FileExistsError, OSError: the file is there already, or cannot be written.
+        ValueError, FloatingPointError, MemoryError, ImportError: as `fclib.simulate.simulate`.
+    """
+    if isinstance(plan.scene, scenes.Assembled):
+        raise TypeError(f"{plan.name} is assembled directly: there is nothing to simulate")
+    if target.exists():
+        raise FileExistsError(f"{target}: is there already, and a trajectory is never rewritten")
+    from fclib.simulate import model_of, problem_at, scheme_of, simulate
+
+    way = plan.simulation
+    # the states are assembled by a model of their own, as they are from the file
+    model = model_of(plan.scene)
+    scheme = scheme_of(model, way.stabilization)
+    exponent = trajectory.exponent_of(model)
+    kept, start = read_checkpoint(checkpoint)
+    # a scene that never touches anything would go on for ever
+    most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
+    done = start.index if start is not None else 0
+    last = time.monotonic()
+    for step in simulate(
+        plan.scene,
+        most - done,
+        solver=way.solver,
+        tol=way.tol,
+        stabilization=way.stabilization,
+        start=start,
+        **way.options,
+    ):
+        if time.monotonic() - last > CHECKPOINT:
+            write_checkpoint(checkpoint, kept, step.start)
+            last = time.monotonic()
+        position = trajectory.rounded(step.start.position, exponent)
+        velocity = trajectory.rounded(step.start.velocity, exponent)
+        problem = problem_at(model, scheme, position, velocity).problem
+        if problem.nc:
+            if plan.chosen is None or kept.looked in plan.chosen:
+                kept.add(step.index, position, velocity, problem)
+            kept.looked += 1
+            if report is not None:
+                report(plan.name, kept.looked, plan.total)
+            if kept.looked == plan.problems:
+                break
+
+    count = len(kept.number)
+    trajectory.write(
+        target,
+        trajectory.Trajectory(
+            scene=plan.scene,
+            origin={
+                "collection": plan.collection,
+                "version": plan.version,
+                "settings": {"fclib": _core.version, **way.record()},
+            },
+            exponent=exponent,
+            number=np.array(kept.number, dtype=np.int64),
+            step=np.array(kept.step, dtype=np.int64),
+            position=np.reshape(kept.position, (count, len(model.position))),
+            velocity=np.reshape(kept.velocity, (count, len(model.velocity))),
+            digest=tuple(kept.digest),
+            structure=tuple(kept.structure),
+            sketch=np.reshape(kept.sketch, (count, len(_digest.FIELDS), 2)),
+        ),
+    )
+    checkpoint.unlink(missing_ok=True)
+
+
+def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
+    """Store where to go on: the start of a step, and what was kept before it."""
+    known = {name: getattr(kept, name) for name in ("looked", "number", "step")}
+    known |= {name: getattr(kept, name) for name in ("digest", "structure")}
+    arrays: dict[str, Any] = {
+        name: np.array(getattr(kept, name)) for name in ("position", "velocity", "sketch")
+    }
+    arrays |= {f"start_{f.name}": getattr(start, f.name) for f in fields(start)}
+    content = io.BytesIO()
+    np.savez(content, known=json.dumps(known), **arrays)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    catalog.replace_file(path, lambda beside: beside.write_bytes(content.getvalue()))
+
+
+def read_checkpoint(path: Path) -> tuple[Recorded, State | None]:
+    """What was kept, and where to go on; nothing and None for the scene's start."""
+    if not path.is_file():
+        return Recorded(), None
+    from fclib.simulate import State
+
+    with np.load(path) as arrays:
+        values = {name: arrays[name] for name in arrays.files}
+    kept = Recorded(**json.loads(str(values.pop("known"))))
+    for name in ("position", "velocity", "sketch"):
+        setattr(kept, name, list(values.pop(name)))
+    state = {name.removeprefix("start_"): value for name, value in values.items()}
+    return kept, State(**(state | {"index": int(state["index"])}))

@@ -1,0 +1,334 @@
+"""A trajectory: the stored states from which problems are assembled again, without a solve.
+
+    problem = trajectory.problem(i).problem     a function of the scene and of state i alone
+
+A state is a configuration q (nq) and a velocity v (n) at the start of a step; q has the time where
+loads or controls change with it. All else that the assembly needs is the scene's, and is in the
+file: the MJCF text or the elastic blocks, time step, law, restitution, activation. Impulses of the
+step before are not needed: they are a guess for a solver and no part of a problem.
+
+States are rounded to multiples of a power of 2 (`exponent_of`), and problems are assembled from the
+rounded ones: nothing adds up, since each problem starts from its own state. Multiples of a fixed
+quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the same
+resolution of its gap as one on it, and because what rests is then 0 and takes no room.
+
+The file is a ZIP archive, which any tool opens, compressed by LZMA, which Python's own library has:
+
+    trajectory.json     what is in it, the scene, what simulated it, and the shapes of the arrays
+    position.bin        (K x nq) integers of the quantum, see below
+    velocity.bin        (K x n)
+    number.bin, step.bin            (K) int64, little-endian
+    digest.bin, structure.bin       (K x 32) bytes, `fclib.digest` and the digest of the pattern
+    sketch.bin          (K x 13 x 2) float64, little-endian: two sums of each matrix's entries with
+                        signs, in the order of `_digest.FIELDS`; NaN where there is no such matrix
+
+Integers are stored as second differences along K, those of one coordinate one after the other, in
+zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first: 4.5 MB for
+the 4,934 states of RT-0444's families; as floats of 32 bits they take 7.8 MB.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
+from lzma import LZMAError
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib import _digest
+from fclib.scenes import Scene
+from fclib.scenes.shared.solids import Bed, Block, Load, Solids
+
+if TYPE_CHECKING:
+    from fclib.simulate import Model
+    from fclib.simulate.moreau_jean import MoreauJean, StepProblem
+
+Vector = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+FORMAT: Final = 1
+SUFFIX: Final = ".trajectory"
+OWN: Final = f"states{SUFFIX}"  # beside the problems of a build that simulated it
+EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # so that equal trajectories make equal files
+# quanta 2^e in m, rad, m/s, rad/s, s: about 1 nm; for bodies below 16 mm finer in proportion
+RIGID: Final = -30
+PER_SIZE: Final = -24  # of the smallest body's size
+# elastic displacements are small: 1e-12 m
+ELASTIC: Final = -40
+LARGEST: Final = 2**53  # integers that a double holds
+DIFFERENCES: Final = 2  # along the steps
+
+
+class TrajectoryError(ValueError):
+    """A file that is no trajectory, or one that this version cannot read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """K stored states of a scene, and what is known of their problems."""
+
+    scene: Scene
+    # how it was simulated, in JSON's types: collection (the set), version, and `settings` of the
+    # simulation: solver, tol, warm_start, options, stabilization, fclib (its version)
+    origin: Mapping[str, Any]
+    exponent: int  # states are multiples of 2^exponent
+    number: Integers  # (K) of the problem in its family, increasing
+    step: Integers  # (K) of the simulation
+    position: Vector  # (K x nq)
+    velocity: Vector  # (K x n)
+    digest: tuple[str, ...] = ()  # (K) `fclib.digest` of the problems as they were published
+    structure: tuple[str, ...] = ()  # (K) of their patterns
+    sketch: Vector = field(default_factory=lambda: np.zeros((0, len(_digest.FIELDS), 2)))
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    @cached_property
+    def model(self) -> Model:
+        """The model of the scene, left in the state that was assembled last."""
+        from fclib.simulate import model_of
+
+        return model_of(self.scene)
+
+    @cached_property
+    def scheme(self) -> MoreauJean:
+        """How its steps are made into problems."""
+        from fclib.simulate import scheme_of
+
+        return scheme_of(self.model, self.origin["settings"]["stabilization"])
+
+    def index(self, number: int) -> int:
+        """The place of a problem's number. KeyError where there is no such problem."""
+        place = int(np.searchsorted(self.number, number))
+        if place == len(self) or self.number[place] != number:
+            name = f"{self.origin['collection']}/{self.scene.name}/{number:04d}"
+            raise KeyError(f"version {self.origin['version']} has no problem {name}")
+        return place
+
+    def time(self, place: int) -> float:
+        """At the start of a state's step [s]."""
+        return float(self.step[place] * self.model.time_step)
+
+    def problem(self, place: int) -> StepProblem:
+        """The problem of a state, by its place 0, 1, ..., K - 1; solves nothing.
+
+        Raises as `fclib.simulate.simulate` does where the scene cannot be assembled.
+        """
+        from fclib.simulate import describe, problem_at
+
+        known = {name: self.origin[name] for name in ("collection", "version")}
+        settings = self.origin["settings"] | known | {"number": int(self.number[place])}
+        info = describe(self.scene, self.scheme, settings, int(self.step[place]))
+        return problem_at(self.model, self.scheme, self.position[place], self.velocity[place], info)
+
+    def differences(self, place: int, problem: Any) -> dict[str, float]:
+        """How far a problem is from the published one: of each matrix and vector that is not equal.
+
+        Returns:
+            For each ||A - A'|| / ||A|| in the Frobenius norm, estimated from two sums with signs,
+            right within a factor of a few; infinite for all where the pattern is another one.
+        """
+        if _digest.structure(problem) != self.structure[place]:
+            return dict.fromkeys(_digest.parts(problem), math.inf)
+        return _digest.distance(problem, self.sketch[place])
+
+
+# ---- rounding
+
+
+def exponent_of(model: Model) -> int:
+    """The quantum 2^e to which the states of a model are rounded."""
+    size = model.smallest_size
+    if size is None:
+        return ELASTIC
+    return min(RIGID, PER_SIZE + math.floor(math.log2(size)))
+
+
+def rounded(values: Vector, exponent: int) -> Vector:
+    """Values as multiples of 2^exponent; the nearest one, of two the even one.
+
+    ValueError where a value is not finite, or so large that it has no such multiple.
+    """
+    integers = np.rint(np.ldexp(values, -exponent))
+    if not (np.abs(integers) < LARGEST).all():
+        raise ValueError(f"a state is out of range: {np.abs(values).max():g}")
+    multiples: Vector = np.ldexp(integers, exponent)
+    return multiples
+
+
+# ---- files
+
+
+def write(path: Path, trajectory: Trajectory) -> None:
+    """Write a trajectory; equal ones make equal files. OSError, FileExistsError.
+
+    A file is never rewritten: another trajectory is another version, in a file of its own.
+    """
+    arrays: dict[str, bytes] = {}
+    shapes: dict[str, Any] = {}
+    for name in ("position", "velocity"):
+        values = getattr(trajectory, name)
+        arrays[name], width = packed(values, trajectory.exponent)
+        shapes[name] = {"shape": list(values.shape), "bytes": width}
+    arrays["number"] = trajectory.number.astype("<i8").tobytes()
+    arrays["step"] = trajectory.step.astype("<i8").tobytes()
+    for name in ("digest", "structure"):
+        arrays[name] = bytes.fromhex("".join(getattr(trajectory, name)))
+    arrays["sketch"] = trajectory.sketch.astype("<f8").tobytes()
+    head = {
+        "format": FORMAT,
+        "origin": dict(trajectory.origin),
+        "exponent": trajectory.exponent,
+        "problems": len(trajectory),
+        "arrays": shapes,
+        "scene": record(trajectory.scene),
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if path.exists():
+        raise FileExistsError(f"{path}: is there already, and a trajectory is never rewritten")
+    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        with zipfile.ZipFile(beside, "w", zipfile.ZIP_LZMA) as archive:
+            content = {"trajectory.json": json.dumps(head, indent=1, sort_keys=True).encode()}
+            content |= {f"{name}.bin": data for name, data in arrays.items()}
+            for name, data in content.items():
+                entry = zipfile.ZipInfo(name, date_time=EPOCH)
+                entry.compress_type = zipfile.ZIP_LZMA
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, data)
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def head_of(path: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
+    """What a file says it is."""
+    head: dict[str, Any] = json.loads(archive.read("trajectory.json"))
+    if head["format"] != FORMAT:
+        raise TrajectoryError(
+            f"{path}: is of format {head['format']}, and this version of fclib reads {FORMAT}:"
+            " a later one reads it"
+        )
+    return head
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """The archive of a trajectory. OSError, TrajectoryError."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            yield archive
+    except (zipfile.BadZipFile, LZMAError, KeyError, TypeError, EOFError, ValueError) as error:
+        if isinstance(error, TrajectoryError):
+            raise
+        raise TrajectoryError(f"{path}: is no trajectory, or a damaged one: {error}") from error
+
+
+def read_origin(path: Path) -> tuple[Scene, dict[str, Any]]:
+    """The scene of a trajectory and where it is from. OSError, TrajectoryError."""
+    with opened(path) as archive:
+        head = head_of(path, archive)
+        return scene_of(head["scene"]), head["origin"]
+
+
+def read_digests(path: Path) -> dict[int, str]:
+    """The digest of each problem of a trajectory, by its number. OSError, TrajectoryError."""
+    with opened(path) as archive:
+        head_of(path, archive)
+        numbers = np.frombuffer(archive.read("number.bin"), "<i8").tolist()
+        digests = archive.read("digest.bin")
+        return {n: digests[32 * i : 32 * i + 32].hex() for i, n in enumerate(numbers)}
+
+
+def read(path: Path) -> Trajectory:
+    """Read a trajectory. OSError, TrajectoryError."""
+    with opened(path) as archive:
+        head = head_of(path, archive)
+        arrays = {
+            entry.removesuffix(".bin"): archive.read(entry)
+            for entry in archive.namelist()
+            if entry.endswith(".bin")
+        }
+        count, exponent = head["problems"], head["exponent"]
+
+        def states(name: str) -> Vector:
+            return unpacked(arrays[name], **head["arrays"][name], exponent=exponent)
+
+        def hexes(name: str) -> tuple[str, ...]:
+            return tuple(arrays[name][32 * i : 32 * i + 32].hex() for i in range(count))
+
+        return Trajectory(
+            scene=scene_of(head["scene"]),
+            origin=head["origin"],
+            exponent=exponent,
+            number=np.frombuffer(arrays["number"], "<i8").astype(np.int64),
+            step=np.frombuffer(arrays["step"], "<i8").astype(np.int64),
+            position=states("position"),
+            velocity=states("velocity"),
+            digest=hexes("digest"),
+            structure=hexes("structure"),
+            sketch=np.frombuffer(arrays["sketch"], "<f8")
+            .astype(float)
+            .reshape(count, len(_digest.FIELDS), 2),
+        )
+
+
+def packed(values: Vector, exponent: int) -> tuple[bytes, int]:
+    """Multiples of 2^exponent (K x m) as bytes, and how many bytes a number has."""
+    integers = np.rint(np.ldexp(values, -exponent)).astype(np.int64)
+    for _ in range(DIFFERENCES):
+        integers = np.diff(integers, axis=0, prepend=np.zeros((1, integers.shape[1]), np.int64))
+    zigzag = ((integers << 1) ^ (integers >> 63)).T.astype("<u8", order="C")
+    planes = zigzag.view(np.uint8).reshape(-1, 8).T
+    width = 8
+    while width > 1 and not planes[width - 1].any():
+        width -= 1
+    return planes[:width].tobytes(), width
+
+
+def unpacked(data: bytes, *, shape: list[int], bytes: int, exponent: int) -> Vector:
+    """What `packed` has made into bytes (K x m)."""
+    rows, columns = shape
+    planes = np.zeros((8, rows * columns), dtype=np.uint8)
+    planes[:bytes] = np.frombuffer(data, np.uint8).reshape(bytes, rows * columns)
+    zigzag = np.ascontiguousarray(planes.T).view("<u8").reshape(columns, rows).T.astype(np.uint64)
+    integers = (zigzag >> np.uint64(1)).astype(np.int64) ^ -(zigzag & np.uint64(1)).astype(np.int64)
+    for _ in range(DIFFERENCES):
+        integers = np.cumsum(integers, axis=0)
+    values: Vector = np.ldexp(integers.astype(float), exponent)
+    return values
+
+
+def record(scene: Scene) -> dict[str, Any]:
+    """A scene in JSON's types: all of it but the place of its file on this machine."""
+    return asdict(replace(scene, parameters=dict(scene.parameters), path=None))
+
+
+def scene_of(known: Mapping[str, Any]) -> Scene:
+    """The scene of a record."""
+    values = {
+        name: tuples(value) if name != "parameters" else value for name, value in known.items()
+    }
+    if known["solids"] is not None:
+        solids = {name: tuples(value) for name, value in known["solids"].items()}
+        for name, kind in (("blocks", Block), ("beds", Bed), ("loads", Load)):
+            own: Any = kind
+            solids[name] = tuple(
+                own(**{key: tuples(value) for key, value in part.items()}) for part in solids[name]
+            )
+        values["solids"] = Solids(**solids)
+    return Scene(**values)
+
+
+def tuples(value: Any) -> Any:
+    """Lists as tuples, which frozen dataclasses have."""
+    return tuple(tuples(item) for item in value) if isinstance(value, list) else value

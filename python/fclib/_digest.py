@@ -131,8 +131,9 @@ def places(part: Any) -> npt.NDArray[np.uint64]:
     if isinstance(part, np.ndarray):
         return np.arange(part.size, dtype=np.uint64)
     columns = np.repeat(np.arange(part.shape[1], dtype=np.uint64), np.diff(part.indptr))
-    above: npt.NDArray[np.uint64] = columns * np.uint64(part.shape[0])
-    return above + part.indices.astype(np.uint64)
+    place: npt.NDArray[np.uint64] = columns * np.uint64(part.shape[0])
+    place += part.indices.astype(np.uint64)
+    return place
 
 
 def signs(place: npt.NDArray[np.uint64], which: int) -> Numbers:

@@ -13,7 +13,7 @@ from fclib.scenes.shared import mjcf
 # MuJoCo has no release for the oldest Python that fclib takes
 pytest.importorskip("mujoco")
 
-from fclib.simulate import MujocoModel, Step, simulate
+from fclib.simulate import MujocoModel, Step, problem_at, scheme_of, simulate
 
 FAMILIES = scenes.families()
 
@@ -84,6 +84,38 @@ def test_boxes_stack_lands_on_four_points_a_box() -> None:
     np.testing.assert_array_equal(counts, 4)
 
 
+@pytest.mark.parametrize(("activation", "contacts"), [(0.0, 3), (1e-4, 4)])
+def test_corners_of_a_face_that_touches_are_closed(activation: float, contacts: int) -> None:
+    """A box that is tilted by less than the activation rests on all its corners."""
+    scene = scenes.get("BoxesStack")(boxes=1, gap=0.0, activation=activation).scene(seed=0)
+    model = MujocoModel(scene)
+    q = model.position
+    # three corners in the floor, the fourth 0.05 mm above it
+    q[2] -= 5e-5
+    tilt = 5e-5 / 2.0
+    q[3:7] = np.array([1.0, 0.5 * tilt, -0.5 * tilt, 0.0])
+    model.set_state(q, np.zeros(6))
+    problem = problem_at(model, scheme_of(model), q, np.zeros(6))
+    assert len(problem.contacts) == contacts
+    gaps = problem.contacts.gap
+    assert ((gaps > 0).sum(), gaps.max() < 1e-4) == (contacts - 3, True)
+
+
+def test_activation_closes_no_gap_between_bodies_that_do_not_touch() -> None:
+    scene = scenes.get("BoxesStack")(boxes=1, gap=5e-5, activation=1e-4).scene(seed=0)
+    (step,) = simulate(scene, 1)
+    assert step.problem.nc == 0
+    with pytest.raises(ValueError, match="activation must be >= 0"):
+        list(simulate(dataclasses.replace(scene, activation=-1.0), 1))
+
+
+def test_frictionless_contacts_of_three_components_have_no_friction() -> None:
+    scene = scenes.get("BoxesStack")(boxes=1, gap=0.0, mu=0.0).scene(seed=0)
+    *_, last = simulate(scene, 3)
+    assert last.problem.nc == 4
+    np.testing.assert_array_equal(np.asarray(last.problem.mu), 0.0)
+
+
 def test_boxes_stack_seed_draws_the_offsets() -> None:
     family: Any = scenes.get("BoxesStack")
     low, high = family(boxes=3).scene(seed=0), family(boxes=5).scene(seed=0)
@@ -136,10 +168,30 @@ def test_chain_hangs() -> None:
     assert last.problem.n == 60
     z = places(last)[:, 2]
     pitch = (family.length - 2 * family.thickness) / family.links
-    np.testing.assert_allclose(z, -pitch * np.arange(1, family.links), atol=5e-3)
+    # beside the corners of two rods, which rise by 15 degrees, a link is higher by this at most
+    joints = np.arange(1, family.links)
+    high = 2 * family.offset * np.tan(np.pi / 12) * joints
+    above = z + pitch * joints
+    assert (above > -family.thickness / 50).all()
+    assert (above < high + family.thickness / 50).all()
     # the tip goes on at its speed
     assert 0.8 * family.tip_speed < last.velocity[-6] < 1.2 * family.tip_speed
     assert last.contacts.gap.min() > -0.1 * family.thickness
+
+
+def test_chain_begins_with_links_alike_that_touch() -> None:
+    scene = scenes.get("Chain")().scene(seed=0)
+    m = MujocoModel(scene).model
+    links = m.geom_bodyid[m.geom_bodyid > 0]
+    _, counts = np.unique(links, return_counts=True)
+    assert (counts == counts[0]).all()
+    np.testing.assert_allclose(m.body_inertia[1:], m.body_inertia[1:2].repeat(11, axis=0))
+    first, last = (list(simulate(scene, steps))[-1] for steps in (1, 31))
+    # the two lowest links fall, all others touch in one point
+    assert (first.problem.n, first.problem.nc) == (48, 8)
+    assert np.abs(first.contacts.gap).max() < 2e-6
+    assert last.index * last.model.time_step == pytest.approx(scene.begin)
+    assert (last.problem.n, last.problem.nc >= 8) == (48, True)
 
 
 def test_capsules_stay_in_the_box() -> None:

@@ -28,7 +28,7 @@ Progress = Callable[[str, int, int], None]
 # one problem of each kind: family, parameters, number
 TINY: tuple[tuple[str, dict[str, Any], int], ...] = (
     ("PlanarBlocks", {"courses": 4, "blocks": 3}, 90),  # d = 2
-    ("Capsules", {"capsules": 20}, 300),  # d = 3
+    ("Capsules", {"capsules": 20, "width": 16.0}, 300),  # d = 3
     ("KaplasTower", {"levels": 2}, 30),  # d = 3, reactions not unique
     ("RollingDiscs", {"discs": 12, "per_row": 4}, 40),  # d = 3, planar rolling
     ("RollingSpheres", {"spheres": 16, "per_layer": 4}, 60),  # d = 5

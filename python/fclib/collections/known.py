@@ -28,7 +28,7 @@ SHIPPED = ("tiny",)  # whose problems are there without a build
 
 # name, version, what it is; a set that a family names and that is not here has version 1
 KNOWN: dict[str, tuple[str, str]] = {
-    "rt444": ("4", "the four families of RT-0444"),
+    "rt444": ("5", "the four families of RT-0444"),
     "granular": ("5", "grains that fall, flow and are pressed"),
     "rolling": ("4", "grains with rolling friction"),
     "masonry": ("4", "blocks laid without mortar"),
@@ -39,7 +39,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("5", "all families that came after RT-0444"),
     "hard": ("5", "what most solvers fail on; chosen by the bench"),
-    "tiny": ("4", "one problem of each kind; comes with the package"),
+    "tiny": ("5", "one problem of each kind; comes with the package"),
 }
 EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")
 

@@ -169,6 +169,7 @@ def origin(scene: Source) -> dict[str, Any]:
         "restitution": scene.restitution,
         "law": scene.law,
         "activation": scene.activation,
+        "begin": scene.begin,
         "theta": scene.theta,
         "time_step": scene.time_step,
         "ignore": list(scene.ignore),

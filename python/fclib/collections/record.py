@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
@@ -81,6 +82,8 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
     kept, start = read_checkpoint(checkpoint)
     # a scene that never touches anything would go on for ever
     most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
+    # the last step that starts before counts not, whatever the last digits of its time
+    first = math.ceil(plan.scene.begin / scheme.h - 1e-6)
     done = start.index if start is not None else 0
     last = time.monotonic()
     for step in simulate(
@@ -95,6 +98,8 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         if time.monotonic() - last > CHECKPOINT:
             write_checkpoint(checkpoint, kept, step.start)
             last = time.monotonic()
+        if step.index < first:
+            continue
         position = trajectory.rounded(step.start.position, exponent)
         velocity = trajectory.rounded(step.start.velocity, exponent)
         problem = problem_at(model, scheme, position, velocity).problem

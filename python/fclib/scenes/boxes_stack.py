@@ -43,12 +43,13 @@ class BoxesStack:
     yaw: float = parameter(0.05, "rad", "largest rotation of a box about the vertical")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(2e-3, "s", "time step h")
+    activation: float = parameter(1e-4, "m", "gap of a corner that counts as closed")
 
     def __post_init__(self) -> None:
         mjcf.check(
             self,
             positive=("size", "mass", "time_step"),
-            non_negative=("mu", "gap", "offset", "yaw"),
+            non_negative=("mu", "activation", "gap", "offset", "yaw"),
             at_least={"boxes": 1},
         )
 

@@ -40,16 +40,17 @@ class Capsules:
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
     tilt: float = parameter(0.2, "rad", "largest slope of a capsule at the start")
     gap: float = parameter(0.05, "m", "clearance of two layers at the start")
-    width: float = parameter(16.0, "m", "inner edge of the box, a square")
+    width: float = parameter(20.0, "m", "inner edge of the box, a square")
     speed: float = parameter(1.0, "m/s", "largest component of a velocity at the start")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(2.5e-3, "s", "time step h")
+    activation: float = parameter(1e-3, "m", "gap of an end that counts as closed")
 
     def __post_init__(self) -> None:
         mjcf.check(
             self,
             positive=("length", "radius", "mass", "width", "time_step"),
-            non_negative=("mu", "tilt", "gap", "speed"),
+            non_negative=("mu", "activation", "tilt", "gap", "speed"),
             at_least={"capsules": 1},
         )
         if not self.length > 2 * self.radius:

@@ -49,12 +49,13 @@ class KaplasTower:
     offset: float = parameter(2e-4, "m", "largest horizontal offset of a plank along x and along y")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(5e-4, "s", "time step h")
+    activation: float = parameter(1e-5, "m", "gap of a corner that counts as closed")
 
     def __post_init__(self) -> None:
         mjcf.check(
             self,
             positive=("length", "width", "thickness", "mass", "time_step"),
-            non_negative=("mu", "clearance", "gap", "offset"),
+            non_negative=("mu", "activation", "clearance", "gap", "offset"),
             at_least={"levels": 1, "planks": 5},
         )
 

@@ -163,6 +163,7 @@ class DeformableModel:
         force = self.weight + self.loads(self._time + 0.5 * h) - self.K @ u - self.C @ v
         speed = float(np.linalg.norm(v.reshape(-1, 3), axis=1).max(initial=0.0))
         reach = max(2 * h * speed + h**2 * self.solids.gravity, SKIN * self._edge)
+        reach += self.scene.activation
         H, contacts = self.contacts(reach)
         n = len(v)
         nothing = sp.csc_array((n, 0))

@@ -20,11 +20,12 @@ theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the en
 
 Two unilateral laws:
 
-velocity (default)  a contact is active where g + h/2 u_N^- <= a, with Newton's law of impact
+velocity (default)  a contact is active where g + h/2 u_N^- <= 0, with Newton's law of impact
                     u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
-                    penetration (of order h u_N at an impact) is kept and not amplified. The
-                    activation a [m], 0 by default, keeps bodies at rest in contact where one of
-                    several points is open by less.
+                    penetration (of order h u_N at an impact) is kept and not amplified. Of
+                    two geometries that touch in one point, the others with g + h/2 u_N^- <= a are
+                    active too: a is the activation [m], 0 by default. Without it a box at rest on
+                    three corners loses the fourth to the last digits of its gap.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -173,7 +174,7 @@ class MoreauJean:
     law: Law = "velocity"
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
-    activation: float = 0.0  # [m], of the velocity law: a contact within this is active
+    activation: float = 0.0  # [m], of the velocity law: points of a pair that touches, within this
 
     def __post_init__(self) -> None:
         if not self.h > 0:
@@ -204,7 +205,7 @@ class MoreauJean:
         d = contacts.dimension
         if self.law == "velocity":
             before = (H.T @ v)[0::d]
-            active = np.flatnonzero(contacts.gap + 0.5 * h * before <= self.activation)
+            active = closing(contacts.pair, contacts.gap + 0.5 * h * before, self.activation)
             contacts, H = contacts[active], H[:, block_columns(active, d)]
             w_n = self.restitution * before[active]
         else:
@@ -263,6 +264,21 @@ class StepProblem:
     contacts: Contacts  # nc, the active ones
     dofs: npt.NDArray[np.int64]  # (n') degrees of freedom of the system that the problem has
     free: Callable[[], Vector]  # (n) velocity after the step of the others, 0 at `dofs`; solves
+
+
+def closing(pair: npt.NDArray[np.int64], middle: Vector, activation: float) -> npt.NDArray[np.intp]:
+    """Which contacts are active, by their gaps in the middle of the step (nc) [m].
+
+    Those that close, and of their pairs (nc x 2) those that are open by the activation at most.
+    """
+    touches = middle <= 0
+    if activation > 0:
+        _, which = np.unique(pair, axis=0, return_inverse=True)
+        which = which.reshape(-1)
+        pairs = np.zeros(len(middle), dtype=bool)
+        pairs[which[touches]] = True
+        touches |= pairs[which] & (middle <= activation)
+    return np.flatnonzero(touches)
 
 
 def linked(

@@ -37,6 +37,7 @@ from fclib.simulate.mujoco_scene import (
 from fclib.simulate.plane import in_plane
 
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
+LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
 ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
 
 
@@ -190,7 +191,8 @@ class MujocoModel:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
             speed = speed[self._cell.geometry]
-        reach = h * speed + h**2 * np.linalg.norm(m.opt.gravity)
+        # half of the activation for each of the two
+        reach = h * speed + h**2 * np.linalg.norm(m.opt.gravity) + 0.5 * self.scene.activation
 
         m.geom_margin[:] = np.maximum(self._margin, reach)
         m.body_margin[:] = 0
@@ -318,6 +320,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     which = np.flatnonzero(contact.efc_address >= 0)
     dim = contact.dim[which]
     friction = contact.friction[which]
+    friction[friction <= LEAST_MU] = 0
     # sliding has two coefficients, rolling two more
     for first, second, use in ((0, 1, dim > 1), (3, 4, dim == 6)):
         differs = use & (friction[:, first] != friction[:, second])

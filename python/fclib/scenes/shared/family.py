@@ -32,7 +32,8 @@ class Scene:
     time_step: float | None = None  # h [s]; None: the one of the MJCF file
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
-    activation: float = 0.0  # [m], distance within which the velocity law takes a contact
+    activation: float = 0.0  # [m], of the velocity law, see `fclib.simulate.MoreauJean`
+    begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
     seed: int | None = None
@@ -57,6 +58,8 @@ class Scene:
             xml=xml,
             time_step=family.time_step,
             restitution=family.restitution,
+            activation=getattr(family, "activation", 0.0),
+            begin=getattr(family, "begin", 0.0),
             parameters=asdict(family),
             seed=seed,
             title=family.title,
@@ -184,6 +187,8 @@ class Assembly(Described, Protocol):
 
 class Family(Described, Protocol):
     """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
+
+    Where it has parameters `activation` [m] and `begin` [s], they are those of its scenes.
 
     Where the default scene takes long, `small` holds parameters of a quick one of the kind.
     """

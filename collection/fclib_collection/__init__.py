@@ -1,0 +1,3 @@
+"""Trajectories of the collection of FCLIB: the states that its problems are assembled from."""
+
+__version__ = "1"

@@ -379,6 +379,85 @@ def test_package_is_found_where_it_is_installed(
     assert published.versions(FOLDER) == ["7"]
 
 
+# ---- what is published
+
+STORED = sorted(
+    path.relative_to(published.IN_PLACE / published.FOLDER).as_posix()
+    for path in published.IN_PLACE.rglob(f"*{trajectory.SUFFIX}")
+)
+LIMIT = 25e6  # bytes, of all that is stored in the repository
+# of RT-0444, page by page: degrees of freedom, contacts; and the smallest thickness of a body
+RANGES = {
+    "BoxesStack": ((6, 300), (1, 200), lambda p: p["size"]),
+    "Capsules": ((6, 600), (1, 300), lambda p: 2 * p["radius"]),
+    "Chain": ((48, 60), (8, 28), lambda p: p["thickness"]),
+    "KaplasTower": ((72, 864), (48, 1104), lambda p: p["thickness"]),
+}
+
+
+def stored(name: str) -> tuple[Path, Any]:
+    path = published.IN_PLACE / published.FOLDER / name
+    return path, trajectory.read(path)
+
+
+def test_published_trajectories_are_few_megabytes() -> None:
+    names = {name.rpartition("-")[0] for name in STORED}
+    assert names >= set(collections.sets()["rt444"])
+    simulated = {
+        name for name in collections.sets()["tiny"] if name.split("/")[1] in scenes.families()
+    }
+    assert names >= simulated
+    sizes = [(published.IN_PLACE / published.FOLDER / name).stat().st_size for name in STORED]
+    assert sum(sizes) < LIMIT
+
+
+@pytest.mark.parametrize("name", STORED)
+def test_published_trajectory_is_what_its_name_says(name: str) -> None:
+    path, states = stored(name)
+    folder, _, version = name.removesuffix(trajectory.SUFFIX).rpartition("-")
+    assert f"{states.origin['collection']}/{states.scene.name}" == folder
+    assert states.origin["version"] == version
+    assert published.path_of(folder, version) == path
+    assert int(version) <= int(collections.version(folder.split("/")[0]))
+    # the newest one has all problems of the set
+    newest = collections.plan_of(folder)
+    if newest.version == version:
+        assert states.number.tolist() == newest.numbers().tolist()
+    # bit for bit here, or up to rounding where mathematical libraries differ
+    for place in sorted({0, len(states) // 2, len(states) - 1}):
+        problem = states.problem(place).problem
+        apart = states.differences(place, problem)
+        assert max(apart.values(), default=0.0) < 1e-12, apart
+        if not apart:
+            assert fclib.digest(problem) == states.digest[place]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RANGES)
+def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
+    folder = f"rt444/{name}"
+    path = published.path_of(folder, known.version_of(folder))
+    assert path is not None
+    states = trajectory.read(path)
+    dofs, contacts, thickness = RANGES[name]
+    limit = 0.02 * thickness(states.scene.parameters)
+    for place in np.linspace(0, len(states) - 1, 60).astype(int).tolist():
+        part = states.problem(place)
+        assert dofs[0] <= part.problem.n <= dofs[1]
+        assert contacts[0] <= part.problem.nc <= contacts[1]
+        assert part.contacts.gap.min() > -limit
+
+
+def test_a_column_at_rest_has_all_its_contacts() -> None:
+    """Contacts neither come nor go at the end: four for each box."""
+    path = published.path_of("rt444/BoxesStack", known.version_of("rt444/BoxesStack"))
+    assert path is not None
+    states = trajectory.read(path)
+    boxes = states.scene.parameters["boxes"]
+    found = [states.problem(len(states) - 1 - k).problem.nc for k in range(20)]
+    assert found == [4 * boxes] * 20
+
+
 # ---- commands
 
 

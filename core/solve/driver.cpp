@@ -46,9 +46,10 @@ struct Measure {
     scaled_rounding = scaled(rounding_of_q.cast<double>());
   }
 
-  /// That of a solver, which need not go below what rounding leaves.
-  static double scale(double q, double rounding, double tolerance) {
-    const double largest = std::max(q, tolerance > 0 ? rounding / (2 * tolerance) : rounding);
+  /// That of a solver. It aims below what rounding leaves, as far as it gets; the merit of what it
+  /// reached leaves rounding out.
+  static double scale(double q, double rounding) {
+    const double largest = std::max(q, rounding);
     return largest > 0 ? largest : 1.0;
   }
 };
@@ -75,16 +76,16 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return result;
     }
   }
-  const double tolerance = request.settings.tolerance;
   const ReducedProblem reduced{
       .W = BlockMatrix(plain.W, plain.spacedim),
       .q = plain.q,
       .friction = friction,
-      .scale = Measure::scale(measure.q, measure.rounding, tolerance),
+      .scale = Measure::scale(measure.q, measure.rounding),
       .rho = measure.rho,
-      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding, tolerance),
+      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
       .primal = primal,
-      .deadline = &request.deadline};
+      .deadline = &request.deadline,
+      .proves_no_solution = &proves};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -203,7 +204,6 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
   const OwnSizes own = own_sizes(problem, condensation.mass());
-  const Measure measure(local, own.rounding, kind);
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
     return merit(problem, solution, condensation.mass(), own).error_by(kind);
@@ -212,6 +212,7 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
   };
   if (!condensation.finished()) return stop();
+  const Measure measure(local, own.rounding, kind);
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
     return run(local, friction_of(problem), measure, request, guess, judge, prove, &primal);

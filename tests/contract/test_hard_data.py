@@ -140,7 +140,7 @@ def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: s
     (entry,) = (s for s in fclib.solvers() if s.name == solver)
     for limit in (1.0, 4.0, 12.0):
         clock = Looks()
-        result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, clock=clock)
+        result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, False, clock=clock)
         assert result.status == "time_limit", (limit, result.status)
         assert sum(stage.factorisations for stage in result.stages) <= limit
         assert clock.count <= limit + 40
@@ -155,7 +155,7 @@ def test_the_clock_is_looked_at_before_each_factorisation_between_reports() -> N
         counts.append(clock.count)
         return len(counts) < 6
 
-    _core.solve(dense_contacts(), entry, 1e-15, 0, 1e9, {}, None, follow, False, clock=clock)
+    _core.solve(dense_contacts(), entry, 1e-15, 0, 1e9, {}, None, follow, False, False, clock=clock)
     # a report looks four times at most, and a proximal step takes several factorisations
     assert max(np.diff(counts)) > 6, counts
 
@@ -165,12 +165,12 @@ def test_conversions_are_held_to_the_limit() -> None:
     planted = planted_global(3, p=2)
     problem: Any = planted.problem
     (entry,) = (s for s in fclib.solvers() if s.name == "auto")
-    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, clock=Looks())
+    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, False, clock=Looks())
     assert result.status == "time_limit"
     assert result.iterations == 0
     assert judge(problem, result.solution).error == pytest.approx(result.error)
     result = _core.solve(
-        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, clock=Looks()
+        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, False, clock=Looks()
     )
     assert judge(problem, result.solution).error == pytest.approx(result.error)
 

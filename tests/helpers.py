@@ -159,7 +159,7 @@ def sizes(a: Any, x: Array) -> Array:
 
 
 def ratio(x: Array, y: Array) -> Array:
-    """x / y, 0 where y is."""
+    """Components of x over those of y, 0 where y is."""
     return np.where(y > 0, x / np.where(y > 0, y, 1), 0)
 
 

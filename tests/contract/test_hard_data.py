@@ -140,7 +140,9 @@ def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: s
     (entry,) = (s for s in fclib.solvers() if s.name == solver)
     for limit in (1.0, 4.0, 12.0):
         clock = Looks()
-        result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, False, clock=clock)
+        result = _core.solve(
+            problem, entry, 1e-15, 0, limit, {}, None, None, False, False, clock=clock
+        )
         assert result.status == "time_limit", (limit, result.status)
         assert sum(stage.factorisations for stage in result.stages) <= limit
         assert clock.count <= limit + 40

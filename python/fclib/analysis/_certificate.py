@@ -234,7 +234,7 @@ def check(
         raise CertificateError(
             f"bilateral constraint {row}: V^T E y + R^T z = {float(value):.3g}, which must be 0"
         )
-    image, size = _sum(system.cone, x)
+    image, magnitudes = _sum(system.cone, x)
     distance, broken, curvature = 0.0, -1, Fraction()
     bounded = p == 0
     for a in sorted({row // system.d for row in image}):
@@ -245,7 +245,9 @@ def check(
             continue
         broken = a if broken < 0 else broken
         distance = float(np.hypot(distance, off)) * (1 + 1e-15)
-        terms_of_a = sum(size.get(system.d * a + k, Fraction()) for k in range(system.d))
+        terms_of_a = sum(
+            (magnitudes.get(system.d * a + k, Fraction()) for k in range(system.d)), Fraction()
+        )
         bounded = bounded and off <= LAST_DIGITS * 2.0**-53 * float(terms_of_a)
     if broken >= 0 and not (bounded and curvature < 0):
         raise CertificateError(

@@ -263,6 +263,16 @@ def check(
     )
 
 
+def check_arrays(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate:
+    """`check` of y (nc,) and z (p,) as arrays, as `fclib.Result` has them.
+
+    Raises:
+        CertificateError: they prove nothing.
+    """
+    by_constraint = {} if z is None else dict(enumerate(z.tolist()))
+    return check(problem, dict(enumerate(y.tolist())), by_constraint)
+
+
 def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dict[int, Fraction]:
     result = {}
     for key, value in values.items():

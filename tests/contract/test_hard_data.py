@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +16,7 @@ from fclib import _core
 from helpers import judge, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from planted_judge import verdict
+from planted_judge import claim, verdict
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -124,6 +125,13 @@ class Looks:
     def __call__(self) -> float:
         self.count += 1
         return float(self.count)
+
+
+def test_problems_without_a_solution_get_a_proof_or_no_claim() -> None:
+    words = Counter(claim(number) for number in range(150))
+    assert not [word for word in words if word.startswith("false")], words
+    # of bodies and with whole numbers each has an exact proof, and is there half of the times
+    assert words["infeasible, exactly"] > 60
 
 
 def dense_contacts() -> fclib.LocalProblem:

@@ -21,8 +21,8 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "diverged": "says itself that it diverged",
         "infeasible": "proved that the problem has no solution; the proof was checked",
         "interrupted": "stopped for another reason",
-        "inaccurate": "said to be done, and the recomputed error is above the tolerance; or that there"
-        " is no solution, and proved nothing",
+        "inaccurate": "said to be done, and the recomputed error is above the tolerance; "
+        "or said that there is no solution, and proved nothing",
         "invalid": "returned numbers that are not finite",
         "nothing": "returned no solution: none at all, or the starting point as it was",
         "garbage": "returned what is no solution of this problem: another shape, another format",

@@ -99,16 +99,24 @@ def rounding(problem: Any, solution: fclib.Solution) -> float:
         terms = abs(dense(problem.W)) @ r
         if problem.V is not None and solution.l is not None:
             terms += abs(dense(problem.V)) @ np.abs(solution.l)
-        q = problem.q
+        q, diagonal = problem.q, np.diag(dense(problem.W))
     else:
         H, mass = dense(problem.H), np.diag(dense(problem.M))
         impulse = abs(H) @ r + np.abs(problem.f)
         if problem.G is not None and solution.l is not None:
             impulse += abs(dense(problem.G)) @ np.abs(solution.l)
         terms = abs(H).T @ (impulse / mass) + np.abs(problem.w)
-        q = H.T @ (problem.f / mass) + problem.w
-    size = np.linalg.norm(terms) + np.linalg.norm(r)
-    return float(8 * np.finfo(float).eps * size / (np.linalg.norm(q) or 1.0))
+        q, diagonal = H.T @ (problem.f / mass) + problem.w, np.sum(H * H / mass[:, None], axis=0)
+    d = problem.spacedim
+    trace = diagonal.reshape(-1, d).mean(axis=1)
+    rho = np.repeat(1 / np.where(trace > 0, trace, 1), d)
+    steepest = np.repeat(1 + problem.mu + getattr(problem, "mu_r", 0), d)  # u^_N = u_N + mu |u_T|
+
+    def relative(weight: Any) -> float:
+        size = np.linalg.norm(weight * steepest * terms) + np.linalg.norm(r)
+        return float(size / (np.linalg.norm(weight * q) or 1.0))
+
+    return float(8 * np.finfo(float).eps * max(relative(1.0), relative(rho)))
 
 
 def verdict(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:

@@ -11,8 +11,11 @@ namespace fclib {
 
 namespace {
 
-/// What rounding leaves of a sum, over the sizes of its terms: some roundings each.
+/// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer than
+/// v, u and l, which a solver has brought through conversions, and what is allowed to q is hidden
+/// from the natural map.
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
+constexpr Real rounding_unit_of_q = 4 * Real(std::numeric_limits<double>::epsilon());
 
 RealVector product(const Matrix& a, const RealVector& x) {
   RealVector y = RealVector::Zero(a.rows);
@@ -173,7 +176,7 @@ OwnSizes own_sizes(const LocalProblem& problem) {
   result.l = quotient(problem.s.cast<Real>(), diagonal(problem.R));
   const RealVector moved = sizes(problem.V, result.l);
   result.q += moved;
-  result.rounding = rounding_unit * moved;
+  result.rounding = rounding_unit_of_q * moved;
   return result;
 }
 
@@ -195,7 +198,7 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
     impulse += sizes(problem.G, result.l);
   }
   result.q = sizes_transposed(problem.H, free) + problem.w.cast<Real>().cwiseAbs();
-  result.rounding = rounding_unit * (result.q + Spread(mass, impulse).along(problem.H));
+  result.rounding = rounding_unit_of_q * (result.q + Spread(mass, impulse).along(problem.H));
   result.scale = mean_of_contacts(gram(problem.H, condensed != nullptr ? condensed->W : none),
                                   problem.spacedim);
   return result;

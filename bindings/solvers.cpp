@@ -70,7 +70,7 @@ void bind_solve(nb::module_& m) {
       "solve",
       [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
          double time_limit, const OptionValues& options, const Solution* guess,
-          const nb::object& callback, bool history, bool natural, const nb::object& clock) {
+         const nb::object& callback, bool history, bool natural, const nb::object& clock) {
         Settings settings{.tolerance = tolerance,
                           .merit = natural ? MeritKind::natural : MeritKind::both,
                           .max_iterations = max_iterations,
@@ -83,8 +83,8 @@ void bind_solve(nb::module_& m) {
         return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
-       "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
-       "clock"_a.none() = nb::none());
+      "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
+      "clock"_a.none() = nb::none());
 }
 
 nb::object history_of(const Result& result) {

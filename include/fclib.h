@@ -314,6 +314,10 @@ struct fclib_solve_options {
   double time_limit;   /**< wall clock [s]; 0 for none */
   const double* guess; /**< reactions to start from (m), or NULL */
   const char* options; /**< options of the solver, "name=value name=value", or NULL */
+  /** (nc) and (p), or NULL: filled where the status is FCLIB_INFEASIBLE, by a proof that there is
+   * no solution; see fclib_certificate_global() */
+  double* certificate_y;
+  double* certificate_z;
 };
 
 /** New. How a solve ended. */
@@ -334,6 +338,9 @@ struct fclib_solve_result {
   int iterations;
   double error; /**< MERIT_2 of the solution */
   double cpu_s; /**< CPU time of the solver alone [s] */
+  /** of the certificate where the status is FCLIB_INFEASIBLE, as fclib_certificate_global() has it;
+   *  else 0 */
+  double certificate_bound;
 };
 
 /** New. Solves a problem by the solver of this name (see fclib_solver_name()). The arrays of
@@ -352,6 +359,22 @@ int fclib_solve_global_rolling(const struct fclib_global_rolling* problem, const
 int fclib_solve_local_rolling(const struct fclib_local_rolling* problem, const char* solver,
                               const struct fclib_solve_options* options,
                               struct fclib_solution* solution, struct fclib_solve_result* result);
+
+/** New. What y >= 0 (nc) and z (p; NULL for zeros) prove: no reactions of a norm below what is
+ *  returned are a solution. INFINITY: there is no solution; 0: nothing is proven; NaN where the
+ *  problem, y or z is not valid. With E y the vector whose normal parts are y it is a proof where
+ *
+ *    local    -(W^T E y + V z) is in K*,  V^T E y + R^T z = 0,  y . q_N + z . s < 0
+ *    global   H E y + G z = 0,                                  y . w_N + z . b < 0
+ *
+ *  (Farkas' lemma; docs/mathematics.md). All sums are exact. */
+double fclib_certificate_global(const struct fclib_global* problem, const double* y,
+                                const double* z);
+double fclib_certificate_local(const struct fclib_local* problem, const double* y, const double* z);
+double fclib_certificate_global_rolling(const struct fclib_global_rolling* problem, const double* y,
+                                        const double* z);
+double fclib_certificate_local_rolling(const struct fclib_local_rolling* problem, const double* y,
+                                       const double* z);
 
 /** New. The name of solver number k = 0, 1, ..., NULL past the last. Not to be freed. */
 const char* fclib_solver_name(int k);

@@ -158,6 +158,11 @@ def sizes(a: Any, x: Array) -> Array:
     return np.asarray(abs(a) @ abs(x))
 
 
+def ratio(x: Array, y: Array) -> Array:
+    """Components of x over those of y, 0 where y is."""
+    return np.where(y > 0, x / np.where(y > 0, y, 1), 0)
+
+
 def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
     """Judge a solution by the equations of its formulation; nothing is left to rounding."""
     d, mu, r = problem.spacedim, problem.mu, solution.r
@@ -166,7 +171,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
     def stopping(velocity: Array) -> Array:
         """Impulses that stop velocities of the contacts, each alone."""
         w = np.repeat(diagonal.reshape(-1, d).mean(axis=1), d)
-        return np.where(w > 0, by_contact(velocity, d) / np.where(w > 0, w, 1), 0)
+        return ratio(by_contact(velocity, d), w)
 
     if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         q = problem.q
@@ -179,7 +184,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
             assert lam is not None
             assert s is not None
             u = u + V @ lam
-            held = abs(s / R.diagonal())
+            held = ratio(abs(s), abs(R.diagonal()))
             own = own + sizes(V, held)
             velocity = sizes(V.T, stopping(own)) + sizes(R, held) + abs(s)
             bilateral = worst(V.T @ r + R @ lam + s, np.maximum(velocity, mean(s)))
@@ -200,7 +205,7 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
             G, b = columns(problem.G), problem.b
             impulse = impulse + G @ solution.l
             inertia = np.sum(G.toarray() * solve(G.toarray()), axis=0)
-            stop = stop + sizes(G, (sizes(G.T, free) + abs(b)) / inertia)
+            stop = stop + sizes(G, ratio(sizes(G.T, free) + abs(b), inertia))
         v = solution.v
         if v is None:
             v = solve(impulse)

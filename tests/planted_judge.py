@@ -1,10 +1,12 @@
 """Random problems of every formulation whose solution is known, and what `auto` says of them.
 
     python tests/planted_judge.py [COUNT] [FIRST]    problems FIRST.. (20000 of them, from 0)
+    python tests/planted_judge.py --infeasible [COUNT] [FIRST]    2000 that have no solution
 
 Each false word is printed with the number of its problem: `converged` where an independent judge
-finds a larger error, `infeasible`, and `diverged`. Problems that are not solved are counted. Exit
-status 1 where a word was false.
+finds a larger error, `infeasible`, and `diverged`. Problems that are not solved are counted. Of
+those without a solution `converged` is false, and `infeasible` where its proof does not hold in
+rational arithmetic. Exit status 1 where a word was false.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 import fclib
+from fclib import analysis
 from helpers import dense, judge, planted_law
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -64,7 +67,7 @@ def planted(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     nc = int(rng.integers(1, 9))
     n = int(rng.integers(d + 2, 2 * d * nc + 4))
     p = int(rng.integers(0, min(4, n // 3) + 1))
-    ratio = 10.0 ** rng.choice([0, 0, 3, 6])
+    ratio = 10.0 ** rng.choice([0, 0, 3, 6, 9, 12])
     unit = 10.0 ** rng.choice([0, 0, -9, -3, 3, 9])
     friction = (None, 0.0, 0.3, 1.0, 100.0)[rng.integers(5)]
     law, (u, r, _) = planted_law(rng, d, nc, friction, rolling)
@@ -96,16 +99,24 @@ def rounding(problem: Any, solution: fclib.Solution) -> float:
         terms = abs(dense(problem.W)) @ r
         if problem.V is not None and solution.l is not None:
             terms += abs(dense(problem.V)) @ np.abs(solution.l)
-        q = problem.q
+        q, diagonal = problem.q, np.diag(dense(problem.W))
     else:
         H, mass = dense(problem.H), np.diag(dense(problem.M))
         impulse = abs(H) @ r + np.abs(problem.f)
         if problem.G is not None and solution.l is not None:
             impulse += abs(dense(problem.G)) @ np.abs(solution.l)
         terms = abs(H).T @ (impulse / mass) + np.abs(problem.w)
-        q = H.T @ (problem.f / mass) + problem.w
-    size = np.linalg.norm(terms) + np.linalg.norm(r)
-    return float(8 * np.finfo(float).eps * size / (np.linalg.norm(q) or 1.0))
+        q, diagonal = H.T @ (problem.f / mass) + problem.w, np.sum(H * H / mass[:, None], axis=0)
+    d = problem.spacedim
+    trace = diagonal.reshape(-1, d).mean(axis=1)
+    rho = np.repeat(1 / np.where(trace > 0, trace, 1), d)
+    steepest = np.repeat(1 + problem.mu + getattr(problem, "mu_r", 0), d)  # u^_N = u_N + mu |u_T|
+
+    def relative(weight: Any) -> float:
+        size = np.linalg.norm(weight * steepest * terms) + np.linalg.norm(r)
+        return float(size / (np.linalg.norm(weight * q) or 1.0))
+
+    return float(8 * np.finfo(float).eps * max(relative(1.0), relative(rho)))
 
 
 def verdict(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
@@ -127,13 +138,79 @@ def verdict(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> st
     return str(result.status)
 
 
+def without_solution(number: int) -> Any:
+    """Problem `number` of those that have none: normal reactions y and joints' z move nothing.
+
+    All that the proof is made of are whole numbers or halves of them, so that it is exact; where
+    the masses are powers of four, it is in the local form too.
+    """
+    rng = np.random.default_rng([number, 2027])
+    rolling = bool(rng.integers(2))
+    d = int(rng.choice([3, 5] if rolling else [2, 3]))
+    squeezed = int(rng.integers(2, 6))
+    nc = squeezed + int(rng.integers(0, 6))
+    n = int(rng.integers(max(d, 3), 2 * d + 6))
+    p = int(rng.integers(0, 3))
+    y, z = rng.integers(1, 5, squeezed), rng.integers(-3, 4, p)
+    H = rng.integers(-3, 4, (n, d * nc)).astype(float)
+    G = rng.integers(-2, 3, (n, p)).astype(float)
+    y[-1] = 1  # the last normal makes the sum vanish
+    rest = H[:, : d * (squeezed - 1) : d] @ y[:-1] + G @ z
+    H[:, d * (squeezed - 1)] = -rest
+    unit = 4.0 ** rng.integers(-10, 11)
+    whole = bool(rng.integers(2))
+    mass = unit * (4.0 ** rng.integers(0, 6, n) if whole else bodies_of(rng, n, 1e4))
+    w, b = rng.integers(-4, 5, d * nc) / 2.0, rng.integers(-4, 5, p) / 2.0
+    gain = 2.0 ** rng.integers(-10, 4)
+    normals = d * np.arange(squeezed)
+    w[normals[-1]] = -gain - y[:-1] @ w[normals[:-1]] - z @ b
+    law: dict[str, Any] = {"mu": rng.choice([0.0, 0.3, 1.0, 10.0], nc)}
+    if rolling:
+        law["mu_r"] = rng.choice([0.01, 0.1], nc)
+    kind: Any = fclib.GlobalRollingProblem if rolling else fclib.GlobalProblem
+    problem: Any = kind(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=unit * rng.standard_normal(n),
+        w=w,
+        **law,
+        **({"G": G, "b": b} if p else {}),
+    )
+    return problem.condense() if rng.integers(2) else problem
+
+
+def claim(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
+    """The word of `auto` on a problem without a solution; 'false ...' where it is not true."""
+    problem = without_solution(number)
+    try:
+        result = solve(problem, max_iterations=20000)
+    except fclib.UnsuitableError as refusal:
+        return f"refused ({refusal})"
+    if result.status == "infeasible":
+        try:
+            proof = analysis.check_arrays(problem, result.certificate, result.certificate_z)
+        except analysis.CertificateError as error:
+            return f"false infeasible: {error}"
+        return "infeasible, exactly" if proof.exact else "infeasible, up to a bound"
+    if result.converged:
+        local = isinstance(problem, fclib.LocalProblem | fclib.LocalRollingProblem)
+        within = judge(problem, result.solution).error <= 1.01 * TOLERANCE
+        # rounding has given the condensed W a way out, or the gap closes within the tolerance
+        return "converged, by rounding" if local and within else "false converged"
+    return str(result.status)
+
+
 def main() -> int:
     """Run the problems; see the top of the file."""
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 20000
-    first = int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    arguments = sys.argv[1:]
+    infeasible = "--infeasible" in arguments
+    numbers = [int(one) for one in arguments if one != "--infeasible"]
+    count = numbers[0] if numbers else 2000 if infeasible else 20000
+    first = numbers[1] if len(numbers) > 1 else 0
     words: Counter[str] = Counter()
     for number in range(first, first + count):
-        word = verdict(number)
+        word = claim(number) if infeasible else verdict(number)
         if word.startswith("false"):
             print(f"{number}: {word}", flush=True)
         words[word.split(" (")[0].split(":")[0]] += 1

@@ -1,10 +1,13 @@
 // The functions of fclib.h that judge: validation and merits.
+#include <cmath>
 #include <limits>
+#include <string>
 
 #include "capi/errors.hpp"
 #include "capi/from_c.hpp"
 #include "merit/merit.hpp"
 #include "merit/merit_1.hpp"
+#include "proof/no_solution.hpp"
 
 namespace fclib::c {
 
@@ -42,6 +45,23 @@ double merit_of(const C* c, fclib_merit kind, const fclib_solution* solution) {
   });
 }
 
+template <class C>
+double bound_of_certificate(const C* c, const double* y, const double* z) {
+  return guarded(std::numeric_limits<double>::quiet_NaN(), [&] {
+    const auto problem = valid_problem(given(c, "problem"));
+    const Vector of_contacts = vector(y, problem.size(Dim::nc), "y");
+    const Vector of_joints = z == nullptr ? Vector() : vector(z, problem.size(Dim::p), "z");
+    for (const auto* part : {&of_contacts, &of_joints}) {
+      const char* const name = part == &of_contacts ? "y" : "z";
+      for (Eigen::Index k = 0; k < part->size(); ++k) {
+        if (std::isfinite((*part)[k])) continue;
+        fail(std::string(name) + "[" + std::to_string(k) + "]", "is not finite");
+      }
+    }
+    return check_no_solution(problem, of_contacts, of_joints).bound;
+  });
+}
+
 }  // namespace
 
 }  // namespace fclib::c
@@ -50,14 +70,17 @@ using namespace fclib::c;
 
 extern "C" {
 
-#define FCLIB_FUNCTIONS_OF(kind)                                                                  \
-  int fclib_validate_##kind(const fclib_##kind* problem) { return validate_problem(problem); }    \
-  int fclib_validate_##kind##_solution(const fclib_##kind* problem,                               \
-                                       const fclib_solution* solution) {                          \
-    return validate_solution(problem, solution);                                                  \
-  }                                                                                               \
-  double fclib_merit_##kind(fclib_##kind* problem, fclib_merit merit, fclib_solution* solution) { \
-    return merit_of(problem, merit, solution);                                                    \
+#define FCLIB_FUNCTIONS_OF(kind)                                                                   \
+  int fclib_validate_##kind(const fclib_##kind* problem) { return validate_problem(problem); }     \
+  int fclib_validate_##kind##_solution(const fclib_##kind* problem,                                \
+                                       const fclib_solution* solution) {                           \
+    return validate_solution(problem, solution);                                                   \
+  }                                                                                                \
+  double fclib_merit_##kind(fclib_##kind* problem, fclib_merit merit, fclib_solution* solution) {  \
+    return merit_of(problem, merit, solution);                                                     \
+  }                                                                                                \
+  double fclib_certificate_##kind(const fclib_##kind* problem, const double* y, const double* z) { \
+    return bound_of_certificate(problem, y, z);                                                    \
   }
 
 FCLIB_FOR_EACH_KIND(FCLIB_FUNCTIONS_OF)

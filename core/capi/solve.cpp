@@ -1,6 +1,7 @@
 // The functions of fclib.h that solve.
 #include "solve/driver.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <limits>
 
@@ -81,12 +82,20 @@ int solve_problem(const C* c, const char* solver, const fclib_solve_options* opt
       std::memcpy(target.*member, from.data(),
                   static_cast<std::size_t>(from.size()) * sizeof(double));
     });
+    const auto fill = [](double* target, const Vector& from) {
+      if (target != nullptr) std::copy(from.begin(), from.end(), target);
+    };
+    if (options != nullptr && solved.status == Status::infeasible) {
+      fill(options->certificate_y, solved.certificate.y);
+      fill(options->certificate_z, solved.certificate.z);
+    }
     if (result != nullptr) {
       constexpr std::int64_t most = std::numeric_limits<int>::max();
       result->status = status_in_c(solved.status);
       result->iterations = static_cast<int>(std::min(solved.iterations, most));
       result->error = solved.error;
       result->cpu_s = solved.cpu_s;
+      result->certificate_bound = solved.certificate.bound;
     }
     return 1;
   });
@@ -123,7 +132,7 @@ const char* fclib_solver_name(int k) {
 const char* fclib_status_name(fclib_status status) {
   for (const Status candidate :
        {Status::converged, Status::iteration_limit, Status::time_limit, Status::diverged,
-        Status::inaccurate, Status::interrupted, Status::stalled}) {
+        Status::inaccurate, Status::interrupted, Status::stalled, Status::infeasible}) {
     if (status_in_c(candidate) == status) return name_of(candidate).data();  // a literal
   }
   return "unknown";

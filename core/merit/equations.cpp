@@ -11,8 +11,11 @@ namespace fclib {
 
 namespace {
 
-/// What rounding leaves of a sum, over the sizes of its terms: some roundings each.
+/// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer than
+/// v, u and l, which a solver has brought through conversions, and what is allowed to q is hidden
+/// from the natural map.
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
+constexpr Real rounding_unit_of_q = 4 * Real(std::numeric_limits<double>::epsilon());
 
 RealVector product(const Matrix& a, const RealVector& x) {
   RealVector y = RealVector::Zero(a.rows);
@@ -117,6 +120,21 @@ Real root_mean_square(const RealVector& x) {
   return x.size() > 0 ? x.norm() / std::sqrt(Real(x.size())) : Real(0);
 }
 
+RealVector diagonal(const Matrix& a) {
+  RealVector result = RealVector::Zero(a.rows);
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    if (row == col) result[row] += value;
+  });
+  return result;
+}
+
+/// The mean of each d components.
+RealVector mean_of_contacts(const RealVector& x, Index d) {
+  RealVector result = RealVector::Zero(x.size() / d);
+  for (Eigen::Index k = 0; k < x.size(); ++k) result[k / d] += x[k] / d;
+  return result;
+}
+
 /// What is left of each component beyond its rounding.
 RealVector beyond(const RealVector& x, const RealVector& rounding) {
   RealVector result(x.size());
@@ -150,21 +168,25 @@ RealVector largest(const RealVector& x, const RealVector& y) {
 }  // namespace
 
 OwnSizes own_sizes(const LocalProblem& problem) {
-  OwnSizes result{.free = {}, .l = {}, .q = problem.q.cast<Real>().cwiseAbs(), .rounding = {}};
+  OwnSizes result;
+  result.q = problem.q.cast<Real>().cwiseAbs();
   result.rounding = RealVector::Zero(problem.q.size());
+  result.scale = mean_of_contacts(diagonal(problem.W), problem.spacedim);
   if (!is_mixed(problem)) return result;
-  RealVector diagonal = RealVector::Zero(problem.s.size());
-  for_each_entry(problem.R, [&](Index row, Index col, double value) {
-    if (row == col) diagonal[row] += value;
-  });
-  result.l = quotient(problem.s.cast<Real>(), diagonal);
+  result.l = quotient(problem.s.cast<Real>(), diagonal(problem.R));
   const RealVector moved = sizes(problem.V, result.l);
   result.q += moved;
-  result.rounding = rounding_unit * moved;
+  result.rounding = rounding_unit_of_q * moved;
   return result;
 }
 
-OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass) {
+OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
+                   const LocalProblem* condensed) {
+  const auto gram = [&](const Matrix& a, const Matrix& product) {
+    return condensed != nullptr ? diagonal(product)
+                                : RealVector(mass.gram_diagonal(to_eigen(a)).cast<Real>());
+  };
+  const Matrix none;
   OwnSizes result;
   result.free = solved(mass, problem.f.cast<Real>());
   const RealVector& free = result.free;
@@ -172,41 +194,32 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass) {
   if (is_mixed(problem)) {
     const RealVector velocity =
         sizes_transposed(problem.G, free) + problem.b.cast<Real>().cwiseAbs();
-    result.l = quotient(velocity, mass.gram_diagonal(to_eigen(problem.G)).cast<Real>());
+    result.l = quotient(velocity, gram(problem.G, condensed != nullptr ? condensed->R : none));
     impulse += sizes(problem.G, result.l);
   }
   result.q = sizes_transposed(problem.H, free) + problem.w.cast<Real>().cwiseAbs();
-  result.rounding = rounding_unit * (result.q + Spread(mass, impulse).along(problem.H));
+  result.rounding = rounding_unit_of_q * (result.q + Spread(mass, impulse).along(problem.H));
+  result.scale = mean_of_contacts(gram(problem.H, condensed != nullptr ? condensed->W : none),
+                                  problem.spacedim);
   return result;
 }
 
-RealVector mean_diagonals(const LocalProblem& problem) {
-  const Index d = problem.spacedim;
-  RealVector result = RealVector::Zero(problem.mu.size());
-  for_each_entry(problem.W, [&](Index row, Index col, double value) {
-    if (row == col) result[row / d] += Real(value) / d;
-  });
-  return result;
-}
-
-Equations equations(const LocalProblem& problem, const Solution& solution) {
+Equations equations(const LocalProblem& problem, const Solution& solution, const OwnSizes& own) {
   const Index d = problem.spacedim;
   Equations result;
   const RealVector r = solution.r.cast<Real>();
-  OwnSizes own = own_sizes(problem);
   result.q = problem.q.cast<Real>();
-  result.rounding = std::move(own.rounding);
-  result.scale = mean_diagonals(problem);
-  const RealVector stop = stopping(own.q, result.scale, d);
+  result.rounding = own.rounding;
+  result.scale = own.scale;
 
   // u = W r + V lambda + q
   result.u = product(problem.W, r) + result.q;
-  RealVector terms = sizes(problem.W, r) + result.q.cwiseAbs();
+  const RealVector stop =
+      is_mixed(problem) || solution.u.size() > 0 ? stopping(own.q, own.scale, d) : RealVector();
   if (is_mixed(problem)) {
     const RealVector l = solution.l.cast<Real>();
     const RealVector s = problem.s.cast<Real>();
     result.u += product(problem.V, l);
-    terms += sizes(problem.V, l);
     // V^T r + R lambda + s = 0
     const RealVector residual = product_transposed(problem.V, r) + product(problem.R, l) + s;
     const RealVector parts = sizes_transposed(problem.V, r) + sizes(problem.R, l) + s.cwiseAbs();
@@ -219,6 +232,8 @@ Equations equations(const LocalProblem& problem, const Solution& solution) {
   }
   if (solution.u.size() > 0) {
     const RealVector difference = solution.u.cast<Real>() - result.u;
+    RealVector terms = sizes(problem.W, r) + result.q.cwiseAbs();
+    if (is_mixed(problem)) terms += sizes(problem.V, solution.l.cast<Real>());
     const RealVector velocity =
         largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
     const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
@@ -240,11 +255,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   const RealVector& free = own.free;
   result.q = product_transposed(problem.H, free) + w;
   result.rounding = own.rounding;
-  result.scale = RealVector::Zero(problem.mu.size());
-  const Vector diagonal = mass.gram_diagonal(to_eigen(problem.H));
-  for (Eigen::Index col = 0; col < diagonal.size(); ++col) {
-    result.scale[col / d] += Real(diagonal[col]) / d;
-  }
+  result.scale = own.scale;
 
   // M v = H r + G lambda + f
   RealVector momentum = product(problem.H, r) + f;

@@ -45,16 +45,16 @@ struct OwnSizes {
   RealVector l;         ///< reactions that stop the joints, each alone (p)
   RealVector q;         ///< of the terms of u without reactions (m) [m/s]
   RealVector rounding;  ///< Equations::rounding
+  RealVector scale;     ///< Equations::scale
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);
-OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass);
+/// `condensed` saves the diagonals of W and R, where it is there.
+OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
+                   const LocalProblem* condensed = nullptr);
 
-Equations equations(const LocalProblem& problem, const Solution& solution);
+Equations equations(const LocalProblem& problem, const Solution& solution, const OwnSizes& own);
 Equations equations(const GlobalProblem& problem, const Solution& solution,
                     const Factorization& mass, const OwnSizes& own);
-
-/// Equations::scale of a local problem.
-RealVector mean_diagonals(const LocalProblem& problem);
 
 }  // namespace fclib

@@ -103,35 +103,38 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
   return result;
 }
 
-Equations equations_of(const LocalProblem& problem, const Solution& solution,
-                       const Factorization* /*mass*/, const OwnSizes* /*own*/) {
-  return equations(problem, solution);
+Equations equations_of(const LocalProblem& problem, const Solution& solution) {
+  return equations(problem, solution, own_sizes(problem));
 }
 
-Equations equations_of(const GlobalProblem& problem, const Solution& solution,
-                       const Factorization* known, const OwnSizes* own) {
-  if (known && own) return equations(problem, solution, *known, *own);
-  if (known) return equations(problem, solution, *known, own_sizes(problem, *known));
+Equations equations_of(const GlobalProblem& problem, const Solution& solution) {
   const Factorization mass(to_eigen(problem.M), "M");
   return equations(problem, solution, mass, own_sizes(problem, mass));
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each,
-                  const Factorization* mass = nullptr, const OwnSizes* own = nullptr) {
+Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
   validate(problem);
   validate(solution, problem);
-  const Equations found = equations_of(problem, solution, mass, own);
+  const Equations found = equations_of(problem, solution);
   each.mismatches = found.mismatches;
   return judge(problem.spacedim, friction_of(problem), solution, found, each);
 }
 
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution, const Factorization* mass = nullptr,
-                  const OwnSizes* own = nullptr) {
+Merit judge_valid(const P& problem, const Solution& solution) {
   ContactMerits each;
-  return judge_valid(problem, solution, each, mass, own);
+  return judge_valid(problem, solution, each);
+}
+
+/// The solution gets the u that follows.
+Merit judge_and_complete(Index spacedim, const Friction& friction, const Equations& found,
+                         Solution& solution) {
+  ContactMerits each;
+  const Merit result = judge(spacedim, friction, solution, found, each);
+  solution.u = std::move(each.u);
+  return result;
 }
 
 template <class P>
@@ -156,20 +159,18 @@ Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
   return judge_valid(problem, solution);
 }
 
-Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass) {
-  return judge_valid(problem, solution, &mass);
+Merit judge_and_complete(const LocalProblem& problem, const Friction& friction, const OwnSizes& own,
+                         Solution& solution) {
+  solution.u.resize(0);
+  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, own),
+                            solution);
 }
-Merit merit(const GlobalProblem& problem, const Solution& solution, const Factorization& mass,
-            const OwnSizes& own) {
-  return judge_valid(problem, solution, &mass, &own);
-}
-Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
-            const Factorization& mass) {
-  return judge_valid(problem, solution, &mass);
-}
-Merit merit(const GlobalRollingProblem& problem, const Solution& solution,
-            const Factorization& mass, const OwnSizes& own) {
-  return judge_valid(problem, solution, &mass, &own);
+
+Merit judge_and_complete(const GlobalProblem& problem, const Friction& friction,
+                         const Factorization& mass, const OwnSizes& own, Solution& solution) {
+  solution.u.resize(0);
+  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, mass, own),
+                            solution);
 }
 
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 #include "linalg/exact_sum.hpp"
@@ -143,20 +144,32 @@ Dense kernel(const Dense& a) {
   return size.cwiseInverse().asDiagonal() * (qr.colsPermutation() * basis);
 }
 
+/// The least denominator of a fraction that is x but for rounding, by its continued fraction; 0
+/// where there is none below `most`.
+double denominator(double x, double most) {
+  const double rounding = 1e-11 * std::max(1.0, std::abs(x));
+  double rest = x;
+  double before = 0;
+  double last = 1;
+  while (last <= most) {
+    if (std::abs(x * last - std::round(x * last)) <= rounding * last) return last;
+    rest = 1 / (rest - std::floor(rest));
+    before = std::exchange(last, std::floor(rest) * last + before);
+  }
+  return 0;
+}
+
 /// Whole numbers in the same ratios, or nothing.
 Vector whole_numbers(const Vector& x) {
+  constexpr double most = 1e7;
   const double largest = x.cwiseAbs().maxCoeff();
+  if (!(largest > 0)) return {};
+  double common = 1;
   for (const double one : x) {
-    if (!(std::abs(one) > 1e-6 * largest)) continue;
-    for (int denominator = 1; denominator <= 12; ++denominator) {
-      const Vector scaled = x * (denominator / std::abs(one));
-      const Vector rounded = scaled.array().round();
-      const auto limit = 1e-8 * scaled.array().abs().max(1.0);
-      if (((scaled - rounded).array().abs() <= limit).all() && rounded.cwiseAbs().maxCoeff() < 1e12)
-        return rounded;
-    }
+    common *= denominator(one / largest * common, most / common);
+    if (common == 0) return {};
   }
-  return {};
+  return (x * (common / largest)).array().round();
 }
 
 template <class P>

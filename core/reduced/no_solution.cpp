@@ -9,9 +9,7 @@ template <class Cone>
 double no_solution_bound(const ReducedProblem& problem, const Vector& y) {
   constexpr int D = Cone::dim;
   constexpr double least_gain = 1e-8;  // relative to its terms
-  // relative to the terms that cancel: their last digits. A body a million times lighter than its
-  // neighbours leaves more, and such a problem has solutions.
-  constexpr double rounding = 1e-14;
+  constexpr double rounding = 1e-8;    // relative to the terms that cancel
   double gain = 0;
   double terms = 0;
   for (Index a = 0; a < problem.nc(); ++a) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <functional>
 
-#include "convert/complete.hpp"
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "linalg/cpu_time.hpp"
@@ -32,23 +31,24 @@ struct Measure {
   double scaled_rounding = 0;
 
   /// Of a problem without conversion or condensed, before bilateral constraints left it.
-  Measure(const LocalProblem& problem, const RealVector& rounding_of_q, MeritKind kind)
-      : q(problem.q.norm()), rounding(static_cast<double>(rounding_of_q.norm())) {
+  Measure(const LocalProblem& problem, const OwnSizes& own, MeritKind kind)
+      : q(problem.q.norm()), rounding(static_cast<double>(own.rounding.norm())) {
     if (kind == MeritKind::natural) return;
     const Index d = problem.spacedim;
-    rho = mean_diagonals(problem).cast<double>();
+    rho = own.scale.cast<double>();
     for (double& value : rho) value = value > 0 ? 1 / value : 1;
     const auto scaled = [&](Vector x) {
       for (Eigen::Index k = 0; k < x.size(); ++k) x[k] *= rho[k / d];
       return x.stableNorm();
     };
     scaled_q = scaled(problem.q);
-    scaled_rounding = scaled(rounding_of_q.cast<double>());
+    scaled_rounding = scaled(own.rounding.cast<double>());
   }
 
-  /// That of a solver, which need not go below what rounding leaves.
-  static double scale(double q, double rounding, double tolerance) {
-    const double largest = std::max(q, tolerance > 0 ? rounding / (2 * tolerance) : rounding);
+  /// That of a solver. It aims below what rounding leaves, as far as it gets; the merit of what it
+  /// reached leaves rounding out.
+  static double scale(double q, double rounding) {
+    const double largest = std::max(q, rounding);
     return largest > 0 ? largest : 1.0;
   }
 };
@@ -75,16 +75,16 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return result;
     }
   }
-  const double tolerance = request.settings.tolerance;
   const ReducedProblem reduced{
       .W = BlockMatrix(plain.W, plain.spacedim),
       .q = plain.q,
       .friction = friction,
-      .scale = Measure::scale(measure.q, measure.rounding, tolerance),
+      .scale = Measure::scale(measure.q, measure.rounding),
       .rho = measure.rho,
-      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding, tolerance),
+      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
       .primal = primal,
-      .deadline = &request.deadline};
+      .deadline = &request.deadline,
+      .proves_no_solution = &proves};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -175,25 +175,22 @@ template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
   const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
   const MeritKind kind = request.settings.merit;
-  const Measure measure(problem, own_sizes(problem).rounding, kind);
+  const Friction friction = friction_of(problem);
+  const OwnSizes own = own_sizes(problem);
+  const Measure measure(problem, own, kind);
   const auto judge = [&](Solution& solution) {
-    solution.u.resize(0);
-    solution = complete(problem, solution);
-    return merit(problem, solution).error_by(kind);
+    return judge_and_complete(problem, friction, own, solution).error_by(kind);
   };
-  if (is_mixed(problem)) {
-    const Elimination elimination(problem, &request.deadline);
-    if (!elimination.finished()) {
-      return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
-    }
-    const auto judge_expanded = [&](Solution& solution) {
-      solution = elimination.expand(solution);
-      return merit(problem, solution).error_by(kind);
-    };
-    return run(elimination.plain(), friction_of(problem), measure, request, guess, judge_expanded,
-               prove);
+  if (!is_mixed(problem)) return run(problem, friction, measure, request, guess, judge, prove);
+  const Elimination elimination(problem, &request.deadline);
+  if (!elimination.finished()) {
+    return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
   }
-  return run(problem, friction_of(problem), measure, request, guess, judge, prove);
+  const auto judge_expanded = [&](Solution& solution) {
+    solution = elimination.expand(solution);
+    return judge(solution);
+  };
+  return run(elimination.plain(), friction, measure, request, guess, judge_expanded, prove);
 }
 
 template <class P>
@@ -202,19 +199,21 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
-  const OwnSizes own = own_sizes(problem, condensation.mass());
-  const Measure measure(local, own.rounding, kind);
+  const Friction friction = friction_of(problem);
+  const OwnSizes own =
+      own_sizes(problem, condensation.mass(), condensation.finished() ? &local : nullptr);
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
-    return merit(problem, solution, condensation.mass(), own).error_by(kind);
+    return judge_and_complete(problem, friction, condensation.mass(), own, solution).error_by(kind);
   };
   const auto stop = [&] {
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
   };
   if (!condensation.finished()) return stop();
+  const Measure measure(local, own, kind);
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction_of(problem), measure, request, guess, judge, prove, &primal);
+    return run(local, friction, measure, request, guess, judge, prove, &primal);
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
@@ -222,8 +221,7 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     solution = elimination.expand(solution);
     return judge(solution);
   };
-  return run(elimination.plain(), friction_of(problem), measure, request, guess, judge_expanded,
-             prove);
+  return run(elimination.plain(), friction, measure, request, guess, judge_expanded, prove);
 }
 
 /// What every solve does: checks, times.

@@ -27,8 +27,8 @@ struct Result {
   std::int64_t iterations = 0;
   double error = 0;  ///< Merit::error_by(Settings::merit) of the solution, on the problem as given
   double cpu_s = 0;  ///< CPU time of the solver alone [s]
-  double setup_s = 0;      ///< CPU time of conversions, validation and merit [s]
-  NoSolution certificate;  ///< the proof on the problem as it was given, where infeasible
+  double setup_s = 0;         ///< CPU time of conversions, validation and merit [s]
+  NoSolution certificate;     ///< the proof on the problem as it was given, where infeasible
   std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
   std::string solver;
   std::optional<std::vector<HistoryPoint>> history;  ///< where the settings ask for it

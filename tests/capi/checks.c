@@ -274,7 +274,7 @@ static void solving(void) {
   CHECK(fclib_solve_global(&b, "nsgs", NULL, &s, NULL));
   CHECK(fabs(v_[1] - 1.5) < 1e-8);
 
-  struct fclib_solve_options options = {1e-12, 50, 5, r, NULL};
+  struct fclib_solve_options options = {1e-12, 50, 5, r, NULL, NULL, NULL};
   CHECK(fclib_solve_local(&a, "nsgs", &options, &s, &result) && result.error <= 1e-12);
   CHECK(!fclib_solve_local(&a, "no such solver", NULL, &s, &result));
   SAYS("nsgs");
@@ -290,6 +290,37 @@ static void solving(void) {
   CHECK(!fclib_solve_local(&a, "nsgs", NULL, NULL, &result));
   s.r = NULL;
   CHECK(!fclib_solve_local(&a, "nsgs", NULL, &s, &result));
+}
+
+/* two contacts that close a body in from both sides: normal reactions that move nothing prove it */
+static void certificates(void) {
+  double x[] = {1, -1, 1, -1, -1, 1, -1, 1};
+  int rows[] = {0, 2, 1, 3, 0, 2, 1, 3}, columns[] = {0, 0, 1, 1, 2, 2, 3, 3};
+  struct fclib_matrix W = {8, 4, 4, columns, rows, x, 8, NULL};
+  double mu_[] = {0.5, 0.5}, q[] = {-1, 0, -1, 0};
+  struct fclib_local a = {&W, NULL, NULL, mu_, q, NULL, 2, NULL};
+  double r_[4], y[2] = {0, 0};
+  struct fclib_solution s = {NULL, NULL, r_, NULL};
+  struct fclib_solve_options options = {0};
+  struct fclib_solve_result result;
+  options.certificate_y = y;
+  CHECK(fclib_solve_local(&a, "auto", &options, &s, &result));
+  CHECK(result.status == FCLIB_INFEASIBLE &&
+        !strcmp(fclib_status_name(result.status), "infeasible"));
+  CHECK(isinf(result.certificate_bound) && y[0] > 0 && y[0] == y[1]);
+  CHECK(isinf(fclib_certificate_local(&a, y, NULL)));
+  y[1] *= 2; /* which moves the body */
+  CHECK(fclib_certificate_local(&a, y, NULL) == 0 && !*fclib_last_error());
+  y[1] = NAN;
+  CHECK(isnan(fclib_certificate_local(&a, y, NULL)));
+  SAYS("y[1]");
+  CHECK(isnan(fclib_certificate_local(&a, NULL, NULL)));
+  SAYS("y");
+  y[0] = y[1] = 1;
+  q[0] = 2; /* the other way round they part */
+  CHECK(fclib_certificate_local(&a, y, NULL) == 0);
+  CHECK(fclib_solve_local(&a, "auto", &options, &s, &result));
+  CHECK(result.status == FCLIB_CONVERGED && result.certificate_bound == 0 && y[0] == 1);
 }
 
 /* each thread with its own file, and its own last error */
@@ -329,6 +360,7 @@ int main(int argc, char** argv) {
   validation_and_merits();
   rolling();
   solving();
+  certificates();
   threads();
   return 0;
 }

@@ -143,6 +143,7 @@ contains
     type(fclib_solution), allocatable :: guesses(:)
     type(fclib_solve_result) :: result
     real(dp), pointer :: r(:), u(:)
+    real(dp) :: y(1)
     integer :: n, m, p, nc
     character(:), allocatable :: path
     path = path_of("local.hdf5")
@@ -166,6 +167,9 @@ contains
     call check(fclib_merit(problem, MERIT_1, solution) < 1e-11, "the merit of libfclib")
     call fclib_allocate(other, problem)
     call check(fclib_solve(problem, "nsgs", other, guess=solution), "with a guess, and no more")
+    y = -1
+    call check(fclib_solve(problem, "auto", other, certificate_y=y), "with room for a certificate")
+    call check(all(y == -1._dp) .and. fclib_certificate(problem, [1._dp]) == 0, "there is none")
 
     call check(fclib_write(problem, path), "write")
     call check(.not. fclib_write(problem, path), "it is there already")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +16,7 @@ from fclib import _core
 from helpers import judge, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from planted_judge import verdict
+from planted_judge import claim, verdict
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -126,6 +127,13 @@ class Looks:
         return float(self.count)
 
 
+def test_problems_without_a_solution_get_a_proof_or_no_claim() -> None:
+    words = Counter(claim(number) for number in range(150))
+    assert not [word for word in words if word.startswith("false")], words
+    # of bodies and with whole numbers each has an exact proof, and is there half of the times
+    assert words["infeasible, exactly"] > 60
+
+
 def dense_contacts() -> fclib.LocalProblem:
     rng = np.random.default_rng(0)
     nc = 50
@@ -140,7 +148,9 @@ def test_every_solver_looks_at_the_clock_and_ends_soon_after_the_limit(solver: s
     (entry,) = (s for s in fclib.solvers() if s.name == solver)
     for limit in (1.0, 4.0, 12.0):
         clock = Looks()
-        result = _core.solve(problem, entry, 1e-15, 0, limit, {}, None, None, False, clock=clock)
+        result = _core.solve(
+            problem, entry, 1e-15, 0, limit, {}, None, None, False, False, clock=clock
+        )
         assert result.status == "time_limit", (limit, result.status)
         assert sum(stage.factorisations for stage in result.stages) <= limit
         assert clock.count <= limit + 40
@@ -155,7 +165,7 @@ def test_the_clock_is_looked_at_before_each_factorisation_between_reports() -> N
         counts.append(clock.count)
         return len(counts) < 6
 
-    _core.solve(dense_contacts(), entry, 1e-15, 0, 1e9, {}, None, follow, False, clock=clock)
+    _core.solve(dense_contacts(), entry, 1e-15, 0, 1e9, {}, None, follow, False, False, clock=clock)
     # a report looks four times at most, and a proximal step takes several factorisations
     assert max(np.diff(counts)) > 6, counts
 
@@ -165,12 +175,12 @@ def test_conversions_are_held_to_the_limit() -> None:
     planted = planted_global(3, p=2)
     problem: Any = planted.problem
     (entry,) = (s for s in fclib.solvers() if s.name == "auto")
-    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, clock=Looks())
+    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, False, clock=Looks())
     assert result.status == "time_limit"
     assert result.iterations == 0
     assert judge(problem, result.solution).error == pytest.approx(result.error)
     result = _core.solve(
-        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, clock=Looks()
+        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, False, clock=Looks()
     )
     assert judge(problem, result.solution).error == pytest.approx(result.error)
 

@@ -63,7 +63,7 @@ PYTHON: dict[str, set[str]] = {
     "simulate": {"_core", "_solve", "scenes"},
     "collections": {"_core", "_digest", "_solve", "analysis", "scenes", "simulate"},
     "__init__": {"_core", "_digest", "_registry", "_solve", "collections"},
-    "bench": {"_core", "_digest", "_registry", "_solve", "scenes", "simulate"},
+    "bench": {"_core", "_digest", "_registry", "_solve", "analysis", "scenes", "simulate"},
     "report": {"_core", "_registry", "bench", "collections"},
     "demo": {"__init__", "scenes", "simulate", "bench"},
     "doctor": {"_core", "__init__", "external"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import shutil
 import subprocess
@@ -15,10 +16,11 @@ import numpy as np
 import pytest
 
 import fclib
-from fclib import bench
+from fclib import analysis, bench
 from fclib.bench import problems
-from fclib.bench.job import Job
+from fclib.bench.job import Job, Record
 from fclib.bench.pool import SupervisorClient
+from fclib.bench.supervisor import prove
 from helpers import planted_local
 
 LIMIT = 0.5  # [s]
@@ -349,6 +351,45 @@ def test_a_supervisor_that_is_killed_is_replaced(
     while (taken := supervisor.take()) is None:
         pass
     assert taken[1].status == "converged"
+
+
+def closing_walls(folder: Path) -> Path:
+    """A body that two contacts would have to push in opposite ways."""
+    W = np.kron([[1, -1], [-1, 1]], np.eye(3))
+    path = folder / "closing.hdf5"
+    fclib.write(path, fclib.LocalProblem(W=W, q=[-1, 0, 0] * 2, mu=[0.5] * 2))
+    return path
+
+
+def test_a_proof_that_there_is_no_solution_is_checked_and_kept(
+    folder: Path, tmp_path: Path, supervisor: SupervisorClient
+) -> None:
+    path = closing_walls(tmp_path)
+    asked = dataclasses.replace(job(folder, "auto"), problem=problems.look(path))
+    record = supervisor.do(asked)
+    assert record.status == "infeasible"
+    assert record.message == "proven, on 2 of 2 contacts"
+    assert record.certificate is not None
+    (tmp_path / "proof.json").write_text(record.certificate)
+    y, z, digest = analysis.read_certificate(tmp_path / "proof.json")
+    assert analysis.check(fclib.read(path), y, z).exact
+    assert digest == fclib.digest(fclib.read(path))
+
+    with bench.Store(tmp_path / "runs.sqlite") as store:
+        assert store.add(asked, record)
+    with bench.Store(tmp_path / "merged.sqlite") as merged:
+        merged.merge([tmp_path / "runs.sqlite"])
+        (row,) = merged.results()
+        assert merged.certificate(row["run"]) == record.certificate
+
+
+@pytest.mark.parametrize("y", [None, np.array([1.0, 2.0]), np.array([1.0]), np.array([1, np.nan])])
+def test_a_claim_that_is_not_proven_is_not_kept(y: Any, tmp_path: Path) -> None:
+    record = Record("infeasible")
+    prove(fclib.read(closing_walls(tmp_path)), record, y, None)
+    assert record.status == "inaccurate"
+    assert record.certificate is None
+    assert "proved nothing" in record.message
 
 
 def test_what_is_measured(folder: Path, supervisor: SupervisorClient) -> None:

@@ -66,7 +66,7 @@ def test_from_a_robot_to_a_benchmark(root: Path, tmp_path: Path) -> None:
     for path in files:
         problem, solution = fclib.read(path), fclib.read_solution(path)
         assert solution is not None
-        assert fclib.merit(problem, solution).error <= 1e-8
+        assert fclib.merit(problem, solution).error_by("natural") <= 1e-8
     with sqlite3.connect(tmp_path / "robot.sqlite") as store:
         runs = store.execute("SELECT count(*), sum(solved) FROM results").fetchone()
     assert runs == (4 * len(files), 4 * len(files))

@@ -23,6 +23,7 @@ from fclib.analysis._certificate import (
     Certificate,
     CertificateError,
     check,
+    check_arrays,
     farkas,
     read_certificate,
 )
@@ -59,6 +60,7 @@ __all__ = [
     "Units",
     "analyze",
     "check",
+    "check_arrays",
     "contacts",
     "energy",
     "farkas",

@@ -234,7 +234,7 @@ def check(
         raise CertificateError(
             f"bilateral constraint {row}: V^T E y + R^T z = {float(value):.3g}, which must be 0"
         )
-    image, size = _sum(system.cone, x)
+    image, magnitudes = _sum(system.cone, x)
     distance, broken, curvature = 0.0, -1, Fraction()
     bounded = p == 0
     for a in sorted({row // system.d for row in image}):
@@ -245,7 +245,9 @@ def check(
             continue
         broken = a if broken < 0 else broken
         distance = float(np.hypot(distance, off)) * (1 + 1e-15)
-        terms_of_a = sum(size.get(system.d * a + k, Fraction()) for k in range(system.d))
+        terms_of_a = sum(
+            (magnitudes.get(system.d * a + k, Fraction()) for k in range(system.d)), Fraction()
+        )
         bounded = bounded and off <= LAST_DIGITS * 2.0**-53 * float(terms_of_a)
     if broken >= 0 and not (bounded and curvature < 0):
         raise CertificateError(
@@ -259,6 +261,16 @@ def check(
     return Certificate(
         doubles, bilateral if p else None, exact_y, exact_z, float(gain), distance, bound
     )
+
+
+def check_arrays(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate:
+    """`check` of y (nc,) and z (p,) as arrays, as `fclib.Result` has them.
+
+    Raises:
+        CertificateError: they prove nothing.
+    """
+    by_constraint = {} if z is None else dict(enumerate(z.tolist()))
+    return check(problem, dict(enumerate(y.tolist())), by_constraint)
 
 
 def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dict[int, Fraction]:

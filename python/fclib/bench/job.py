@@ -19,9 +19,10 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "time_limit": "stopped itself at the time limit, or came too late",
         "stalled": "gave up: nothing left to try",
         "diverged": "says itself that it diverged",
-        "infeasible": "proved that the problem has no solution",
+        "infeasible": "proved that the problem has no solution; the proof was checked",
         "interrupted": "stopped for another reason",
-        "inaccurate": "said to be done, and the recomputed error is above the tolerance",
+        "inaccurate": "said to be done, and the recomputed error is above the tolerance; "
+        "or said that there is no solution, and proved nothing",
         "invalid": "returned numbers that are not finite",
         "nothing": "returned no solution: none at all, or the starting point as it was",
         "garbage": "returned what is no solution of this problem: another shape, another format",
@@ -168,6 +169,7 @@ class Record:
     wall_s: float | None = None  # [s]
     memory: float | None = None  # [MB] by which the run's processes grew at most, together
     merits: Mapping[str, float] | None = None  # by MERITS, recomputed by the bench
+    certificate: str | None = None  # JSON, the proof that there is no solution
     stages: str | None = None  # JSON, of a solver that chains others
     history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage
     machine: Mapping[str, Any] | None = None

@@ -85,6 +85,10 @@ LEFT JOIN campaigns ON campaigns.id = runs.campaign;
     merits=", ".join(f"{name} REAL" for name in MERITS),
     run_merits=", ".join(f"runs.{name}" for name in MERITS),
 )
+# what came later, in stores that had no room for it
+ADDED = """CREATE TABLE IF NOT EXISTS certificates (
+    run INTEGER PRIMARY KEY REFERENCES runs, certificate TEXT NOT NULL
+)"""
 PROBLEM = tuple(field.name for field in dataclasses.fields(ProblemFacts))
 SOLVER = ("hash", "label", "name", "options", "version", "family", "origin")
 MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
@@ -164,6 +168,7 @@ class Store:
                         db.execute(statement)
                     db.execute(f"PRAGMA application_id = {APPLICATION}")
                     db.execute(f"PRAGMA user_version = {VERSION}")
+        db.execute(ADDED)
 
     def __enter__(self) -> Store:
         return self
@@ -296,8 +301,10 @@ class Store:
             )
             if cursor.rowcount == 0:
                 return False
+            run = cursor.lastrowid
+            if record.certificate:
+                self.db.execute("INSERT INTO certificates VALUES (?, ?)", (run, record.certificate))
             if record.history:
-                run = cursor.lastrowid
                 self.db.executemany(
                     "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
                     [(run, *report) for report in record.history],
@@ -351,6 +358,12 @@ class Store:
         """The reports of a run: iteration, error, time [s], stage."""
         query = "SELECT iteration, error, time, stage FROM history WHERE run = ? ORDER BY rowid"
         return list(self.db.execute(query, (run,)))
+
+    def certificate(self, run: int) -> str | None:
+        """The proof that a run gave that there is no solution, in JSON."""
+        query = "SELECT certificate FROM certificates WHERE run = ?"
+        row = self.db.execute(query, (run,)).fetchone()
+        return None if row is None else str(row[0])
 
     def texts(self) -> list[str]:
         """The campaigns that have written here, as their files have them."""
@@ -443,6 +456,8 @@ class Store:
             if cursor.rowcount:
                 added += 1
                 new = cursor.lastrowid
+                if certificate := other.certificate(number):
+                    self.db.execute("INSERT INTO certificates VALUES (?, ?)", (new, certificate))
                 self.db.executemany(
                     "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
                     [(new, *report) for report in other.history(number)],

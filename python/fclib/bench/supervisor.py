@@ -28,7 +28,7 @@ import numpy as np
 from fclib import _core
 from fclib.bench import machine, processes
 from fclib.bench.job import MERITS, ORDERLY, Record
-from fclib.bench.worker import Problems, of_signal, one_line, send, serve
+from fclib.bench.worker import CERTIFICATE, Problems, of_signal, one_line, send, serve
 
 READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
 PAUSES = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
@@ -268,6 +268,7 @@ class Supervisor:
 
     def judge(self, order: dict[str, Any], record: Record, vectors: dict[str, Any]) -> None:
         """Recompute every merit, and let it decide."""
+        proof = [vectors.pop(name, None) for name in CERTIFICATE]
         try:
             problem = self.problems.get(order)
             merit = _core.merit(problem, _core.Solution(**vectors))
@@ -278,6 +279,8 @@ class Supervisor:
             record.status, record.message = "garbage", one_line(error)
             return
         record.merits = {name: float(getattr(merit, name)) for name in MERITS}
+        if record.status == "infeasible":
+            prove(problem, record, *proof)
         if record.status != "converged":
             return
         limits = order["limits"]
@@ -285,6 +288,24 @@ class Supervisor:
             record.status = "inaccurate"
         elif (record.cpu_s or 0.0) > limits["time"] or (record.wall_s or 0.0) > limits["wall"]:
             record.status, record.message = "time_limit", "solved, but too late"
+
+
+def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
+    """Check the proof that there is no solution, and keep it."""
+    from fclib import analysis  # which few runs need
+
+    try:
+        if y is None:
+            raise analysis.CertificateError("there is no certificate")
+        proof = analysis.check_arrays(problem, y, z)
+    except analysis.CertificateError as error:
+        record.status = "inaccurate"
+        record.message = f"said that there is no solution, and proved nothing: {one_line(error)}"
+        return
+    record.certificate = json.dumps(proof.record(problem))
+    record.message = f"proven, on {proof.contacts} of {problem.nc} contacts"
+    if not proof.exact:
+        record.message += f", for reactions up to {proof.bound:.1e}"
 
 
 def main() -> None:

@@ -28,6 +28,7 @@ from fclib.bench.modules import load_modules
 
 CACHE = 256e6  # [bytes] of problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
+CERTIFICATE = ("certificate_y", "certificate_z")
 STAGE = ("name", "calls", "solved", "iterations", "time")
 HISTORY = 500  # reports that are kept of a run, the first and the last among them
 
@@ -172,6 +173,11 @@ def answer(
             reply["status"] = "nothing"
         vectors = {name: getattr(solution, name) for name in VECTORS}
         vectors = {name: value for name, value in vectors.items() if value is not None}
+        for name, value in zip(
+            CERTIFICATE, (result.certificate, result.certificate_z), strict=True
+        ):
+            if value is not None:
+                vectors[name] = value
         arrays = [np.ascontiguousarray(value, dtype=float) for value in vectors.values()]
         stages = [{name: getattr(stage, name) for name in STAGE} for stage in result.stages]
         reply |= {

@@ -48,16 +48,6 @@ class Trace:
             err.print(make_table(stages))
 
 
-def proof_of(problem: fclib.Problem, result: fclib.Result) -> dict[str, Any]:
-    """The certificate of a result, as `fclib check --certificate` reads it."""
-    from fclib import analysis
-
-    y, z = result.certificate, result.certificate_z
-    assert y is not None
-    by_constraint = {} if z is None else dict(enumerate(z.tolist()))
-    return analysis.check(problem, dict(enumerate(y.tolist())), by_constraint).record(problem)
-
-
 def command(
     files: Files,
     solver: Annotated[str, typer.Option(help="A name of `fclib solvers`.")] = "auto",
@@ -112,6 +102,11 @@ def command(
         else:
             record = run.record | {"stages": stages}
             if run.result.certificate is not None:
-                record["certificate"] = proof_of(problem, run.result)
+                from fclib import analysis  # which takes its time to import
+
+                proof = analysis.check_arrays(
+                    problem, run.result.certificate, run.result.certificate_z
+                )
+                record["certificate"] = proof.record(problem)
             report.add(record, run.status == "converged")
     report.finish()

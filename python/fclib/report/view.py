@@ -143,8 +143,10 @@ def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
         inside = network.frames[:, :, : 1 + tangential]
         found["forces"] = rounded(np.einsum("kij,kj->ki", inside, force))
     merit = _core.merit(problem, solution)
-    names = [name for name in dir(merit) if not name.startswith("_")]
-    found["merit"] = rounded({name: float(getattr(merit, name)) for name in names}, 6)
+    figures = {name: getattr(merit, name) for name in dir(merit) if not name.startswith("_")}
+    found["merit"] = rounded(
+        {name: float(value) for name, value in figures.items() if not callable(value)}, 6
+    )
     return found
 
 

@@ -8,6 +8,7 @@
 #include "by_definition.hpp"
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
+#include "convert/condense.hpp"
 #include "linalg/factorization.hpp"
 
 namespace fclib {
@@ -185,20 +186,28 @@ TEST(Merit, one_contact_and_one_velocity_are_judged_like_many) {
   expect_the_formulas<Coulomb<2>>(global, testing::random_solution(random, global, true, true));
 }
 
-TEST(Merit, a_mass_that_is_factorised_already_changes_nothing) {
+TEST(Merit, what_is_known_of_the_problem_changes_nothing) {
   RandomData random(33);
   const auto plain = testing::random_global<GlobalProblem>(random, 12, 3, 3, 2);
   const auto rolling = testing::random_global<GlobalRollingProblem>(random, 12, 5, 2, 2);
   const auto expect_same = [&](const auto& problem) {
-    const Solution solution = testing::random_solution(random, problem, true, false);
-    const Factorization mass(to_eigen(problem.M), "M");
+    Solution solution = testing::random_solution(random, problem, true, false);
     const Merit own = merit(problem, solution);
-    const Merit given = merit(problem, solution, mass);
-    EXPECT_EQ(own.error, given.error);
-    EXPECT_EQ(own.scaled_natural, given.scaled_natural);
+    const ContactMerits each = contact_merits(problem, solution);
+    const Factorization mass(to_eigen(problem.M), "M");
+    const LocalProblem condensed = condense(static_cast<const GlobalProblem&>(problem));
+    for (const LocalProblem* known : {static_cast<const LocalProblem*>(nullptr), &condensed}) {
+      const Merit given = judge_and_complete(problem, friction_of(problem), mass,
+                                             own_sizes(problem, mass, known), solution);
+      EXPECT_EQ(own.error, given.error);
+      EXPECT_NEAR(own.scaled_natural, given.scaled_natural, 1e-12 * own.scaled_natural);
+      EXPECT_EQ(each.u, solution.u);
+    }
     // it is this one that is used: with twice the mass the solution is another one
-    const SparseColumns twice = 2 * to_eigen(problem.M);
-    EXPECT_NE(merit(problem, solution, Factorization(twice, "M")).error, own.error);
+    const Factorization heavy(SparseColumns(2 * to_eigen(problem.M)), "M");
+    const Merit other = judge_and_complete(problem, friction_of(problem), heavy,
+                                           own_sizes(problem, heavy), solution);
+    EXPECT_NE(other.error, own.error);
   };
   expect_same(plain);
   expect_same(rolling);

@@ -11,8 +11,8 @@ JOBS ?= auto
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
-.PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels deb \
-        clean help
+.PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
+        collection-wheel deb clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -32,6 +32,7 @@ help:
 	@echo "make wheel   a wheel of it with an HDF5 of its own, installed and tried (HDF5_SOURCE=FOLDER:"
 	@echo "             sources of HDF5, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
+	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make deb     the C library as Debian packages, into dist/"
 	@echo "make clean   remove what was built (not $(VENV))"
 
@@ -102,6 +103,12 @@ wheel: sdist
 wheels: sdist
 	HDF5_SOURCE="$(HDF5_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
 	$(BIN)/python scripts/try_wheels.py --build $(BUILD)/bundled $(CHROOTS:%=--chroot %)
+
+# tried as it is installed: every stored trajectory is found in it and read
+collection-wheel: setup $(VENV)/.package-tools
+	rm -rf dist/collection
+	$(BIN)/python -m build --wheel --outdir dist/collection collection
+	$(BIN)/python scripts/check_collection.py dist/collection/*.whl
 
 deb:
 	cmake -S . -B $(BUILD)/deb -G Ninja -DFCLIB_PYTHON=OFF -DCMAKE_INSTALL_PREFIX=/usr

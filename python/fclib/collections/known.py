@@ -38,7 +38,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("5", "all families that came after RT-0444"),
-    "hard": ("5", "what most solvers fail on; chosen by the bench"),
+    "hard": ("6", "what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
 EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")
@@ -209,4 +209,4 @@ def published_digest(row: Mapping[str, Any]) -> str | None:
         return None
     listed = choices(row["collection"])
     found = [c.digest for c in listed if (c.family, c.number) == (row["family"], number)]
-    return found[0] if found else None
+    return found[0] or None if found else None

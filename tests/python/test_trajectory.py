@@ -41,7 +41,7 @@ def stack(**parameters: Any) -> scenes.Scene:
 
 def recorded(folder: Path, version: str = "7", **settings: Any) -> Path:
     """A trajectory of a stack, where the published ones of a folder lie."""
-    values: Any = {"scene": stack(), "problems": NUMBERS} | settings
+    values: Any = {"scene": stack(), "problems": NUMBERS, "simulation": Simulation()} | settings
     plan = Plan(collection="rt444", version=version, **values)
     target = folder / collections.file_name(FOLDER, version)
     record(plan, target, folder / "state.npz")
@@ -189,11 +189,11 @@ from pathlib import Path
 from fclib import scenes
 from fclib.collections import record
 module = sys.modules["fclib.collections.record"]
-from fclib.collections.plan import Plan
+from fclib.collections.plan import Plan, Simulation
 
 module.CHECKPOINT = 0.0  # at each step
 scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=0)
-plan = Plan(scene=scene, collection="rt444", version="7", problems=12)
+plan = Plan(scene=scene, collection="rt444", version="7", problems=12, simulation=Simulation())
 folder = Path(sys.argv[1])
 record(plan, folder / "x.trajectory", folder / "state.npz",
        lambda name, done, total: print(done, flush=True))

@@ -20,7 +20,7 @@ import numpy as np
 from fclib import _core, _digest, _solve, scenes
 from fclib.collections import catalog, trajectory
 from fclib.collections.known import Choice
-from fclib.collections.plan import Plan, source
+from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
 
 Progress = Callable[[str, int, int], None]
@@ -60,7 +60,13 @@ def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int
     if isinstance(scene, scenes.Assembled):
         digest = _digest.digest(scene.problem(number))
         return Choice(family, scene.parameters, seed, number, number, digest)
-    plan = Plan(scene=scene, collection="chosen", problems=number + 1, chosen=(number,))
+    plan = Plan(
+        scene=scene,
+        collection="chosen",
+        problems=number + 1,
+        chosen=(number,),
+        simulation=Simulation(),
+    )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"{family}{trajectory.SUFFIX}"
         record(plan, target, Path(folder) / "state.npz")

@@ -36,6 +36,7 @@ class Worker:
     """A process that solves files with the fclib of its Python."""
 
     def __init__(self, python: str) -> None:
+        self._python = python
         self._process = subprocess.Popen(
             [python, "-c", WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -48,7 +49,7 @@ class Worker:
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
-            raise SystemExit(f"{self._process.args}: has ended with {self._process.wait()}")
+            raise SystemExit(f"{self._python}: has ended with {self._process.wait()}")
         status, cpu_s, iterations, error = json.loads(line)
         return status, cpu_s, iterations, error
 

@@ -188,6 +188,7 @@ def claim(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
     except fclib.UnsuitableError as refusal:
         return f"refused ({refusal})"
     if result.status == "infeasible":
+        assert result.certificate is not None
         try:
             proof = analysis.check_arrays(problem, result.certificate, result.certificate_z)
         except analysis.CertificateError as error:

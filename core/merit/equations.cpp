@@ -11,9 +11,9 @@ namespace fclib {
 
 namespace {
 
-/// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer than
-/// v, u and l, which a solver has brought through conversions, and what is allowed to q is hidden
-/// from the natural map.
+/// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer
+/// than v, u and l, which a solver has brought through conversions, and what is allowed to q is
+/// hidden from the natural map.
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
 constexpr Real rounding_unit_of_q = 4 * Real(std::numeric_limits<double>::epsilon());
 

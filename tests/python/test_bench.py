@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -406,6 +407,35 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         bench.Store(tmp_path / "new.sqlite")
     assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
     assert not (tmp_path / "absent.sqlite").exists()
+
+
+def test_a_store_of_version_1_is_brought_up_to_date(small: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old.sqlite"
+    shutil.copy(small, old)
+    with bench.Store(old) as store:
+        rows = store.results()
+        columns = [name for name in store.columns() if name != "merit"]
+    database = sqlite3.connect(old)
+    (view,) = database.execute("SELECT sql FROM sqlite_master WHERE name = 'results'").fetchone()
+    for statement in (
+        "DROP VIEW results",
+        "DROP TABLE certificates",
+        "ALTER TABLE runs DROP COLUMN merit",
+        view.replace("runs.merit, ", ""),
+        "PRAGMA user_version = 1",
+    ):
+        database.execute(statement)
+    database.commit()
+    database.close()
+    with bench.Store(old) as store:
+        again = store.results()
+        assert [{name: row[name] for name in columns} for row in again] == [
+            {name: row[name] for name in columns} for row in rows
+        ]
+        assert {row["merit"] for row in again} == {"natural"}
+        assert store.certificate(again[0]["run"]) is None
+    with bench.Store(old) as store:
+        assert len(store.results()) == len(rows)
 
 
 # ---- what is asked for

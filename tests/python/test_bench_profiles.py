@@ -10,17 +10,19 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from typer.testing import CliRunner
 
 from fclib import bench
 from fclib.bench import campaign, profiles
 from fclib.bench.job import MERITS, Job, ProblemFacts, Record
+from fclib.cli import app
 
 # CPU times of three solvers on four problems; None: failed
 TIMES: dict[str, list[float | None]] = {
@@ -39,6 +41,7 @@ def fill(
     repeat: int = 0,
     node: str = "here",
     version: str = "1.0",
+    merit: Literal["both", "natural"] = "both",
 ) -> None:
     """A store, made by hand."""
     with bench.Store(path) as store:
@@ -66,6 +69,7 @@ def fill(
                     bench.Limits(LIMIT, LIMIT, 1000),
                     repeat,
                     1,
+                    merit=merit,
                 )
                 error = 0.5 * tol if time else 1.0
                 record = Record(
@@ -562,6 +566,20 @@ def test_runs_of_an_unknown_machine_are_of_another_one(store: Path) -> None:
     fill(store, node="", tol=1e-7)
     with pytest.raises(profiles.ProfileError, match=r"choose one: \?, here"):
         profiles.load(store)
+
+
+def test_two_merits_are_not_mixed(store: Path) -> None:
+    fill(store, {"A": [1.0, 1.0, 1.0, 1.0]}, merit="natural")
+    with pytest.raises(profiles.ProfileError, match="both, natural"):
+        profiles.load(store)
+    assert {row["merit"] for row in profiles.load(store, merit="both")} == {"both"}
+    rows = profiles.load(store, merit="natural")
+    assert {row["solver"] for row in rows} == {"A"}
+    refused = CliRunner().invoke(app, ["profile", str(store)])
+    assert refused.exit_code == 1
+    shown = CliRunner().invoke(app, ["profile", str(store), "--merit", "natural"])
+    assert shown.exit_code == 0
+    assert "natural map of the literature alone" in " ".join(shown.output.split())
 
 
 def test_two_versions_of_a_solver_are_two_solvers(store: Path) -> None:

@@ -80,8 +80,13 @@ def test_joints_that_leave_no_solution(path: Path) -> None:
 @cases("cx02")
 def test_two_velocities_are_not_called_unique(path: Path) -> None:
     found = analysis.analyze(fclib.read(path))
-    assert found.uniqueness.verdict == "undecided"
+    assert found.uniqueness.verdict == "not unique"
     assert found.uniqueness.contraction > 1
+    assert found.enumeration is not None
+    assert found.isolated_solutions == 3
+    speeds = [one.u for one in found.enumeration.isolated]
+    assert np.array(speeds, dtype=float) == pytest.approx(np.array([[1, 6], [0, 1], [0, 0]]))
+    assert [one.error for one in found.enumeration.isolated] == [0, 0, 0]
 
 
 @cases("cx13")

@@ -8,7 +8,10 @@ Existence is decided by conic programs, for which Clarabel is needed: ``pip inst
 "fclib[analysis]"``.
 
 _analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _existence.py
-_existence.py   whether there is a solution. Needs _conic.py and _certificate.py
+_existence.py   whether there is a solution. Needs _enumerate.py, _conic.py and _certificate.py
+_enumerate.py   all solutions of a small problem. Needs _rational.py and _spatial.py
+_spatial.py     all solutions of one spatial contact, by the roots of polynomials
+_rational.py    linear systems and linear programs in exact arithmetic
 _certificate.py a proof that there is none, checked in exact arithmetic
 _reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
 _least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
@@ -28,8 +31,10 @@ from fclib.analysis._certificate import (
     read_certificate,
 )
 from fclib.analysis._contacts import Energy, contacts, energy
+from fclib.analysis._enumerate import Enumeration, SolutionSet, enumerate_solutions
 from fclib.analysis._existence import (
     EXISTS_AT_HAND,
+    EXISTS_ENUMERATED,
     EXISTS_SLATER,
     PROVEN_NOT,
     UNDECIDED,
@@ -42,6 +47,7 @@ from fclib.analysis._spectrum import Spectrum
 
 __all__ = [
     "EXISTS_AT_HAND",
+    "EXISTS_ENUMERATED",
     "EXISTS_SLATER",
     "PROVEN_NOT",
     "UNDECIDED",
@@ -52,9 +58,11 @@ __all__ = [
     "Confirmation",
     "Definiteness",
     "Energy",
+    "Enumeration",
     "Existence",
     "Reference",
     "Slater",
+    "SolutionSet",
     "Spectrum",
     "Uniqueness",
     "Units",
@@ -63,6 +71,7 @@ __all__ = [
     "check_arrays",
     "contacts",
     "energy",
+    "enumerate_solutions",
     "farkas",
     "read_certificate",
     "reference",

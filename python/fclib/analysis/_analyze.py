@@ -13,11 +13,13 @@ from scipy.sparse.csgraph import connected_components
 from fclib import _core, _digest, _solve
 from fclib.analysis._certificate import Certificate
 from fclib.analysis._data import DENSE, EPS, SYMMETRIC, Data, Reduced, asymmetry, columns
+from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import Existence, Slater, existence, slater
 from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
 DEFINITE = ("positive definite", "positive semidefinite", "indefinite")
 UNKNOWN = "not known"
+ENUMERATION = 5.0  # [s] for the states of all contacts, at most
 FAR = 1e4  # a size this many times above or below 1 is said to be far from the units
 SPREAD = 1e6  # the same of a ratio inside the problem
 
@@ -45,18 +47,20 @@ class Uniqueness:
     """Whether the velocity is unique, in the words of the theory.
 
     Attributes:
-        verdict: "unique" or "undecided".
+        verdict: "unique", "not unique" or "undecided".
         reason: in words.
         contraction: Lipschitz constant of the map s -> mu ||u_T||, u the velocity of the convex
             problem with q + [s, 0, 0], in the norm of s: below 1 its fixed point is unique. nan
             where W is not symmetric positive definite.
         reactions: whether they follow from the velocity: W is nonsingular.
+        one_reaction: whether all solutions have the same reactions; None where that is not known.
     """
 
     verdict: str
     reason: str
     contraction: float
     reactions: bool
+    one_reaction: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,8 @@ class Analysis:
             the rank is not known.
         hyperstaticity_ratio: m / rank W.
         units, slater, existence, uniqueness: see there.
+        enumeration: what the states of all contacts say; None where theorems say it all.
+        isolated_solutions: how many there are; None where that is not known.
     """
 
     problem: _solve.Problem = field(repr=False, compare=False)
@@ -118,6 +124,14 @@ class Analysis:
     slater: Slater
     existence: Existence
     uniqueness: Uniqueness
+    enumeration: Enumeration | None = field(default=None, repr=False)
+
+    @property
+    def isolated_solutions(self) -> int | None:
+        """How many solutions have no other near them."""
+        if self.enumeration is None:
+            return 1
+        return len(self.enumeration.isolated) if self.enumeration.complete else None
 
     @property
     def certificate(self) -> Certificate | None:
@@ -183,6 +197,8 @@ class Analysis:
             "uniqueness_reason": self.uniqueness.reason,
             "contraction": self.uniqueness.contraction,
             "reactions_follow": self.uniqueness.reactions,
+            "reactions_unique": self.uniqueness.one_reaction,
+            "isolated_solutions": self.isolated_solutions,
         }
         if self.certificate is not None:
             record["certificate_bound"] = self.certificate.bound
@@ -272,7 +288,13 @@ def analyze(
             sign = replace(sign, word=UNKNOWN)
     full = rank == problem.m and sign.word == DEFINITE[0]
     condition = slater(data, sign.word in DEFINITE[:2], full, time_limit)
-    verdict = existence(data, condition, tol, time_limit)
+    unique = _uniqueness(data, sign, full, dense)
+    states = None
+    # one solution, by theorems; else the states of the contacts say how many
+    if not (condition.holds and unique.verdict == "unique" and unique.reactions):
+        states = enumerate_solutions(problem, time_limit=min(time_limit, ENUMERATION))
+    unique = _enumerated(unique, states)
+    verdict = existence(data, condition, states, tol, time_limit)
     numbers = data.local.islands().contact
     return Analysis(
         problem=problem,
@@ -290,7 +312,8 @@ def analyze(
         units=_units(data, verdict),
         slater=condition,
         existence=verdict,
-        uniqueness=_uniqueness(data, sign, full, dense),
+        uniqueness=unique,
+        enumeration=states,
     )
 
 
@@ -338,6 +361,20 @@ def _uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqu
     else:
         reason = f"the fixed point on mu ||u_T|| need not be a contraction ({constant:.2g})"
     return Uniqueness("undecided", reason, constant, full)
+
+
+def _enumerated(found: Uniqueness, states: Enumeration | None) -> Uniqueness:
+    """With what the states of the contacts say."""
+    if states is None:
+        return replace(found, one_reaction=True)
+    found = replace(found, one_reaction=states.reaction_unique)
+    if found.verdict == "unique" or states.velocity_unique is None:
+        return found
+    return replace(
+        found,
+        verdict="unique" if states.velocity_unique else "not unique",
+        reason=states.reason,
+    )
 
 
 def _contraction(data: Data, reduced: Reduced, dense: int) -> float:

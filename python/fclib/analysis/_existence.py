@@ -8,6 +8,8 @@ Lemarechal & Malick 2011, "A formulation of the linear discrete Coulomb friction
 optimization"; Klarbring & Pang 1998, "Existence of solutions to discrete semicoercive frictional
 contact problems").
 
+Few contacts are decided by all their states (_enumerate.py).
+
 With bilateral constraints W is W' = W - V R^-1 V^T here: a W that is positive definite says nothing
 where W' is not. A proof that there is no solution is checked in exact arithmetic (_certificate.py).
 
@@ -26,15 +28,17 @@ from fclib import _core, _solve
 from fclib.analysis._certificate import Certificate, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
+from fclib.analysis._enumerate import EXISTS, NONE, Enumeration
 
 PAIRS = 500  # of contacts, that are tried as a proof at most
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
 
 EXISTS_SLATER = "exists by Slater"
+EXISTS_ENUMERATED = "exists by enumeration"
 EXISTS_AT_HAND = "exists (a solution is at hand)"
 PROVEN_NOT = "proven not to exist"
 UNDECIDED = "undecided"
-VERDICTS = (EXISTS_SLATER, EXISTS_AT_HAND, PROVEN_NOT, UNDECIDED)
+VERDICTS = (EXISTS_SLATER, EXISTS_ENUMERATED, EXISTS_AT_HAND, PROVEN_NOT, UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -250,9 +254,9 @@ class Existence:
     """The verdict on existence, one of VERDICTS, with its reason.
 
     Attributes:
-        verdict: one of four.
+        verdict: one of five.
         reason: in words.
-        certificate: the proof where there is no solution.
+        certificate: the proof where there is no solution and Farkas' lemma shows it.
         solution: the one at hand, of whatever verdict; error: its merit (nan without one).
     """
 
@@ -263,8 +267,14 @@ class Existence:
     error: float = float("nan")
 
 
-def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> Existence:
-    """The verdict. Raises ImportError where Clarabel is needed, and not installed."""
+def existence(
+    data: Data, condition: Slater, states: Enumeration | None, tol: float, time_limit: float
+) -> Existence:
+    """The verdict; `states` is what those of the contacts say, where they were asked.
+
+    Raises:
+        ImportError: Clarabel is needed, and not installed.
+    """
     problem = data.problem
     solution, error, proof = None, float("nan"), None
     why = ""
@@ -282,6 +292,17 @@ def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> E
         name = "W'" if problem.p else "W"
         reason = f"Slater's condition holds ({condition.method}), {name} is positive semidefinite"
         return Existence(EXISTS_SLATER, reason, None, solution, error)
+    refuted = states is not None and states.verdict == NONE
+    if states is not None and states.verdict == EXISTS:
+        if solution is None:
+            solution, error = min(
+                ((found.solution, found.error) for found in states.sound), key=lambda one: one[1]
+            )
+        return Existence(EXISTS_ENUMERATED, states.reason, None, solution, error)
+    if solution is not None and refuted:
+        assert states is not None
+        reason = f"solved to an error of {error:.1e} relative to ||q||, but {states.reason}"
+        return Existence(UNDECIDED, reason, None, solution, error)
     if solution is not None:
         reason = (
             f"solved to an error of {error:.1e} relative to ||q|| (tolerance {tol:.0e}), which is "
@@ -294,4 +315,8 @@ def existence(data: Data, condition: Slater, tol: float, time_limit: float) -> E
         how = "in exact arithmetic" if proof.exact else "W being rounded in its last digits"
         reason = f"{which} keep {proof.contacts} contacts from closing (Farkas, {how})"
         return Existence(PROVEN_NOT, reason, proof, None, error)
+    if states is not None and refuted:
+        return Existence(PROVEN_NOT, states.reason, None, None, error)
+    if states is not None and states.states:
+        why += f"; {states.reason}"
     return Existence(UNDECIDED, f"{why}; no proof was found that there is no solution", None)

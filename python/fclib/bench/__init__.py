@@ -25,6 +25,7 @@ plots.py        profiles as pictures
 single.py       one run by hand, in this process
 """
 
+from fclib._solve import MeritKind
 from fclib.bench.campaign import Campaign, CampaignError
 from fclib.bench.job import STATUSES, Job, Limits, ProblemFacts, Record, SolverChoice
 from fclib.bench.runner import Progress, run_campaign
@@ -38,6 +39,7 @@ __all__ = [
     "CampaignError",
     "Job",
     "Limits",
+    "MeritKind",
     "ProblemFacts",
     "Progress",
     "Record",

@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
+from fclib._solve import MeritKind
 from fclib.bench.store import Store
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -131,6 +132,7 @@ def load(
     solvers: Sequence[str] = (),
     tolerances: Sequence[float] = (),
     machine: str | None = None,
+    merit: MeritKind | None = None,
 ) -> list[dict[str, Any]]:
     """The rows of a store that a profile is of.
 
@@ -141,10 +143,11 @@ def load(
         solvers: only these, by their labels, in this order.
         tolerances: only these.
         machine: its node's name.
+        merit: only runs whose tolerance bounds this.
 
     Raises:
         StoreError: the file is no store.
-        ProfileError: no run is left, or they are of several machines.
+        ProfileError: no run is left, or they are of several machines or merits.
     """
     with Store(store, create=False) as opened:
         rows = opened.results()
@@ -154,6 +157,7 @@ def load(
         ("solver", solvers),
         ("tol", tolerances),
         ("node", [machine] if machine else ()),
+        ("merit", [merit] if merit else ()),
     ]
     for column, values in wanted:
         if values:
@@ -171,6 +175,11 @@ def load(
         raise ProfileError(
             f"{store}: times of several machines do not compare; choose one: {', '.join(nodes)}"
         )
+    if len({row["merit"] for row in rows}) > 1:
+        raise ProfileError(
+            f"{store}: the tolerance of some runs bounds both natural maps, of others that of the"
+            " literature alone, which does not compare; choose one by merit: both, natural"
+        )
     versions: dict[str, set[tuple[str, str]]] = defaultdict(set)
     for row in rows:
         versions[row["solver"]].add((row["version"], row["options"]))
@@ -179,6 +188,12 @@ def load(
             row["solver"] = f"{row['solver']} ({row['version']})"
     order = {name: k for k, name in enumerate(solvers)}
     return sorted(rows, key=lambda row: order.get(row["solver"], len(order)))
+
+
+JUDGED = {
+    "both": "the tolerance bounds both natural maps",
+    "natural": "the tolerance bounds the natural map of the literature alone",
+}
 
 
 def costs(rows: Sequence[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:

@@ -26,7 +26,7 @@ from typing import Any
 from fclib import _core
 from fclib.bench.job import MERITS, Job, ProblemFacts, Record
 
-VERSION = 1  # of the schema
+VERSION = 2  # of the schema; 1 had neither certificates nor `merit`, which was "natural"
 APPLICATION = 0x46434C42  # "FCLB"
 PATIENCE = 60.0  # [s] to wait for another writer
 
@@ -52,6 +52,7 @@ CREATE TABLE runs (
     campaign INTEGER REFERENCES campaigns, problem INTEGER NOT NULL REFERENCES problems,
     solver INTEGER NOT NULL REFERENCES solvers, machine INTEGER NOT NULL REFERENCES machines,
     tol REAL, time_limit REAL, wall_limit REAL, memory_limit REAL, threads INTEGER, repeat INTEGER,
+    merit TEXT NOT NULL DEFAULT 'natural',
     status TEXT NOT NULL, message TEXT, solved INTEGER NOT NULL, iterations INTEGER,
     cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
     {merits}, stages TEXT, load REAL, frequency_mhz REAL, started REAL,
@@ -62,6 +63,9 @@ CREATE TABLE history (
     run INTEGER NOT NULL REFERENCES runs, iteration INTEGER, error REAL, time REAL, stage TEXT
 );
 CREATE INDEX history_by_run ON history (run);
+CREATE TABLE certificates (
+    run INTEGER PRIMARY KEY REFERENCES runs, certificate TEXT NOT NULL
+);
 CREATE TABLE files (
     path TEXT PRIMARY KEY, size INTEGER, modified INTEGER, problem INTEGER REFERENCES problems
 );
@@ -71,8 +75,8 @@ CREATE VIEW results AS SELECT
     problems.p, problems.nc, problems.nnz, problems.title, problems.hash,
     solvers.label AS solver, solvers.name AS solver_name, solvers.options, solvers.version,
     solvers.family AS solver_family, solvers.origin,
-    runs.tol, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads, runs.repeat,
-    runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s, runs.setup_s,
+    runs.tol, runs.merit, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads,
+    runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s, runs.setup_s,
     runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits}, runs.stages,
     machines.node, machines.cpu, machines.hash AS machine, runs.load, runs.frequency_mhz,
     runs.started
@@ -85,16 +89,20 @@ LEFT JOIN campaigns ON campaigns.id = runs.campaign;
     merits=", ".join(f"{name} REAL" for name in MERITS),
     run_merits=", ".join(f"runs.{name}" for name in MERITS),
 )
-# what came later, in stores that had no room for it
-ADDED = """CREATE TABLE IF NOT EXISTS certificates (
-    run INTEGER PRIMARY KEY REFERENCES runs, certificate TEXT NOT NULL
-)"""
+STATEMENTS = SCHEMA.split(";\n")
+# what a store of version 1 lacks
+ADDED = (
+    "ALTER TABLE runs ADD COLUMN merit TEXT NOT NULL DEFAULT 'natural'",
+    *(one for one in STATEMENTS if one.strip().startswith("CREATE TABLE certificates")),
+    "DROP VIEW results",
+    *(one for one in STATEMENTS if one.strip().startswith("CREATE VIEW results")),
+)
 PROBLEM = tuple(field.name for field in dataclasses.fields(ProblemFacts))
 SOLVER = ("hash", "label", "name", "options", "version", "family", "origin")
 MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
 RUN = (
     *("key", "campaign", "problem", "solver", "machine"),
-    *("tol", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
+    *("tol", "merit", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
     *("status", "message", "solved", "iterations"),
     *("cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
     *(*MERITS, "stages", "load", "frequency_mhz", "started"),
@@ -150,7 +158,7 @@ class Store:
         db = self.db
         version = db.execute("PRAGMA user_version").fetchone()[0]
         empty = not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone()
-        if not empty and version != VERSION:
+        if not empty and version not in (1, VERSION):
             db.close()
             if version == 0:
                 raise StoreError(f"{self.path}: is a database, but no store of fclib bench")
@@ -164,11 +172,17 @@ class Store:
             with self.transaction():
                 # another may have made it meanwhile
                 if not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
-                    for statement in SCHEMA.split(";\n"):
+                    for statement in STATEMENTS:
                         db.execute(statement)
                     db.execute(f"PRAGMA application_id = {APPLICATION}")
                     db.execute(f"PRAGMA user_version = {VERSION}")
-        db.execute(ADDED)
+        elif version < VERSION:
+            with self.transaction():
+                # another may have brought it up to date meanwhile
+                if db.execute("PRAGMA user_version").fetchone()[0] < VERSION:
+                    for statement in ADDED:
+                        db.execute(statement)
+                    db.execute(f"PRAGMA user_version = {VERSION}")
 
     def __enter__(self) -> Store:
         return self
@@ -273,6 +287,7 @@ class Store:
                 solver,
                 machine,
                 job.tol,
+                job.merit,
                 job.limits.time,
                 job.limits.wall,
                 job.limits.memory,

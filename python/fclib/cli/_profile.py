@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fclib.bench import profiles
+from fclib.bench import MeritKind, profiles
 from fclib.bench.campaign import published_means
 from fclib.cli._output import Report, err, make_table, out
 
@@ -27,6 +27,7 @@ def print_profile(
     tol: Sequence[float] = (),
     campaign: str | None = None,
     machine: str | None = None,
+    merit: MeritKind | None = None,
     penalty: float = profiles.PENALTY,
     shift: float = profiles.SHIFT,
     formats: Sequence[str] = ("pdf", "svg", "png"),
@@ -41,6 +42,7 @@ def print_profile(
         solvers=solver,
         tolerances=tol,
         machine=machine,
+        merit=merit,
     )
     costs = profiles.costs(rows, metric)
     published = published_means(store)
@@ -58,21 +60,25 @@ def print_profile(
             for record in records:
                 report.add({"table": table, **record})
     elif not quiet:
-        show(tables, costs, penalty, shift)
+        show(tables, costs, penalty, shift, profiles.JUDGED[rows[0]["merit"]])
     if folder is not None:
         draw(tables, costs, rows, store, folder, formats)
         err.print(f"Pictures and tables: {folder}", highlight=False)
 
 
 def show(
-    tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, penalty: float, shift: float
+    tables: dict[str, list[dict[str, Any]]],
+    costs: profiles.Costs,
+    penalty: float,
+    shift: float,
+    judged: str,
 ) -> None:
     """The tables, for people."""
     words = profiles.METRICS[costs.metric][0]
     several = len({instance.tol for instance in costs.instances}) > 1
     out.print(
         f"{len(costs.instances)} problems{' at a tolerance' if several else ''}, {words};"
-        f" shifted geometric means, shift {shift:g}, failures as {penalty:g} x the limit",
+        f" shifted geometric means, shift {shift:g}, failures as {penalty:g} x the limit; {judged}",
         highlight=False,
     )
     if costs.left_out:

@@ -135,6 +135,8 @@ def command(
             words.append(f"{path.name}: {line}")
         if found.existence.verdict in (analysis.PROVEN_NOT, analysis.UNDECIDED):
             words.append(f"{path.name}: {found.existence.reason}")
+        if found.uniqueness.verdict == "not unique":
+            words.append(f"{path.name}: {found.uniqueness.reason}")
     for line in words:
         err.print(line, highlight=False)
     report.finish()

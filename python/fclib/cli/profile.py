@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from fclib.bench import profiles
-from fclib.cli._output import Json, fail
+from fclib.cli._output import Json, MeritKind, fail
 from fclib.cli._profile import print_profile
 
 Metric = Enum("Metric", {name: name for name in profiles.METRICS}, type=str)  # type: ignore[misc]
@@ -24,6 +24,9 @@ def command(
     tol: Annotated[list[float] | None, typer.Option(help="Only these tolerances.")] = None,
     campaign: Annotated[str | None, typer.Option(help="Only the runs of this campaign.")] = None,
     machine: Annotated[str | None, typer.Option(help="Only the runs of this node.")] = None,
+    merit: Annotated[
+        MeritKind | None, typer.Option(help="Only the runs whose tolerance bounds this.")
+    ] = None,
     penalty: Annotated[
         float, typer.Option(help="A failure counts as so many times the limit.", min=1.0)
     ] = profiles.PENALTY,
@@ -50,6 +53,7 @@ def command(
             tol=tol or (),
             campaign=campaign,
             machine=machine,
+            merit=merit.value if merit else None,
             penalty=penalty,
             shift=shift,
             formats=formats.split(","),

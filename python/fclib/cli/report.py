@@ -11,7 +11,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 import fclib
-from fclib.cli._output import err, fail, out
+from fclib.cli._output import MeritKind, err, fail, out
 
 
 @contextmanager
@@ -44,6 +44,9 @@ def command(
     ] = False,
     machine: Annotated[str | None, typer.Option(help="Only the runs of this node.")] = None,
     campaign: Annotated[str | None, typer.Option(help="Only the runs of this campaign.")] = None,
+    merit: Annotated[
+        MeritKind | None, typer.Option(help="Only the runs whose tolerance bounds this.")
+    ] = None,
     views: Annotated[
         int, typer.Option(help="Problems that get a 3D view, those with runs first.", min=0)
     ] = 60,
@@ -64,7 +67,9 @@ def command(
         with ExitStack() as stack:
             campaigns = None
             if stores:
-                campaigns = stack.enter_context(report.Campaigns(stores, machine, campaign))
+                campaigns = stack.enter_context(
+                    report.Campaigns(stores, machine, campaign, merit.value if merit else None)
+                )
             if pdf:
                 assert campaigns is not None
                 for path in report.write_paper(campaigns, folder):

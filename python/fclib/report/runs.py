@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fclib.bench import STATUSES as STATUSES
-from fclib.bench import Store, profiles
+from fclib.bench import MeritKind, Store, profiles
 from fclib.bench.profiles import METRICS, Costs, Instance
 from fclib.report.error import ReportError
 from fclib.report.view import rounded
@@ -40,7 +40,11 @@ class Campaigns:
     """The runs of one or several stores on one machine; ``with Campaigns(paths) as campaigns``."""
 
     def __init__(
-        self, stores: Sequence[str | Path], machine: str | None = None, campaign: str | None = None
+        self,
+        stores: Sequence[str | Path],
+        machine: str | None = None,
+        campaign: str | None = None,
+        merit: MeritKind | None = None,
     ) -> None:
         """Read them.
 
@@ -48,15 +52,16 @@ class Campaigns:
             stores: files of `fclib bench`.
             machine: only the runs of this node.
             campaign: only the runs of this campaign.
+            merit: only the runs whose tolerance bounds this.
 
         Raises:
             StoreError: a file is no store.
-            ProfileError: no run is left, or they are of several machines.
+            ProfileError: no run is left, or they are of several machines or merits.
         """
         self._folder = tempfile.TemporaryDirectory(prefix="fclib-report-")
         try:
             self.store = self._merged(stores)
-            self.rows = profiles.load(self.store, machine=machine, campaign=campaign)
+            self.rows = profiles.load(self.store, machine=machine, campaign=campaign, merit=merit)
         except BaseException:
             self._folder.cleanup()
             raise

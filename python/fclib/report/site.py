@@ -25,7 +25,7 @@ from typing import Any
 
 from fclib import _core, _registry
 from fclib.bench.job import MERITS
-from fclib.bench.profiles import METRICS, PENALTY, SHIFT
+from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
@@ -329,6 +329,7 @@ class _Writer:
         return {
             "overview": campaigns.overview(),
             "tolerances": campaigns.tolerances,
+            "judged": JUDGED[campaigns.rows[0]["merit"]],
             "headlines": headlines,
             "solvers": [
                 _solver(label, first[label]["solver_name"], first[label])

@@ -72,7 +72,7 @@
       page.append(h("p", {}, `${s.problems} problems in ${s.families.length} families. No runs were given to this report.`));
     } else {
       page.append(h("p", {}, `${s.solvers.length} solvers on ${o.problems} problems${s.problems > o.problems ? ` of ${s.problems} in the catalogue` : ""}. Every error is recomputed from the problem and the returned solution: `,
-        h("em", {}, "solved"), " means that the relative natural-map error meets the tolerance within the limits."),
+        h("em", {}, "solved"), ` means that the relative error meets the tolerance within the limits; ${s.judged}.`),
       h("ul", { class: "figures" }, [[s.problems, "problems"], [s.families.length, "families"], [s.solvers.length, "solvers"], [o.runs, "runs"], [Fclib.percent(o.solved / o.runs), "of them solved"]].map(([value, name]) =>
         h("li", {}, h("b", {}, value.toLocaleString("en").replaceAll(",", " ")), h("span", {}, name)))));
       page.append(h("h2", {}, "Performance profiles"), h("p", {}, "How many of the instances a solver has solved within a multiple τ of the CPU time of the best solver on each. At the left: how often it is the fastest. At the right: how often it succeeds at all."));
@@ -85,7 +85,7 @@
           Fclib.lines({
             half: true, name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
             ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
-            note: `${head.instances} instances${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
+            note: `${head.instances} instances; ${s.judged}${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
           }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
       });
       page.append(charts, h("h2", {}, "Solvers"));
@@ -170,7 +170,7 @@
         name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, xlog: state.axis === "log",
         xrange: performance ? [1, state.axis === "log" ? high * 1.1 : high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
         xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
-        note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run${state.family ? `, family ${state.family}` : ""}.`,
+        note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
       }));
     };
     const drawStatuses = (order, bench, keepProblem) => {
@@ -205,7 +205,7 @@
       pair.replaceChildren(h("div", { class: "controls" }, select("across", names, labels[a], change("a")), select("up", names, labels[b], change("b"))),
         points.length ? Fclib.scatter({
           name: `${labels[a]}-${labels[b]}`, title: `${labels[a]} against ${labels[b]}, ${metric}`, points, groups: families, range: [low * 0.8, high * 1.25], xlabel: `${labels[a]}: ${metric}`, ylabel: `${labels[b]}: ${metric}`, xname: labels[a], yname: labels[b], to: problemHref,
-          note: `${points.length} instances that at least one of the two solves; ${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point leads to its problem.`,
+          note: `${points.length} instances that at least one of the two solves (${s.judged}); ${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point leads to its problem.`,
         }) : h("p", { class: "panel" }, "No instance that both have run and one solves."));
     };
     await draw();

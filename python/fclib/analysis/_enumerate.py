@@ -1,0 +1,771 @@
+"""All solutions of a small problem, by the states of its contacts.
+
+In the plane each contact is in one of four states, of which exactly one holds at a solution:
+
+    open      u_N > 0,                r = 0
+    slide +   u_N = 0,  u_T > 0,      r = n (1, -mu), n >= 0
+    slide -   u_N = 0,  u_T < 0,      r = n (1, mu),  n >= 0
+    stick     u_N = 0,  u_T = 0,      r in K
+
+and without friction, in the plane or in space, in one of two: open, or u_N = 0 and r_N >= 0. In a
+state of all contacts the law is linear: the solutions in it are a polyhedron, often a point or
+nothing. Klarbring 1990, "Examples of non-uniqueness and non-existence of solutions to quasistatic
+contact problems with friction" (Ingenieur-Archiv 60), does so by hand.
+
+The equations are those of the whole problem, with v and lambda: nothing is condensed in doubles and
+no R^-1 is needed. They are solved in rational arithmetic (_rational.py). Contacts are given states
+one after the other; those that have none yet only satisfy u_N >= 0 and r in K. Where a linear
+program has no solution, Farkas' lemma gives a reason, which refutes all states that it fits. Before
+that, states are refuted in doubles, many at a time, by the inverses of their systems: with bounds
+of all rounding, and of a change of q and s by ROBUST ||(q, s)||.
+
+A single spatial contact with friction is decided too (_spatial.py).
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from fclib import _core, _solve
+from fclib.analysis._data import EPS, Array, columns
+from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError, Table, integers
+from fclib.analysis._spatial import one_contact
+
+MOST_STATES = 4**8  # of all contacts together
+MOST_UNKNOWNS = 200  # n + p, taken out of the equations in rational arithmetic
+ROBUST = 1e-6  # of ||(q, s)||: what such a change of q and s makes solvable is not refuted
+SOUND = 1e-8  # the error in doubles of a solution that does not rest on the data's last digits
+FEW_STATES = 64  # up to which doubles are not asked first
+LARGEST, SMALLEST = Fraction(10**300), Fraction(1, 10**290)  # of what is rounded to doubles
+BATCH = 4096  # states whose systems are inverted at a time
+
+EXISTS = "exists"
+NONE = "none"
+UNDECIDED = "undecided"
+LATE = "the time was over"
+
+Numbers = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class SolutionSet:
+    """The solutions in one state of the contacts: a point, or a polyhedron with one of its points.
+
+    Attributes:
+        states: (nc,) "open", "stick", "slide +" (u_T > 0), "slide -" (u_T < 0) or, without
+            friction, "closed".
+        solution: one of them, in doubles.
+        error: its merit.
+        velocity: whether all of them have this u.
+        reaction: whether all of them have this r.
+        isolated: whether it is a point, with no other solution near it.
+        u, r: (m,) the solution, exact; where a spatial contact slides to 24 digits.
+    """
+
+    states: tuple[str, ...]
+    solution: _core.Solution = field(repr=False, compare=False)
+    error: float
+    velocity: bool
+    reaction: bool
+    isolated: bool
+    u: Numbers = field(repr=False)
+    r: Numbers = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Enumeration:
+    """What the states of all contacts say of a problem, in exact arithmetic, of the data as given.
+
+    Attributes:
+        solutions: the sets of solutions, of different states.
+        missing: why these may not be all; empty where each state was decided.
+        robust: whether what was refuted is so too where each component of q and s changes by 1e-6
+            of ||(q, s)||.
+        contacts, states: how many contacts there are, and states of all of them together.
+        speed: [m/s] ||(q, s)||, of a global problem of its local form.
+    """
+
+    solutions: tuple[SolutionSet, ...]
+    missing: str
+    robust: bool = False
+    contacts: int = 0
+    states: int = 0
+    speed: float = 0.0
+
+    @property
+    def complete(self) -> bool:
+        """Whether each state was decided."""
+        return not self.missing
+
+    @property
+    def reason(self) -> str:
+        """In words, what was found, or why nothing was."""
+        if not self.states:
+            return f"not decided by enumeration of contact states: {self.missing}"
+        plural = "s" * (self.contacts != 1)
+        words = [f"enumeration of contact states, {self.states} of {self.contacts} contact{plural}"]
+        isolated = len(self.isolated)
+        sets = sum(not found.isolated for found in self.sound)
+        beyond = len(self.solutions) - len(self.sound)
+        if self.sound:
+            words.append(f": {isolated} isolated solution{'s' * (isolated != 1)}")
+            words.append(f" and {sets} set{'s' * (sets != 1)} of others" if sets else "")
+            error = max(found.error for found in self.sound)
+            words.append(f", exact, in doubles of an error up to {error:.1e}")
+        elif beyond:
+            words.append(": no solution in doubles")
+        else:
+            words.append(": no solution" + ("" if self.complete else " yet"))
+        if beyond:
+            words.append(f"; {beyond} in exact arithmetic that rest on the last digits of the data")
+        if not self.complete:
+            words.append(f"; not all states were decided: {self.missing}")
+        elif not self.robust:
+            words.append(f"; there may be others where q changes by {ROBUST:.0e} ||q||")
+        elif not self.solutions:
+            words.append(f", also where q changes by {ROBUST:.0e} ||q||")
+        return "".join(words)
+
+    @property
+    def verdict(self) -> str:
+        """One of "exists", "none" and "undecided".
+
+        A solution whose error in doubles is above 1e-8 rests on the last digits of the data, and is
+        not enough.
+        """
+        if self.sound:
+            return EXISTS
+        return NONE if self.complete and self.robust else UNDECIDED
+
+    @property
+    def sound(self) -> tuple[SolutionSet, ...]:
+        """The sets whose solution is one in doubles too, of an error up to 1e-8."""
+        return tuple(found for found in self.solutions if found.error <= SOUND)
+
+    @property
+    def isolated(self) -> tuple[SolutionSet, ...]:
+        """The isolated solutions among these; of such as differ by rounding one."""
+        kept: list[SolutionSet] = []
+        for found in self.sound:
+            if found.isolated and all(
+                _apart(found.u, one.u, self.speed) or _apart(found.r, one.r) for one in kept
+            ):
+                kept.append(found)
+        return tuple(kept)
+
+    @property
+    def velocity_unique(self) -> bool | None:
+        """Whether all solutions have one u; None where that is not known, or there is none."""
+        return self._unique([found.u for found in self.sound], "velocity", self.speed)
+
+    @property
+    def reaction_unique(self) -> bool | None:
+        """Whether all solutions have one r; None where that is not known, or there is none."""
+        return self._unique([found.r for found in self.sound], "reaction", 0.0)
+
+    def _unique(self, points: list[Numbers], part: str, size: float) -> bool | None:
+        if any(_apart(point, points[0], size) for point in points):
+            return False
+        if not all(getattr(found, part) for found in self.sound):
+            return False
+        # what rests on the last digits leaves it open
+        known = self.complete and self.robust and self.sound == self.solutions
+        alike = known and len(set(points)) == 1
+        return True if alike else None
+
+
+def _apart(a: Numbers, b: Numbers, size: float = 0.0) -> bool:
+    """Whether they differ by more than the last digits of the data, relative to `size` or to a."""
+    difference = max((abs(x - y) for x, y in zip(a, b, strict=True)), default=Fraction())
+    return difference > Fraction(SOUND) * max([Fraction(size), *map(abs, a)])
+
+
+@dataclass(frozen=True)
+class _State:
+    """Of a contact: its name, the columns that need not be zero, and that which is positive."""
+
+    name: str
+    columns: tuple[int, ...]
+    strict: int | None
+
+
+class _Whole:
+    """The equations of the whole problem, v and lambda taken out of them exactly.
+
+    Attributes:
+        elimination: what is left, and how the others follow.
+        smooth: the numbers of u_T where there is no friction, taken out too.
+        changes: the numbers of the changes of the joints' right sides.
+        plain: whether what is left is u = W r + q.
+        drifts: whether a lambda moves such u_T and nothing else, so that u is never unique.
+    """
+
+    def __init__(self, problem: _solve.Problem, end: float) -> None:
+        self.problem = problem
+        d = problem.spacedim
+        self.mu = [Fraction(float(value)) for value in problem.mu]
+        equations, hidden, inner = _equations(problem)
+        first = 2 * problem.m + len(hidden)
+        self.changes = range(first, first + problem.p)
+        self.elimination = Elimination(equations, end=end)
+        left = self.elimination.take_out(hidden, inner)
+        # what redundant joints leave is 0 = 0, or says something of r, or is impossible
+        for k in inner:
+            if all(j in self.changes for j in equations[k]):
+                equations[k] = {}
+        plain = not any(equations[k] for k in inner)
+        smooth = [d * a + k for a in range(problem.nc) if not self.mu[a] > 0 for k in range(1, d)]
+        self.elimination.take_out(smooth)
+        # what is left of lambda, where joints are redundant
+        loose = self.elimination.take_out(left)
+        self.plain = plain and len(loose) == len(left)
+        self.smooth = set(smooth)
+        self.drifts = any(
+            value and k in self.smooth
+            for free in loose
+            for k, value in self.elimination.complete({free: Fraction(1)}, 0).items()
+        )
+
+    def rows(self) -> list[tuple[dict[int, Fraction], Fraction, float]]:
+        """Of a plain one each u_k = row . r + constant that is left, in order.
+
+        Row (by components of r), constant, and how much u_k changes at most where q and the right
+        sides of the joints change by 1.
+        """
+        m = self.problem.m
+        result = []
+        for equation in self.elimination.equations:
+            if not equation:
+                continue
+            (own,) = (k for k in equation if 0 <= k < m)
+            by = equation[own]
+            row = {k - m: -value / by for k, value in equation.items() if m <= k < 2 * m}
+            moved = 1 + sum(abs(float(equation.get(k, 0) / by)) for k in self.changes)
+            result.append((own, (row, equation.get(CONSTANT, Fraction()) / by, moved)))
+        return [values for _, values in sorted(result, key=lambda one: one[0])]
+
+    def solution(self, whole: dict[int, Fraction]) -> _core.Solution:
+        """Of all unknowns, in doubles."""
+        problem, m = self.problem, self.problem.m
+        bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+        n = problem.n if bodies else 0
+        exact = [whole.get(k, Fraction()) for k in range(2 * m + n + problem.p)]
+        values = np.array([float(max(-LARGEST, min(LARGEST, value))) for value in exact])
+        u, r, v, bilateral = np.split(values, [m, 2 * m, 2 * m + n])
+        return _core.Solution(r=r, u=u, v=v if bodies else None, l=bilateral if problem.p else None)
+
+
+def _double(exact: Fraction) -> float:
+    """Rounded to the nearest, by a part of EPS at most; nan where doubles have no such number."""
+    return float(exact) if not exact or SMALLEST < abs(exact) < LARGEST else float("nan")
+
+
+class _System:
+    """The equations of all contacts, A x = b with x >= 0, and what the columns stand for.
+
+    The columns of a contact with friction are u_N, u_T > 0, u_T < 0, and r along both edges of K;
+    those of one without are u_N and r_N.
+    """
+
+    def __init__(self, whole: _Whole) -> None:
+        self.whole, self.problem = whole, whole.problem
+        d, m, nc = self.problem.spacedim, self.problem.m, self.problem.nc
+        self.elimination = whole.elimination
+        rows = [equation for equation in whole.elimination.equations if equation]
+        self.parts: list[list[tuple[int, Fraction]]] = []
+        self.states: list[list[_State]] = []
+        one = Fraction(1)
+        for a in range(nc):
+            first, N = len(self.parts), d * a
+            if (mu := whole.mu[a]) > 0:
+                self.parts += [[(N, one)], [(N + 1, one)], [(N + 1, -one)]]
+                across, along = Fraction(mu.numerator), Fraction(mu.denominator)
+                self.parts += [[(m + N, along), (m + N + 1, sign * across)] for sign in (one, -one)]
+                open_, right, left_, up, down = range(first, first + 5)
+                self.states.append(
+                    [
+                        _State("open", (open_, right, left_), open_),
+                        _State("slide +", (right, down), right),
+                        _State("slide -", (left_, up), left_),
+                        _State("stick", (up, down), None),
+                    ]
+                )
+            else:
+                self.parts += [[(N, one)], [(m + N, one)]]
+                self.states.append(
+                    [
+                        _State("open", (first,), first),
+                        _State("closed", (first + 1,), None),
+                    ]
+                )
+        # the columns of u, with what they are of
+        self.speeds = {
+            k: part for k, ((of, _), *_rest) in enumerate(self.parts) if (part := of) < m
+        }
+        table = []
+        for row in rows:
+            entries = [
+                sum((row[k] * factor for k, factor in part if k in row), Fraction())
+                for part in self.parts
+            ]
+            moved = [row.get(k, Fraction()) for k in whole.changes]
+            table.append([*entries, *moved, row.get(CONSTANT, Fraction())])
+        # with the determinant all entries are minors of the whole system, which are integers
+        self.denominator = int(self.elimination.determinant)
+        entire = [[int(value * self.denominator) for value in row] for row in table]
+        values = np.array(entire, dtype=object).reshape(len(rows), self.count + 1)
+        self.A, self.b = values[:, :-1], values[:, -1]
+
+    def plain_form(self) -> tuple[Array, Array, Array, tuple[list[Any], list[Any], list[Any]]]:
+        """Of a plain system, u = G x + q in doubles, x what the columns of r are.
+
+        Also how q changes, as in `rows`; and for each contact and state: which x may be positive,
+        which u are zero, and the signs of the other u that have one.
+        """
+        m = self.problem.m
+        reactions = [k for k, part in enumerate(self.parts) if part[0][0] >= m]
+        G, q, moved = [], [], []
+        for row, constant, by in self.whole.rows():
+            q.append(_double(constant))
+            moved.append(by)
+            G.append(
+                [
+                    _double(sum((row.get(k - m, 0) * f for k, f in part), Fraction()) / part[0][1])
+                    for part in (self.parts[c] for c in reactions)
+                ]
+            )
+        used: list[Any] = []
+        held: list[Any] = []
+        sign: list[Any] = []
+        for own_states in self.states:
+            across = {c for state in own_states for c in state.columns}
+            x = [c for c in reactions if c in across]
+            u = sorted({self.speeds[c] for c in across if c in self.speeds})
+            used.append(np.array([[c in state.columns for c in x] for state in own_states]))
+            free = [
+                {self.speeds[c] for c in state.columns if c in self.speeds} for state in own_states
+            ]
+            held.append(np.array([[k not in own for k in u] for own in free]))
+            signs = np.zeros((len(own_states), len(u)))
+            for s, state in enumerate(own_states):
+                if state.strict is not None:
+                    of = self.speeds[state.strict]
+                    factor = self.parts[state.strict][0][1]
+                    signs[s, u.index(of)] = float(factor)
+            sign.append(signs)
+        width = len(reactions)
+        names = (used, held, sign)
+        return np.array(G).reshape(len(q), width), np.array(q), np.array(moved), names
+
+    @property
+    def count(self) -> int:
+        """The columns, those of the joints' changes too, which are zero."""
+        return len(self.parts) + len(self.whole.changes)
+
+    def exact(self, x: dict[int, Fraction]) -> tuple[dict[int, Fraction], Numbers, Numbers]:
+        """All unknowns, u and r of a point."""
+        m = self.problem.m
+        values: dict[int, Fraction] = {}
+        for column, value in x.items():
+            for k, factor in self.parts[column]:
+                values[k] = values.get(k, Fraction()) + factor * value
+        whole = self.elimination.complete(values)
+        parts = [
+            tuple(whole.get(k, Fraction()) for k in part) for part in (range(m), range(m, 2 * m))
+        ]
+        return whole, parts[0], parts[1]
+
+
+def _equations(problem: _solve.Problem) -> tuple[list[Equation], list[int], set[int]]:
+    """The equations of the whole problem; the numbers of v and lambda; which equations are theirs.
+
+    The unknowns are u, r, v, lambda, in this order, and then a change of each joint's right side,
+    which is zero.
+    """
+    m, p = problem.m, problem.p
+    equations: list[Equation] = []
+
+    def add(count: int, constants: Any) -> int:
+        first = len(equations)
+        for k in range(count):
+            value = Fraction(float(constants[k]))
+            equations.append({CONSTANT: value} if value else {})
+        return first
+
+    def put(row: int, column: int, value: float) -> None:
+        equations[row][column] = equations[row].get(column, Fraction()) + Fraction(value)
+
+    def matrix(a: Any, row: int, column: int, sign: int, transposed: bool = False) -> None:
+        entries = columns(a).tocoo()
+        if transposed:
+            entries = entries.T.tocoo()
+        for i, j, value in zip(
+            entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True
+        ):
+            put(row + i, column + j, sign * value)
+
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        n = problem.n
+        velocity, bilateral = 2 * m, 2 * m + n
+        dynamics = add(n, problem.f)
+        matrix(problem.M, dynamics, velocity, 1)
+        matrix(problem.H, dynamics, m, -1)
+        contact = add(m, problem.w)
+        matrix(problem.H, contact, velocity, -1, transposed=True)
+        if p:
+            assert problem.b is not None
+            matrix(problem.G, dynamics, bilateral, -1)
+            joints = add(p, problem.b)
+            matrix(problem.G, joints, velocity, -1, transposed=True)
+        hidden = list(range(velocity, bilateral + p))
+    else:
+        contact = add(m, problem.q)
+        matrix(problem.W, contact, m, -1)
+        if p:
+            assert problem.s is not None
+            matrix(problem.V, contact, 2 * m, -1)
+            joints = add(p, problem.s)
+            matrix(problem.V, joints, m, -1, transposed=True)
+            matrix(problem.R, joints, 2 * m, -1)
+        hidden = list(range(2 * m, 2 * m + p))
+    for k in range(m):
+        put(contact + k, k, 1.0)
+    for k in range(p):
+        put(joints + k, hidden[-1] + 1 + k, 1.0)
+    inner = set(range(len(equations))) - set(range(contact, contact + m))
+    for row, equation in enumerate(equations):
+        keys = list(equation)
+        equations[row] = dict(
+            zip(keys, map(Fraction, integers([equation[k] for k in keys])), strict=True)
+        )
+    return equations, hidden, inner
+
+
+def qualifies(problem: _solve.Problem) -> str:
+    """Why a problem is not decided by the states of its contacts; empty where it may be."""
+    if problem.n + problem.p > MOST_UNKNOWNS:
+        return f"n + p is above {MOST_UNKNOWNS}"
+    rubbing = problem.mu > 0
+    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
+        rubbing = rubbing | (problem.mu_r > 0)
+        if rubbing.any():
+            return "the contacts roll with friction"
+    elif problem.spacedim == 3 and rubbing.any():
+        if problem.nc == 1:
+            return ""
+        return "of spatial contacts with friction only a single one is decided"
+    bits = problem.nc + int(rubbing.sum())
+    if 2**bits > MOST_STATES:
+        return f"there are 2^{bits} states of {problem.nc} contacts"
+    return ""
+
+
+def enumerate_solutions(problem: _solve.Problem, *, time_limit: float = 5.0) -> Enumeration:
+    """All solutions, by the states of the contacts, in exact arithmetic.
+
+    Args:
+        problem: planar with up to eight contacts, or without friction with up to sixteen; of any
+            formulation, with any W, R and M. Others are undecided, and the reason says why.
+        time_limit: [s] wall clock, after which what was found is returned as not complete.
+
+    Raises:
+        fclib.ProblemError: the data is not valid.
+    """
+    problem.validate()
+    if why := qualifies(problem):
+        return Enumeration((), why)
+    end = time.monotonic() + time_limit
+    try:
+        whole = _Whole(problem, end)
+    except LateError:
+        return Enumeration((), LATE)
+    if problem.spacedim == 3 and problem.nc == 1 and problem.mu[0] > 0:
+        return _single(whole)
+    return _Search(whole, end).run()
+
+
+def _single(whole: _Whole) -> Enumeration:
+    """Of one spatial contact with friction."""
+    problem = whole.problem
+    if not whole.plain:
+        return Enumeration((), "redundant joints act on the contact")
+    rows = whole.rows()
+    W = [[row.get(k, Fraction()) for k in range(3)] for row, *_ in rows]
+    q = [constant for _, constant, _ in rows]
+    speed = _speed(problem)
+    change = ROBUST * speed * max(moved for *_, moved in rows)
+    result = one_contact(W, q, whole.mu[0], change)
+    alone = not result.missing and all(one.velocity and one.reaction for one in result.points)
+    found = []
+    for one in result.points:
+        values = whole.elimination.complete(dict(enumerate((*one.u, *one.r))))
+        solution = whole.solution(values)
+        error = _core.merit(problem, solution).error
+        found.append(
+            SolutionSet(
+                (one.state,), solution, error, one.velocity, one.reaction, alone, one.u, one.r
+            )
+        )
+    return Enumeration(tuple(found), result.missing, result.robust, 1, 3, speed)
+
+
+class _Search:
+    """The search over the states of all contacts."""
+
+    def __init__(self, whole: _Whole, end: float) -> None:
+        self.problem, self.end = whole.problem, end
+        self.system = _System(whole)
+        self.counts = tuple(len(own) for own in self.system.states)
+        self.alive = np.ones(self.counts, dtype=bool)
+        self.robust = True
+        self.speed = _speed(self.problem)
+        self.leaves: list[tuple[tuple[int, ...], dict[int, Fraction], bool, bool]] = []
+        self.contact_of = np.full(self.system.count, -1)
+        for a, own in enumerate(self.system.states):
+            for state in own:
+                self.contact_of[list(state.columns)] = a
+
+    def run(self) -> Enumeration:
+        complete = True
+        if self.alive.size > FEW_STATES and self.system.whole.plain:
+            _refute(self.system, self.alive, ROBUST * self.speed, self.end)
+        table = Table(self.system.A, self.system.b, self.system.denominator)
+        try:
+            proof = table.feasible(self._allowed((None,) * self.problem.nc))
+            if proof is None:
+                self._visit(table, (None,) * self.problem.nc)
+            else:
+                self._weigh(proof)
+        except LateError:
+            complete = False
+        return self._result(complete)
+
+    def _visit(self, table: Table, states: tuple[int | None, ...]) -> None:
+        if time.monotonic() > self.end:
+            raise LateError
+        left = self.alive[tuple(slice(None) if s is None else s for s in states)]
+        if not left.any():
+            return
+        undecided = [a for a, s in enumerate(states) if s is None]
+        if not undecided:
+            self._leaf(table, states)
+            return
+        # the contact with the fewest states left
+        possible = [
+            left.any(axis=tuple(k for k in range(len(undecided)) if k != place))
+            for place in range(len(undecided))
+        ]
+        place = min(range(len(undecided)), key=lambda k: int(possible[k].sum()))
+        a = undecided[place]
+        for s in np.flatnonzero(possible[place]):
+            child = (*states[:a], int(s), *states[a + 1 :])
+            if not self.alive[tuple(slice(None) if t is None else t for t in child)].any():
+                continue
+            own = table.copy()
+            allowed = self._allowed(child)
+            proof = own.feasible(allowed)
+            if proof is not None:
+                self._weigh(proof)
+                self._kill(proof[:-1] <= 0)
+                continue
+            strict = self.system.states[a][s].strict
+            if strict is not None and (zero := own.positive(strict, allowed)) is not None:
+                self._kill(zero[:-1] >= 0, strict)
+                continue
+            self._visit(own, child)
+
+    def _allowed(self, states: tuple[int | None, ...]) -> Any:
+        allowed = self.contact_of >= 0
+        for a, s in enumerate(states):
+            if s is not None:
+                allowed[self.contact_of == a] = False
+                allowed[list(self.system.states[a][s].columns)] = True
+        return allowed
+
+    def _kill(self, fits: Any, strict: int | None = None) -> None:
+        """Refutes all states whose columns fit; with `strict`, those that want it positive."""
+        refuted: Any = np.ones((), dtype=bool)
+        for own in self.system.states:
+            held = [all(fits[k] for k in state.columns) for state in own]
+            if strict is not None and any(state.strict == strict for state in own):
+                held = [h and state.strict == strict for h, state in zip(held, own, strict=True)]
+            refuted = np.logical_and.outer(refuted, np.array(held))
+        self.alive &= ~refuted
+
+    def _weigh(self, proof: Any) -> None:
+        """Whether the proof stands where q and s change a little, in each component."""
+        moved = {k: abs(proof[k]) for k in range(len(self.system.parts), self.system.count)}
+        for k, of in self.system.speeds.items():
+            moved[-of - 1] = abs(proof[k])
+        change = Fraction(ROBUST * self.speed) * sum(moved.values())
+        self.robust = self.robust and proof[-1] > change
+
+    def _leaf(self, table: Table, states: Any) -> None:
+        """The solutions in a state of all contacts."""
+        allowed = self._allowed(states)
+        points = [table.point()]
+        for a, s in enumerate(states):
+            strict = self.system.states[a][s].strict
+            if strict is None or any(point.get(strict, 0) > 0 for point in points):
+                continue
+            if (zero := table.positive(strict, allowed)) is not None:
+                self._kill(zero[:-1] >= 0, strict)
+                return
+            points.append(table.point())
+        self.alive[states] = False
+        middle: dict[int, Fraction] = {}
+        for point in points:
+            for k, value in point.items():
+                middle[k] = middle.get(k, Fraction()) + value / len(points)
+        varies = self._varying(table, allowed)
+        self.leaves.append((states, middle, not varies[0], not varies[1]))
+
+    def _varying(self, table: Table, allowed: Any) -> tuple[bool, bool]:
+        """Whether u and r vary among the solutions in a state."""
+        result = [False, False]
+        m = self.problem.m
+        functionals: dict[int, Any] = {}
+        for k in np.flatnonzero(allowed):
+            for of, factor in self.system.parts[k]:
+                gain = functionals.setdefault(of, np.zeros(self.system.count, dtype=object))
+                gain[k] = 1 if factor > 0 else -1
+        # r_T of edges that are alike in size is mu times their difference
+        for of, gain in functionals.items():
+            part = int(of >= m)
+            if result[part] or table.free(allowed).size == 0:
+                continue
+            result[part] = table.rises(gain, allowed) or table.rises(-gain, allowed)
+        # u_T without friction follows from the others
+        images: dict[int, list[Fraction]] = {}
+        if self.system.whole.smooth and not result[0]:
+            for column, own in enumerate(self.system.parts):
+                moved = self.system.elimination.complete(dict(own), 0)
+                for of in self.system.whole.smooth:
+                    row = images.setdefault(of, [Fraction()] * self.system.count)
+                    row[column] = moved.get(of, Fraction())
+        for row in images.values():
+            gain = np.array(integers(row), dtype=object)
+            result[0] = result[0] or table.rises(gain, allowed) or table.rises(-gain, allowed)
+        return result[0] or self.system.whole.drifts, result[1]
+
+    def _result(self, complete: bool) -> Enumeration:
+        points = [self.system.exact(x) for _, x, _, _ in self.leaves]
+        lines = [leaf for leaf in self.leaves if not (leaf[2] and leaf[3])]
+        found = []
+        for (states, _, velocity, reaction), (whole, u, r) in zip(self.leaves, points, strict=True):
+            solution = self.system.whole.solution(whole)
+            alone = velocity and reaction and complete
+            alone = alone and not any(self._near(u, r, other) for other, *_ in lines)
+            found.append(
+                SolutionSet(
+                    tuple(self.system.states[a][s].name for a, s in enumerate(states)),
+                    solution,
+                    _core.merit(self.problem, solution).error,
+                    velocity,
+                    reaction,
+                    alone,
+                    u,
+                    r,
+                )
+            )
+        missing = "" if complete else LATE
+        robust = complete and self.robust
+        size = (self.problem.nc, self.alive.size)
+        return Enumeration(tuple(found), missing, robust, *size, self.speed)
+
+    def _near(self, u: Numbers, r: Numbers, states: Any) -> bool:
+        """Whether a point is in the closure of a state."""
+        d = self.problem.spacedim
+        for a, s in enumerate(states):
+            name = self.system.states[a][s].name
+            N, T = d * a, d * a + 1
+            if name == "open":
+                held = not any(r[N : N + d]) and u[N] >= 0
+            elif name == "closed":
+                held = u[N] == 0
+            else:
+                held = u[N] == 0
+                if name == "stick":
+                    held = held and u[T] == 0
+                else:
+                    sign = 1 if name == "slide +" else -1
+                    held = (
+                        held and sign * u[T] >= 0 and r[T] == -sign * self.system.whole.mu[a] * r[N]
+                    )
+            if not held:
+                return False
+        return True
+
+
+def _speed(problem: _solve.Problem) -> float:
+    """||(q, s)||, of a global problem of its local form."""
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        problem = problem.condense()
+    return float(np.linalg.norm([*problem.q, *(() if problem.s is None else problem.s)]))
+
+
+def _refute(system: _System, alive: Any, change: float, end: float) -> None:
+    """Refutes states in doubles, beyond all rounding and a change of each q and s.
+
+    Of a state the system B x = -q of what is not zero has an approximate inverse Y. Where
+    e = ||I - Y B||_inf < 1, B is regular and x is within |Y| rho + e / (1 - e) max(|Y| rho) of any
+    x', rho the residual of x' (Rump 2010, "Verification methods: rigorous results using
+    floating-point arithmetic", section 10).
+    """
+    G, q, moved, names = system.plain_form()
+    if not (np.isfinite(G).all() and np.isfinite(q).all()):
+        return
+    changes = change * moved
+    # rows and columns of like sizes, by powers of two: nothing is rounded
+    rows, cols = np.ones(len(q)), np.ones(G.shape[1])
+    for _ in range(4):
+        scaled = abs(G) * rows[:, None] * cols
+        rows /= np.sqrt(np.where((top := scaled.max(axis=1, initial=0)) > 0, top, 1.0))
+        cols /= np.sqrt(np.where((top := scaled.max(axis=0, initial=0)) > 0, top, 1.0))
+    rows, cols = (np.exp2(np.round(np.log2(factor))) for factor in (rows, cols))
+    G, q, changes = G * rows[:, None] * cols, q * rows, changes * rows
+    G_size, q_size = abs(G), abs(q)
+    unit = 2 * EPS * (2 * max(G.shape) + 4)  # of sums of products, entries being rounded too
+
+    numbers = np.argwhere(alive)
+    used, held, sign = (
+        np.concatenate([table[numbers[:, a]] for a, table in enumerate(tables)], axis=1)
+        for tables in names
+    )
+    sizes = used.sum(axis=1)
+    for size in np.unique(sizes):
+        group = np.flatnonzero(sizes == size)
+        for batch in np.array_split(group, -(-group.size // BATCH)):
+            if time.monotonic() > end:
+                return
+            i = np.nonzero(held[batch])[1].reshape(batch.size, size)
+            j = np.nonzero(used[batch])[1].reshape(batch.size, size)
+            B = G[i[:, :, None], j[:, None, :]]
+            try:
+                # any Y will do: this one is there for exactly singular systems too
+                Y = np.linalg.inv(B + 1e-14 * np.diag(np.linspace(0.5, 1, size)))
+            except np.linalg.LinAlgError:
+                continue
+            with np.errstate(over="ignore", invalid="ignore"):
+                B_size, Y_size = abs(B), abs(Y)
+                off = abs(np.eye(size) - Y @ B) + unit * (Y_size @ B_size + np.eye(size))
+                e = 1.001 * off.sum(axis=2).max(axis=1, initial=0)
+                x = -(Y @ q[i][:, :, None])[:, :, 0]
+                rho = abs((B @ x[:, :, None])[:, :, 0] + q[i]) + changes[i]
+                rho += unit * ((B_size @ abs(x)[:, :, None])[:, :, 0] + q_size[i])
+                error = 1.001 * (Y_size @ rho[:, :, None])[:, :, 0]
+                error += (1.001 * e / (1 - e) * error.max(axis=1, initial=0))[:, None]
+                whole, wide = np.zeros((2, batch.size, G.shape[1]))
+                np.put_along_axis(whole, j, x, axis=1)
+                np.put_along_axis(wide, j, error, axis=1)
+                u = whole @ G.T + q
+                wide_u = wide @ G_size.T + unit * (abs(whole) @ G_size.T + q_size) + changes
+                beyond = (x + error < 0).any(axis=1)
+                beyond |= (sign[batch] * u + 1.001 * wide_u < 0).any(axis=1)
+                refuted = beyond & (e < 0.5) & np.isfinite(error).all(axis=1)
+            alive[tuple(numbers[batch[refuted]].T)] = False

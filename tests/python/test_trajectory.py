@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +65,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def installed(store: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def installed(store: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """That package as the one that is found."""
     monkeypatch.setattr(published, "IN_PLACE", store)
     return store
@@ -79,7 +78,7 @@ def plan(**settings: Any) -> Plan:
 
 # ---- states and files
 
-MADE = {
+MADE: dict[str, dict[str, Any]] = {
     "BoxesStack": {"boxes": 3, "gap": 2e-3, "time_step": 5e-3},
     "CubesH8x2": {},  # elastic
     "Walker": {},  # with a gait, and bilateral constraints
@@ -387,7 +386,7 @@ STORED = sorted(
 )
 LIMIT = 25e6  # bytes, of all that is stored in the repository
 # of RT-0444, page by page: degrees of freedom, contacts; and the smallest thickness of a body
-RANGES = {
+RANGES: dict[str, Any] = {
     "BoxesStack": ((6, 300), (1, 200), lambda p: p["size"]),
     "Capsules": ((6, 600), (1, 300), lambda p: 2 * p["radius"]),
     "Chain": ((48, 60), (8, 28), lambda p: p["thickness"]),

@@ -322,7 +322,7 @@ def test_positions_are_those_of_the_simulation() -> None:
     """Capsules that fall into a box: two that touch are apart as they are there."""
     from fclib import scenes, simulate
 
-    scene = scenes.get("Capsules")(capsules=40).scene(seed=0)
+    scene = scenes.get("Capsules")(capsules=40, width=16.0).scene(seed=0)
     step = next(s for s in simulate.simulate(scene, 600) if s.problem.nc > 20)
     network = network_of(step.problem)
     assert network.placed

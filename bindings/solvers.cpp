@@ -156,15 +156,19 @@ void bind_solvers(nb::module_& m) {
   bind_python_solvers(m);
 
   nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
-      .def_prop_ro("name", [](const Stage& s) { return std::string(s.name); })
+      .def_prop_ro("name", [](const Stage& s) { return std::string(s.kind.name); })
+      .def_prop_ro(
+          "families", [](const Stage& s) { return std::string(s.kind.families); },
+          "of solvers whose methods it uses, separated by ', '")
       .def_ro("calls", &Stage::calls, "how often it was entered: once for each island in need")
       .def_ro("solved", &Stage::solved, "of these, how many it brought to the tolerance")
       .def_ro("iterations", &Stage::iterations)
       .def_ro("factorisations", &Stage::factorisations)
       .def_ro("time", &Stage::time, "[s] wall clock")
       .def("__repr__", [](const Stage& s) {
-        return "<Stage " + std::string(s.name) + ": solved " + std::to_string(s.solved) + " of " +
-               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
+        return "<Stage " + std::string(s.kind.name) + ": solved " + std::to_string(s.solved) +
+               " of " + std::to_string(s.calls) + ", " + std::to_string(s.iterations) +
+               " iterations>";
       });
   nb::class_<Result>(m, "Result", "What fclib.solve returns.")
       .def_ro("solution", &Result::solution)

@@ -127,9 +127,15 @@ class Monitor {
   double last_poll_;
 };
 
+/// A method that is a stage of solvers that chain others.
+struct StageKind {
+  std::string_view name;
+  std::string_view families;  ///< of solvers whose methods it uses, separated by ", "
+};
+
 /// A part of a solve, by a method of its own.
 struct Stage {
-  std::string_view name;
+  StageKind kind;
   std::int64_t calls = 0;   ///< how often it was entered: once for each island that needed it
   std::int64_t solved = 0;  ///< ... and brought it to the tolerance
   std::int64_t iterations = 0;

@@ -92,18 +92,20 @@ struct Options {
 
 /// The names of the stages, as results and histories have them.
 namespace stages {
-constexpr std::string_view gauss_seidel = "gauss-seidel";
-constexpr std::string_view conjugate_gradients = "conjugate gradients";
-constexpr std::string_view newton_from_guess = "newton from the guess";
-constexpr std::string_view proximal_newton = "proximal newton";
-constexpr std::string_view interior_point = "interior point";
-constexpr std::string_view interior_point_short = "interior point, shorter steps";
-constexpr std::string_view interior_point_smoothed = "interior point, smoothed";
-constexpr std::string_view associated = "associated";
-constexpr std::string_view semismooth_newton = "semismooth newton";
-constexpr std::string_view no_solution = "no solution?";
-constexpr std::string_view proximal_point = "proximal point";
-constexpr std::string_view homotopy = "homotopy";
+// what it reaches is polished by the proximal point
+constexpr std::string_view polished = "interior point, newton, proximal point";
+constexpr StageKind gauss_seidel{"gauss-seidel", "splitting"};
+constexpr StageKind conjugate_gradients{"conjugate gradients", "krylov"};
+constexpr StageKind newton_from_guess{"newton from the guess", "newton"};
+constexpr StageKind proximal_newton{"proximal newton", "newton, proximal point"};
+constexpr StageKind interior_point{"interior point", polished};
+constexpr StageKind interior_point_short{"interior point, shorter steps", polished};
+constexpr StageKind interior_point_smoothed{"interior point, smoothed", polished};
+constexpr StageKind associated{"associated", polished};
+constexpr StageKind semismooth_newton{"semismooth newton", "newton"};
+constexpr StageKind no_solution{"no solution?", "newton, proximal point"};
+constexpr StageKind proximal_point{"proximal point", "newton, proximal point"};
+constexpr StageKind homotopy{"homotopy", polished};
 }  // namespace stages
 
 /// Up to here the error is evaluated often: a few sweeps may do, and cost no more than it.
@@ -190,11 +192,11 @@ class Tracker {
   [[nodiscard]] std::int64_t left() const { return monitor_.max_iterations() - iterations_; }
 
   template <class F>
-  void stage(std::string_view name, const F& run) {
+  void stage(const StageKind& kind, const F& run) {
     auto at = std::find_if(stages_.begin(), stages_.end(),
-                           [&](const Stage& stage) { return stage.name == name; });
-    if (at == stages_.end()) at = stages_.insert(stages_.end(), Stage{.name = name});
-    monitor_.enter(name);
+                           [&](const Stage& stage) { return stage.kind.name == kind.name; });
+    if (at == stages_.end()) at = stages_.insert(stages_.end(), Stage{.kind = kind});
+    monitor_.enter(kind.name);
     const auto place = at - stages_.begin();  // stages may be entered one inside another
     const auto start = std::chrono::steady_clock::now();
     const auto before = iterations_;
@@ -280,8 +282,8 @@ class Island {
   }
 
   template <class F>
-  void stage(std::string_view name, const F& run) {
-    tracker_.stage(name, [&] {
+  void stage(const StageKind& kind, const F& run) {
+    tracker_.stage(kind, [&] {
       const auto before = system_ ? system_->factorisations() : 0;
       const double cpu = system_ ? system_->others_cpu() : 0;
       run();
@@ -542,10 +544,10 @@ class Island {
   }
 
   /// Always on the contacts.
-  void semismooth_newton(std::string_view name, ContactFunctionKind function,
+  void semismooth_newton(const StageKind& kind, ContactFunctionKind function,
                          const NewtonRules& rules, Vector r, std::int64_t left,
                          double most = std::numeric_limits<double>::infinity()) {
-    tracker_.stage(name, [&] {
+    tracker_.stage(kind, [&] {
       SemismoothNewton<Cone> newton(problem_, function, static_cast<int>(options_.threads));
       if (std::isfinite(most) && newton.system().flops() > most * system().flops())
         return std::pair(std::int64_t{0}, false);

@@ -27,14 +27,6 @@ CONFIRMED = 1e2  # the confirming error may be this many times the target
 AGREE = 1e-8  # distance of the velocities, relative to max(||u||, ||q||)
 DIGITS = 3  # of the reactions that a second try starts from
 
-# what runs inside the default solver, in the families of the others
-STAGES = {
-    "gauss-seidel": {"splitting"},
-    "conjugate gradients": {"krylov"},
-    "proximal newton": {"newton", "proximal point"},
-    "proximal point": {"newton", "proximal point"},
-}
-INTERIOR = {"interior point", "newton", "proximal point"}  # each polishes by proximal Newton
 FIRST = ("auto", "nsn-jm", "nsn-ac", "ppa-nsn", "admm", "nsgs", "apgd")
 SECOND = ("nsn-jm", "nsn-ac", "admm", "apgd", "aclm", "nsgs", "fp-eg-upk", "ppa-nsgs")
 
@@ -227,9 +219,9 @@ def _families(result: _core.Result) -> tuple[str, ...]:
         return (_registry.find_solver(result.solver).family,)
     found: set[str] = set()
     for stage in result.stages:
-        # gauss-seidel comes first in nearly every chain: it counts where it ended the work
-        if stage.solved or stage.name != "gauss-seidel":
-            found |= STAGES.get(stage.name, INTERIOR)
+        # sweeps come first in nearly every chain: they count where they ended the work
+        if stage.solved or stage.families != "splitting":
+            found |= set(stage.families.split(", "))
     return tuple(sorted(found)) or ("none",)
 
 

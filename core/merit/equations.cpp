@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 namespace fclib {
@@ -128,6 +129,42 @@ RealVector diagonal(const Matrix& a) {
   return result;
 }
 
+/// The part of a matrix that each row is coupled to, named by its first row.
+std::vector<Index> coupled_parts(const Matrix& a) {
+  std::vector<Index> part(static_cast<std::size_t>(a.rows));
+  std::iota(part.begin(), part.end(), Index{0});
+  const auto first = [&](Index row) {
+    while (part[static_cast<std::size_t>(row)] != row) {
+      Index& next = part[static_cast<std::size_t>(row)];
+      row = next = part[static_cast<std::size_t>(next)];
+    }
+    return row;
+  };
+  for_each_entry(a, [&](Index row, Index col, double) {
+    const Index one = first(row);
+    const Index other = first(col);
+    part[static_cast<std::size_t>(std::max(one, other))] = std::min(one, other);
+  });
+  for (Index row = 0; row < a.rows; ++row) part[static_cast<std::size_t>(row)] = first(row);
+  return part;
+}
+
+/// What M v adds up, where v comes from the factors of M: |L| |L^T v| of M = L L^T, at most
+/// sqrt(M_ii) || sqrt(M_jj) v_j || over the part of M that i is coupled to. In its own row |M| |v|
+/// may be next to nothing, as at the joints of a robot in free flight.
+RealVector momentum_sizes(const Matrix& mass, const std::vector<Index>& part, const RealVector& v) {
+  const RealVector inertia = diagonal(mass).cwiseAbs();
+  RealVector squares = RealVector::Zero(v.size());
+  for (Eigen::Index k = 0; k < v.size(); ++k) {
+    squares[part[static_cast<std::size_t>(k)]] += inertia[k] * v[k] * v[k];
+  }
+  RealVector result = sizes(mass, v);
+  for (Eigen::Index k = 0; k < v.size(); ++k) {
+    result[k] += std::sqrt(inertia[k] * squares[part[static_cast<std::size_t>(k)]]);
+  }
+  return result;
+}
+
 /// The mean of each d components.
 RealVector mean_of_contacts(const RealVector& x, Index d) {
   RealVector result = RealVector::Zero(x.size() / d);
@@ -190,7 +227,9 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
   OwnSizes result;
   result.free = solved(mass, problem.f.cast<Real>());
   const RealVector& free = result.free;
-  RealVector impulse = sizes(problem.M, free) + problem.f.cast<Real>().cwiseAbs();
+  result.part = coupled_parts(problem.M);
+  RealVector impulse =
+      momentum_sizes(problem.M, result.part, free) + problem.f.cast<Real>().cwiseAbs();
   if (is_mixed(problem)) {
     const RealVector velocity =
         sizes_transposed(problem.G, free) + problem.b.cast<Real>().cwiseAbs();
@@ -268,7 +307,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   const bool given_v = solution.v.size() > 0;
   const RealVector v =
       given_v ? RealVector(solution.v.cast<Real>()) : solved_precisely(problem, mass, momentum);
-  terms += sizes(problem.M, v);
+  terms += momentum_sizes(problem.M, own.part, v);
   const RealVector fastest = largest(v, free);
   if (given_v) {
     const RealVector residual = product(problem.M, v) - momentum;

@@ -64,12 +64,15 @@ Vector selected(const Vector& a, const std::vector<Index>& places) {
 
 SparseColumns transposed(const SparseColumns& a) { return a.transpose(); }
 
-/// Throws where a constraint that follows from others differs from them by more than rounding.
-void require_agreement(const std::vector<Index>& dropped, const Vector& gap, const Vector& size) {
+/// Throws where a constraint that follows from others differs from them by more than rounding: by
+/// more than a part of its terms, of which the first `rounding` [m/s] does not count.
+void require_agreement(const std::vector<Index>& dropped, const Vector& gap, const Vector& size,
+                       double rounding = 0) {
   Eigen::Index worst = -1;
   double most = agreement;
   for (Eigen::Index k = 0; k < gap.size(); ++k) {
-    const double relative = std::abs(gap[k]) / (size[k] > 0 ? size[k] : 1.0);
+    const double left = std::max(0.0, std::abs(gap[k]) - rounding);
+    const double relative = left / (size[k] > 0 ? size[k] : 1.0);
     if (!(relative <= most)) {
       most = relative;
       worst = k;
@@ -78,8 +81,7 @@ void require_agreement(const std::vector<Index>& dropped, const Vector& gap, con
   if (worst < 0) return;
   throw Error(ErrorKind::unsuitable,
               "contradicts the others, from which it follows: where they hold it is off by " +
-                  std::to_string(std::abs(gap[worst])) + ", " + std::to_string(most) +
-                  " of its terms",
+                  detail::shortest(std::abs(gap[worst])) + ", " + detail::shortest(most) + " of its terms",
               "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }
 
@@ -134,15 +136,16 @@ bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation
   const Vector beta = triangle.transpose().solve(selected(b, basis.columns.kept));
   const Vector dropped = selected(b, basis.columns.dropped);
   const Vector size = dropped.cwiseAbs() + basis.T2.cwiseAbs().transpose() * beta.cwiseAbs();
-  // where b is rounding, it is that of velocities
   const Vector free = *mass.half(SparseColumns(bodies.f.sparseView()));
-  require_agreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta,
-                    size.array() + std::numeric_limits<double>::epsilon() * free.norm());
-
   Vector free_rows(count);
   for (Eigen::Index k = 0; k < count; ++k) {
     free_rows[k] = free[basis.rows[static_cast<std::size_t>(k)]];
   }
+  // no velocity holds a constraint better than this, the columns having length one
+  constexpr double rounding_unit = 32 * std::numeric_limits<double>::epsilon();
+  require_agreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta, size,
+                    rounding_unit * free_rows.norm());
+
   s_ = basis.Q.transpose() * free_rows + beta;
   // V' by rows of Q; what is rounding of a contact's row would couple what is apart
   std::vector<Index> place(static_cast<std::size_t>(a->rows()), -1);
@@ -239,8 +242,19 @@ void Elimination::reduce() {
   w.prune([&](Eigen::Index row, Eigen::Index col, double value) {
     return std::abs(value) > rounding * size.coeff(row, col);
   });
+  const Vector impulse = bilateral_ ? bilateral_->solve(s_) : s_;
+  plain_.q = problem_.q - v_ * impulse;
+  // and so is the row of such a component, W' being semidefinite, and its velocity
+  const Vector free = full.diagonal();
+  const Vector left = w.diagonal();
+  const auto is_held = [&](Eigen::Index k) { return left[k] == 0 && free[k] != 0; };
+  w.prune(
+      [&](Eigen::Index row, Eigen::Index col, double) { return !is_held(row) && !is_held(col); });
+  const Vector terms = problem_.q.cwiseAbs() + v_.cwiseAbs() * impulse.cwiseAbs();
+  for (Eigen::Index k = 0; k < left.size(); ++k) {
+    if (is_held(k) && std::abs(plain_.q[k]) <= rounding * terms[k]) plain_.q[k] = 0;
+  }
   plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
-  plain_.q = problem_.q - v_ * (bilateral_ ? bilateral_->solve(s_) : s_);
 }
 
 Vector Elimination::multipliers(const Vector& velocity) const {

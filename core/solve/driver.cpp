@@ -75,16 +75,15 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return result;
     }
   }
-  const ReducedProblem reduced{
-      .W = BlockMatrix(plain.W, plain.spacedim),
-      .q = plain.q,
-      .friction = friction,
-      .scale = Measure::scale(measure.q, measure.rounding),
-      .rho = measure.rho,
-      .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
-      .primal = primal,
-      .deadline = &request.deadline,
-      .proves_no_solution = &proves};
+  ReducedProblem reduced{.W = BlockMatrix(plain.W, plain.spacedim),
+                         .q = plain.q,
+                         .friction = friction,
+                         .scale = Measure::scale(measure.q, measure.rounding),
+                         .rho = measure.rho,
+                         .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
+                         .primal = primal,
+                         .deadline = &request.deadline,
+                         .proves_no_solution = &proves};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
@@ -137,6 +136,10 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
                                                  : Status::inaccurate;
     if (correction == max_corrections || result.status != Status::inaccurate) return result;
     settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
+    // the velocity is that of the problem as it was given: what conversions lost of it goes into q
+    Vector u;
+    reduced.velocity(r, u);
+    reduced.q += result.solution.u - u;
   }
 }
 

@@ -136,3 +136,56 @@ def test_constraints_of_many_loops_are_solved() -> None:
     lam = result.solution.l
     assert lam is not None
     assert lam[:40] == pytest.approx(lam[40:], rel=1e-9, abs=1e-12)
+
+
+def held_contact(seed: int) -> fclib.GlobalProblem:
+    """A contact that the joints hold in all its directions beside one that they do not."""
+    rng = np.random.default_rng(seed)
+    n, p = 12, 5
+    root = rng.standard_normal((n, n))
+    G = rng.standard_normal((n, p))
+    turn = rng.standard_normal((p, 3))
+    H = np.hstack([G @ turn, rng.standard_normal((n, 3))])
+    b = rng.standard_normal(p)
+    # u = turn^T G^T v + w = 0 of the first
+    w = np.concatenate([turn.T @ b, np.zeros(3)])
+    return fclib.GlobalProblem(
+        spacedim=3, M=root @ root.T + np.eye(n), H=H, f=10 * rng.standard_normal(n), w=w,
+        mu=np.full(2, 0.5), G=G, b=b,
+    )  # fmt: skip
+
+
+def test_a_contact_that_joints_hold_is_not_moved_by_rounding() -> None:
+    for seed in range(30):
+        problem = held_contact(seed)
+        plain = problem.condense().eliminate()
+        assert not dense(plain.W)[:3].any(), seed
+        assert not dense(plain.W)[:, :3].any(), seed
+        assert not plain.q[:3].any(), seed
+        result = fclib.solve(problem)
+        assert result.status == "converged", (seed, result.status, result.error)
+
+
+def test_constraints_that_differ_by_the_rounding_of_velocities_do_not_contradict() -> None:
+    for seed in range(10):
+        problem = planted_global(seed, p=2).problem
+        G = dense(problem.G)
+        twice = problem.replace(G=np.hstack([G, G]), b=np.array([0.0, 0.0, 3e-17, -3e-17]))
+        assert fclib.solve(twice).status != "infeasible"
+        with pytest.raises(fclib.UnsuitableError, match="contradicts the others"):
+            fclib.solve(problem.replace(G=np.hstack([G, G]), b=np.array([0.0, 0.0, 1e-9, -1e-9])))
+
+
+def test_what_conversions_lose_to_rounding_is_put_right() -> None:
+    """Nearly parallel constraints that disagree: fast bodies, of which the contacts see little."""
+    for seed in range(20):
+        problem: Any = planted_global(seed, p=2).problem
+        rng = np.random.default_rng(seed)
+        G = dense(problem.G).copy()
+        G[:, 1] = G[:, 0] + 1e-7 * rng.standard_normal(len(G))
+        b = problem.b.copy()
+        b[1] = b[0] + 1e-4 * rng.standard_normal()
+        hard = problem.replace(G=G, b=b)
+        result = fclib.solve(hard)
+        assert result.status == "converged", (seed, result.status, result.error)
+        assert judge(hard, result.solution).error <= 1e-8

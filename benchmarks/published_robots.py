@@ -178,7 +178,9 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
-    print(f"{'problems':>9}{'solved':>8}{'proven':>8}{'stalled':>8}{'others':>8}{'max s':>8}  model")
+    print(
+        f"{'problems':>9}{'solved':>8}{'proven':>8}{'stalled':>8}{'others':>8}{'max s':>8}  model"
+    )
     sums: dict[str, Tally] = {}
     models: Counter[str] = Counter()
     refused: Counter[str] = Counter()

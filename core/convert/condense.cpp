@@ -1,10 +1,15 @@
 #include "convert/condense.hpp"
 
+#include <limits>
+#include <optional>
+
 namespace fclib {
 
 Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadline)
     : problem_(problem), mass_(to_eigen(problem.M), "M") {
-  if (deadline != nullptr && deadline->passed()) return;
+  const Deadline never(std::numeric_limits<double>::infinity());
+  if (deadline == nullptr) deadline = &never;
+  if (deadline->passed()) return;
   local_.spacedim = problem.spacedim;
   local_.mu = problem.mu;
   local_.info = problem.info;
@@ -24,7 +29,9 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
   both.reserve(h.nonZeros() + g.nonZeros());
   both.leftCols(m) = h;
   both.rightCols(p) = g;
-  const SparseColumns gram = mass_.gram(both);
+  const std::optional<SparseColumns> product = mass_.gram(both, *deadline);
+  if (!product) return;
+  const SparseColumns& gram = *product;
   local_.W = store(SparseColumns(SparseColumns(gram.leftCols(m)).topRows(m)));
   if (is_mixed(problem)) {
     const SparseColumns right = gram.rightCols(p);

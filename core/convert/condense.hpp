@@ -14,8 +14,8 @@ class Condensation {
  public:
   /// Throws Error (unsuitable) where M is singular, or symmetric and not positive definite.
   ///
-  /// What is left after the factorisation of M is not done where the deadline has passed:
-  /// finished() says so, and local() is empty then.
+  /// After the factorisation of M nothing is done once the deadline has passed: finished() says so,
+  /// and local() is no problem then.
   explicit Condensation(const GlobalProblem& problem, const Deadline* deadline = nullptr);
 
   [[nodiscard]] bool finished() const { return finished_; }

@@ -81,7 +81,8 @@ void require_agreement(const std::vector<Index>& dropped, const Vector& gap, con
   if (worst < 0) return;
   throw Error(ErrorKind::unsuitable,
               "contradicts the others, from which it follows: where they hold it is off by " +
-                  detail::shortest(std::abs(gap[worst])) + ", " + detail::shortest(most) + " of its terms",
+                  detail::shortest(std::abs(gap[worst])) + ", " + detail::shortest(most) +
+                  " of its terms",
               "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }
 
@@ -108,6 +109,8 @@ Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodie
   } catch (const Error&) {
     bilateral_.reset();
   }
+  const auto too_late = [&] { return deadline != nullptr && deadline->passed(); };
+  if (too_late()) return;
   if (!bilateral_ || condition(*bilateral_, r) > ill_conditioned) {
     Vector size = problem.s.cwiseAbs();
     if (bodies != nullptr) {  // s is a sum of these
@@ -118,7 +121,7 @@ Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodie
                          leave_out_redundant(r, size);
     if (!changed && !bilateral_) throw Error(ErrorKind::unsuitable, "R is singular");
   }
-  if (deadline != nullptr && deadline->passed()) return;
+  if (too_late()) return;
   reduce();
   finished_ = true;
 }

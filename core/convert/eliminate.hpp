@@ -26,7 +26,7 @@ class Elimination {
   /// Throws Error (unsuitable) where R is singular though no constraint follows from the others,
   /// and where one that follows contradicts them; the message names it.
   ///
-  /// What is left after the factorisation of R is not done where the deadline has passed:
+  /// The deadline is looked at after each factorisation, and nothing is done once it has passed:
   /// finished() says so, and plain() is empty then.
   explicit Elimination(const LocalProblem& problem, const Deadline* deadline = nullptr);
   /// Of condensation.local().

@@ -5,6 +5,7 @@
 #include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "error.hpp"
 
@@ -17,6 +18,30 @@ constexpr Eigen::Index large = 1000;
 constexpr Eigen::Index mesh_entries = 20;
 /// ... and used where an LU factorisation would take so many multiplications.
 constexpr double supernodal_flops = 1e8;
+
+/// After so many columns of a product one looks at the clock.
+constexpr Index columns_at_once = 64;
+
+const Deadline never(std::numeric_limits<double>::infinity());
+
+/// A B, column by column; nothing where the deadline passes.
+std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns& b,
+                                     const Deadline& deadline) {
+  SparseColumns result(a.rows(), b.cols());
+  for (Eigen::Index col = 0; col < b.cols(); col += columns_at_once) {
+    if (deadline.passed()) return std::nullopt;
+    const Eigen::Index count = std::min<Eigen::Index>(columns_at_once, b.cols() - col);
+    const SparseColumns part = a * SparseColumns(b.middleCols(col, count));
+    for (Eigen::Index k = 0; k < count; ++k) {
+      result.startVec(col + k);
+      for (SparseColumns::InnerIterator at(part, k); at; ++at) {
+        result.insertBack(at.row(), col + k) = at.value();
+      }
+    }
+  }
+  result.finalize();
+  return result;
+}
 
 bool is_symmetric(const SparseColumns& a) {
   const SparseColumns transposed = a.transpose();
@@ -93,16 +118,19 @@ SparseColumns Factorization::solve(const SparseColumns& b) const {
   return b;
 }
 
-SparseColumns Factorization::gram(const SparseColumns& b) const {
-  if (supernodal_) return supernodal_->gram(b);
-  if (lu_) return b.transpose() * solve(b);
-  const SparseColumns y = half_solve(b);
-  return y.transpose() * y;
+SparseColumns Factorization::gram(const SparseColumns& b) const { return *gram(b, never); }
+
+std::optional<SparseColumns> Factorization::gram(const SparseColumns& b,
+                                                 const Deadline& deadline) const {
+  if (supernodal_) return supernodal_->gram(b, deadline);
+  const auto right = lu_ ? std::optional(solve(b)) : half_solve(b, deadline);
+  if (!right) return std::nullopt;
+  return product(SparseColumns((lu_ ? b : *right).transpose()), *right, deadline);
 }
 
 Vector Factorization::gram_diagonal(const SparseColumns& b) const {
   if (supernodal_) return supernodal_->gram_diagonal(b);
-  const SparseColumns x = lu_ ? lu_->solve(b) : half_solve(b);
+  const SparseColumns x = lu_ ? lu_->solve(b) : *half_solve(b, never);
   Vector result(b.cols());
   for (Eigen::Index col = 0; col < b.cols(); ++col) {
     result[col] = lu_ ? b.col(col).dot(x.col(col)) : x.col(col).squaredNorm();
@@ -112,10 +140,11 @@ Vector Factorization::gram_diagonal(const SparseColumns& b) const {
 
 std::optional<SparseColumns> Factorization::half(const SparseColumns& b) const {
   if (!cholesky_) return std::nullopt;
-  return half_solve(b);
+  return half_solve(b, never);
 }
 
-SparseColumns Factorization::half_solve(const SparseColumns& b) const {
+std::optional<SparseColumns> Factorization::half_solve(const SparseColumns& b,
+                                                       const Deadline& deadline) const {
   if (!cholesky_) return b;
   const SparseColumns& lower = cholesky_->matrixL().nestedExpression();
   const SparseColumns permuted = cholesky_->permutationP() * b;
@@ -140,6 +169,7 @@ SparseColumns Factorization::half_solve(const SparseColumns& b) const {
   SparseColumns result(b.rows(), b.cols());
   result.reserve(permuted.nonZeros());
   for (Index col = 0; col < static_cast<Index>(b.cols()); ++col) {
+    if (col % columns_at_once == 0 && deadline.passed()) return std::nullopt;
     reach.clear();
     for (SparseColumns::InnerIterator entry(permuted, col); entry; ++entry) {
       work[static_cast<std::size_t>(entry.row())] = entry.value();

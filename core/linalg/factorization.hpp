@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "deadline.hpp"
 #include "linalg/matrix.hpp"
 #include "linalg/multifrontal_cholesky.hpp"
 
@@ -30,7 +31,9 @@ class Factorization {
   /// A^-1 B.
   [[nodiscard]] SparseColumns solve(const SparseColumns& b) const;
 
-  /// B^T A^-1 B; symmetric to the last bit where A is.
+  /// B^T A^-1 B; symmetric to the last bit where A is. Nothing where `deadline` passes on the way.
+  [[nodiscard]] std::optional<SparseColumns> gram(const SparseColumns& b,
+                                                  const Deadline& deadline) const;
   [[nodiscard]] SparseColumns gram(const SparseColumns& b) const;
   /// Its diagonal.
   [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
@@ -45,7 +48,8 @@ class Factorization {
 
   /// Y = L^-1 P B, so that B^T A^-1 B = Y^T Y, of the simplicial factors. Costs the non-zeros it
   /// makes, not n times the columns: bodies that do not touch stay apart.
-  [[nodiscard]] SparseColumns half_solve(const SparseColumns& b) const;
+  [[nodiscard]] std::optional<SparseColumns> half_solve(const SparseColumns& b,
+                                                        const Deadline& deadline) const;
 
   std::unique_ptr<Cholesky> cholesky_;                // of bodies, each with its own small block
   std::unique_ptr<MultifrontalCholesky> supernodal_;  // of meshes

@@ -1,8 +1,33 @@
 #include "linalg/multifrontal_cholesky.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace fclib {
+
+namespace {
+
+/// After so many columns of a product one looks at the clock.
+constexpr Eigen::Index columns_at_once = 256;
+
+/// sum += y^T y, the lower triangle; false where the deadline passes on the way.
+bool add_gram(Eigen::MatrixXd& sum, const Eigen::Ref<const Eigen::MatrixXd>& y,
+              const Deadline& deadline) {
+  const Eigen::Index size = y.cols();
+  for (Eigen::Index col = 0; col < size; col += columns_at_once) {
+    if (col > 0 && deadline.passed()) return false;
+    const Eigen::Index count = std::min(columns_at_once, size - col);
+    const Eigen::Index below = size - col - count;
+    const auto some = y.middleCols(col, count);
+    sum.block(col, col, count, count).selfadjointView<Eigen::Lower>().rankUpdate(some.transpose());
+    if (below > 0) {
+      sum.block(col + count, col, below, count).noalias() += y.rightCols(below).transpose() * some;
+    }
+  }
+  return true;
+}
+
+}  // namespace
 
 BlockPattern MultifrontalCholesky::symmetric_pattern(const SparseColumns& a) {
   BlockPattern pattern;
@@ -104,9 +129,12 @@ std::vector<Index> MultifrontalCholesky::roots() const {
 }
 
 /// Y = L^-1 P B, front by front: visit(front, columns, rows of Y at its pivots), where only the
-/// columns of B that reach the front are there, in ascending order.
+/// columns of B that reach the front are there, in ascending order. False where the visitor says so
+/// or where the deadline has passed, which is looked at for every front and every `columns_at_once`
+/// of its columns.
 template <class Visit>
-void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) const {
+bool MultifrontalCholesky::forward(const SparseColumns& b, const Deadline& deadline,
+                                   const Visit& visit) const {
   struct Part {  // of B, updated, at the rows below a front's pivots
     std::vector<Index> columns;
     Dense values;
@@ -118,6 +146,7 @@ void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) c
   std::vector<Index> place(static_cast<std::size_t>(b.cols()));
   Dense work;
   for (std::size_t f = 0; f < factors_.size(); ++f) {
+    if (deadline.passed()) return false;
     const Front& front = symbolic_.fronts[f];
     const Index k = front.pivots;
     const Index u = front.size - k;
@@ -149,17 +178,24 @@ void MultifrontalCholesky::forward(const SparseColumns& b, const Visit& visit) c
       part = {};
     }
     auto y = work.topRows(k);
-    factors_[f].diagonal.triangularView<Eigen::Lower>().solveInPlace(y);
+    const Eigen::Index count = y.cols();
+    for (Eigen::Index col = 0; col < count; col += columns_at_once) {
+      if (col > 0 && deadline.passed()) return false;
+      auto some = y.middleCols(col, std::min(columns_at_once, count - col));
+      factors_[f].diagonal.triangularView<Eigen::Lower>().solveInPlace(some);
+    }
     if (u > 0) {
       parts[f].values = work.bottomRows(u);
       parts[f].values.noalias() -= factors_[f].lower * y;
     }
-    visit(f, columns, y);
+    if (!visit(f, columns, y)) return false;
     if (u > 0) parts[f].columns = std::move(columns);
   }
+  return true;
 }
 
-SparseColumns MultifrontalCholesky::gram(const SparseColumns& b) const {
+std::optional<SparseColumns> MultifrontalCholesky::gram(const SparseColumns& b,
+                                                        const Deadline& deadline) const {
   // Y^T Y of each tree of fronts, dense in the columns that reach it
   const std::vector<Index> root = roots();
   std::vector<std::vector<Index>> reaching(factors_.size());
@@ -180,34 +216,38 @@ SparseColumns MultifrontalCholesky::gram(const SparseColumns& b) const {
   Dense tree;
   Dense part;
   Index last = -1;  // the tree whose columns have their places
-  forward(b, [&](std::size_t f, const std::vector<Index>& columns, const auto& y) {
-    const std::vector<Index>& all = reaching[root[f]];
-    if (last != root[f]) {
-      last = root[f];
-      for (std::size_t c = 0; c < all.size(); ++c) place[all[c]] = static_cast<Index>(c);
-      tree.setZero(static_cast<Eigen::Index>(all.size()), static_cast<Eigen::Index>(all.size()));
-    }
-    if (columns.size() == all.size()) {
-      tree.selfadjointView<Eigen::Lower>().rankUpdate(y.transpose());
-    } else {
-      part.setZero(y.cols(), y.cols());
-      part.selfadjointView<Eigen::Lower>().rankUpdate(y.transpose());
-      for (std::size_t c = 0; c < columns.size(); ++c) {
-        for (std::size_t r = c; r < columns.size(); ++r) {
-          tree(place[columns[r]], place[columns[c]]) +=
-              part(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+  const bool whole =
+      forward(b, deadline, [&](std::size_t f, const std::vector<Index>& columns, const auto& y) {
+        const std::vector<Index>& all = reaching[root[f]];
+        if (last != root[f]) {
+          last = root[f];
+          for (std::size_t c = 0; c < all.size(); ++c) place[all[c]] = static_cast<Index>(c);
+          tree.setZero(static_cast<Eigen::Index>(all.size()),
+                       static_cast<Eigen::Index>(all.size()));
         }
-      }
-    }
-    if (root[f] != static_cast<Index>(f)) return;
-    for (std::size_t c = 0; c < all.size(); ++c) {
-      for (std::size_t r = c; r < all.size(); ++r) {
-        const double value = tree(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
-        entries.emplace_back(all[r], all[c], value);
-        if (r != c) entries.emplace_back(all[c], all[r], value);
-      }
-    }
-  });
+        if (columns.size() == all.size()) {
+          if (!add_gram(tree, y, deadline)) return false;
+        } else {
+          part.setZero(y.cols(), y.cols());
+          if (!add_gram(part, y, deadline)) return false;
+          for (std::size_t c = 0; c < columns.size(); ++c) {
+            for (std::size_t r = c; r < columns.size(); ++r) {
+              tree(place[columns[r]], place[columns[c]]) +=
+                  part(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+            }
+          }
+        }
+        if (root[f] != static_cast<Index>(f)) return true;
+        for (std::size_t c = 0; c < all.size(); ++c) {
+          for (std::size_t r = c; r < all.size(); ++r) {
+            const double value = tree(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c));
+            entries.emplace_back(all[r], all[c], value);
+            if (r != c) entries.emplace_back(all[c], all[r], value);
+          }
+        }
+        return true;
+      });
+  if (!whole) return std::nullopt;
   SparseColumns result(b.cols(), b.cols());
   result.setFromTriplets(entries.begin(), entries.end());
   return result;
@@ -215,11 +255,13 @@ SparseColumns MultifrontalCholesky::gram(const SparseColumns& b) const {
 
 Vector MultifrontalCholesky::gram_diagonal(const SparseColumns& b) const {
   Vector result = Vector::Zero(b.cols());
-  forward(b, [&](std::size_t, const std::vector<Index>& columns, const auto& y) {
-    for (std::size_t c = 0; c < columns.size(); ++c) {
-      result[columns[c]] += y.col(static_cast<Eigen::Index>(c)).squaredNorm();
-    }
-  });
+  forward(b, Deadline(std::numeric_limits<double>::infinity()),
+          [&](std::size_t, const std::vector<Index>& columns, const auto& y) {
+            for (std::size_t c = 0; c < columns.size(); ++c) {
+              result[columns[c]] += y.col(static_cast<Eigen::Index>(c)).squaredNorm();
+            }
+            return true;
+          });
   return result;
 }
 

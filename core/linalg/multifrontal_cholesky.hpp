@@ -4,8 +4,10 @@
 #pragma once
 
 #include <Eigen/Dense>
+#include <optional>
 #include <vector>
 
+#include "deadline.hpp"
 #include "linalg/fronts.hpp"
 
 namespace fclib {
@@ -24,8 +26,9 @@ class MultifrontalCholesky {
   /// A^-1 b.
   [[nodiscard]] Vector solve(ConstVectorRef b) const;
 
-  /// B^T A^-1 B, symmetric to the last bit.
-  [[nodiscard]] SparseColumns gram(const SparseColumns& b) const;
+  /// B^T A^-1 B, symmetric to the last bit; nothing where the deadline passes on the way.
+  [[nodiscard]] std::optional<SparseColumns> gram(const SparseColumns& b,
+                                                  const Deadline& deadline) const;
   /// Its diagonal.
   [[nodiscard]] Vector gram_diagonal(const SparseColumns& b) const;
 
@@ -40,7 +43,7 @@ class MultifrontalCholesky {
   bool factorise(const SparseColumns& a);
   std::vector<Index> roots() const;
   template <class Visit>
-  void forward(const SparseColumns& b, const Visit& visit) const;
+  bool forward(const SparseColumns& b, const Deadline& deadline, const Visit& visit) const;
 
   Fronts symbolic_;
   std::vector<Factors> factors_;

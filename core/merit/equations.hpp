@@ -41,12 +41,12 @@ struct Equations {
 
 /// What the equations are judged by that depends on the problem alone.
 struct OwnSizes {
-  RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
+  RealVector free;          ///< M^-1 f of a global problem (n) [m/s]
   std::vector<Index> part;  ///< of M that a degree of freedom is coupled to, by its first one (n)
-  RealVector l;         ///< reactions that stop the joints, each alone (p)
-  RealVector q;         ///< of the terms of u without reactions (m) [m/s]
-  RealVector rounding;  ///< Equations::rounding
-  RealVector scale;     ///< Equations::scale
+  RealVector l;             ///< reactions that stop the joints, each alone (p)
+  RealVector q;             ///< of the terms of u without reactions (m) [m/s]
+  RealVector rounding;      ///< Equations::rounding
+  RealVector scale;         ///< Equations::scale
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <limits>
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
@@ -158,6 +159,21 @@ Result out_of_time(Eigen::Index m, Eigen::Index p, const Request& request, const
   return result;
 }
 
+/// The same before the condensation has ended. Its merit is left infinite: what judges it takes as
+/// long as what there was no time for.
+Result out_of_time(const GlobalProblem& problem, const Condensation& condensation,
+                   const Request& request, const Solution& guess) {
+  Result result;
+  result.solver = request.solver.name;
+  result.solution.r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(problem.w.size()));
+  if (problem.b.size() > 0) result.solution.l = Vector::Zero(problem.b.size());
+  result.solution = condensation.expand(result.solution);
+  result.error = std::numeric_limits<double>::infinity();
+  result.status = Status::time_limit;
+  if (request.settings.history) result.history.emplace();
+  return result;
+}
+
 template <class P>
 void require_solvable(const P& problem, const Solver& solver, const Solution& guess) {
   validate(problem);
@@ -203,8 +219,8 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
   const Friction friction = friction_of(problem);
-  const OwnSizes own =
-      own_sizes(problem, condensation.mass(), condensation.finished() ? &local : nullptr);
+  if (!condensation.finished()) return out_of_time(problem, condensation, request, guess);
+  const OwnSizes own = own_sizes(problem, condensation.mass(), &local);
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
     return judge_and_complete(problem, friction, condensation.mass(), own, solution).error_by(kind);
@@ -212,7 +228,6 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const auto stop = [&] {
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
   };
-  if (!condensation.finished()) return stop();
   const Measure measure(local, own, kind);
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};

@@ -171,18 +171,28 @@ def test_the_clock_is_looked_at_before_each_factorisation_between_reports() -> N
 
 
 def test_conversions_are_held_to_the_limit() -> None:
-    """The clock has passed when M is factorised: nothing else is done, and the guess is judged."""
+    """Nothing is done after the limit, not even a judgement that takes as long."""
     planted = planted_global(3, p=2)
     problem: Any = planted.problem
     (entry,) = (s for s in fclib.solvers() if s.name == "auto")
-    result = _core.solve(problem, entry, 1e-8, 0, 0.5, {}, None, None, False, False, clock=Looks())
-    assert result.status == "time_limit"
-    assert result.iterations == 0
-    assert judge(problem, result.solution).error == pytest.approx(result.error)
-    result = _core.solve(
-        problem, entry, 1e-8, 0, 0.5, {}, planted.solution, None, False, False, clock=Looks()
-    )
-    assert judge(problem, result.solution).error == pytest.approx(result.error)
+    unjudged = 0
+    for limit in np.arange(0.5, 12.5):
+        for guess in (None, planted.solution):
+            clock = Looks()
+            result = _core.solve(
+                problem, entry, 1e-15, 0, limit, {}, guess, None, False, False, clock=clock
+            )
+            if result.error == np.inf:
+                # a look at the start, and none after the one that was too late
+                assert clock.count <= limit + 2
+                assert result.status == "time_limit"
+                assert result.iterations == 0
+                unjudged += 1
+            else:
+                assert judge(problem, result.solution).error == pytest.approx(result.error)
+            assert result.solution.v is not None
+    # once M is factorised, and before each block of columns of two products
+    assert unjudged >= 6
 
 
 @pytest.mark.parametrize("k", [20, 25, 28, 40])

@@ -168,7 +168,7 @@ def test_a_contact_that_joints_hold_is_not_moved_by_rounding() -> None:
 
 def test_constraints_that_differ_by_the_rounding_of_velocities_do_not_contradict() -> None:
     for seed in range(10):
-        problem = planted_global(seed, p=2).problem
+        problem: Any = planted_global(seed, p=2).problem
         G = dense(problem.G)
         twice = problem.replace(G=np.hstack([G, G]), b=np.array([0.0, 0.0, 3e-17, -3e-17]))
         assert fclib.solve(twice).status != "infeasible"

@@ -20,7 +20,7 @@ from fclib.simulate import simulate
 STEPS = 10  # of each published model: benchmarks/published_robots.py makes 100
 MODELS = 12  # of each package, evenly spread over its files
 
-# a trunk with three legs, each with its hip at a limit and its knee beside one, high above the floor
+# a trunk with three legs, each with its hip and its knee at a limit, high above the floor
 HOPPER = """
 <mujoco>
   <option timestep="0.002"/>
@@ -61,7 +61,7 @@ def published() -> Any:
 
 
 def in_flight(velocity: str, hip: float = 0.0) -> Scene:
-    """The robot with its joints at their limits, moving as a whole but for its first hip [rad/s]."""
+    """The robot, joints at their limits, moving as a whole but for its first hip [rad/s]."""
     legs = "".join(LEG.format(x=x) for x in (-0.15, 0.0, 0.15))
     xml = HOPPER.format(legs=legs, angles="0 0 " * 3, velocity=f"{velocity} {hip} 0 0 0 0 0")
     return Scene(name="in flight", xml=xml)

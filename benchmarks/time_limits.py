@@ -88,7 +88,7 @@ def dense_global(nc: int, seed: int = 0) -> fclib.GlobalProblem:
 
 def cases(arguments: argparse.Namespace) -> list[Case]:
     """The cases that are asked for."""
-    kinds = scenes.assemblies()
+    kinds: dict[str, Any] = dict(scenes.assemblies())
     made: dict[str, Callable[[], Any]] = {
         "dense": lambda: dense_local(arguments.dense),
         "dense-bodies": lambda: dense_global(arguments.dense),

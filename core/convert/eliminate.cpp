@@ -253,7 +253,9 @@ void Elimination::reduce() {
   const auto is_held = [&](Eigen::Index k) { return left[k] == 0 && free[k] != 0; };
   w.prune(
       [&](Eigen::Index row, Eigen::Index col, double) { return !is_held(row) && !is_held(col); });
-  const Vector terms = problem_.q.cwiseAbs() + v_.cwiseAbs() * impulse.cwiseAbs();
+  // the terms of s, of which `impulse` is a sum, may be larger than it in one place
+  const Vector lengths = (v_.cwiseAbs2() * Vector::Ones(v_.cols())).cwiseSqrt();
+  const Vector terms = problem_.q.cwiseAbs() + impulse.norm() * lengths;
   for (Eigen::Index k = 0; k < left.size(); ++k) {
     if (is_held(k) && std::abs(plain_.q[k]) <= rounding * terms[k]) plain_.q[k] = 0;
   }

@@ -247,17 +247,29 @@ void Elimination::reduce() {
   });
   const Vector impulse = bilateral_ ? bilateral_->solve(s_) : s_;
   plain_.q = problem_.q - v_ * impulse;
-  // and so is the row of such a component, W' being semidefinite, and its velocity
+  // and so is the row of such a component, and its velocity: where W' is semidefinite,
+  // |W'_kj|^2 <= W'_kk W'_jj, and what is larger says that it is not
   const Vector free = full.diagonal();
   const Vector left = w.diagonal();
-  const auto is_held = [&](Eigen::Index k) { return left[k] == 0 && free[k] != 0; };
-  w.prune(
-      [&](Eigen::Index row, Eigen::Index col, double) { return !is_held(row) && !is_held(col); });
+  const Vector terms_of_diagonal = size.diagonal();
+  Eigen::Array<bool, Eigen::Dynamic, 1> held_entirely = left.array() == 0 && free.array() != 0;
+  const auto is_rounding = [&](Eigen::Index k, Eigen::Index j, double value) {
+    return value * value <= 2 * rounding * terms_of_diagonal[k] * terms_of_diagonal[j];
+  };
+  for (Eigen::Index col = 0; col < w.outerSize(); ++col) {
+    for (SparseColumns::InnerIterator entry(w, col); entry; ++entry) {
+      if (is_rounding(entry.row(), col, entry.value())) continue;
+      held_entirely[entry.row()] = held_entirely[col] = false;
+    }
+  }
+  w.prune([&](Eigen::Index row, Eigen::Index col, double) {
+    return !held_entirely[row] && !held_entirely[col];
+  });
   // the terms of s, of which `impulse` is a sum, may be larger than it in one place
   const Vector lengths = (v_.cwiseAbs2() * Vector::Ones(v_.cols())).cwiseSqrt();
   const Vector terms = problem_.q.cwiseAbs() + impulse.norm() * lengths;
   for (Eigen::Index k = 0; k < left.size(); ++k) {
-    if (is_held(k) && std::abs(plain_.q[k]) <= rounding * terms[k]) plain_.q[k] = 0;
+    if (held_entirely[k] && std::abs(plain_.q[k]) <= rounding * terms[k]) plain_.q[k] = 0;
   }
   plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
 }

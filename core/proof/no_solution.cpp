@@ -20,9 +20,6 @@ constexpr double unit = 0x1p-53;
 constexpr double last_digits = 8;
 /// A gain below this part of its terms is rounding.
 constexpr double least_gain = 1e-8;
-/// Of ||q||: what closes more slowly than this is within the tolerance of solutions, and q may have
-/// it from rounding when it was condensed.
-constexpr double least_speed = 1e-6;
 /// Beyond, what is found is not brought to where it is exact.
 constexpr Index most_unknowns = 96;
 constexpr Index most_rows = 4096;

@@ -28,6 +28,11 @@
 
 namespace fclib {
 
+/// Of ||q||, the condensed one: what closes more slowly than this (the gain over ||y||) is within
+/// the tolerance of solutions, and q may have it from rounding. Of a local problem it proves
+/// nothing here; of a global one, whose q is not at hand, it is for the caller to say so.
+constexpr double least_speed = 1e-6;
+
 struct NoSolution {
   Vector y;             ///< (nc) >= 0; empty where nothing is proven
   Vector z;             ///< (p)

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
@@ -62,8 +63,10 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
            const std::function<NoSolution(const Vector&)>& prove, const Primal* primal = nullptr) {
   Result result;
   const std::function<bool(const Vector&)> proves = [&](const Vector& y) {
-    result.certificate = prove(y);
-    return result.certificate.proven();
+    NoSolution found = prove(y);
+    if (!(found.gain > least_speed * measure.q * found.y.norm())) return false;
+    result.certificate = std::move(found);
+    return true;
   };
   result.solver = request.solver.name;
   if (measure.q <= measure.rounding) {

@@ -189,3 +189,39 @@ def test_what_conversions_lose_to_rounding_is_put_right() -> None:
         result = fclib.solve(hard)
         assert result.status == "converged", (seed, result.status, result.error)
         assert judge(hard, result.solution).error <= 1e-8
+
+
+def test_a_component_without_inertia_of_its_own_is_not_taken_for_one_that_is_held() -> None:
+    """W' is no matrix of bodies here: zero on its diagonal, and not beside it."""
+    W = np.array([[1.0, 0, 0.5], [0, 1, 0], [0.5, 0, 1]])
+    problem = fclib.LocalProblem(
+        spacedim=3,
+        W=W,
+        V=np.array([[1.0], [0], [0]]),
+        R=np.array([[1.0]]),
+        q=[-1, 0, -1],
+        s=[0.0],
+        mu=[0.5],
+    )
+    eliminated = dense(problem.eliminate().W)
+    assert eliminated == pytest.approx(W - np.diag([1.0, 0, 0]))
+
+
+def test_what_closes_by_rounding_is_not_called_infeasible() -> None:
+    """Joints hold a contact in its normal direction, to the last digits of their velocities."""
+    H, G = np.zeros((6, 6)), np.zeros((6, 1))
+    H[:3, :3] = H[3:, 3:] = np.eye(3)
+    G[0] = 1
+    slow, fast = 2e-15, 1e-3
+    problem = fclib.GlobalProblem(
+        spacedim=3,
+        M=np.eye(6),
+        H=H,
+        G=G,
+        f=[0, 1, 0, -3, 0.5, 0],
+        b=[slow],
+        w=np.zeros(6),
+        mu=[0.5, 0.5],
+    )
+    assert fclib.solve(problem).status == "converged"
+    assert fclib.solve(problem.replace(b=[fast])).status == "infeasible"

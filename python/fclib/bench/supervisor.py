@@ -260,7 +260,8 @@ class Supervisor:
                 record.memory = watch.memory - watch.memory_before
                 self.cpu_limited = watch.cpu_limited
         said = json.loads(reply)
-        said["memory"] = max(said.get("memory", 0.0), record.memory or 0.0) or None
+        known = [one for one in (said.get("memory"), record.memory) if one is not None]
+        said["memory"] = max(known, default=None)
         names = said.pop("vectors", [])
         for name, value in said.items():
             setattr(record, name, value)

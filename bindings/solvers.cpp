@@ -178,10 +178,10 @@ void bind_solvers(nb::module_& m) {
           "infeasible")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
-      .def_ro("error", &Result::error,
-              "Merit.error of the solution (Merit.error_by where `solve` was asked for a merit), "
-              "on the "
-              "problem as given")
+      .def_ro(
+          "error", &Result::error,
+          "Merit.error of the solution on the problem as given (Merit.error_by where `solve` was "
+          "asked for a merit)")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)

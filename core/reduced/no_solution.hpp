@@ -1,4 +1,4 @@
-// A proof that a problem has no solution.
+// Candidates for a proof that a problem has no solution.
 //
 // u^ is in K* exactly where u_N >= 0, so that a solution needs r in K with (W r + q)_N >= 0 at
 // every contact. By Farkas' lemma there is none where some y >= 0 has
@@ -9,10 +9,9 @@
 // nothing, at contacts that would have to move. The rays along which the frictionless problem
 // diverges are such y.
 //
-// In floating point -W^T E y is in K* up to a distance e, and the proof holds for all reactions
-// with
-// ||r|| < -y . q_N / e. A heavy body needs large reactions, so that a small e alone is none: e must
-// be the rounding of terms that cancel, at each contact.
+// Here such a y is a candidate: in floating point -W^T E y is in K* up to a distance, and W may
+// have been condensed or without joints that were eliminated. proof/no_solution.hpp judges it on
+// the problem as it was given.
 #pragma once
 
 #include "contact/cones.hpp"
@@ -20,7 +19,8 @@
 
 namespace fclib {
 
-/// The bound on ||r|| below which y proves that there is no solution; 0 where y proves nothing.
+/// Of reactions of a smaller norm y would prove that they are no solution; 0 where it proves
+/// nothing.
 template <class Cone>
 double no_solution_bound(const ReducedProblem& problem, const Vector& y);
 

@@ -103,6 +103,8 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return !request.settings.callback || request.settings.callback(progress);
     };
   }
+  double least = std::numeric_limits<double>::infinity();
+  Solution best;
   for (int correction = 0;; ++correction) {
     const double start = cpu_time();
     const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
@@ -131,14 +133,26 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       result.certificate = {};
       return result;
     }
-    if (result.status != Status::converged) return result;
+    // a correction may end worse than what it was to better
+    if (result.error < least) {
+      least = result.error;
+      best = result.solution;
+    }
+    const auto end = [&] {
+      if (!(result.error <= least)) {
+        result.error = least;
+        result.solution = best;
+      }
+      return result;
+    };
+    if (result.status != Status::converged) return end();
     // the limits hold for all the attempts together
     settings.max_iterations = max_iterations - result.iterations;
     settings.time_limit = request.deadline.left();
     result.status = settings.max_iterations <= 0 ? Status::iteration_limit
                     : settings.time_limit <= 0   ? Status::time_limit
                                                  : Status::inaccurate;
-    if (correction == max_corrections || result.status != Status::inaccurate) return result;
+    if (correction == max_corrections || result.status != Status::inaccurate) return end();
     settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
     // the velocity is that of the problem as it was given: what conversions lost of it goes into q
     Vector u;

@@ -225,3 +225,16 @@ def test_what_closes_by_rounding_is_not_called_infeasible() -> None:
     )
     assert fclib.solve(problem).status == "converged"
     assert fclib.solve(problem.replace(b=[fast])).status == "infeasible"
+
+
+def test_no_claim_rests_on_what_closes_far_below_the_free_velocities() -> None:
+    """A contact that nothing moves closes by 1e-9 m/s: exactly proven, and no claim of a solver."""
+    H = np.zeros((3, 6))
+    H[:, 3:] = np.eye(3)
+
+    def closing(speed: float) -> fclib.GlobalProblem:
+        w = [-speed, 0, 0, 0, 0, 0]
+        return fclib.GlobalProblem(spacedim=3, M=np.eye(3), H=H, f=[-3, 0.5, 0], w=w, mu=[0.5] * 2)
+
+    assert fclib.solve(closing(1e-9), tol=1e-17).status == "stalled"
+    assert fclib.solve(closing(1e-3), tol=1e-17).status == "infeasible"

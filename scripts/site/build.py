@@ -19,6 +19,7 @@ import commands
 import examples
 import families
 import python_api
+import results
 import solvers
 from sphinx.cmd.build import main as sphinx
 
@@ -85,9 +86,15 @@ def gather(folder: Path, quick: bool) -> None:
             path.write_bytes(content)
         else:
             path.write_text(content, encoding="utf-8")
+    tables = results.Results(folder / "results")
     for path in sorted(folder.rglob("*.md")):
         name = path.relative_to(folder).as_posix()
-        text = linked(path.read_text(encoding="utf-8"), "../" * name.count("/"))
+        text = path.read_text(encoding="utf-8")
+        try:
+            text = tables.put_into(text)
+        except ValueError as error:
+            sys.exit(f"{name}: {error}")
+        text = linked(text, "../" * name.count("/"))
         if name == "index.md":
             text += "".join(toctree(entries, title) for title, entries in MENU.items())
         elif name.endswith("/index.md"):

@@ -12,6 +12,7 @@ import datetime
 import json
 import os
 import platform
+import re
 import shlex
 import subprocess
 import sys
@@ -105,6 +106,11 @@ def short(words: Sequence[str]) -> list[str]:
         if not (name == "FILE..." and found and found[-1] == name):
             found.append(name)
     return found
+
+
+def power(tolerance: float) -> str:
+    """A tolerance as it is written on pages and in names of tables: 1e-8."""
+    return re.sub(r"e-0?", "e-", f"{tolerance:.0e}")
 
 
 def commit() -> str:

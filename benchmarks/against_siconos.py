@@ -1,7 +1,7 @@
 """A solver of fclib beside solvers of Siconos, problem by problem, in one run on one machine.
 
     .venv/bin/python benchmarks/against_siconos.py FILE... [--solver auto] [--siconos all]
-        [--tol 1e-8] [--limit 10] [--csv OUT]
+        [--tol 1e-8] [--limit 10] [--csv OUT] [--results NAME]
 
 With several of Siconos' solvers, or `all`, each problem is compared with the fastest of those that
 solved it, picked in hindsight. Theirs have their own default options, and no limit of iterations.
@@ -25,12 +25,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import _results
+
 import fclib
 from fclib.external import siconos
 
 SHORT = 0.02  # [s] solves shorter than this are repeated
 REPEATS = 5
 MOST_ITERATIONS = 10**7
+LARGE = 100  # contacts: where the time is the solver's, not that of the call
 
 # its solvers with their default options
 SICONOS = (
@@ -103,10 +106,8 @@ def measure(
     return Run(solver, solved, cpu_s, result.iterations, result.error)
 
 
-def compare(
-    path: Path, solver: str, theirs: list[str], tol: float, limit: float
-) -> tuple[dict[str, Any], float | None]:
-    """The row of one problem, and the ratio of the times where both sides solve it."""
+def compare(path: Path, solver: str, theirs: list[str], tol: float, limit: float) -> dict[str, Any]:
+    """The row of one problem, with the ratio of the times where both sides solve it."""
     problem = read(path)
     ours = measure(problem, solver, tol, limit)
     runs = [measure(problem, siconos.PREFIX + name, tol, limit) for name in theirs]
@@ -116,7 +117,32 @@ def compare(
     row: dict[str, Any] = {"problem": path.stem, "nc": problem.nc}
     for prefix, run in (("", ours), ("siconos_", best)):
         row |= {prefix + name: value for name, value in vars(run).items()}
-    return row | {"ratio": ratio}, ratio
+    return row | {"ratio": ratio}
+
+
+def summarise(rows: list[dict[str, Any]], solver: str) -> list[dict[str, Any]]:
+    """What the rows come to."""
+    ratios = [row["ratio"] for row in rows if row["ratio"]]
+    large = [row["ratio"] for row in rows if row["ratio"] and row["nc"] >= LARGE]
+    found: list[tuple[str, Any]] = [
+        ("problems", len(rows)),
+        (f"solved by {solver}", sum(row["solved"] for row in rows)),
+        ("solved by one of Siconos", sum(row["siconos_solved"] for row in rows)),
+        ("solved by both", len(ratios)),
+    ]
+    if ratios:
+        found += [
+            ("geometric mean of CPU ratios", statistics.geometric_mean(ratios)),
+            ("median CPU ratio", statistics.median(ratios)),
+            ("worst CPU ratio", max(ratios)),
+        ]
+    found.append((f"solved by both from {LARGE} contacts on", len(large)))
+    if large:
+        found.append((f"geometric mean from {LARGE} contacts on", statistics.geometric_mean(large)))
+    return [
+        {"figure": name, "value": f"{value:.3f}" if isinstance(value, float) else value}
+        for name, value in found
+    ]
 
 
 def main() -> None:
@@ -128,39 +154,35 @@ def main() -> None:
     parser.add_argument("--tol", type=float, default=1e-8)
     parser.add_argument("--limit", type=float, default=10.0, help="[s] for each solve")
     parser.add_argument("--csv", type=Path, help="write the rows there")
+    _results.add_option(parser)
     arguments = parser.parse_args()
     require_siconos()
     theirs = list(SICONOS) if "all" in arguments.siconos else arguments.siconos
-    rows, ratios, large = [], [], []
+    rows = []
     print(f"{'problem':44} {'nc':>5} {'fclib s':>10} {'siconos s':>10} {'ratio':>7}  of siconos")
     for path in arguments.files:
-        row, ratio = compare(path, arguments.solver, theirs, arguments.tol, arguments.limit)
+        row = compare(path, arguments.solver, theirs, arguments.tol, arguments.limit)
         rows.append(row)
-        if ratio is not None:
-            ratios.append(ratio)
-            large += [ratio] if row["nc"] >= 100 else []
         ours = f"{row['cpu_s']:.2e}" if row["solved"] else "unsolved"
         peer = f"{row['siconos_cpu_s']:.2e}" if row["siconos_solved"] else "unsolved"
-        shown = f"{ratio:.3f}" if ratio else ""
+        shown = f"{row['ratio']:.3f}" if row["ratio"] else ""
         print(
             f"{row['problem'][:44]:44} {row['nc']:5} {ours:>10} {peer:>10} {shown:>7}  "
             f"{row['siconos_solver']}",
             flush=True,
         )
-    print(
-        f"\nsolved: fclib {sum(row['solved'] for row in rows)}, "
-        f"siconos {sum(row['siconos_solved'] for row in rows)}, of {len(rows)}"
-    )
-    if ratios:
-        mean = statistics.geometric_mean(ratios)
-        print(
-            f"CPU ratio fclib / siconos where both solve ({len(ratios)}): "
-            f"median {statistics.median(ratios):.3f}, geometric mean {mean:.3f}, "
-            f"worst {max(ratios):.3f}"
+    summary = summarise(rows, arguments.solver)
+    print()
+    for line in summary:
+        print(": ".join(str(entry) for entry in line.values()))
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            summary,
+            title=f"`{arguments.solver}` beside the fastest solver of Siconos, picked in hindsight",
+            note=f"At {_results.power(arguments.tol)}, at most {arguments.limit:g} s of wall-clock "
+            "time a solve.",
         )
-    if large:
-        mean = statistics.geometric_mean(large)
-        print(f"... of 100 contacts and more ({len(large)}): geometric mean {mean:.3f}")
     if arguments.csv:
         with arguments.csv.open("w", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]))

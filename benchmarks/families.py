@@ -1,7 +1,7 @@
 """Every built-in solver beside Siconos' solver of the same family, in one run on one machine.
 
     .venv/bin/python benchmarks/families.py FILE... [--tol 1e-4 1e-8] [--limit 60]
-        [--only nsgs admm ...] [--csv RUNS]
+        [--only nsgs admm ...] [--csv RUNS] [--results NAME]
 
 Problems, times and tolerances are as in against_siconos.py. The table has, for each pair and each
 tolerance: the problems solved; on how many a solver is the fastest of all, ours and theirs; the
@@ -10,7 +10,8 @@ ratio of the CPU times on the problems that both solve.
 
 The relaxations are left out: they solve another problem than Coulomb's law. A solver that did not
 reach one tolerance is not asked for a tighter one. --csv appends a line a run, and skips the runs
-it has: a run of hours may be cut short, and the table is then made of the file.
+it has: a run of hours may be cut short, and the table is then made of the file. --results stores
+the table of each tolerance as NAME-TOLERANCE.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+import _results
 from against_siconos import Run, measure, read, require_siconos
 
 import fclib
@@ -160,8 +162,8 @@ def shifted_mean(runs: Iterable[Run], limit: float) -> float:
 
 def table(
     files: Sequence[Path], pairs: Sequence[Pair], tol: float, limit: float, known: dict[Key, Run]
-) -> Iterator[str]:
-    """The lines of the table of one tolerance, in Markdown."""
+) -> list[dict[str, str]]:
+    """The table of one tolerance."""
     shown = names(pairs)
     runs = {name: [known[path.stem, name, tol] for path in files] for name in shown}
     fastest: dict[str, int] = defaultdict(int)
@@ -169,21 +171,26 @@ def table(
         solved = [name for name in runs if runs[name][k].solved]
         if solved:
             fastest[min(solved, key=lambda name: runs[name][k].cpu_s)] += 1
-    yield "| ours | Siconos' | solved | fastest on | shifted mean [ms] | median CPU ratio (of) |"
-    yield "|---|---|---|---|---|---|"
+    rows = []
     for pair in pairs:
         sides = [pair.ours, *([pair.theirs] if pair.theirs else [])]
-        cells = [pair.ours, pair.siconos or "none"]
-        cells.append(" : ".join(str(sum(run.solved for run in runs[s])) for s in sides))
-        cells.append(" : ".join(str(fastest[s]) for s in sides))
-        cells.append(" : ".join(f"{1e3 * shifted_mean(runs[s], limit):.3g}" for s in sides))
         ratio = ""
         if pair.theirs:
             both = zip(runs[pair.ours], runs[pair.theirs], strict=True)
             ratios = [a.cpu_s / b.cpu_s for a, b in both if a.solved and b.solved]
             ratio = f"{statistics.median(ratios):.3f} ({len(ratios)})" if ratios else "(0)"
-        cells.append(ratio)
-        yield f"| {' | '.join(cells)} |"
+        means = [f"{1e3 * shifted_mean(runs[s], limit):.3g}" for s in sides]
+        rows.append(
+            {
+                "ours": pair.ours,
+                "Siconos'": pair.siconos or "none",
+                "solved": " : ".join(str(sum(run.solved for run in runs[s])) for s in sides),
+                "fastest on": " : ".join(str(fastest[s]) for s in sides),
+                "shifted mean [ms]": " : ".join(means),
+                "median CPU ratio (of)": ratio,
+            }
+        )
+    return rows
 
 
 def main() -> None:
@@ -194,6 +201,7 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=60.0, help="[s] for each solve")
     parser.add_argument("--only", nargs="+", choices=sorted({pair.solver for pair in PAIRS}))
     parser.add_argument("--csv", type=Path, help="append the runs there, and skip those it has")
+    _results.add_option(parser)
     arguments = parser.parse_args()
     require_siconos()
     if forgotten := without_pair():
@@ -214,9 +222,19 @@ def main() -> None:
         for _ in rows:
             pass
     for tol in sorted(arguments.tol, reverse=True):
+        found = table(arguments.files, pairs, tol, arguments.limit, known)
         print(f"\n{len(arguments.files)} problems at {tol:g}, {arguments.limit:g} s each\n")
-        for line in table(arguments.files, pairs, tol, arguments.limit, known):
-            print(line)
+        print(f"| {' | '.join(found[0])} |\n{'|---' * len(found[0])}|")
+        for line in found:
+            print(f"| {' | '.join(line.values())} |")
+        if arguments.results:
+            _results.store(
+                f"{arguments.results}-{_results.power(tol)}",
+                found,
+                title="Solvers beside those of Siconos of the same family",
+                note=f"{len(arguments.files)} problems to {_results.power(tol)}, at most "
+                f"{arguments.limit:g} s of wall-clock time a solve.",
+            )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Files of ours beside those of libfclib 3.1: how large, and how long a read takes, in one run.
 
     .venv/bin/python benchmarks/files_against_libfclib.py FILE... [--limit 1.5] [--csv OUT]
+        [--results NAME]
 
 Each problem (with its solution and guesses) is written by both libraries, and each library reads
 both files: the same numbers, bit by bit, or the run fails. 3.1 never compresses. Times are CPU
@@ -24,6 +25,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import _results
 import h5py
 import numpy as np
 
@@ -124,6 +126,27 @@ def line(name: str, row: dict[str, float]) -> str:
     )
 
 
+def summary(rows: dict[str, dict[str, float]]) -> list[dict[str, str]]:
+    """Medians and ranges of the ratios."""
+    shown = {
+        "size_ratio": "bytes of a file",
+        "ours_of_3_1": "CPU time of a read, both libraries the file of 3.1",
+        "ours_same": "CPU time of a read, both libraries our file",
+        "ours_own": "CPU time of a read, each its own file",
+    }
+    found = []
+    for name, title in shown.items():
+        values = [row[name] for row in rows.values()]
+        found.append(
+            {
+                "ours : 3.1": title,
+                "median": f"{statistics.median(values):.2f}",
+                "range": f"{min(values):.2f} to {max(values):.2f}",
+            }
+        )
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="+", type=Path)
@@ -131,6 +154,7 @@ def main() -> None:
     parser.add_argument("--theirs", type=Path, default=None)
     parser.add_argument("--limit", type=float, default=1.5, help="CPU time on a file [s]")
     parser.add_argument("--csv", type=Path)
+    _results.add_option(parser)
     options = parser.parse_args()
 
     theirs = options.theirs or system_library()
@@ -176,6 +200,21 @@ def main() -> None:
     for name in ("entries", "indices"):
         print(f", {name} {share[name]:.1%} (by LZMA {share[f'{name}_lzma']:.1%})", end="")
     print()
+    if options.results:
+        _results.store(
+            options.results,
+            [
+                *summary(rows),
+                {
+                    "ours : 3.1": "bytes of all files",
+                    "median": f"{total[0] / total[1]:.2f}",
+                    "range": "",
+                },
+            ],
+            title="Our files beside those of libfclib 3.1",
+            note=f"{len(rows)} files of {min(of('bytes_3_1')) / 1e3:.0f} kB to "
+            f"{max(of('bytes_3_1')) / 1e6:.1f} MB.",
+        )
     if options.csv:
         with options.csv.open("w", newline="") as stream:
             writer = csv.writer(stream)

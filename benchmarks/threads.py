@@ -1,7 +1,7 @@
 """Sweeps on several threads: what the order by colours costs, and what the threads gain.
 
     .venv/bin/python benchmarks/threads.py FILE... [--solver nsgs] [--threads 1 2 4]
-        [--tol 1e-4] [--limit 60] [--sweeps 100] [--repeat 3]
+        [--tol 1e-4] [--limit 60] [--sweeps 100] [--repeat 3] [--results NAME]
 
 For each number of threads: the sweeps to the tolerance and their wall-clock time, the making of
 the colours with it; then the CPU time of a sweep, all threads together, and its wall-clock time,
@@ -17,6 +17,7 @@ import argparse
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import _results
 import numpy as np
 
 import fclib
@@ -83,9 +84,19 @@ def main() -> None:
     parser.add_argument("--limit", type=float, default=60.0, help="[s] for each solve")
     parser.add_argument("--sweeps", type=int, default=100, help="timed, at --repeat times")
     parser.add_argument("--repeat", type=int, default=3)
+    _results.add_option(parser)
     arguments = parser.parse_args()
-    print("| problem | contacts | threads | sweeps | wall [s] | a sweep, wall [ms] | CPU [ms] |")
-    print("|---|---|---|---|---|---|---|")
+    heads = [
+        "problem",
+        "contacts",
+        "threads",
+        "sweeps",
+        "wall clock [s]",
+        "a sweep, wall clock [ms]",
+        "a sweep, CPU [ms]",
+    ]
+    print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
+    rows = []
     for path in arguments.files:
         problem = fclib.read(path)
         if isinstance(problem, fclib.GlobalProblem):
@@ -105,6 +116,15 @@ def main() -> None:
                 f"{1e3 * cpu:.3g} ({cpu / min(first.cpu):.2f})",
             ]
             print(f"| {' | '.join(cells)} |", flush=True)
+            rows.append(dict(zip(heads, cells, strict=True)))
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            rows,
+            title="Sweeps on several threads; in brackets the ratio to the first row of a problem",
+            note=f"`{arguments.solver}` to {_results.power(arguments.tol)} within "
+            f"{arguments.limit:g} s, and {arguments.repeat} times {arguments.sweeps} sweeps.",
+        )
 
 
 if __name__ == "__main__":

@@ -11,12 +11,13 @@ own that PYTHONPATH names.
 
 An unsolved problem is written to OUT and tried by other solvers, so that one sees whether it is
 hard or whether what is left of it is rounding: ||q|| at most its rounding, or an error of that
-size. What a problem cannot hold (dry friction in joints, torsion) is left out of the models.
+size. What a problem cannot hold is left out, as `fclib simulate` does without a flag.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -34,7 +35,6 @@ from fclib.simulate import simulate
 
 # packages whose MJCF files are not robots of others
 NOT_THESE = ("fclib", "mujoco", "mujoco_core", "mujoco_studio")
-LEFT_OUT = ("frictionloss", "torsion", "anisotropy", "activation")
 UNIT = 32 * np.finfo(float).eps  # of core/merit/equations.cpp: some roundings of each term
 
 
@@ -71,7 +71,8 @@ def robots(packages: list[str] | None = None) -> Iterator[Robot]:
                 continue
             seen.add(path)
             text = path.read_text(encoding="utf-8", errors="replace")
-            if "<mujoco" in text and ("<worldbody" in text or "<include" in text):
+            # not a part that others include
+            if re.search(r"<mujoco[\s>]", text) and ("<worldbody" in text or "<include" in text):
                 yield Robot(name, path, "/".join(file.parts[1:]))
 
 
@@ -82,7 +83,7 @@ def _plain(name: str) -> str:
 
 def problems(path: Path, steps: int, seed: int = 0, **options: Any) -> Iterator[Any]:
     """The problems of a model's steps, those with contacts; raises as `simulate` does."""
-    scene = Scene.from_file(path, ignore=LEFT_OUT)
+    scene = Scene.from_file(path)
     rng = np.random.default_rng(seed)
     for step in simulate(scene, steps, **options):
         model, data = step.model.model, step.model.data  # type: ignore[union-attr]

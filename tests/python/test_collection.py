@@ -541,7 +541,6 @@ def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (ROBOT.format(loss=1), "dry friction in joints"),
         ("<mujoco><nonsense/></mujoco>", "MuJoCo refuses the MJCF"),
         (b"\xff\xfe\x00", "is no text"),
     ],
@@ -555,13 +554,86 @@ def test_simulate_refuses_in_a_line(tmp_path: Path, content: str | bytes, messag
     assert not (tmp_path / "out").exists()
 
 
-def test_simulate_leaves_out_what_it_is_told_to(tmp_path: Path) -> None:
+def test_simulate_leaves_out_what_no_problem_holds_and_says_so(tmp_path: Path) -> None:
     path = tmp_path / "legs.xml"
-    path.write_text(ROBOT.format(loss=1), encoding="utf-8")
-    done = invoke(
-        *("simulate", path, "--steps", 10, "--out", tmp_path / "out", "--no-pictures"),
-        *("--ignore", "frictionloss"),
+    twisted = ROBOT.format(loss=1).replace('mass="2"', 'mass="2" condim="4"')
+    path.write_text(twisted, encoding="utf-8")
+    common = ("simulate", path, "--steps", 10, "--out", tmp_path / "out", "--no-pictures")
+    refused = invoke(*common, "--strict")
+    assert refused.exit_code == 1
+    assert "not supported: torsional friction" in refused.output
+    assert not (tmp_path / "out").exists()
+    done = invoke(*common)
+    assert done.exit_code == 0, done.output
+    assert "Left out: torsional friction" in done.output
+    row = collections.read_catalog(tmp_path / "out").to_pylist()[0]
+    assert row["left_out"] == "torsional friction (condim 4 and 6)"
+    described = read(tmp_path / "out" / row["global_file"]).info.description
+    assert "Left out: torsional friction" in described
+
+
+def test_simulate_with_controls_and_a_keyframe(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A row for each step, or a function; what is stored has the controls in its states."""
+    path = tmp_path / "legs.xml"
+    rest = (
+        '<actuator><motor joint="knee"/></actuator><keyframe><key name="up"'
+        ' qpos="0 0 0.55 1 0 0 0 0 0"/></keyframe></mujoco>'
     )
+    text = ROBOT.format(loss=1).replace("<joint", '<joint name="knee"', 1)
+    path.write_text(text.replace("</mujoco>", rest), encoding="utf-8")
+    rows = tmp_path / "rows.csv"
+    rows.write_text("0.5\n1.5\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "walking.py").write_text("def policy(t, state):\n    return [1.5 - (t == 0)]\n")
+    common = ("simulate", path, "--steps", 6, "--keyframe", "up", "--no-pictures")
+    digests = []
+    for option, value in (("--ctrl", rows), ("--policy", "walking:policy")):
+        out = tmp_path / option
+        done = invoke(*common, option, value, "--out", out)
+        assert done.exit_code == 0, done.output
+        assert "From the keyframe 'up'" in done.output
+        assert invoke("collection", "verify", out).exit_code == 0
+        digests.append([row["digest"] for row in collections.read_catalog(out).to_pylist()])
+        states = collections.read_trajectory(next(out.rglob("*.trajectory")))
+        np.testing.assert_array_equal(states.position[:, -1], [0.5] + 5 * [1.5])
+    assert digests[0] == digests[1]
+    for wrong, message in (
+        (("--keyframe", "down"), "no keyframe 'down'; it has: up"),
+        (("--policy", "walking:none"), "no function 'none'"),
+        (("--policy", "nothing:policy"), "cannot be imported"),
+        (("--ctrl", path), "no MODULE:FUNCTION"),
+        (("--ctrl", tmp_path / "none.csv"), "none.csv"),
+    ):
+        failed = invoke("simulate", path, "--out", tmp_path / "wrong", *wrong)
+        assert failed.exit_code == 1
+        assert message in " ".join(failed.output.split())
+        assert not (tmp_path / "wrong").exists()
+
+
+def test_simulate_finds_the_packages_of_a_urdf(tmp_path: Path) -> None:
+    folder = tmp_path / "share" / "arm" / "meshes"
+    folder.mkdir(parents=True)
+    corners = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+    faces = [(1, 2, 4), (1, 4, 3), (5, 7, 8), (5, 8, 6), (1, 5, 6), (1, 6, 2), (3, 4, 8), (3, 8, 7)]
+    lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in faces]
+    (folder / "link.obj").write_text("\n".join(lines), encoding="utf-8")
+    mesh = '<geometry><mesh filename="package://arm/meshes/link.obj"/></geometry>'
+    inertia = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"'
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        f'<robot name="arm"><link name="base"/><link name="link">{inertia}/></inertial>'
+        f'<collision>{mesh}</collision></link><joint name="j" type="revolute"><parent link="base"/>'
+        '<child link="link"/><axis xyz="0 1 0"/><limit lower="0" upper="1" effort="1"'
+        ' velocity="1"/></joint></robot>',
+        encoding="utf-8",
+    )
+    common = ("simulate", path, "--steps", 3, "--out", tmp_path / "out", "--no-pictures")
+    refused = invoke(*common)
+    assert refused.exit_code == 1
+    assert "--package arm=DIR" in " ".join(refused.output.split())
+    done = invoke(*common, "--package", f"arm={tmp_path / 'share' / 'arm'}")
     assert done.exit_code == 0, done.output
 
 

@@ -1,10 +1,11 @@
 """The time stepper against mechanics: what has a closed form is compared with it."""
 
+import dataclasses
 import importlib
 import math
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -553,27 +554,33 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
     ("xml", "message"),
     [
         (mjcf(SPHERE, more='condim="4"'), "condim 4"),
-        (mjcf(ARM.replace('name="elbow"', 'name="elbow" frictionloss="1"')), "dry friction"),
         (mjcf(SPHERE, more='adhesion="1"'), "adhesion"),
         (mjcf(SPHERE, more='surfacevel="1 0 0 0 0 0"'), "surfacevel"),
         (
             mjcf(
                 ARM,
-                rest='<actuator><general joint="elbow" dyntype="integrator"/></actuator>',
+                rest='<actuator><general joint="elbow" dyntype="user"/></actuator>',
             ),
-            "actuators with a state",
+            "states of actuators",
         ),
+        (mjcf(SPHERE, more='solref="0.01 1"'), "solref"),
     ],
 )
-def test_what_is_not_supported_is_named(xml: str, message: str) -> None:
+def test_what_is_left_out_is_said_and_strictly_refused(xml: str, message: str) -> None:
     with pytest.raises(UnsupportedSceneError, match=f"^test: not supported: .*{message}"):
-        simulate(Scene(name="test", xml=xml), 1)
+        run(xml, 1, strict=True)
+    (step,) = run(xml, 1)
+    assert any(message in line for line in step.model.left_out)
+    assert message in step.problem.info.description.splitlines()[-2]
+    assert provenance(step.problem.info)["left_out"] == list(step.model.left_out)
 
 
 def test_anisotropic_friction_is_named() -> None:
-    pair = '<contact><pair geom1="floor" geom2="box" condim="3" friction="0.1 0.2"/></contact>'
+    pair = '<contact><pair geom1="floor" geom2="box" condim="3" friction="0.1 0.4"/></contact>'
+    xml = mjcf(SLAB, more='name="box"', rest=pair)
     with pytest.raises(UnsupportedSceneError, match="anisotropic"):
-        run(mjcf(SLAB, more='name="box"', rest=pair), 1)
+        run(xml, 1, strict=True)
+    np.testing.assert_allclose(run(xml, 1)[0].problem.mu, 0.2)
 
 
 def test_what_is_left_out_on_demand_is_said() -> None:
@@ -584,7 +591,200 @@ def test_what_is_left_out_on_demand_is_said() -> None:
         run(mjcf(LIMITED), 2, ignore=("contacts",))
 
 
+# ---- dry friction in joints and tendons: contacts of auxiliary degrees of freedom
+
+
+Torque = Callable[[float], float]
+
+
+def driven(loss: float, torque: Torque, *, v0: float = 0.0) -> list[Any]:
+    """A flywheel of 2 kg m^2 with dry friction, by a motor whose torque follows the steps."""
+    wheel = (
+        f'<body><joint name="axle" frictionloss="{loss}"/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="1 1 2"/></body>'
+    )
+    motor = '<actuator><motor joint="axle"/></actuator>'
+    xml = mjcf(wheel, floor=False, rest=motor + start("0", str(v0)))
+    return run(xml, 100, control=lambda t, state: [torque(t)])
+
+
+@pytest.mark.parametrize(
+    ("torque", "v0", "signs"),
+    [
+        (lambda t: 0.0, 0.5, {0, 1}),
+        (lambda t: 2.5, 0.0, {0}),
+        (lambda t: 4.0, 0.0, {1}),
+        (lambda t: 4 * math.sin(20 * t), -0.5, {-1, 0, 1}),
+    ],
+    ids=["slips and stops", "sticks", "slips", "reverses"],
+)
+def test_dry_friction_in_a_joint_is_exact(torque: Torque, v0: float, signs: set[int]) -> None:
+    """Each step: I v' = I v + h T - p, |p| <= h F, which stops the joint if it can."""
+    inertia, loss, v = 2.0, 3.0, v0
+    seen = set()
+    for step in driven(loss, torque, v0=v0):
+        problem = step.problem
+        assert (problem.nc, problem.n) == (1, 2)
+        free = v + H * torque(step.time) / inertia
+        v = math.copysign(max(abs(free) - H * loss / inertia, 0), free)
+        seen.add(float(np.sign(v)))
+        np.testing.assert_allclose(step.velocity, [v], atol=1e-9)
+        r = step.result.solution.r
+        np.testing.assert_allclose(r[0], H * loss, rtol=1e-8)
+        np.testing.assert_allclose(r[1], (v - free) * inertia, atol=1e-9)
+        np.testing.assert_array_equal(step.contacts.pair[0], [-1 - 1, 0])
+    assert seen == signs
+
+
+def test_dry_friction_of_a_tendon_stops_what_it_pulls() -> None:
+    slide = '<body name="{0}"><joint name="{0}" type="slide" axis="1 0 0"/><geom size="1"' + (
+        ' contype="0" conaffinity="0" mass="{1}"/></body>'
+    )
+    tendon = (
+        '<tendon><fixed frictionloss="6"><joint joint="a" coef="1"/><joint joint="b" coef="-2"/>'
+        "</fixed></tendon>"
+    )
+    xml = mjcf(
+        slide.format("a", 2) + slide.format("b", 1),
+        floor=False,
+        gravity="0 0 0",
+        rest=tendon + start("0 0", "0.3 0"),
+    )
+    steps = run(xml, 40)
+    mass, pull = np.array([2.0, 1.0]), np.array([1.0, -2.0])
+    inverse = float(pull @ (pull / mass))
+    v = np.array([0.3, 0.0])
+    for step in steps:
+        rate = float(pull @ v)
+        impulse = math.copysign(min(H * 6, abs(rate) / inverse), rate)
+        v = v - pull * impulse / mass
+        np.testing.assert_allclose(step.velocity, v, atol=1e-9)
+    assert abs(pull @ v) < 1e-9
+
+
+def test_dry_friction_holds_an_arm_beside_contacts_in_the_plane_and_in_space() -> None:
+    """A box on the ground, and an arm with a limit whose friction exceeds its weight's moment."""
+    arm = (
+        '<body pos="0 0 1"><joint axis="0 1 0" frictionloss="{loss}" limited="true" range="-1 1"/>'
+        '<geom type="capsule" size="0.02" fromto="0 0 0 0.5 0 0" mass="1"/></body>'
+    )
+    block = (
+        '<body pos="2 0 0.1"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/>'
+        '<joint axis="0 1 0"/><geom type="box" size="0.2 0.1 0.1" mass="1" friction="0.5"/></body>'
+    )
+    held, falls = G * 0.25 * 1.01, G * 0.25 * 0.5
+    for planar in (False, True):
+        for loss, angle in ((held, 0.0), (falls, 1.0)):
+            scene = Scene(name="test", xml=mjcf(arm.format(loss=loss) + block), planar=planar)
+            *_, last = simulate(scene, 160, tol=1e-10)
+            assert last.position[0] == pytest.approx(angle, abs=0.05)
+            assert abs(last.velocity[0]) < 1e-9
+            assert last.result.converged
+
+
+# ---- actuators with a state, controls, keyframes
+
+
+@pytest.mark.parametrize("dynamics", ["filter", "filterexact", "integrator"])
+def test_states_of_actuators_follow_their_rates(dynamics: str) -> None:
+    """As MuJoCo's own Euler step has them, whose forces are the same where nothing touches."""
+    wheel = '<body><joint name="axle"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 2"/></body>'
+    motor = (
+        f'<actuator><general joint="axle" dyntype="{dynamics}" dynprm="0.05"'
+        ' actlimited="true" actrange="-1 0.8"/></actuator>'
+    )
+    xml = mjcf(wheel, floor=False, rest=motor)
+    m = mujoco.MjModel.from_xml_string(xml)
+    d = mujoco.MjData(m)
+    d.ctrl[:] = 1.5
+    for step in run(xml, 150, control=lambda t, state: [1.5]):
+        np.testing.assert_allclose(step.position[:2], [d.qpos[0], d.act[0]], atol=1e-12)
+        mujoco.mj_step(m, d)
+    assert d.act[0] == 0.8
+
+
+def test_muscle_contracts() -> None:
+    arm = '<body><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0" mass="1"/></body>'
+    muscle = '<actuator><muscle joint="j" lengthrange="-1 1" force="5"/></actuator>'
+    xml = mjcf(arm, floor=False, gravity="0 0 0", rest=muscle)
+    m = mujoco.MjModel.from_xml_string(xml)
+    d = mujoco.MjData(m)
+    d.ctrl[:] = 0.7
+    for step in run(xml, 30, control=lambda t, state: [0.7]):
+        np.testing.assert_allclose(step.position[1], d.act[0], atol=1e-6)
+        mujoco.mj_step(m, d)
+    assert 0.3 < d.act[0] < 0.8
+
+
+def test_controls_and_the_states_they_act_on_are_regenerated() -> None:
+    """A step is a function of its state, which has the controls; also from a stored one."""
+    sent = []
+
+    def policy(time: float, state: Any) -> Any:
+        sent.append((time, state.index))
+        return [3 * math.sin(20 * time) - state.velocity[0]]
+
+    wheel = '<body><joint name="j"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 2"/></body>'
+    rest = '<actuator><general joint="j" dyntype="filter" dynprm="0.02"/></actuator>'
+    scene = Scene(name="test", xml=mjcf(wheel + SPHERE, z=0.1, rest=rest))
+    steps = list(simulate(scene, 20, control=policy))
+    assert sent == [(H * i, i) for i in range(20)]
+    later = list(simulate(scene, 5, start=steps[15].start, control=policy))
+    np.testing.assert_array_equal(later[-1].velocity, steps[19].velocity)
+    model = MujocoModel(scene)
+    scheme = fclib.simulate.scheme_of(model)
+    for step in (steps[3], steps[12]):
+        again = fclib.simulate.problem_at(
+            model, scheme, step.start.position, step.start.velocity
+        ).problem
+        assert fclib.digest(again) == fclib.digest(step.problem)
+
+
+@pytest.mark.parametrize(("given", "message"), [([1.0, 2.0], "1 controls"), ([math.nan], "finite")])
+def test_wrong_controls_are_named(given: Any, message: str) -> None:
+    wheel = '<body><joint name="j"/><geom size="0.1"/></body>'
+    xml = mjcf(wheel, floor=False, rest='<actuator><motor joint="j"/></actuator>')
+    with pytest.raises(ValueError, match=message):
+        run(xml, 1, control=lambda t, state: given)
+    with pytest.raises(ValueError, match="no actuators"):
+        run(mjcf(SPHERE), 1, control=lambda t, state: given)
+
+
+def test_keyframes_by_name_and_by_use() -> None:
+    keys = (
+        '<keyframe><key name="other" qpos="0 0 7 1 0 0 0"/><key name="home" qpos="0 0 5 1 0 0 0"/>'
+        "</keyframe>"
+    )
+    scene = Scene(name="test", xml=mjcf(SPHERE, rest=keys))
+    model = MujocoModel(scene)
+    assert (model.keyframe, model.position[2]) == ("home", 5)
+    named = MujocoModel(dataclasses.replace(scene, keyframe="other"))
+    assert (named.keyframe, named.position[2]) == ("other", 7)
+    with pytest.raises(ValueError, match="no keyframe 'stand'; it has: other, home"):
+        MujocoModel(dataclasses.replace(scene, keyframe="stand"))
+
+
 # ---- limits of joints and tendons: contacts without friction
+
+
+def test_limit_of_a_planar_scene() -> None:
+    """Twenty joints and one geometry: a limit's number is that of a joint."""
+    links = "".join(
+        f'<body pos="{i} 0 9"><joint axis="0 1 0" limited="true" range="-0.1 0.1"/>'
+        '<inertial pos="0.2 0 0" mass="1" diaginertia="1 1 1"/></body>'
+        for i in range(20)
+    )
+    scene = Scene(name="test", xml=mjcf(links), planar=True)
+    *_, last = simulate(scene, 100)
+    assert last.problem.nc == 20
+    assert np.abs(last.velocity).max() < 1e-8
+
+
+def test_what_no_joint_moves_is_no_contact() -> None:
+    """A mocap body within another fixed one: rows without entries, and no problem of no bodies."""
+    fixed = '<body mocap="true" pos="0 0 0.05"><geom size="0.1"/></body>'
+    steps = run(mjcf(fixed), 2)
+    assert [step.problem.nc for step in steps] == [0, 0]
 
 
 def test_limit_stops_a_joint() -> None:

@@ -19,6 +19,7 @@ from fclib.cli._build import (
     build_plans,
 )
 from fclib.cli._output import Json, err, fail
+from fclib.collections.plan import ON_DEMAND
 
 
 def command(
@@ -40,9 +41,32 @@ def command(
         bool,
         typer.Option("--planar", help="The scene moves in the plane x, z: contacts of N and T."),
     ] = False,
+    keyframe: Annotated[
+        str | None,
+        typer.Option(help="Keyframe to start from; by default start, home or stand, if any."),
+    ] = None,
+    ctrl: Annotated[
+        Path | None,
+        typer.Option(help="Controls, one step a row: a .csv or .npy file. The last row goes on."),
+    ] = None,
+    policy: Annotated[
+        str | None,
+        typer.Option(
+            help="MODULE:FUNCTION, called each step with the time [s] and the state"
+            " (its position, velocity); returns the controls."
+        ),
+    ] = None,
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", help="Refuse a scene that asks for what no problem can hold."),
+    ] = False,
+    package: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=DIR of package://NAME/... in a URDF file; can be repeated."),
+    ] = None,
     ignore: Annotated[
         list[str] | None,
-        typer.Option(help="Leave out a feature that no problem can hold; can be repeated."),
+        typer.Option(help="Leave out a feature knowingly: limits, frictionloss, ..."),
     ] = None,
     form: FormOption = Form.BOTH,
     count: Count = None,
@@ -51,15 +75,24 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF file, and store the problem of each step.
+    """Simulate an MJCF or URDF file, and store the problem of each step.
+
+    What no problem can hold is left out, and said in a line each, in the catalogue and in each
+    file's description.
 
     The scheme is that of Moreau and Jean; the solutions are stored too. Steps without contact give
     no problem. What is stored is a collection: fclib collection verify and publish take it.
     """
     if law not in ("velocity", "gap"):
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')
+    if ctrl is not None and policy is not None:
+        raise typer.BadParameter("the controls are those of --ctrl or of --policy, not of both")
+    pairs = [entry.partition("=") for entry in package or []]
+    for name, equals, place in pairs:
+        if not (name and equals and place):
+            raise typer.BadParameter("--package takes NAME=DIR")
     try:
-        from fclib.simulate import MujocoModel
+        from fclib.simulate import MujocoModel, control_of
     except ImportError as error:
         fail(str(error))
     try:
@@ -69,9 +102,14 @@ def command(
             restitution=restitution,
             law=law,  # type: ignore[arg-type]
             planar=planar,
+            keyframe=keyframe,
+            packages={name: place for name, _, place in pairs},
             ignore=tuple(ignore or ()),
         )
-        MujocoModel(loaded)
+        model = MujocoModel(loaded, strict=strict)
+        control = str(ctrl) if ctrl is not None else policy or ""
+        if control:
+            control_of(control)
         plan = collections.Plan(
             scene=loaded,
             collection="scenes",
@@ -81,10 +119,15 @@ def command(
             count=count,
             select=select.value,
             analyze=analyze,
+            simulation=collections.Simulation(tol=ON_DEMAND, control=control),
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")
-    except ValueError as error:
+    except (OSError, ValueError) as error:
         fail(str(error))
+    for line in model.left_out:
+        err.print(f"Left out: {line}", highlight=False)
+    if model.keyframe:
+        err.print(f"From the keyframe {model.keyframe!r}", highlight=False)
     err.print(f"Simulating {loaded.name}, {steps} steps ...", highlight=False)
     build_plans([plan], folder, 1, pictures, as_json)

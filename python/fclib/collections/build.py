@@ -193,6 +193,7 @@ class Item:
     step: int  # of the simulation, or the problem's number
     time: float | None = None  # at the start of the step [s]
     bodies: int | None = None
+    left_out: tuple[str, ...] = ()
 
 
 def states_of(plan: Plan, folder: Path, report: Progress) -> trajectory.Trajectory | None:
@@ -226,7 +227,13 @@ def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> It
     place = states.index(number)
     part = states.problem(place)
     bodies = int(np.unique(states.model.trees[part.dofs]).size)
-    return Item(part.problem, int(states.step[place]), states.time(place), bodies)
+    return Item(
+        part.problem,
+        int(states.step[place]),
+        states.time(place),
+        bodies,
+        states.model.left_out,
+    )
 
 
 def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
@@ -334,6 +341,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "nnz_M": nnz(problem.M) if problem.n else None,
         "nnz_H": nnz(problem.H) if problem.n else None,
         **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
+        "left_out": "; ".join(item.left_out) or None,
         "digest": _digest.digest(problem),
     }
 

@@ -48,6 +48,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("tol", "float64", "what it was asked for"),
     ("error", "float64", "relative natural-map error of the stored solution, global form"),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
+    ("left_out", "string", "what the scene asked for and no problem holds; null: nothing"),
     ("digest", "string", "fclib.digest of the global form, or the only one"),
     ("global_file", "string", "path from the catalogue's folder"),
     ("global_sha256", "string", "of that file"),

@@ -49,10 +49,16 @@ class Simulation:
     tol: float = 1e-12  # of each step
     stabilization: float = 0.2  # of `fclib.simulate.simulate`
     options: dict[str, Any] = field(default_factory=dict)  # its further ones
+    control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
-        """In JSON's types."""
-        return asdict(self)
+        """In JSON's types; of a file of controls also its SHA-256."""
+        known = asdict(self)
+        if not self.control:
+            del known["control"]
+        elif Path(self.control).is_file():
+            known["control_sha256"] = hashlib.sha256(Path(self.control).read_bytes()).hexdigest()
+        return known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,6 +174,7 @@ def origin(scene: Source) -> dict[str, Any]:
 
     return known | {
         **engine(scene),
+        **({"keyframe": scene.keyframe} if scene.keyframe else {}),
         "restitution": scene.restitution,
         "law": scene.law,
         "activation": scene.activation,

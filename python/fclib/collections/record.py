@@ -72,7 +72,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         raise TypeError(f"{plan.name} is assembled directly: there is nothing to simulate")
     if target.exists():
         raise FileExistsError(f"{target}: is there already, and a trajectory is never rewritten")
-    from fclib.simulate import model_of, problem_at, scheme_of, simulate
+    from fclib.simulate import control_of, model_of, problem_at, scheme_of, simulate
 
     way = plan.simulation
     # the states are assembled by a model of their own, as they are from the file
@@ -93,6 +93,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         tol=way.tol,
         stabilization=way.stabilization,
         start=start,
+        control=control_of(way.control) if way.control else None,
         **way.options,
     ):
         if time.monotonic() - last > CHECKPOINT:
@@ -125,7 +126,8 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
             exponent=exponent,
             number=np.array(kept.number, dtype=np.int64),
             step=np.array(kept.step, dtype=np.int64),
-            position=np.reshape(kept.position, (count, len(model.position))),
+            # of a state, controls and all
+            position=np.reshape(kept.position, (count, -1) if count else (0, len(model.position))),
             velocity=np.reshape(kept.velocity, (count, len(model.velocity))),
             digest=tuple(kept.digest),
             structure=tuple(kept.structure),

@@ -127,7 +127,9 @@ class Trajectory:
 
         known = {name: self.origin[name] for name in ("collection", "version")}
         settings = self.origin["settings"] | known | {"number": int(self.number[place])}
-        info = describe(self.scene, self.scheme, settings, int(self.step[place]))
+        info = describe(
+            self.scene, self.scheme, settings, int(self.step[place]), self.model.left_out
+        )
         return problem_at(self.model, self.scheme, self.position[place], self.velocity[place], info)
 
     def differences(self, place: int, problem: Any) -> dict[str, float]:

@@ -13,6 +13,7 @@ mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks to
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
 periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
+control.py        controls from outside: a file's rows, a function of time and state
 simulation.py     the loop, warm starts, and what each problem says of its origin
 render.py         a picture of a state with its reactions
 
@@ -20,12 +21,14 @@ Importing this package needs MuJoCo, in the version that `_mujoco.py` pins; defo
 scikit-fem, in that of `_skfem.py`.
 """
 
+from fclib.simulate.control import control_of
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import UnsupportedSceneError
 from fclib.simulate.render import NoRenderer, render
 from fclib.simulate.simulation import (
+    Control,
     Model,
     State,
     Step,
@@ -41,6 +44,7 @@ from fclib.simulate.simulation import (
 __all__ = [
     "ContactModel",
     "Contacts",
+    "Control",
     "DeformableModel",
     "Model",
     "MoreauJean",
@@ -50,6 +54,7 @@ __all__ = [
     "Step",
     "System",
     "UnsupportedSceneError",
+    "control_of",
     "describe",
     "engine",
     "model_of",

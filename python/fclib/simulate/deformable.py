@@ -80,6 +80,7 @@ class DeformableModel:
             raise ValueError(f"{scene.name}: a deformable scene needs a time step")
         skfem = _skfem.load()
         self.scene, self.solids = scene, scene.solids
+        self.left_out: tuple[str, ...] = ()
         self.time_step = float(scene.time_step)
 
         known: dict[Any, tuple[Vector, Vector]] = {}

@@ -36,6 +36,14 @@ A bilateral constraint with violation c is corrected by the same share: b = stab
 With rolling friction a contact has five components, N, T1, T2, R1, R2: the last two are the
 relative angular velocity about T1 and T2 [rad/s], and the rolling moment, ||r_R|| <= mu_r r_N.
 
+Dry friction in a joint, a force of at most F against its velocity s^T v, is a contact too
+(docs/mathematics.md): an auxiliary degree of freedom z of mass a, pressed by F, is its normal
+velocity, the joint's velocity its tangential one, and mu = 1,
+
+    a z = r_N - h F,  u_N = z,  u_T1 = s^T v,  u_T2 = 0
+
+so that z = 0 and r_N = h F at every solution.
+
 In the plane a contact has two, N and T, and with rolling friction a third, R, about the normal of
 the plane.
 
@@ -125,6 +133,16 @@ def components(planar: bool, *, rolling: bool) -> int:
 
 
 @dataclass(frozen=True)
+class DryFriction:
+    """Dry friction in k joints and tendons: a force of at most its bound against the velocity."""
+
+    gradient: Sparse  # (n x k) of the joints, their velocities are gradient^T v
+    bound: Vector  # (k) F [N], [N m]
+    mass: Vector  # (k) a of the auxiliary degrees of freedom, of the size of the joint's inertia
+    pair: npt.NDArray[np.int64]  # (k x 2) < 0, as of a limit: which joint or tendon
+
+
+@dataclass(frozen=True)
 class System:
     """The equations of motion at one configuration, and the contacts within reach."""
 
@@ -137,6 +155,7 @@ class System:
     G: Sparse  # (n x p) gradients of the bilateral constraints, d violation / dt = G^T v
     violation: Vector  # (p) of the bilateral constraints
     tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
+    dry: DryFriction | None = None
 
 
 class ContactModel(Protocol):
@@ -224,13 +243,19 @@ class MoreauJean:
             f -= implicit * (h - implicit) * (system.K @ v)
         M = sp.csc_array(M + implicit**2 * system.K)
         b = self.stabilization / h * system.violation
+        tree, G = system.tree, system.G
+        if system.dry is not None:
+            M, H, G, f, w, contacts, tree = with_dry_friction(
+                system.dry, h, M, H, G, f, w, contacts, tree
+            )
 
-        inside, rows = linked(system.tree, M, H, system.G)
+        inside, rows = linked(tree, M, H, G)
+        # auxiliary degrees of freedom have contacts
         apart = np.setdiff1d(np.arange(len(v)), inside)
         fields: dict[str, Any] = {
             "M": M[inside][:, inside],
             "H": H[inside],
-            "G": system.G[inside][:, rows] if rows.size else None,
+            "G": G[inside][:, rows] if rows.size else None,
             "f": f[inside],
             "w": w,
             "mu": contacts.mu,
@@ -249,11 +274,11 @@ class MoreauJean:
             if apart.size:
                 others = np.setdiff1d(np.arange(len(b)), rows)
                 velocity[apart] = free_velocity(
-                    M[apart][:, apart], system.G[apart][:, others], f[apart], b[others]
+                    M[apart][:, apart], G[apart][:, others], f[apart], b[others]
                 )
             return velocity
 
-        return StepProblem(problem, contacts, inside, free)
+        return StepProblem(problem, contacts, inside[inside < len(v)], free)
 
 
 @dataclass(frozen=True)
@@ -262,8 +287,58 @@ class StepProblem:
 
     problem: _core.GlobalProblem | _core.GlobalRollingProblem
     contacts: Contacts  # nc, the active ones
-    dofs: npt.NDArray[np.int64]  # (n') degrees of freedom of the system that the problem has
+    # (n') degrees of freedom of the system that the problem has; its auxiliary ones come after them
+    dofs: npt.NDArray[np.int64]
     free: Callable[[], Vector]  # (n) velocity after the step of the others, 0 at `dofs`; solves
+
+    def after(self, v: Vector | None) -> Vector:
+        """The velocity (n) of the whole system after the step, by that of the problem."""
+        velocity = self.free()
+        if v is not None:
+            velocity[self.dofs] = v[: len(self.dofs)]
+        return velocity
+
+
+def with_dry_friction(
+    dry: DryFriction,
+    h: float,
+    M: Sparse,
+    H: Sparse,
+    G: Sparse,
+    f: Vector,
+    w: Vector,
+    contacts: Contacts,
+    tree: npt.NDArray[np.int64],
+) -> tuple[Sparse, Sparse, Sparse, Vector, Vector, Contacts, npt.NDArray[np.int64]]:
+    """The problem's data with an auxiliary degree of freedom and a contact for each friction."""
+    k, d = len(dry.bound), contacts.dimension
+    n = len(f)
+    gradient = sp.coo_array(dry.gradient)
+    # N is the auxiliary velocity, T1 the joint's
+    rows = np.concatenate((gradient.row, n + np.arange(k)))
+    columns = np.concatenate((d * gradient.col + 1, d * np.arange(k)))
+    values = np.concatenate((gradient.data, np.ones(k)))
+    own = sp.csc_array((values, (rows, columns)), shape=(n + k, d * k))
+    H = sp.hstack((sp.vstack((H, sp.csc_array((k, H.shape[1])))), own), format="csc")
+    first = np.full(k, n)
+    np.minimum.at(first, gradient.col, gradient.row)
+    return (
+        sp.csc_array(sp.block_diag((M, sp.diags_array(dry.mass)))),
+        H,
+        sp.vstack((G, sp.csc_array((k, G.shape[1]))), format="csc"),
+        np.concatenate((f, -h * dry.bound)),
+        np.concatenate((w, np.zeros(d * k))),
+        Contacts(
+            np.concatenate((contacts.pair, dry.pair)),
+            np.concatenate((contacts.point, np.zeros((k, 3)))),
+            np.concatenate((contacts.frame, np.zeros((k, 3, 3)))),
+            np.concatenate((contacts.gap, np.zeros(k))),
+            np.concatenate((contacts.mu, np.ones(k))),
+            None if contacts.mu_r is None else np.concatenate((contacts.mu_r, np.zeros(k))),
+            contacts.planar,
+        ),
+        np.concatenate((tree, tree[first])),
+    )
 
 
 def closing(pair: npt.NDArray[np.int64], middle: Vector, activation: float) -> npt.NDArray[np.intp]:

@@ -6,10 +6,12 @@ velocity of the second relative to the first. A row of an equality is the rate o
 `efc_pos`. Only MuJoCo's own solver, its soft contacts and its integrator are left aside.
 
 A limit of a joint or a tendon is a contact without friction: its row is N, its tangents are zero,
-and its pair is (-1 - kind, index). Contacts of condim 6 make rolling problems; their spin
-friction, which FCLIB's law does not have, is left out.
+and its pair is (-1 - kind, index); of dry friction likewise. Contacts of condim 6 make rolling
+problems; their spin friction, which FCLIB's law does not have, is left out.
 
-A scene with a gait (`mujoco_scene.py`) has the configuration (q, t).
+The configuration is q, then the states of actuators, which MuJoCo's own rates advance, and what the
+forces depend on besides: of a scene with a gait (`mujoco_scene.py`) the time, of one with
+other controls these.
 """
 
 from __future__ import annotations
@@ -24,15 +26,25 @@ import scipy.sparse as sp
 
 from fclib.scenes import Scene
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector, components
+from fclib.simulate.moreau_jean import (
+    Contacts,
+    DryFriction,
+    Sparse,
+    System,
+    Vector,
+    components,
+)
 from fclib.simulate.mujoco_scene import (
+    DYNAMICS,
     Gait,
     UnsupportedSceneError,
     compile_scene,
     has_condim,
+    keyframe_of,
+    left_out,
     periodic_cell,
     refuse_out_of_plane,
-    refuse_unsupported,
+    refuse_unknown,
 )
 from fclib.simulate.plane import in_plane
 
@@ -44,12 +56,18 @@ ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest 
 class MujocoModel:
     """A `ContactModel` made of an MJCF scene."""
 
-    def __init__(self, scene: Scene) -> None:
-        """ValueError where the MJCF is wrong, UnsupportedSceneError where it asks too much."""
+    def __init__(self, scene: Scene, *, strict: bool = False) -> None:
+        """ValueError where the MJCF is wrong.
+
+        What no problem can hold is left out, and named in `left_out`; `strict`:
+        UnsupportedSceneError.
+        """
         self.scene = scene
         self.model: Any = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
-        refuse_unsupported(scene, self.model)
+        self.left_out = left_out(scene, self.model)
+        if strict:
+            refuse_unknown(scene, self.left_out)
         if scene.planar:
             refuse_out_of_plane(scene, self.model, self.data)
 
@@ -66,9 +84,13 @@ class MujocoModel:
         m.tendon_margin[:] = REACH
 
         self._gait = Gait.of(scene, m)
-        start = mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_KEY, "start")
-        if start >= 0:
-            mujoco.mj_resetDataKeyframe(m, self.data, start)
+        self.controlled = False  # from outside: controls are part of the configuration
+        self.keyframe = keyframe_of(scene, m)
+        if self.keyframe:
+            mujoco.mj_resetDataKeyframe(m, self.data, m.key(self.keyframe).id)
+        if m.na:
+            # of the rates of actuators
+            m.opt.timestep = self.time_step
         if self._cell:
             self._cell.wrap(m, self.data.qpos)
 
@@ -79,9 +101,19 @@ class MujocoModel:
 
     @property
     def position(self) -> Vector:
-        """Configuration q (nq), with a gait (q, t) (nq + 1), a copy."""
-        q: Vector = self.data.qpos.copy()
-        return np.append(q, self.data.time) if self._gait else q
+        """Configuration (q, states of actuators, time or controls), a copy."""
+        d = self.data
+        parts = [d.qpos, d.act]
+        if self._gait:
+            parts.append([d.time])
+        elif self.controlled:
+            parts.append(d.ctrl)
+        return np.concatenate(parts)
+
+    @property
+    def has_gait(self) -> bool:
+        """Whether the scene itself says its controls at each time."""
+        return self._gait is not None
 
     @property
     def velocity(self) -> Vector:
@@ -105,8 +137,8 @@ class MujocoModel:
     def assemble(self, h: float, *, shared_speed: bool = False) -> System:
         """The system at (q, v), with every contact that may close within h.
 
-        MemoryError where MuJoCo's arena is too small, UnsupportedSceneError where a contact is of a
-        kind that has no problem yet.
+        MemoryError where MuJoCo's arena is too small, UnsupportedSceneError where a contact of a
+        planar scene leaves the plane.
         """
         m, d = self.model, self.data
         if self._cell:
@@ -129,7 +161,8 @@ class MujocoModel:
             rows = sp.csr_array(rows + self._cell.rows(m, d))
         H, contacts = contact_columns(self, rows)
         if self.scene.planar:
-            sizes = m.geom_rbound[np.maximum(contacts.pair, 0)].max(axis=1)
+            geometries = np.where(contacts.pair[:, :1] < 0, 0, contacts.pair)
+            sizes = m.geom_rbound[geometries].max(axis=1)
             try:
                 H, contacts = in_plane(H, contacts, sizes)
             except ValueError as error:
@@ -143,14 +176,40 @@ class MujocoModel:
             d.ctrl[:] = self._gait.controls(d.time + h)
         force = self._force()
         C, K = linear_forces(m, d)
-        return System(self._pattern.fill(d.M), force, C, K, H, contacts, G, violation, self.trees)
+        return System(
+            self._pattern.fill(d.M),
+            force,
+            C,
+            K,
+            H,
+            contacts,
+            G,
+            violation,
+            self.trees,
+            dry_friction(m, d, rows),
+        )
+
+    def control(self, values: Any) -> None:
+        """Set the controls (nu) until they are set again. ValueError for another number of them."""
+        values = np.asarray(values, dtype=float)
+        if values.shape != self.data.ctrl.shape or not np.isfinite(values).all():
+            raise ValueError(
+                f"{self.scene.name}: has {self.model.nu} controls, which must be finite;"
+                f" those given: shape {values.shape}"
+            )
+        self.controlled = True
+        self.data.ctrl[:] = values
 
     def set_state(self, position: Vector, velocity: Vector) -> None:
         """Take a configuration, as `position` gives it, and a velocity v (n)."""
+        m, d = self.model, self.data
+        own, act, rest = np.split(position, [m.nq, m.nq + m.na])
+        d.qpos[:], d.act[:] = own, act
         if self._gait:
-            position, self.data.time = position[:-1], float(position[-1])
-        self.data.qpos[:] = position
-        self.data.qvel[:] = velocity
+            d.time = float(rest[0])
+        elif rest.size:
+            self.control(rest)
+        d.qvel[:] = velocity
         if self._cell:
             self._cell.wrap(self.model, self.data.qpos)
 
@@ -159,6 +218,8 @@ class MujocoModel:
         moved = v if theta == 1 else (1 - theta) * self.data.qvel + theta * v
         self.data.qvel[:] = v
         mujoco.mj_integratePos(self.model, self.data.qpos, moved, h)
+        if self.model.na and "activation" not in self.scene.ignore:
+            advance_actuators(self.model, self.data, h)
         self.data.time += h
         if self._cell:
             self._cell.wrap(self.model, self.data.qpos)
@@ -229,7 +290,11 @@ class MujocoModel:
                     ' <size memory="..."/> in the MJCF'
                 )
         if self.data.warning[kinds.mjWARN_INERTIA].number:
-            raise ValueError(f"{self.scene.name}: the mass matrix is singular")
+            fastest = np.abs(self.data.qvel).max(initial=0.0)
+            raise ValueError(
+                f"{self.scene.name}: the mass matrix is singular (the largest velocity is"
+                f" {fastest:.3g}; the motion has diverged if that is huge)"
+            )
 
 
 def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
@@ -242,9 +307,11 @@ def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
     springs = np.zeros(m.nv)
     springs[m.jnt_dofadr[plain]] = m.jnt_stiffness[plain]
     moment = sp.csr_array(
-        (d.actuator_moment, d.moment_colind, pointers(d.moment_rownnz)), shape=(m.nu, m.nv)
+        (d.actuator_moment, d.moment_colind, pointers(d.moment_rownnz)), shape=(m.nout, m.nv)
     )
-    affine = m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    # the actuator of each output
+    owner = np.repeat(np.arange(len(m.actuator_outnum)), m.actuator_outnum)
+    affine = m.actuator_biastype[owner] == mujoco.mjtBias.mjBIAS_AFFINE
 
     def linear(diagonal: Vector, gain: Vector) -> Sparse:
         feedback = sp.diags_array(np.where(affine, np.maximum(-gain, 0), 0.0))
@@ -253,8 +320,46 @@ def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
         return matrix
 
     # the bias of an actuator is p0 + p1 length + p2 velocity
-    bias = m.actuator_biasprm
+    bias = m.actuator_biasprm[owner]
     return linear(m.dof_damping, bias[:, 2]), linear(springs, bias[:, 1])
+
+
+def advance_actuators(m: Any, d: Any, h: float) -> None:
+    """The states of actuators after h [s], by the rates that MuJoCo found for their start."""
+    kinds = mujoco.mjtDyn
+    for i in np.flatnonzero(np.isin(m.actuator_dyntype, DYNAMICS) & (m.actuator_actnum > 0)):
+        # a muscle's or a filter's is the last one of its states
+        k = m.actuator_actadr[i] + m.actuator_actnum[i] - 1
+        span = h
+        if m.actuator_dyntype[i] == kinds.mjDYN_FILTEREXACT:
+            tau = max(float(m.actuator_dynprm[i, 0]), 1e-15)
+            span = tau * -np.expm1(-h / tau)
+        d.act[k] += span * d.act_dot[k]
+        if m.actuator_actlimited[i]:
+            d.act[k] = np.clip(d.act[k], *m.actuator_actrange[i])
+
+
+def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
+    """Of joints and tendons, by MuJoCo's constraint rows (nefc x n); None: there is none."""
+    if not d.nf:
+        return None
+    types = mujoco.mjtConstraint
+    of_joints = d.efc_type == int(types.mjCNSTR_FRICTION_DOF)
+    which = np.flatnonzero(of_joints | (d.efc_type == int(types.mjCNSTR_FRICTION_TENDON)))
+    gradient = rows[which]
+    moved = np.flatnonzero(np.diff(gradient.indptr))
+    which, gradient = which[moved], gradient[moved]
+    index = d.efc_id[which]
+    joint = of_joints[which]
+    inverse = np.zeros(len(which))
+    inverse[joint] = m.dof_invweight0[index[joint]]
+    inverse[~joint] = m.tendon_invweight0[index[~joint]]
+    return DryFriction(
+        gradient=gradient.T,
+        bound=d.efc_frictionloss[which].copy(),
+        mass=1 / np.where(inverse > 0, inverse, 1.0),
+        pair=np.column_stack((-1 - d.efc_type[which].astype(np.int64), index)),
+    )
 
 
 def frictionless_to_frictional(d: Any) -> None:
@@ -311,24 +416,24 @@ def pointers(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
 
 
 def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
-    """H (n x d nc) and the contacts that give rows: all but those between fixed bodies.
+    """H (n x d nc) and the contacts that give rows: all but those between bodies that stay.
 
     The limits of joints and tendons come after the contacts.
     """
-    m, data, scene = source.model, source.data, source.scene
+    m, data = source.model, source.data
     contact = data.contact
-    which = np.flatnonzero(contact.efc_address >= 0)
+    # a body of a mocap, or one whose joints do not move the point, has rows without entries
+    entries = np.append(np.diff(rows.indptr), 0)
+    first = contact.efc_address[:, None] + np.arange(3)
+    moves = entries[np.where(first < rows.shape[0], first, -1)].any(axis=1)
+    rigid = (contact.geom >= 0).reshape(-1, 2).all(axis=1)
+    which = np.flatnonzero((contact.efc_address >= 0) & rigid & moves)
     dim = contact.dim[which]
     friction = contact.friction[which]
     friction[friction <= LEAST_MU] = 0
     # sliding has two coefficients, rolling two more
     for first, second, use in ((0, 1, dim > 1), (3, 4, dim == 6)):
         differs = use & (friction[:, first] != friction[:, second])
-        if differs.any() and "anisotropy" not in scene.ignore:
-            raise UnsupportedSceneError(
-                f"{scene.name}: not supported: anisotropic friction, two coefficients"
-                ' (their mean is taken with ignore=("anisotropy",))'
-            )
         friction[differs, first] = np.sqrt(friction[differs, first] * friction[differs, second])
 
     types = mujoco.mjtConstraint

@@ -1,4 +1,4 @@
-"""MuJoCo's model of an MJCF scene; what no problem can hold is refused before the first step.
+"""MuJoCo's model of an MJCF scene, and what of it no problem can hold: it is left out, and said.
 
 Keyframes called gait... hold controls at their times: straight between them, the last one's are the
 first one's again, and so on.
@@ -22,7 +22,14 @@ from fclib.simulate.plane import NORMAL
 MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
 FLAT: Final = 1e-9  # sine of the angle of a joint's axis to the plane
 
-# features that a scene may leave out knowingly, and the flag of MuJoCo that does so, if any
+KEYFRAMES: Final = ("start", "home", "stand")  # where a scene starts, the first that is there
+# actuators whose state MuJoCo advances by its rate, which is known here
+DYNAMICS: Final = tuple(
+    int(getattr(mujoco.mjtDyn, f"mjDYN_{name}"))
+    for name in ("NONE", "INTEGRATOR", "FILTER", "FILTEREXACT", "MUSCLE")
+)
+
+# features that a scene leaves out knowingly, and the flag of MuJoCo that does so, if any
 IGNORABLE: Final = {
     "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
     "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
@@ -90,26 +97,66 @@ def has_condim(m: Any, condim: int) -> bool:
     return bool(condim in m.geom_condim[collides] or condim in m.pair_dim)
 
 
-def refuse_unsupported(scene: Scene, m: Any) -> None:
-    """Name all that the scene asks and no problem can hold, before the first step."""
+def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
+    """What the scene asks and no problem holds, a line each; not what it ignores knowingly."""
     lost = []
-    loss_off = m.opt.disableflags & int(IGNORABLE["frictionloss"])
-    if not loss_off and (m.dof_frictionloss.any() or m.tendon_frictionloss.any()):
-        lost.append('dry friction in joints or tendons (left out with ignore=("frictionloss",))')
-    if has_condim(m, 4) and "torsion" not in scene.ignore:
-        lost.append('contacts of condim 4, torsional friction (left out with ignore=("torsion",))')
-    if m.na and "activation" not in scene.ignore:
-        lost.append('actuators with a state (held with ignore=("activation",))')
+    collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+    spins = (m.geom_condim >= 4) & collides & (m.geom_friction[:, 1] > 0)
+    of_pairs = (m.pair_dim >= 4) & (m.pair_friction[:, 2] > 0)
+    if (spins.any() or of_pairs.any()) and "torsion" not in scene.ignore:
+        lost.append("torsional friction (condim 4 and 6)")
+    differs = (m.pair_dim > 1) & (m.pair_friction[:, 0] != m.pair_friction[:, 1])
+    differs |= (m.pair_dim == 6) & (m.pair_friction[:, 3] != m.pair_friction[:, 4])
+    if differs.any() and "anisotropy" not in scene.ignore:
+        lost.append("anisotropic friction (the mean of two coefficients)")
+    if softened(m, collides):
+        lost.append("solref and solimp (contacts, limits and equalities are rigid)")
+    if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        lost.append("the integrator RK4 (Moreau and Jean's scheme)")
+    if not np.isin(m.actuator_dyntype, DYNAMICS).all() and "activation" not in scene.ignore:
+        lost.append("states of actuators other than filters and muscles (they stay as they are)")
     if m.nflex:
-        lost.append("deformable bodies (flex)")
+        lost.append("contacts of deformable bodies (flex)")
     if m.flg_surfacevel:
-        lost.append("surfaces with a prescribed velocity (surfacevel)")
+        lost.append("velocities of surfaces (surfacevel)")
     if m.flg_adhesion:
         lost.append("adhesion")
     if m.nplugin:
         lost.append("plugins")
+    return tuple(lost)
+
+
+def softened(m: Any, collides: Any) -> bool:
+    """Whether a model asks for other compliances than MuJoCo's own."""
+    limited, tied = m.jnt_limited.astype(bool), m.eq_active0.astype(bool)
+    rows = (
+        np.hstack((m.geom_solref, m.geom_solimp))[collides],
+        np.hstack((m.pair_solref, m.pair_solimp)),
+        np.hstack((m.jnt_solref, m.jnt_solimp))[limited],
+        np.hstack((m.eq_solref, m.eq_solimp))[tied],
+    )
+    usual = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
+    return any(bool((own != usual).any()) for own in rows)
+
+
+def refuse_unknown(scene: Scene, lost: tuple[str, ...]) -> None:
+    """UnsupportedSceneError that names all that would be left out."""
     if lost:
         raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
+
+
+def keyframe_of(scene: Scene, m: Any) -> str:
+    """The keyframe where a scene starts: the one it names, or one of a usual name; empty: none.
+
+    ValueError where it names one that is not there.
+    """
+    names = [m.key(i).name for i in range(m.nkey)]
+    if scene.keyframe is not None:
+        if scene.keyframe not in names:
+            known = ", ".join(name for name in names if name) or "none"
+            raise ValueError(f"{scene.name}: has no keyframe {scene.keyframe!r}; it has: {known}")
+        return scene.keyframe
+    return next((name for name in KEYFRAMES if name in names), "")
 
 
 def refuse_out_of_plane(scene: Scene, m: Any, d: Any) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -33,6 +33,9 @@ class State:
     r: Vector  # (nc x d) their impulses [N s]
 
 
+Control: TypeAlias = Callable[[float, State], npt.ArrayLike]
+
+
 @dataclass(frozen=True)
 class Step:
     """One step, from time to time + h: its problem and the solution that carried it on."""
@@ -58,6 +61,8 @@ def simulate(
     warm_start: bool = True,
     stabilization: float = STABILIZATION,
     start: State | None = None,
+    control: Control | None = None,
+    strict: bool = False,
     **options: Any,
 ) -> Iterator[Step]:
     """Yield the steps of a scene, as they are computed.
@@ -68,6 +73,11 @@ def simulate(
     solver, tol    of `fclib.solve`, with its further options
     warm_start     begin from the impulses that the same pairs of bodies had in the step before
     stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
+
+    control        called at the start of each step with the time [s] and the state there; returns
+                   the controls of the actuators (nu). By default those of the scene
+    strict         refuse a scene that asks for what no problem holds; by default that is left out,
+                   `step.model.left_out` names it, and so does each problem's description
 
     The tolerance bounds the natural map alone (merit="natural" of `fclib.solve`) unless the options
     say otherwise: the published sets were made so, and each step depends on those before it.
@@ -81,17 +91,25 @@ def simulate(
     """
     if steps < 0:
         raise ValueError(f"the number of steps must be >= 0, not {steps}")
-    model = model_of(scene)
+    model = model_of(scene, strict=strict)
     scheme = scheme_of(model, stabilization)
+    if control is not None:
+        if not isinstance(model, MujocoModel) or not model.model.nu:
+            raise ValueError(f"{scene.name}: takes no controls, it has no actuators")
+        if model.has_gait:
+            raise ValueError(f"{scene.name}: takes no controls, its keyframes gait... give them")
+        model.controlled = True
     settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
     if start is not None:
         model.set_state(start.position, start.velocity)
-    return _march(model, scheme, steps, settings, start)
+    return _march(model, scheme, steps, settings, start, control)
 
 
-def model_of(scene: Scene) -> Model:
+def model_of(scene: Scene, *, strict: bool = False) -> Model:
     """The model of a scene, at its start; raises as `simulate` does."""
-    return MujocoModel(scene) if scene.solids is None else DeformableModel(scene)
+    if scene.solids is None:
+        return MujocoModel(scene, strict=strict)
+    return DeformableModel(scene)
 
 
 def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
@@ -128,6 +146,7 @@ def _march(
     steps: int,
     settings: dict[str, Any],
     start: State | None,
+    control: Control | None,
 ) -> Iterator[Step]:
     state = start or State(
         0,
@@ -138,7 +157,11 @@ def _march(
         np.zeros((0, 3)),
     )
     for index in range(state.index, state.index + steps):
-        info = describe(model.scene, scheme, settings, index)
+        if control is not None:
+            assert isinstance(model, MujocoModel)
+            model.control(control(index * scheme.h, state))
+            state = replace(state, position=model.position)
+        info = describe(model.scene, scheme, settings, index, model.left_out)
         part = scheme.problem(scheme.assemble(model), model.velocity, info)
         problem, contacts = part.problem, part.contacts
 
@@ -147,8 +170,7 @@ def _march(
             options["guess"] = _core.Solution(r=carry_over(state, contacts))
         result = _solve.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
 
-        after = part.free()
-        after[part.dofs] = result.solution.v
+        after = part.after(result.solution.v)
         if not np.isfinite(after).all():
             raise FloatingPointError(
                 f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
@@ -198,7 +220,11 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
 
 
 def describe(
-    scene: Scene, scheme: MoreauJean, settings: dict[str, Any], index: int
+    scene: Scene,
+    scheme: MoreauJean,
+    settings: dict[str, Any],
+    index: int,
+    left_out: Sequence[str] = (),
 ) -> _core.ProblemInfo:
     """What travels with a problem: its name, its mathematics, and all that regenerates it.
 
@@ -213,6 +239,8 @@ def describe(
         "seed": scene.seed,
         "ignore": list(scene.ignore),
         "planar": scene.planar,
+        **({"left_out": list(left_out)} if left_out else {}),
+        **({"keyframe": scene.keyframe} if scene.keyframe else {}),
         **({"period": list(scene.period)} if scene.period else {}),
         "time_step": scheme.h,
         "restitution": scheme.restitution,
@@ -231,6 +259,7 @@ def describe(
             ("Field of application", scene.application),
             ("Friction", scene.friction),
             ("Authors of the original family", scene.authors),
+            ("Left out", "; ".join(left_out)),
         )
         if text
     ]

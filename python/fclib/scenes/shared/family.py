@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -19,8 +21,9 @@ Law = Literal["velocity", "gap"]
 class Scene:
     """A mechanical scene, ready to be simulated: what is in it, and how to step it.
 
-    In an MJCF model a keyframe named ``start`` gives the initial positions, velocities and
-    controls; without it the scene starts at rest in the positions of the model. Keyframes whose
+    In an MJCF model a keyframe gives the initial positions, velocities and controls: the one that
+    the scene names, or the first of ``start``, ``home`` and ``stand`` that is there; without one
+    the scene starts at rest in the positions of the model. Keyframes whose
     names begin with ``gait`` give controls at times, from 0 on, which repeat after the last.
 
     To solve a problem of a scene again, one needs what is here and nothing else.
@@ -44,6 +47,7 @@ class Scene:
     friction: str = ""  # the law of friction, in words
     # what a picture shows: centre and radius [m]; None: all that moves
     focus: tuple[float, float, float, float] | None = None
+    keyframe: str | None = None  # of the MJCF, where it starts; None: start, home or stand
     planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
@@ -79,28 +83,74 @@ class Scene:
         restitution: float = 0.0,
         law: Law = "velocity",
         planar: bool = False,
+        keyframe: str | None = None,
+        packages: Mapping[str, str | Path] | None = None,
         ignore: tuple[str, ...] = (),
     ) -> Scene:
-        """The scene of an MJCF file. OSError where it cannot be read.
+        """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
 
         Its parameters hold the file's name and its SHA-256, not the files that it includes.
+
+        Args:
+            path: of the file.
+            time_step: h [s]; None: that of the file.
+            restitution: Newton's coefficient e.
+            law: the unilateral law.
+            planar: whether it moves in the plane x, z.
+            keyframe: where it starts, by name; None: start, home or stand where there is one.
+            packages: folders of the names in package://NAME/... of a URDF file.
+            ignore: features that are left out.
+
+        Raises:
+            OSError: it cannot be read.
+            ValueError: a package is not known.
         """
         path = Path(path)
         xml = path.read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
+        resolved = resolve_packages(path.name, xml, packages or {})
         return cls(
             name=path.stem,
-            xml=xml,
+            xml=resolved,
             time_step=time_step,
             restitution=restitution,
             law=law,
             planar=planar,
+            keyframe=keyframe,
             parameters={"file": path.name, "sha256": digest},
             title=path.stem,
             description=f"Problems of the scene {path.name}.",
             ignore=tuple(ignore),
-            path=path,
+            # the text tells all where packages were resolved
+            path=path if resolved == xml else None,
         )
+
+
+def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) -> str:
+    """A URDF text with the folders of its package://NAME/... in their places.
+
+    ValueError where one is not known: by the argument, or as a folder of ROS_PACKAGE_PATH.
+    """
+    asked = sorted(set(re.findall(r"package://([^/\"'<>]+)", xml)))
+    if not asked:
+        return xml
+    roots = [Path(root) for root in os.environ.get("ROS_PACKAGE_PATH", "").split(":") if root]
+    for package in asked:
+        folders = [Path(packages[package])] if package in packages else []
+        folders += [root / package for root in roots]
+        found = next((folder for folder in folders if folder.is_dir()), None)
+        if found is None:
+            raise ValueError(
+                f"{name}: no folder is known for package://{package}; name it with --package"
+                f" {package}=DIR (packages= in Python), or set ROS_PACKAGE_PATH"
+            )
+        xml = xml.replace(f"package://{package}/", f"{found.resolve()}/")
+    if "<mujoco" not in xml:
+        # MuJoCo drops folders from the names of a URDF file's meshes unless it is told not to
+        xml = re.sub(
+            r"(<robot\b[^>]*>)", r'\1<mujoco><compiler strippath="false"/></mujoco>', xml, count=1
+        )
+    return xml
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,68 @@
+"""Controls of a simulation from outside: a file's rows, or a function of time and state."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from fclib.simulate.simulation import Control, State
+
+FILES = (".csv", ".npy")
+
+
+def control_of(source: str) -> Control:
+    """The controls that a name says: FILE.csv, FILE.npy or MODULE:FUNCTION.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: it is no table of numbers, or there is no such function.
+    """
+    if Path(source).suffix in FILES:
+        return control_of_rows(read_rows(Path(source)))
+    return policy_of(source)
+
+
+def control_of_rows(rows: np.ndarray) -> Control:
+    """Row k (steps x nu) in step k; the last one goes on."""
+
+    def control(time: float, state: State) -> np.ndarray:
+        chosen: np.ndarray = rows[min(state.index, len(rows) - 1)]
+        return chosen
+
+    return control
+
+
+def read_rows(path: Path) -> np.ndarray:
+    """The table (steps x nu) of a file: one step a line. OSError, ValueError."""
+    try:
+        if path.suffix == ".npy":
+            rows = np.atleast_2d(np.asarray(np.load(path, allow_pickle=False), dtype=float))
+        else:
+            rows = np.loadtxt(path, delimiter=",", ndmin=2)
+    except (ValueError, EOFError) as error:
+        raise ValueError(f"{path}: is no table of controls, steps x nu: {error}") from None
+    if rows.ndim != 2 or not rows.size:
+        raise ValueError(f"{path}: is no table of controls, steps x nu: shape {rows.shape}")
+    return rows
+
+
+def policy_of(name: str) -> Control:
+    """The function MODULE:FUNCTION; a module may lie in the current folder. ValueError."""
+    module, _, function = name.partition(":")
+    if not function:
+        raise ValueError(f"{name!r}: is no MODULE:FUNCTION, and no .csv or .npy file")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        found = importlib.import_module(module.removesuffix(".py"))
+    except ImportError as error:
+        raise ValueError(f"{name!r}: the module cannot be imported: {error}") from None
+    policy = getattr(found, function, None)
+    if not callable(policy):
+        raise ValueError(f"{name!r}: {module} has no function {function!r}")
+    chosen: Control = policy
+    return chosen

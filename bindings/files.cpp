@@ -169,9 +169,10 @@ void bind_hdf5(nb::module_& m) {
     m.def(
         "write",
         [](const fs::path& path, const P& problem, const Solution* solution,
-           const std::vector<Solution>& guesses, const std::string& mode, int compression) {
-          const WriteOptions options =
-              options_of(mode, {"overwrite", "add", "replace"}, compression);
+           const std::vector<Solution>& guesses, const std::string& mode, int compression,
+           bool dense) {
+          WriteOptions options = options_of(mode, {"overwrite", "add", "replace"}, compression);
+          options.dense = dense;
           if (solution == nullptr && guesses.empty()) {
             write_file(path.string(), &problem, nullptr, {}, options);
             return;
@@ -184,13 +185,13 @@ void bind_hdf5(nb::module_& m) {
         },
         "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
         "guesses"_a = std::vector<Solution>{}, nb::kw_only(), "mode"_a = "overwrite",
-        "compression"_a = WriteOptions{}.compression,
+        "compression"_a = WriteOptions{}.compression, "dense"_a = false,
         nb::sig(signature("write",
                           ", problem: " + class_name(P::kind) +
                               ", solution: Solution | None = None, " + guesses_type +
                               " = (), *, mode: typing.Literal['overwrite', 'add', 'replace'] = "
                               "'overwrite', " +
-                              compression_type,
+                              compression_type + ", dense: bool = False",
                           "None")
                     .c_str()),
         nb::call_guard<Unlocked>(),
@@ -200,7 +201,8 @@ void bind_hdf5(nb::module_& m) {
         "must not have such a problem (\"add\"), or gives up the problem of this kind, with its "
         "solution and its guesses (\"replace\"). In a file of several problems solution and "
         "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
-        "9.\n\n"
+        "9. Dense matrices are written by rows, which every reader takes; dense keeps those of a "
+        "local problem as they are.\n\n"
         "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
         "mode or a compression outside 0..9.");
   });

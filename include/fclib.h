@@ -22,8 +22,9 @@
  *
  *   No function ends the process or throws. An int result is 1 on success and 0 on failure, a
  *   pointer is NULL on failure, a merit is NaN; fclib_last_error() then has the reason, and the
- *   handler of fclib_set_error_handler() has been called with it. A NULL argument is an error of
- *   this kind, except for what is marked "or NULL".
+ *   handler of fclib_set_error_handler() has been called with it: at first, one that prints a line
+ *   on the standard error. A NULL argument is an error of this kind, except for what is marked "or
+ *   NULL".
  *
  * Ownership
  *
@@ -70,6 +71,7 @@
 /* this interface: that of 3.1 is 3.1 */
 #define FCLIB_VERSION_MAJOR 3
 #define FCLIB_VERSION_MINOR 2
+#define FCLIB_VERSION_PATCH 0
 
 #ifdef __cplusplus
 extern "C" {
@@ -102,7 +104,8 @@ struct FCLIB_APICOMPILE fclib_matrix_info {
  *
  *  Up to -2 this is the cs struct of CSparse, to which it may be cast. Triplets are as CSparse has
  *  them, and as all known files are; a comment in the header of 3.1 says the reverse. The entries
- *  of triplets at one place add up. 3.1 does not read dense matrices.
+ *  of triplets at one place add up. 3.1 does not know dense matrices, so that reads hand them out
+ *  by columns, without their zeros, unless fclib_keep_dense() says otherwise.
  */
 struct FCLIB_APICOMPILE fclib_matrix {
   int nzmax; /**< room for entries; in what is read, the length of x */
@@ -187,11 +190,13 @@ int fclib_write_global_rolling(struct fclib_global_rolling* problem, const char*
 int fclib_write_local_rolling(struct fclib_local_rolling* problem, const char* path);   /* new */
 
 /** Adds the solution of the problem that is in the file. Its arrays must have the lengths of that
- *  problem. Returns 1, or 0. */
+ *  problem. Each may be NULL: u and v then follow from r (and l, where p > 0) by the problem, or
+ *  are zeros where r is not given either or the problem is not valid; r and l are zeros. Returns 1,
+ *  or 0. */
 int fclib_write_solution(struct fclib_solution* solution, const char* path);
 
-/** Adds guesses for the problem that is in the file (number_of_guesses structs). Returns 1, or 0.
- */
+/** Adds guesses for the problem that is in the file (number_of_guesses structs), whose arrays may
+ *  be NULL as those of a solution. Returns 1, or 0. */
 int fclib_write_guesses(int number_of_guesses, struct fclib_solution* guesses, const char* path);
 
 /** Reads a problem. Every array has the length that the structs above state; values and indices are
@@ -231,6 +236,10 @@ int fclib_set_write_mode(enum fclib_write_mode mode);
  *  filters are those that every HDF5 has. Returns 1, or 0 for a level outside. */
 int fclib_set_compression(int level);
 
+/** New. Whether all reads of the process hand out dense matrices as they are (nz = -3), or by
+ *  columns (keep = 0, at first). Returns 1. */
+int fclib_keep_dense(int keep);
+
 /* ---- deleting -------------------------------------------------------------------------------- */
 
 /** Frees all members of a problem (or NULL), not the struct itself. */
@@ -252,7 +261,8 @@ const char* fclib_last_error(void);
  *  and may call fclib. */
 typedef void (*fclib_error_handler)(const char* message, void* context);
 
-/** New. Installs a handler (or NULL) and the context it is called with, for the whole process. */
+/** New. Installs a handler (or NULL, which keeps the library silent) and the context it is called
+ *  with, for the whole process, in the place of the one that prints. */
 void fclib_set_error_handler(fclib_error_handler handler, void* context);
 
 /* ---- validation ------------------------------------------------------------------------------ */

@@ -5,6 +5,7 @@ import functools
 import os
 import shutil
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
@@ -81,6 +82,8 @@ def compile_program(source: Path, program: Path, *flags: str, folder: Path | Non
     if folder is None:
         folder = library_folder()
         flags = (f"-I{HEADERS}", f"-Wl,-rpath,{folder}", *flags)
+    elif sys.platform == "linux":  # a library that was unpacked there has its own beside it
+        flags = (*flags, f"-Wl,-rpath-link,{folder}")
     libraries = [f"-L{folder}", "-lfclib", "-lm", "-lpthread"]
     language, standard = ("C++", "-std=c++17") if source.suffix == ".cpp" else ("C", "-std=gnu11")
     command = [compiler(language), standard, "-g", *WARNINGS, str(source), "-o", str(program)]

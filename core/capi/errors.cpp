@@ -1,5 +1,6 @@
 #include "capi/errors.hpp"
 
+#include <cstdio>
 #include <mutex>
 
 #include "capi/structs.hpp"
@@ -11,8 +12,11 @@ namespace {
 
 thread_local std::string last_error;
 
+/// Clients of 3.1 look at no result: they were told on the standard error.
+void print(const char* message, void*) { std::fprintf(stderr, "fclib: %s\n", message); }
+
 struct Handler {
-  fclib_error_handler function = nullptr;
+  fclib_error_handler function = print;
   void* context = nullptr;
 };
 

@@ -5,6 +5,7 @@
 #include "capi/errors.hpp"
 #include "capi/from_c.hpp"
 #include "capi/to_c.hpp"
+#include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
 
 namespace fclib::c {
@@ -14,6 +15,7 @@ namespace {
 // settings of the process
 std::atomic<bool> replace{false};
 std::atomic<int> compression{WriteOptions{}.compression};
+std::atomic<bool> keep_dense{false};
 
 /// 3.1 checks no value and converts no matrix.
 WriteOptions write_options() {
@@ -36,8 +38,34 @@ C* read_c(const char* path) {
   return guarded<C*>(nullptr, [&] {
     using P = CoreOf<C>;
     RawProblem problem = read_raw_problem(&given(path, "path"), P::kind);
-    return to_c<C>(problem);
+    return to_c<C>(problem, keep_dense);
   });
+}
+
+/// What is given of a solution. What v and u lack follows from r and l, where the problem in the
+/// file says so; all else is zero, as 3.1 has it.
+Solution completed(const fclib_solution& c, const Problem& outline, const char* path) {
+  return std::visit(
+      [&]<class P>(const P& sizes) {
+        Solution solution = solution_of(c, sizes, Parts::any);
+        const auto lacks = [&](const Vector& values, Dim rows) {
+          return values.size() < sizes.size(rows);
+        };
+        if ((lacks(solution.u, Dim::m) || lacks(solution.v, Dim::n)) &&
+            !lacks(solution.r, Dim::m) && !lacks(solution.l, Dim::p)) {
+          try {
+            solution = complete(std::get<P>(read_problem(path, P::kind)), std::move(solution));
+          } catch (const Error&) {
+            // 3.1 takes solutions of problems that make no sense, too
+          }
+        }
+        for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::*) {
+          Vector& values = solution.*field.member;
+          if (lacks(values, field.rows)) values = Vector::Zero(sizes.size(field.rows));
+        });
+        return solution;
+      },
+      outline);
 }
 
 template <class C>
@@ -70,10 +98,7 @@ FCLIB_FOR_EACH_KIND(FCLIB_FUNCTIONS_OF)
 int fclib_write_solution(fclib_solution* solution, const char* path) {
   return guarded(0, [&] {
     const Problem outline = read_outline(&given(path, "path"));
-    const Solution whole = std::visit(
-        [&](const auto& p) { return solution_of(given(solution, "solution"), p, Parts::all); },
-        outline);
-    write_solution(path, whole, write_options());
+    write_solution(path, completed(given(solution, "solution"), outline, path), write_options());
     return 1;
   });
 }
@@ -85,8 +110,7 @@ int fclib_write_guesses(int number_of_guesses, fclib_solution* guesses, const ch
     if (count > 0) given(guesses, "guesses");
     std::vector<Solution> all;
     for (std::size_t k = 0; k < count; ++k) {
-      all.push_back(std::visit(
-          [&](const auto& p) { return solution_of(guesses[k], p, Parts::all); }, outline));
+      all.push_back(completed(guesses[k], outline, path));
     }
     write_guesses(path, all, write_options());
     return 1;
@@ -163,6 +187,12 @@ int fclib_set_compression(int level) {
     compression = level;
     return 1;
   });
+}
+
+int fclib_keep_dense(int keep) {
+  forget_error();
+  keep_dense = keep != 0;
+  return 1;
 }
 
 }  // extern "C"

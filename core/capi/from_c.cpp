@@ -95,7 +95,7 @@ CoreOf<C> problem_as_given(const C& c) {
           vector(c.*member, problem.size(field.rows), group + field_path(field));
     }
   });
-  problem.info = {absent_text, absent_text, absent_text};
+  problem.info = {absent_group, absent_group, absent_group};
   if (c.info != nullptr) {
     for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
       problem.info.*field.member = text(c.info->*member);
@@ -126,9 +126,8 @@ template <class P>
 Solution solution_of(const fclib_solution& c, const P& problem, Parts parts) {
   Solution solution;
   for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::* member) {
-    if (parts == Parts::some && field.presence == Presence::optional && c.*member == nullptr) {
-      return;
-    }
+    const bool optional = parts == Parts::any || field.presence == Presence::optional;
+    if (optional && c.*member == nullptr) return;
     solution.*field.member =
         vector(c.*member, problem.size(field.rows), "/solution/" + std::string(field.name));
   });

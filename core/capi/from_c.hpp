@@ -19,9 +19,9 @@ CoreOf<C> problem_as_given(const C& c);
 template <class C>
 CoreOf<C> valid_problem(const C& c);
 
-enum class Parts { all, some };
+enum class Parts { some, any };
 
-/// The solution of a problem; with Parts::some v and u may be missing.
+/// The solution of a problem; with Parts::some v and u may be missing, with Parts::any all may.
 template <class P>
 Solution solution_of(const fclib_solution& c, const P& problem, Parts parts);
 

@@ -1,6 +1,8 @@
 #include "capi/to_c.hpp"
 
 #include <cstring>
+#include <limits>
+#include <utility>
 
 #include "capi/errors.hpp"
 
@@ -16,10 +18,38 @@ double* copy_vector(const Vector& values) {
 }
 
 char* copy_text(const std::string& value) {
-  if (value == absent_text) return nullptr;
+  if (value == absent_text || value == absent_group) return nullptr;
   auto* result = allocate<char>(value.size() + 1);
   std::memcpy(result, value.c_str(), value.size());
   return result;
+}
+
+/// A dense matrix becomes one by columns, without its zeros.
+void put_by_columns(RawMatrix& a) {
+  const auto rows = static_cast<std::size_t>(a.rows);
+  const auto cols = static_cast<std::size_t>(a.cols);
+  std::size_t entries = 0;
+  for (std::size_t k = 0; k < rows * cols; ++k) entries += a.x[k] != 0 ? 1U : 0U;
+  if (entries > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    fail("a dense matrix", "has more entries than an int counts: read it as it is, by "
+                           "fclib_keep_dense(1)");
+  }
+  a.storage = Storage::csc;
+  a.p = MallocArray<Index>(cols + 1);
+  a.i = MallocArray<Index>(entries);
+  MallocArray<double> x(entries);
+  std::size_t at = 0;
+  for (std::size_t col = 0; col < cols; ++col) {
+    a.p[col] = static_cast<Index>(at);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const double value = a.x[row + col * rows];
+      if (value == 0) continue;
+      a.i[at] = static_cast<Index>(row);
+      x[at++] = value;
+    }
+  }
+  a.p[cols] = static_cast<Index>(at);
+  a.x = std::move(x);
 }
 
 fclib_matrix* to_c(RawMatrix& a) {
@@ -67,7 +97,7 @@ void free_members(fclib_matrix& a) {
 }
 
 template <class C>
-C* to_c(RawProblem& problem) {
+C* to_c(RawProblem& problem, bool keep_dense) {
   Owned<C> c(allocate<C>(1));
   for (auto& [name, value] : problem.members) {
     for_each_member<C>([&]<class Field, class Pointer>(const Field& field, Pointer member) {
@@ -76,7 +106,9 @@ C* to_c(RawProblem& problem) {
       if constexpr (std::is_same_v<CType, int>) {
         (*c).*member = std::get<Index>(value);
       } else if constexpr (std::is_same_v<CType, fclib_matrix*>) {
-        (*c).*member = to_c(std::get<RawMatrix>(value));
+        auto& matrix = std::get<RawMatrix>(value);
+        if (matrix.storage == Storage::dense && !keep_dense) put_by_columns(matrix);
+        (*c).*member = to_c(matrix);
       } else {
         (*c).*member = std::get<MallocArray<double>>(value).release();
       }
@@ -86,7 +118,7 @@ C* to_c(RawProblem& problem) {
   bool informed = false;
   for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
     (*info).*member = copy_text(problem.info.*field.member);
-    informed = informed || (*info).*member != nullptr;
+    informed = informed || problem.info.*field.member != absent_group;
   });
   if (informed) c->info = info.release();
   return c.release();
@@ -106,7 +138,7 @@ void to_c(const Solution& solution, const Problem& outline, const std::string& w
   });
 }
 
-#define FCLIB_TO_C(kind) template fclib_##kind* to_c(RawProblem&);
+#define FCLIB_TO_C(kind) template fclib_##kind* to_c(RawProblem&, bool);
 
 FCLIB_FOR_EACH_KIND(FCLIB_TO_C)
 

@@ -48,9 +48,10 @@ T* allocate(std::size_t count) {
   return memory;
 }
 
-/// The arrays of the problem become those of the C struct.
+/// The arrays of the problem become those of the C struct. Dense matrices, which clients of 3.1 do
+/// not know, come by columns unless they are to be kept.
 template <class C>
-C* to_c(RawProblem& problem);
+C* to_c(RawProblem& problem, bool keep_dense);
 
 /// Fills the members of a solution from a file, whose sizes are those of its problem.
 void to_c(const Solution& solution, const Problem& outline, const std::string& where,

@@ -12,7 +12,7 @@
 #include <string.h>
 
 static int fail(const char* what) {
-  fprintf(stderr, "%s: %s\n", what, fclib_last_error());
+  fprintf(stderr, "%s failed\n", what); /* the library has said why */
   return 1;
 }
 

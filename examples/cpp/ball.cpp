@@ -92,6 +92,7 @@ int main(int argc, char** argv) {
     std::cerr << "usage: " << argv[0] << " FILE [SOLVER]\n";
     return 2;
   }
+  fclib_set_error_handler(nullptr, nullptr);  // what fails is thrown, and told once
   try {
     run(argv[1], argc > 2 ? argv[2] : fclib_solver_name(0));
   } catch (const std::exception& error) {

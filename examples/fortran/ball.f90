@@ -61,7 +61,7 @@ contains
 
   subroutine fail(what)
     character(*), intent(in) :: what
-    write (error_unit, "(3a)") what, ": ", fclib_error()
+    write (error_unit, "(2a)") what, " failed" ! the library has said why
     stop 1
   end subroutine
 

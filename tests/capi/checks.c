@@ -203,7 +203,9 @@ static void validation_and_merits(void) {
     char name[] = "storage0";
     name[7] = (char)('0' + k);
     CHECK(fclib_write_local(&other, path_of(name)));
+    CHECK(fclib_keep_dense(1));
     struct fclib_local* back = fclib_read_local(path_of(name));
+    CHECK(fclib_keep_dense(0));
     CHECK(back && back->W->nz == others[k].nz && !back->V && !back->info);
     CHECK(fclib_merit_local(back, MERIT_2, &s) == fclib_merit_local(&a, MERIT_2, &s));
     fclib_delete_local(back);
@@ -269,7 +271,11 @@ static void solving(void) {
   CHECK(fclib_solver_name(0) && !fclib_solver_name(-1) && !fclib_solver_name(1000));
   CHECK(fclib_solve_local(&a, "nsgs", NULL, &s, &result));
   CHECK(result.status == FCLIB_CONVERGED && result.error <= 1e-8 && result.iterations > 0);
-  CHECK(!strcmp(fclib_status_name(result.status), "converged"));
+  const char* names[] = {"converged",  "iteration_limit", "time_limit", "diverged",
+                         "inaccurate", "interrupted",     "stalled",    "infeasible"};
+  for (int k = 0; k <= FCLIB_INFEASIBLE; k++)
+    CHECK(!strcmp(fclib_status_name((enum fclib_status)k), names[k]));
+  CHECK(!strcmp(fclib_status_name((enum fclib_status)99), "unknown"));
   CHECK(fabs(r_[1] + 0.5) < 1e-8 && fabs(u_[1] - 1.5) < 1e-8);
   CHECK(fclib_solve_global(&b, "nsgs", NULL, &s, NULL));
   CHECK(fabs(v_[1] - 1.5) < 1e-8);
@@ -354,6 +360,7 @@ static void threads(void) {
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   snprintf(folder, sizeof folder, "%s", argv[1]);
+  fclib_set_error_handler(NULL, NULL); /* which is silent */
   errors();
   handlers();
   modes();

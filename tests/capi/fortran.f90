@@ -25,6 +25,7 @@ program checks
   character(500) :: folder
 
   call get_command_argument(1, folder)
+  call fclib_set_error_handler(c_null_funptr, c_null_ptr)
   call matrices
   call words
   call sliding_ball

@@ -26,7 +26,9 @@ from capi_library import (
 )
 from helpers import Array, dense, modified, planted_global, planted_local, project
 
-PEER_HEADER = Path("/usr/include/fclib.h")
+# where libfclib 3.1 is installed, or unpacked with what it needs
+PEER = Path(os.environ.get("FCLIB_PEER", "/usr"))
+PEER_HEADER = PEER / "include/fclib.h"
 BATCH = 25  # problems in one process
 
 
@@ -279,6 +281,12 @@ class Library:
 
 
 EXCHANGE = ROOT / "tests/capi/exchange.c"
+OF_PEER = ("-DONLY_3_1", f"-I{PEER_HEADER.parent}")
+
+
+def at(*folders: Path) -> dict[str, str]:
+    """The environment that has libraries loaded from these folders."""
+    return os.environ | {"LD_LIBRARY_PATH": ":".join(map(str, folders))}
 
 
 @pytest.fixture(scope="session")
@@ -290,7 +298,7 @@ def ours(programs: Path) -> Library:
 @pytest.fixture(scope="session")
 def peer_folder() -> Path:
     """The folder of the peer's library."""
-    found = sorted(Path("/usr/lib").glob("*/libfclib.so.0"))
+    found = sorted((PEER / "lib").glob("*/libfclib.so.0"))
     if not PEER_HEADER.is_file() or not found or "FCLIB_VERSION_MAJOR" in PEER_HEADER.read_text():
         pytest.skip("libfclib 3.1 is not installed")
     return found[0].parent
@@ -300,15 +308,15 @@ def peer_folder() -> Path:
 def theirs(programs: Path, peer_folder: Path) -> Library:
     """The peer, and a program compiled with its header."""
     program = compile_program(
-        EXCHANGE, programs / "theirs", "-DONLY_3_1", "-I/usr/include", folder=peer_folder
+        EXCHANGE, programs / "theirs", *OF_PEER, folder=peer_folder
     )
-    return Library("theirs", program, dict(os.environ))
+    return Library("theirs", program, at(peer_folder))
 
 
 @pytest.fixture(scope="session")
-def replaced(theirs: Library) -> Library:
+def replaced(theirs: Library, peer_folder: Path) -> Library:
     """The program compiled with the peer's header, and our library in the place of theirs."""
-    environment = os.environ | {"LD_LIBRARY_PATH": str(library_folder())}
+    environment = at(library_folder(), peer_folder)
     return Library("a client of theirs with our library", theirs.program, environment)
 
 
@@ -318,7 +326,94 @@ def brought(programs: Path, peer_folder: Path) -> Library:
     program = compile_program(
         EXCHANGE, programs / "brought", "-DONLY_3_1", f"-I{HEADERS}", folder=peer_folder
     )
-    return Library("a client of ours with their library", program, dict(os.environ))
+    return Library("a client of ours with their library", program, at(peer_folder))
+
+
+# ---- clients of 3.1
+
+
+OLD_CLIENTS = CAPI / "old_clients.c"
+
+
+@pytest.fixture(scope="session")
+def old_clients(programs: Path) -> Path:
+    """What clients of 3.1 do, compiled with our header."""
+    return compile_program(OLD_CLIENTS, programs / "old-clients")
+
+
+def test_clients_of_3_1_notice_nothing(
+    old_clients: Path, programs: Path, peer_folder: Path, tmp_path: Path
+) -> None:
+    theirs = compile_program(
+        OLD_CLIENTS, programs / "old-clients-of-3.1", *OF_PEER, folder=peer_folder
+    )
+
+    def seen(program: Path, *folders: Path) -> str:
+        done = subprocess.run(
+            [program, "write", tmp_path], capture_output=True, text=True, env=at(*folders)
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    expected = seen(theirs, peer_folder)
+    assert expected.count("local without") == 32
+    assert seen(old_clients, library_folder()) == expected
+    assert seen(theirs, library_folder(), peer_folder) == expected
+    assert seen(old_clients, peer_folder) == expected
+
+
+def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path) -> None:
+    path = tmp_path / "mixed_global"
+    written = subprocess.run([old_clients, "write", tmp_path], capture_output=True, text=True)
+    assert (written.returncode, written.stderr) == (0, "")
+    problem = fclib.read(path)
+    full, bare = fclib.read_guesses(path)  # the last file is that of a guess without anything
+    assert full.r is not None and not np.any(bare.r) and not np.any(bare.u)
+    source = tmp_path / "lacking.c"
+    source.write_text(
+        "#include <fclib.h>\nint main(int argc, char **argv) {\n  double r[] = {1, -0.5, 0}, "
+        "l[] = {7};\n  struct fclib_solution s = {0, 0, r, l};\n"
+        "  return argc > 1 && fclib_set_write_mode(FCLIB_WRITE_REPLACE) &&\n"
+        "         fclib_write_solution(&s, argv[1]) ? 0 : 1;\n}\n"
+    )
+    subprocess.run([compile_program(source, tmp_path / "lacking"), path], check=True)
+    solution = fclib.read_solution(path)
+    assert solution is not None and solution.v is not None and solution.u is not None
+    v = problem.H @ solution.r + problem.G @ solution.l + problem.f
+    np.testing.assert_allclose(solution.v, v)
+    np.testing.assert_allclose(solution.u, problem.H.T @ v + problem.w)
+
+
+@pytest.mark.parametrize("dense", [False, True])
+def test_clients_of_3_1_read_dense_problems(
+    dense: bool, old_clients: Path, tmp_path: Path
+) -> None:
+    W = np.array([[2.0, 0.5, 0], [0.5, 3, -1], [0, -1, 4]])
+    problem = fclib.LocalProblem(spacedim=3, W=W, q=[-1, 0, 0], mu=[0.5])
+    fclib.write(tmp_path / "dense.hdf5", problem, dense=dense)
+    stored = fclib.read(tmp_path / "dense.hdf5")
+    assert isinstance(stored, fclib.LocalProblem)
+    assert isinstance(stored.W, np.ndarray) == dense
+    done = subprocess.run(
+        [old_clients, "read", tmp_path / "dense.hdf5"], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    size, *entries = done.stdout.splitlines()
+    assert size == "3 x 3"
+    seen = np.zeros((3, 3))
+    for line in entries:
+        row, col, value = line.split()
+        seen[int(row), int(col)] = float(value)
+    assert np.array_equal(seen, W)
+    assert len(entries) == (7 if dense else 9)
+
+
+def test_who_looks_at_no_result_is_told(old_clients: Path, tmp_path: Path) -> None:
+    done = subprocess.run([old_clients, "fail", tmp_path / "none"], capture_output=True, text=True)
+    assert done.stderr == f"fclib: {tmp_path / 'none'}: there is no such file\n"
+
+
+# ---- words of a problem
 
 
 def number(x: float) -> str:
@@ -360,11 +455,8 @@ class Words:
         if self.rng.uniform() < 0.3:
             return self.add("-")
         self.add("+")
-        start = len(self.words)
         for _ in range(3):
             self.text()
-        if set(self.words[start:]) == {"-"}:
-            self.words[start] = "="
 
     def matrix(self, rows: int, cols: int) -> None:
         """Indices and pointers are whatever: 3.1 writes and reads them."""

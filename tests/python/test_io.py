@@ -166,7 +166,7 @@ def test_local_problems_come_back_as_they_were_stored(
         l=draw_vector(draw, problem.p) if problem.p else None,
     )
     path = scratch / "local.hdf5"
-    fclib.write(path, problem, solution)
+    fclib.write(path, problem, solution, dense=True)
     assert_same(problem, fclib.read(path))
     assert_same_vectors(solution, fclib.read_solution(path), ("v", "u", "r", "l"))
 
@@ -295,7 +295,8 @@ def test_layout_of_a_mixed_local_file(tmp_path: Path) -> None:
         s=np.ones(3),
         info=INFO,
     )
-    fclib.write(path, problem, fclib.Solution(u=np.ones(4), r=np.zeros(4), l=np.ones(3)))
+    solution = fclib.Solution(u=np.ones(4), r=np.zeros(4), l=np.ones(3))
+    fclib.write(path, problem, solution, dense=True)
     dense_layout = matrix_layout("fclib_local/R", 0, 9)
     del dense_layout["fclib_local/R/p"], dense_layout["fclib_local/R/i"]
     assert tree(path) == {

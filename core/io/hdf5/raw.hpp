@@ -19,6 +19,8 @@ namespace fclib {
 /// The value of a text that a file does not have, where it is read raw; writing it without
 /// validation leaves it out. No text of a file can hold a NUL.
 inline const std::string absent_text(1, '\0');
+/// The same where not even the group of the texts is there.
+inline const std::string absent_group(2, '\0');
 
 /// The storages of a matrix as files and C structs number them in `nz`; from 0 on it is the number
 /// of triplets.
@@ -73,7 +75,7 @@ struct RawProblem {
     std::variant<Index, RawMatrix, MallocArray<double>> value;
   };
   std::vector<Member> members;  ///< those that the file has
-  ProblemInfo info;             ///< of texts that may be absent_text
+  ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
 };
 
 /// The problem of this kind, without validation, and without a copy of its arrays.

@@ -89,15 +89,16 @@ A read_matrix(const Group& parent, const std::string& name) {
   return a;
 }
 
-/// `otherwise` is the value of a text that is not there.
-ProblemInfo read_info(const Group& parent, const std::string& otherwise) {
+/// `otherwise` is the value of a text that is not there, `groupless` that of all without the group.
+ProblemInfo read_info(const Group& parent, const std::string& otherwise,
+                      const std::string& groupless) {
   ProblemInfo info;
   std::optional<Handle> handle;
   if (parent.has("info")) handle.emplace(open_group(parent, "info"));
   for_each_field<ProblemInfo>([&](const auto& field) {
     info.*field.member = handle ? read_text_if_there({handle->id(), parent.child("info")},
                                                      std::string(field.name), otherwise)
-                                : otherwise;
+                                : groupless;
   });
   return info;
 }
@@ -118,7 +119,7 @@ P read_fields(const Group& root) {
                                problem.*field.member = read_number<Member>(place, name);
                              }
                            });
-  problem.info = read_info(group, "");
+  problem.info = read_info(group, "", "");
   return problem;
 }
 
@@ -146,7 +147,7 @@ RawProblem read_raw_fields(const Group& root) {
                                raw.members.push_back({field.name, outline.*field.member});
                              }
                            });
-  raw.info = read_info(group, absent_text);
+  raw.info = read_info(group, absent_text, absent_group);
 
   // vectors have the lengths that the matrices give them
   require_contacts(outline, contacts);

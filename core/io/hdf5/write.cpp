@@ -16,7 +16,7 @@ namespace {
 
 /// A text that its file did not have stays away.
 void write_text_if_there(const Group& group, const std::string& name, const std::string& text) {
-  if (text != absent_text) write_text(group, name, text);
+  if (text != absent_text && text != absent_group) write_text(group, name, text);
 }
 
 void write_matrix(const Target& parent, const std::string& name, const Matrix& a) {
@@ -54,7 +54,8 @@ void write_matrix(const Target& parent, const std::string& name, const Matrix& a
 }
 
 template <class P>
-void write_fields(const Target& root, const P& problem, bool as_given) {
+void write_fields(const Target& root, const P& problem, const WriteOptions& options) {
+  const bool as_given = !options.validate;
   const NewGroup created(root, group_name<P>());
   const Target& group = created.target();
   const NewGroup vectors(group, "vectors");
@@ -65,8 +66,11 @@ void write_fields(const Target& root, const P& problem, bool as_given) {
       const Matrix& a = problem.*field.member;
       // read from a file without it
       if (field.presence != Presence::required && as_given && a.empty() && a.p.empty()) return;
-      const bool convert = P::triplets_on_disk && !as_given;
-      write_matrix(group, name, convert ? converted(a, Storage::triplet) : a);
+      Storage storage = a.storage;
+      if (storage == Storage::dense && !options.dense) storage = Storage::csr;
+      if (P::triplets_on_disk) storage = Storage::triplet;
+      const bool convert = storage != a.storage && !as_given;
+      write_matrix(group, name, convert ? converted(a, storage) : a);
     } else if constexpr (std::is_same_v<Member, Vector>) {
       write_numbers(vectors.target(), name, problem.*field.member);
     } else {
@@ -75,7 +79,7 @@ void write_fields(const Target& root, const P& problem, bool as_given) {
   });
   bool informed = false;
   for_each_field<ProblemInfo>(
-      [&](const auto& field) { informed = informed || problem.info.*field.member != absent_text; });
+      [&](const auto& field) { informed = informed || problem.info.*field.member != absent_group; });
   if (!informed) return;
   const NewGroup info(group, "info");
   for_each_field<ProblemInfo>([&](const auto& field) {
@@ -154,7 +158,7 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
       if (owned) make_room(root, "solution", options.replace);
       if (owned) make_room(root, "guesses", options.replace);
     }
-    std::visit([&](const auto* p) { write_fields(root, *p, !options.validate); }, problem);
+    std::visit([&](const auto* p) { write_fields(root, *p, options); }, problem);
     if (options.validate) {
       require_owner(root, kind, owned, solution != nullptr || !guesses.empty());
     }

@@ -13,6 +13,8 @@ struct WriteOptions {
   bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
   bool append = false;   ///< keep what the file holds: the other problems, the other guesses
   bool replace = false;  ///< what is there already gives way; false: it is an error
+  bool dense = false;    ///< false: a dense matrix goes in by rows, since 3.1 reads no dense ones;
+                         ///< without validation all stays as it is
   int compression = 6;   ///< level of deflate, 0 (none) to 9
 };
 

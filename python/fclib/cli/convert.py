@@ -130,7 +130,7 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
     )
 
 
-def stored_as(problem: fclib.Problem, output: Format) -> str:
+def stored_as(problem: fclib.Problem, output: Format, asked: Storage | None) -> str:
     """How the matrices of a problem stand in a file: those of W, or of M."""
     if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         matrix = problem.W
@@ -139,7 +139,8 @@ def stored_as(problem: fclib.Problem, output: Format) -> str:
     else:
         matrix = problem.M
     if isinstance(matrix, np.ndarray):
-        return Storage.dense.value
+        rows = output is Format.hdf5 and asked is not Storage.dense
+        return Storage.csr.value if rows else Storage.dense.value
     name = str(matrix.format).replace("coo", Storage.triplet.value)
     if output is Format.siconos and name == Storage.csr.value and problem.m:
         return Storage.csc.value if is_global(problem) else "blocks"
@@ -159,7 +160,7 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
     problem = result.problem
     if request.storage is not None:
         problem = problem.with_storage(request.storage.value)
-        stored = stored_as(problem, output).replace("blocks", Storage.csr.value)
+        stored = stored_as(problem, output, request.storage).replace("blocks", Storage.csr.value)
         if stored != request.storage.value:
             file = "an FCLIB file" if output is Format.hdf5 else "a text of Siconos"
             raise fclib.UnsuitableError(
@@ -167,7 +168,8 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
                 f"not {request.storage.value}"
             )
     if output is Format.hdf5:
-        fclib.write(target, problem, result.solution, result.guesses)
+        dense = request.storage is Storage.dense
+        fclib.write(target, problem, result.solution, result.guesses, dense=dense)
         kept = {name for name, (there, _) in result.extras.items() if there}
     else:
         fclib.write_siconos(target, problem)
@@ -183,7 +185,7 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
         "output": str(target),
         "format": output.value,
         "becomes": problem.formulation,
-        "storage": stored_as(problem, output),
+        "storage": stored_as(problem, output, request.storage),
         **{
             name: ("kept" if name in kept else "dropped") if there else None
             for name, (there, _) in given.extras.items()

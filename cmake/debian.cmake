@@ -24,7 +24,7 @@ A drop-in for libfclib 3.1: reads, writes, validates, judges and solves friction
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libfclib-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libfclib0 (= ${FCLIB_C_VERSION}), libhdf5-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "libfclib0 (= ${FCLIB_C_VERSION})")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
     "frictional contact problems in HDF5 files, development files
 Header, Fortran module, and what find_package and pkg-config read.")

@@ -35,7 +35,11 @@
  * Files
  *
  *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
- *   system has no files without a name, it leaves NAME.XXXXXX too.) A file may hold one problem of
+ *   system has no files without a name, it leaves NAME.XXXXXX too.) A new file takes the place of
+ *   the old one, with its owner, permissions and extended attributes. A file of several names, or
+ *   one that cannot be replaced so, is rewritten in place: a process that is killed while it does
+ *   leaves NAME.fclib-journal, or one in $TMPDIR where the folder cannot be written, from which the
+ *   next read or write by that name goes on. A file may hold one problem of
  *   each kind, then one solution and any number of guesses; these belong to the global problem
  *   where there are several. What is there already is replaced only if
  *   fclib_set_write_mode() says so.

@@ -1,15 +1,24 @@
 #include "io/replace_file.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#ifdef __linux__
+#include <sys/xattr.h>
+#endif
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "error.hpp"
 
@@ -44,33 +53,83 @@ class Descriptor {
   int id_;
 };
 
-/// The permissions of the old file, or those a new one gets.
-mode_t mode_of(const std::string& path, const std::string& target) {
+/// What the system knows of the file that is there, which must be one that can be written.
+std::optional<struct stat> status_of(const std::string& path, const std::string& target) {
   struct stat status{};
-  if (::stat(target.c_str(), &status) == 0) {
-    if (S_ISDIR(status.st_mode)) fail(path, "is a directory, expected a file");
-    if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
-    if (::access(target.c_str(), W_OK) != 0) fail_in_system(path, "cannot be written");
-    return status.st_mode & 07777U;
-  }
+  if (::stat(target.c_str(), &status) != 0) return std::nullopt;
+  if (S_ISDIR(status.st_mode)) fail(path, "is a directory, expected a file");
+  if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
+  if (::access(target.c_str(), W_OK) != 0) fail_in_system(path, "cannot be written");
+  return status;
+}
+
+mode_t mode_of_new_files() {
   const mode_t mask = ::umask(0);
   ::umask(mask);
   return 0666U & ~mask;
+}
+
+/// Gives a new file the owner, the permissions and the extended attributes of the old one. False
+/// where one of these cannot be given.
+bool take_over(int file, const std::string& target, const struct stat& old) {
+  struct stat fresh{};
+  if (::fstat(file, &fresh) != 0) return false;
+  const bool same_owner = fresh.st_uid == old.st_uid && fresh.st_gid == old.st_gid;
+  if (!same_owner && ::fchown(file, old.st_uid, old.st_gid) != 0) return false;
+#ifdef __linux__
+  const ssize_t size = ::listxattr(target.c_str(), nullptr, 0);
+  if (size > 0) {
+    std::string names(static_cast<std::size_t>(size), '\0');
+    if (::listxattr(target.c_str(), names.data(), names.size()) != size) return false;
+    for (std::size_t at = 0; at < names.size(); at += std::strlen(&names[at]) + 1) {
+      const char* const name = &names[at];
+      const ssize_t length = ::getxattr(target.c_str(), name, nullptr, 0);
+      std::vector<char> value(static_cast<std::size_t>(std::max<ssize_t>(length, 0)));
+      if (length < 0 || ::getxattr(target.c_str(), name, value.data(), value.size()) != length ||
+          ::fsetxattr(file, name, value.data(), value.size(), 0) != 0) {
+        return false;
+      }
+    }
+  }
+#endif
+  return ::fchmod(file, old.st_mode & 07777U) == 0;
+}
+
+void write_all(int file, std::string_view bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(file, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) fail_in_system(path, "cannot be written");
+    bytes.remove_prefix(static_cast<std::size_t>(count));
+  }
+}
+
+std::string read_all(int file, std::size_t size, const std::string& path) {
+  std::string bytes(size, '\0');
+  std::size_t done = 0;
+  while (done < size) {
+    const ssize_t count = ::read(file, bytes.data() + done, size - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail_in_system(path, "cannot be read");
+    if (count == 0) break;  // somebody made it shorter
+    done += static_cast<std::size_t>(count);
+  }
+  bytes.resize(done);
+  return bytes;
 }
 
 /// A new file beside the target, to be renamed over it.
 class Temporary {
  public:
   Temporary(const std::string& path, const std::string& target)
-      : path_(path), target_(target), name_(target + ".XXXXXX"), file_(open()) {
-    if (file_.id() < 0) fail_in_system(path_, "cannot be written");
-  }
+      : path_(path), target_(target), name_(target + ".XXXXXX"), file_(open()) {}
   ~Temporary() {
     if (named_) ::unlink(name_.c_str());
   }
   Temporary(const Temporary&) = delete;
   Temporary& operator=(const Temporary&) = delete;
 
+  [[nodiscard]] bool ok() const { return file_.id() >= 0; }
   [[nodiscard]] int id() const { return file_.id(); }
 
   void take_the_place() {
@@ -114,7 +173,141 @@ class Temporary {
   Descriptor file_;
 };
 
+// ---- rewriting in place, by a journal
+
+/// Ends a journal that is whole: until it is, the file itself has not been touched.
+struct JournalEnd {
+  std::array<char, 16> magic{'f', 'c', 'l', 'i', 'b', ' ', 'j', 'o', 'u', 'r', 'n', 'a', 'l'};
+  std::uint64_t size = 0;
+  std::uint64_t hash = 0;
+};
+
+std::uint64_t hash_of(std::string_view bytes) {
+  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
+  for (const char byte : bytes) {
+    hash ^= static_cast<unsigned char>(byte);
+    hash *= 0x100000001b3U;
+  }
+  return hash;
+}
+
+/// Where the journals of a file may lie: beside it, and where its folder cannot be written, in that
+/// of temporary files.
+std::vector<std::string> journals_of(const std::string& target) {
+  std::vector<std::string> places{target + ".fclib-journal"};
+  struct stat status{};
+  if (::stat(target.c_str(), &status) == 0) {
+    const char* const named = std::getenv("TMPDIR");
+    places.push_back(std::string(named != nullptr && *named != '\0' ? named : "/tmp") +
+                     "/fclib-journal-" + std::to_string(::geteuid()) + "-" +
+                     std::to_string(status.st_dev) + "-" + std::to_string(status.st_ino));
+  }
+  return places;
+}
+
+void put_in_place(const std::string& target, std::string_view bytes, const std::string& path) {
+  const Descriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
+  if (file.id() < 0) fail_in_system(path, "cannot be written");
+  write_all(file.id(), bytes, path);
+  if (::ftruncate(file.id(), static_cast<off_t>(bytes.size())) != 0 || ::fsync(file.id()) != 0) {
+    fail_in_system(path, "cannot be written");
+  }
+}
+
+void sync_folder_of(const std::string& name) {
+  const fs::path folder = fs::path(name).parent_path();
+  const Descriptor file(
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.id() >= 0) ::fsync(file.id());
+}
+
+/// Writes over the bytes of a file that must stay the same file. They are in a journal by then, from
+/// which finish_rewrite() goes on after a kill.
+void rewrite(const std::string& path, const std::string& target, std::string_view bytes) {
+  finish_rewrite(path);
+  std::string journal;
+  Descriptor file(-1);
+  int reason = 0;
+  for (const std::string& place : journals_of(target)) {
+    Descriptor opened(::open(place.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
+                             S_IRUSR | S_IWUSR));
+    if (opened.id() < 0) {
+      reason = errno;
+      continue;
+    }
+    journal = place;
+    JournalEnd end;
+    end.size = bytes.size();
+    end.hash = hash_of(bytes);
+    try {
+      write_all(opened.id(), bytes, path);
+      write_all(opened.id(), {reinterpret_cast<const char*>(&end), sizeof end}, path);
+      if (::fsync(opened.id()) != 0) fail_in_system(path, "cannot be written");
+    } catch (...) {
+      ::unlink(place.c_str());
+      throw;
+    }
+    sync_folder_of(place);
+    break;
+  }
+  if (journal.empty()) {
+    errno = reason;
+    fail_in_system(path, "cannot be written without a journal, and that cannot be");
+  }
+  // a journal that stays after a failure has the whole file
+  put_in_place(target, bytes, path);
+  ::unlink(journal.c_str());
+}
+
 }  // namespace
+
+Turn::Turn(const std::string& path) {
+  const fs::path folder = fs::path(resolve_links(path)).parent_path();
+  folder_ = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  while (folder_ >= 0 && ::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
+  }
+}
+
+Turn::~Turn() {
+  if (folder_ >= 0) ::close(folder_);
+}
+
+void finish_rewrite(const std::string& path) {
+  const std::string target = resolve_links(path);
+  for (const std::string& place : journals_of(target)) {
+    const Descriptor file(::open(place.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+    struct stat status{};
+    if (file.id() < 0 || ::fstat(file.id(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
+    struct stat own{};
+    // nobody else's, in a folder that all may write to
+    const bool ours = ::stat(target.c_str(), &own) == 0 &&
+                      (status.st_uid == ::geteuid() || status.st_uid == own.st_uid);
+    if (!ours) continue;
+    std::string bytes = read_all(file.id(), static_cast<std::size_t>(status.st_size), path);
+    JournalEnd end;
+    const JournalEnd expected;
+    bool whole = bytes.size() >= sizeof end;
+    if (whole) {
+      std::memcpy(&end, bytes.data() + bytes.size() - sizeof end, sizeof end);
+      bytes.resize(bytes.size() - sizeof end);
+      whole = end.magic == expected.magic && end.size == bytes.size() && end.hash == hash_of(bytes);
+    }
+    if (whole && ::access(target.c_str(), W_OK) != 0) {
+      fail(path, "was being written when its writer ended, and is not yours to repair; " + place +
+                     " has what it is to be");
+    }
+    if (whole) put_in_place(target, bytes, path);
+    ::unlink(place.c_str());
+  }
+}
+
+void finish_rewrite_in_turn(const std::string& path) {
+  for (const std::string& place : journals_of(resolve_links(path))) {
+    if (::access(place.c_str(), F_OK) != 0) continue;
+    const Turn turn(path);
+    return finish_rewrite(path);
+  }
+}
 
 std::string resolve_links(const std::string& path) {
   constexpr int most_hops = 40;
@@ -132,30 +325,23 @@ std::string read_file(const std::string& path) {
   struct stat status{};
   if (file.id() < 0 || ::fstat(file.id(), &status) != 0) fail_in_system(path, "cannot be read");
   if (!S_ISREG(status.st_mode)) fail(path, "is not a regular file");
-  std::string bytes(static_cast<std::size_t>(status.st_size), '\0');
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::read(file.id(), bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) fail_in_system(path, "cannot be read");
-    if (count == 0) break;  // somebody made it shorter
-    done += static_cast<std::size_t>(count);
-  }
-  bytes.resize(done);
-  return bytes;
+  return read_all(file.id(), static_cast<std::size_t>(status.st_size), path);
 }
 
 void replace_file(const std::string& path, std::string_view bytes) {
   const std::string target = resolve_links(path);
-  const mode_t mode = mode_of(path, target);
+  const std::optional<struct stat> old = status_of(path, target);
+  // a file of several names stays the one that they name
+  if (old && old->st_nlink > 1) return rewrite(path, target, bytes);
   Temporary file(path, target);
-  ::fchmod(file.id(), mode);
-  while (!bytes.empty()) {
-    const ssize_t count = ::write(file.id(), bytes.data(), bytes.size());
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) fail_in_system(path, "cannot be written");
-    bytes.remove_prefix(static_cast<std::size_t>(count));
+  if (!file.ok()) {
+    const bool forbidden = errno == EACCES || errno == EPERM || errno == EROFS;
+    if (old && forbidden) return rewrite(path, target, bytes);
+    fail_in_system(path, "cannot be written");
   }
+  if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, bytes);
+  if (!old) ::fchmod(file.id(), mode_of_new_files());
+  write_all(file.id(), bytes, path);
   if (::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");
   file.take_the_place();
 }

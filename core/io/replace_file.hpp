@@ -15,8 +15,34 @@ std::string read_file(const std::string& path);
 /// Puts the bytes in the place of the file, all or none: they go into a file beside it, which is
 /// flushed and renamed over it. A process that is killed leaves nothing of that file, but for the
 /// instant between its naming and its renaming; where the system has no files without a name, it
-/// leaves NAME.XXXXXX. Links are followed, permissions kept. Throws Error (file) that names the
-/// file.
+/// leaves NAME.XXXXXX. Links are followed; owner, permissions and extended attributes kept.
+///
+/// A file of several names, one whose owner or attributes a new file cannot be given, and one in a
+/// folder that cannot be written, are rewritten in place: the bytes go into a journal beside it, or
+/// in $TMPDIR, are flushed, and then written over the file. A process that is killed leaves the
+/// journal, NAME.fclib-journal, from which the next reader or writer of fclib goes on. Throws Error
+/// (file) that names the file.
 void replace_file(const std::string& path, std::string_view bytes);
+
+/// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
+/// since the file itself is replaced; it goes with the process that holds it. Where the file system
+/// has no such locks there is none.
+class Turn {
+ public:
+  explicit Turn(const std::string& path);
+  ~Turn();
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  int folder_ = -1;
+};
+
+/// Goes on with a rewrite that was cut. To be called in one's turn. Throws Error (file) where the
+/// file may not be written.
+void finish_rewrite(const std::string& path);
+
+/// The same before a file is read: after whoever is at it.
+void finish_rewrite_in_turn(const std::string& path);
 
 }  // namespace fclib

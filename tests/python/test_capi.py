@@ -307,9 +307,7 @@ def peer_folder() -> Path:
 @pytest.fixture(scope="session")
 def theirs(programs: Path, peer_folder: Path) -> Library:
     """The peer, and a program compiled with its header."""
-    program = compile_program(
-        EXCHANGE, programs / "theirs", *OF_PEER, folder=peer_folder
-    )
+    program = compile_program(EXCHANGE, programs / "theirs", *OF_PEER, folder=peer_folder)
     return Library("theirs", program, at(peer_folder))
 
 
@@ -368,7 +366,9 @@ def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path)
     assert (written.returncode, written.stderr) == (0, "")
     problem = fclib.read(path)
     full, bare = fclib.read_guesses(path)  # the last file is that of a guess without anything
-    assert full.r is not None and not np.any(bare.r) and not np.any(bare.u)
+    assert full.r is not None
+    assert not np.any(bare.r)
+    assert not np.any(bare.u)
     source = tmp_path / "lacking.c"
     source.write_text(
         "#include <fclib.h>\nint main(int argc, char **argv) {\n  double r[] = {1, -0.5, 0}, "
@@ -378,16 +378,16 @@ def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path)
     )
     subprocess.run([compile_program(source, tmp_path / "lacking"), path], check=True)
     solution = fclib.read_solution(path)
-    assert solution is not None and solution.v is not None and solution.u is not None
+    assert solution is not None
+    assert solution.v is not None
+    assert solution.u is not None
     v = problem.H @ solution.r + problem.G @ solution.l + problem.f
     np.testing.assert_allclose(solution.v, v)
     np.testing.assert_allclose(solution.u, problem.H.T @ v + problem.w)
 
 
 @pytest.mark.parametrize("dense", [False, True])
-def test_clients_of_3_1_read_dense_problems(
-    dense: bool, old_clients: Path, tmp_path: Path
-) -> None:
+def test_clients_of_3_1_read_dense_problems(dense: bool, old_clients: Path, tmp_path: Path) -> None:
     W = np.array([[2.0, 0.5, 0], [0.5, 3, -1], [0, -1, 4]])
     problem = fclib.LocalProblem(spacedim=3, W=W, q=[-1, 0, 0], mu=[0.5])
     fclib.write(tmp_path / "dense.hdf5", problem, dense=dense)

@@ -1,10 +1,13 @@
 """Files keep every number, in the layout of libfclib 3.1, and are never left half written."""
 
+import fcntl
 import gc
 import os
 import pickle
 import subprocess
 import sys
+import tempfile
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -935,3 +938,108 @@ def test_an_argument_of_the_wrong_type_is_named(wrong: dict[str, Any]) -> None:
     arguments: dict[str, Any] = {"W": np.eye(3), "q": np.zeros(3), "mu": [1.0]} | wrong
     with pytest.raises((TypeError, fclib.ProblemError), match=next(iter(wrong))):
         fclib.LocalProblem(**arguments)
+
+
+# ---- what a replaced file keeps
+
+
+def one_contact() -> fclib.LocalProblem:
+    return fclib.LocalProblem(spacedim=2, W=np.eye(2), q=[-1, 0], mu=[0.5])
+
+
+def test_a_file_of_two_names_stays_one(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.hdf5", tmp_path / "b.hdf5"
+    fclib.write(path, planted_local(1).problem)
+    os.link(path, other)
+    fclib.write(path, one_contact())  # a shorter one
+    assert path.samefile(other)
+    assert fclib.read(other).m == 2
+    assert sorted(tmp_path.iterdir()) == [path, other]
+
+
+@pytest.mark.skipif(not hasattr(os, "setxattr"), reason="extended attributes are Linux's")
+def test_a_replaced_file_keeps_owner_and_attributes(tmp_path: Path) -> None:
+    path = tmp_path / "a.hdf5"
+    fclib.write(path, planted_local(1).problem)
+    try:
+        os.setxattr(path, "user.note", b"mine")
+    except OSError:
+        pytest.skip("the file system has no extended attributes")
+    path.chmod(0o640)
+    owner = (12345, 12346) if os.geteuid() == 0 else (os.getuid(), os.getgid())
+    os.chown(path, *owner)
+    fclib.write(path, one_contact())
+    status = path.stat()
+    assert os.getxattr(path, "user.note") == b"mine"
+    assert (status.st_uid, status.st_gid, status.st_mode & 0o777) == (*owner, 0o640)
+
+
+@pytest.fixture
+def locked_folder() -> Iterator[Path]:
+    """A folder that may be read and not be written, with room for journals beside it."""
+    with tempfile.TemporaryDirectory(prefix="fclib-io-") as name:
+        folder = Path(name) / "locked"
+        folder.mkdir()
+        (Path(name) / "tmp").mkdir()
+        (Path(name) / "tmp").chmod(0o777)
+        Path(name).chmod(0o755)
+        yield folder
+        folder.chmod(0o755)
+
+
+def as_nobody(body: Callable[[], object]) -> bool:
+    """Whether it ends well in a process without the rights of root."""
+    child = os.fork()
+    if child == 0:
+        code = 1
+        try:
+            if os.geteuid() == 0:
+                os.setuid(65534)
+            body()
+            code = 0
+        finally:
+            os._exit(code)
+    return os.waitpid(child, 0)[1] == 0
+
+
+def test_a_writable_file_in_an_unwritable_folder_is_written(
+    locked_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, journals = locked_folder / "a.hdf5", locked_folder.parent / "tmp"
+    monkeypatch.setenv("TMPDIR", str(journals))
+    fclib.write(path, planted_local(1).problem)
+    path.chmod(0o666)
+    locked_folder.chmod(0o555)
+    inode = path.stat().st_ino
+    assert as_nobody(lambda: fclib.write(path, one_contact()))
+    assert fclib.read(path).m == 2
+    assert path.stat().st_ino == inode
+    assert list(journals.iterdir()) == []
+    assert not as_nobody(lambda: fclib.write(locked_folder / "new.hdf5", one_contact()))
+
+
+def test_a_journal_is_gone_on_with_only_where_it_is_whole(tmp_path: Path) -> None:
+    path, journal = tmp_path / "a.hdf5", tmp_path / "a.hdf5.fclib-journal"
+    fclib.write(path, one_contact())
+    journal.write_bytes(b"half a")
+    assert fclib.read(path).m == 2
+    assert not journal.exists()
+
+
+# ---- other threads
+
+
+def test_python_goes_on_while_a_file_is_written(tmp_path: Path) -> None:
+    path = tmp_path / "a.hdf5"
+    fclib.write(path, one_contact())
+    folder = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(folder, fcntl.LOCK_EX)  # writers wait for their turn
+    solution = fclib.Solution(r=[1, 0])
+    writer = threading.Thread(target=fclib.write_solution, args=(path, solution), daemon=True)
+    writer.start()
+    writer.join(0.2)
+    assert writer.is_alive()
+    os.close(folder)  # by a thread that still runs
+    writer.join(60)
+    assert not writer.is_alive()
+    assert fclib.read_solution(path) is not None

@@ -2,6 +2,7 @@
 
 import os
 import random
+import shutil
 import signal
 import subprocess
 import time
@@ -12,6 +13,7 @@ import pytest
 from capi_library import compile_program
 
 KILLS = 150
+KILLS_IN_PLACE = 60
 TIME_LIMIT = 600.0  # seconds for all of them, on a machine however busy
 SIZES = (30, 900)  # contacts of the problems that take turns, of one chunk and of several
 
@@ -111,6 +113,34 @@ def two_turns(writer: Path, path: Path) -> float:
 
 
 @pytest.mark.slow
+def test_a_file_of_two_names_is_whole_after_a_kill(
+    programs: tuple[Path, Path], tmp_path: Path
+) -> None:
+    """It is rewritten in place; the next reader goes on where the writer was killed."""
+    writer, reader = programs
+    random.seed(2)
+    path, other = tmp_path / "problem.hdf5", tmp_path / "other.hdf5"
+    longest = max(0.05, 1.5 * two_turns(writer, path))
+    os.link(path, other)
+    repaired, found = 0, []
+    start = time.monotonic()
+    while len(found) < KILLS_IN_PLACE and time.monotonic() - start < TIME_LIMIT:
+        process = subprocess.Popen([writer, path, *map(str, SIZES)], stdout=subprocess.DEVNULL)
+        time.sleep(random.uniform(0, longest))
+        process.kill()
+        assert process.wait() == -signal.SIGKILL
+        journal = Path(f"{path}.fclib-journal")
+        repaired += journal.exists()
+        done = subprocess.run([reader], input=str(path), capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        assert not journal.exists()
+        found.append(done.stdout.split())
+    assert {whole for _, whole, _ in found} == {"1"}
+    assert repaired > 0
+    assert path.samefile(other)
+
+
+@pytest.mark.slow
 def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_path: Path) -> None:
     writer, reader = programs
     random.seed(1)
@@ -130,7 +160,7 @@ def test_a_killed_writer_leaves_a_whole_file(programs: tuple[Path, Path], tmp_pa
             assert process.wait() == -signal.SIGKILL, process.stderr.read()
         # the file as it is now, under a name of its own
         kept.append(tmp_path / f"after-{len(kept)}.hdf5")
-        os.link(path, kept[-1])
+        shutil.copyfile(path, kept[-1])
     assert len(kept) == KILLS
     if unnamed_files(tmp_path):
         # a kill may still come between the naming of a new file and its renaming

@@ -1,10 +1,5 @@
 #include "io/hdf5/transaction.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -23,27 +18,6 @@ namespace fs = std::filesystem;
 /// Entries under a node of an index, halved: few datasets have more than one chunk. With 1 an index
 /// gets a level for each entry, and HDF5 fails, or ends its process, beyond 255.
 constexpr unsigned index_rank = 2;
-
-/// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
-/// since the file itself is replaced; it goes with the process that holds it. Where the file system
-/// has no such locks there is none.
-class Turn {
- public:
-  explicit Turn(const std::string& path) {
-    const fs::path folder = fs::path(resolve_links(path)).parent_path();
-    folder_ = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    while (folder_ >= 0 && ::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
-    }
-  }
-  ~Turn() {
-    if (folder_ >= 0) ::close(folder_);
-  }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
-
- private:
-  int folder_ = -1;
-};
 
 /// What HDF5 leaves of a file in memory when it closes it: the file, and room beyond its end.
 class Image {
@@ -160,6 +134,7 @@ void change_file(const std::string& path, Start start, int compression,
   in_file(path, [&] {
     const Turn turn(path);
     std::error_code error;
+    finish_rewrite(path);
     const bool existing =
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
     if (existing) const Handle checked = open_file(path);  // says best what is wrong with it

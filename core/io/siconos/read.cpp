@@ -352,6 +352,7 @@ Problem parse(Words& in, std::string_view kind) {
 }  // namespace
 
 Problem read_siconos(const std::string& path, std::string_view kind) {
+  finish_rewrite_in_turn(path);
   const std::string text = read_file(path);
   try {
     if (text.starts_with("\x89HDF")) {

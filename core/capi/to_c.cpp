@@ -31,8 +31,9 @@ void put_by_columns(RawMatrix& a) {
   std::size_t entries = 0;
   for (std::size_t k = 0; k < rows * cols; ++k) entries += a.x[k] != 0 ? 1U : 0U;
   if (entries > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
-    fail("a dense matrix", "has more entries than an int counts: read it as it is, by "
-                           "fclib_keep_dense(1)");
+    fail("a dense matrix",
+         "has more entries than an int counts: read it as it is, by "
+         "fclib_keep_dense(1)");
   }
   a.storage = Storage::csc;
   a.p = MallocArray<Index>(cols + 1);

@@ -221,8 +221,8 @@ void sync_folder_of(const std::string& name) {
   if (file.id() >= 0) ::fsync(file.id());
 }
 
-/// Writes over the bytes of a file that must stay the same file. They are in a journal by then, from
-/// which finish_rewrite() goes on after a kill.
+/// Writes over the bytes of a file that must stay the same file. They are in a journal by then,
+/// from which finish_rewrite() goes on after a kill.
 void rewrite(const std::string& path, const std::string& target, std::string_view bytes) {
   finish_rewrite(path);
   std::string journal;

@@ -59,7 +59,8 @@ static void show(const char* name, const double* given, const double* found, int
   if (!given) printf(" %s", sum == sum ? "finite" : "nan");
 }
 
-static void show_solution(struct fclib_solution* given, struct fclib_solution* found, int n, int p) {
+static void show_solution(struct fclib_solution* given, struct fclib_solution* found, int n,
+                          int p) {
   if (n) show("v", given->v, found->v, n);
   show("u", given->u, found->u, 3);
   show("r", given->r, found->r, 3);

@@ -78,8 +78,9 @@ void write_fields(const Target& root, const P& problem, const WriteOptions& opti
     }
   });
   bool informed = false;
-  for_each_field<ProblemInfo>(
-      [&](const auto& field) { informed = informed || problem.info.*field.member != absent_group; });
+  for_each_field<ProblemInfo>([&](const auto& field) {
+    informed = informed || problem.info.*field.member != absent_group;
+  });
   if (!informed) return;
   const NewGroup info(group, "info");
   for_each_field<ProblemInfo>([&](const auto& field) {

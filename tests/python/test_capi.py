@@ -365,6 +365,8 @@ def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path)
     written = subprocess.run([old_clients, "write", tmp_path], capture_output=True, text=True)
     assert (written.returncode, written.stderr) == (0, "")
     problem = fclib.read(path)
+    assert isinstance(problem, fclib.GlobalProblem)
+    assert problem.G is not None
     full, bare = fclib.read_guesses(path)  # the last file is that of a guess without anything
     assert full.r is not None
     assert not np.any(bare.r)
@@ -381,6 +383,7 @@ def test_what_a_solution_lacks_follows_from_r(old_clients: Path, tmp_path: Path)
     assert solution is not None
     assert solution.v is not None
     assert solution.u is not None
+    assert solution.l is not None
     v = problem.H @ solution.r + problem.G @ solution.l + problem.f
     np.testing.assert_allclose(solution.v, v)
     np.testing.assert_allclose(solution.u, problem.H.T @ v + problem.w)

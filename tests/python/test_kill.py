@@ -122,7 +122,8 @@ def test_a_file_of_two_names_is_whole_after_a_kill(
     path, other = tmp_path / "problem.hdf5", tmp_path / "other.hdf5"
     longest = max(0.05, 1.5 * two_turns(writer, path))
     os.link(path, other)
-    repaired, found = 0, []
+    repaired = 0
+    found: list[list[str]] = []
     start = time.monotonic()
     while len(found) < KILLS_IN_PLACE and time.monotonic() - start < TIME_LIMIT:
         process = subprocess.Popen([writer, path, *map(str, SIZES)], stdout=subprocess.DEVNULL)

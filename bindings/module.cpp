@@ -40,6 +40,7 @@ NB_MODULE(_core, m) {
   bind_conversions(m);
   bind_arrangements(m);
   bind_solvers(m);
+  bind_embed(m);
   bind_merits(m);
   bind_files(m);
 }

@@ -31,6 +31,8 @@ void bind_solvers(nb::module_& m);
 /// Monitor and python_solver: solvers written in Python, which the driver runs like those of the
 /// core. A part of bind_solvers().
 void bind_python_solvers(nb::module_& m);
+/// Batches of small problems.
+void bind_embed(nb::module_& m);
 /// Merit, merit, merit_1 and contact_merits.
 void bind_merits(nb::module_& m);
 /// Files: HDF5 and the text of Siconos.

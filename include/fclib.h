@@ -77,6 +77,8 @@
 #define FCLIB_VERSION_MINOR 2
 #define FCLIB_VERSION_PATCH 0
 
+#include <stddef.h>
+
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -395,6 +397,38 @@ const char* fclib_solver_name(int k);
 
 /** New. "converged", "iteration_limit", ...: not to be freed. */
 const char* fclib_status_name(enum fclib_status status);
+
+/* ---- many small problems --------------------------------------------------------------------- */
+
+/** New. Local problems of a few contacts, one behind another in the caller's arrays. Members may be
+ *  added at the end: set it to zeros first, and `size` to sizeof(struct fclib_batch). */
+struct fclib_batch {
+  size_t size;
+  int spacedim;        /**< 2 or 3 */
+  int count;           /**< problems */
+  const int* nc;       /**< contacts of each (count), or NULL: nc_each */
+  int nc_each;         /**< contacts of every problem, where nc is NULL */
+  const double* W;     /**< of each problem m x m by rows, m = spacedim nc */
+  const double* q;     /**< of each m */
+  const double* mu;    /**< of each nc */
+  const double* guess; /**< reactions to start from, of each m, or NULL */
+  double tolerance;    /**< on MERIT_2 of each; 0 for 1e-8 */
+  int threads;       /**< that share the batch, 0 or 1 for none beside the caller's, -1 for as many
+                          as the machine has; the result is the same */
+  double time_limit; /**< wall clock of all [s]; 0 for none */
+  /* the caller's, to be filled; all but r may be NULL */
+  double* r;                 /**< of each m */
+  double* u;                 /**< of each m: W r + q */
+  enum fclib_status* status; /**< (count) */
+  double* error;             /**< (count) MERIT_2 */
+  int* iterations;           /**< (count) */
+};
+
+/** New. Solves all problems of a batch: small ones by a way of their own, which allocates nothing
+ *  for a problem once its thread has seen the largest, and what that does not finish by the solver
+ *  "auto". Returns 1 where all were tried, however they ended, and 0 for invalid data, which names
+ *  the problem: answers of the others are there all the same. */
+int fclib_solve_batch(const struct fclib_batch* batch);
 
 #ifdef __cplusplus
 }

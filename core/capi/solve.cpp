@@ -7,6 +7,7 @@
 
 #include "capi/errors.hpp"
 #include "capi/from_c.hpp"
+#include "capi/status.hpp"
 
 namespace fclib::c {
 
@@ -28,28 +29,6 @@ OptionValues parse_values(std::string_view list) {
     values[std::string(pair.substr(0, equals))] = std::string(pair.substr(equals + 1));
     list.remove_prefix(pair.size());
   }
-}
-
-fclib_status status_in_c(Status status) {
-  switch (status) {
-    case Status::converged:
-      return FCLIB_CONVERGED;
-    case Status::iteration_limit:
-      return FCLIB_ITERATION_LIMIT;
-    case Status::time_limit:
-      return FCLIB_TIME_LIMIT;
-    case Status::diverged:
-      return FCLIB_DIVERGED;
-    case Status::inaccurate:
-      return FCLIB_INACCURATE;
-    case Status::interrupted:
-      return FCLIB_INTERRUPTED;
-    case Status::stalled:
-      return FCLIB_STALLED;
-    case Status::infeasible:
-      return FCLIB_INFEASIBLE;
-  }
-  return FCLIB_DIVERGED;
 }
 
 template <class C>

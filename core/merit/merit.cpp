@@ -6,38 +6,20 @@
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
 #include "merit/equations.hpp"
+#include "merit/natural_sums.hpp"
 
 namespace fclib {
 
 namespace {
 
-/// ||F|| over ||q||, or over what rounding leaves of q where that is larger; absolute without
-/// either.
-double relative(Real squares, Real q_squares, Real rounding_squares) {
-  const Real scale = std::sqrt(std::max(q_squares, rounding_squares));
-  const Real norm = std::sqrt(squares);
-  return static_cast<double>(scale > 0 ? norm / scale : norm);
-}
-
 void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
-
-/// The natural map of a contact beyond what the rounding of its q explains.
-Real square_beyond(Real norm, Real rounding) {
-  const Real left = std::max(Real(0), norm - rounding);
-  return left * left;
-}
 
 /// The parts that depend on one contact at a time.
 template <class Cone>
 void judge_contacts(const Friction& friction, const RealVector& r, const Equations& equations,
                     Merit& result, ContactMerits& each) {
   constexpr int D = Cone::dim;
-  Real squares = 0;
-  Real q_squares = 0;
-  Real rounding_squares = 0;
-  Real scaled_squares = 0;
-  Real scaled_q = 0;
-  Real scaled_rounding = 0;
+  NaturalSums<Cone> sums;
   each.u = equations.u.cast<double>();
   for (Vector* figures : {&each.natural, &each.cone, &each.dual_cone}) {
     figures->resize(friction.mu.size());
@@ -49,14 +31,8 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
     const ContactVector<D, Real> modified = cone.modified(ua);
     const Real q_square = equations.q.segment<D>(D * contact).squaredNorm();
     const Real rounding = equations.rounding.segment<D>(D * contact).norm();
-    const Real norm = natural_map(cone, ua, ra).norm();
-    squares += square_beyond(norm, rounding);
-    q_squares += q_square;
-    rounding_squares += rounding * rounding;
     const Real rho = equations.scale[contact] > 0 ? 1 / equations.scale[contact] : Real(1);
-    scaled_squares += square_beyond(natural_map(cone, ua, ra, rho).norm(), rho * rounding);
-    scaled_q += rho * rho * q_square;
-    scaled_rounding += rho * rho * rounding * rounding;
+    const Real norm = sums.add(cone, ua, ra, q_square, rounding, rho);
     each.natural[contact] = static_cast<double>(norm);
     each.cone[contact] = static_cast<double>(cone_violation(cone, ra));
     each.dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
@@ -76,8 +52,8 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
         break;
     }
   }
-  result.natural = relative(squares, q_squares, rounding_squares);
-  result.scaled_natural = relative(scaled_squares, scaled_q, scaled_rounding);
+  result.natural = sums.natural();
+  result.scaled_natural = sums.scaled_natural();
 }
 
 Merit judge(Index spacedim, const Friction& friction, const Solution& solution,

@@ -8,6 +8,7 @@
 
 import typing
 
+from fclib._batch import BatchResult, solve_batch
 from fclib._core import (
     Error,
     FileError,
@@ -92,6 +93,7 @@ def load(name: str, form: str | None = None, folder: "str | Path | None" = None)
 
 
 __all__ = [
+    "BatchResult",
     "Error",
     "FileError",
     "GlobalProblem",
@@ -130,6 +132,7 @@ __all__ = [
     "read_siconos",
     "read_solution",
     "solve",
+    "solve_batch",
     "solver",
     "solvers",
     "write",

@@ -38,7 +38,7 @@ MENU = {
     "The collection": ["collection", "families/index", "families-of-your-own"],
     "The solvers": ["choosing", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
-    "Interfaces": ["command-line", "python", "compiled", "c-api"],
+    "Interfaces": ["command-line", "python", "compiled", "embedding", "c-api"],
     "Around it": [
         "comparison",
         "migrating",

@@ -210,7 +210,11 @@ def without_comments(header: str) -> str:
     return re.sub(r"/\*.*?\*/", "", header, flags=re.DOTALL)
 
 
-IN_FORTRAN = {"int": "integer(c_int)", "double": "real(c_double)"}
+IN_FORTRAN = {
+    "int": "integer(c_int)",
+    "double": "real(c_double)",
+    "size_t": "integer(c_size_t)",
+}
 
 
 def in_fortran(declaration: str) -> str:
@@ -229,7 +233,7 @@ def test_the_fortran_module_is_the_header() -> None:
     module, header = source.read_text(), without_comments((HEADERS / "fclib.h").read_text())
 
     structs = re.findall(r"struct (?:FCLIB_APICOMPILE )?(\w+) \{(.*?)\};", header, re.DOTALL)
-    assert len(structs) == 10
+    assert len(structs) == 11
     for name, body in structs:
         members = [
             (in_fortran(member), member.split()[-1].strip("*"))

@@ -1,0 +1,60 @@
+// The natural map of a whole solution, plain and scaled, summed up contact by contact: the part of
+// the merit that every formulation shares.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/cone.hpp"
+
+namespace fclib {
+
+/// In the precision of Cone.
+template <class Cone>
+class NaturalSums {
+ public:
+  using Vec = typename Cone::Vec;
+  using Real = typename Vec::Scalar;
+
+  /// Adds a contact with velocity u and reaction r, ||q^a||^2, what rounding leaves of q^a, and
+  /// rho = d / tr(W_aa). The norm of its natural map.
+  Real add(const Cone& cone, const Vec& u, const Vec& r, Real q_square, Real rounding, Real rho) {
+    const Real norm = natural_map(cone, u, r).norm();
+    squares_ += square_beyond(norm, rounding);
+    q_squares_ += q_square;
+    rounding_squares_ += rounding * rounding;
+    scaled_squares_ += square_beyond(natural_map(cone, u, r, rho).norm(), rho * rounding);
+    scaled_q_ += rho * rho * q_square;
+    scaled_rounding_ += rho * rho * rounding * rounding;
+    return norm;
+  }
+
+  [[nodiscard]] double natural() const { return relative(squares_, q_squares_, rounding_squares_); }
+  [[nodiscard]] double scaled_natural() const {
+    return relative(scaled_squares_, scaled_q_, scaled_rounding_);
+  }
+
+ private:
+  /// The natural map of a contact beyond what the rounding of its q explains.
+  static Real square_beyond(Real norm, Real rounding) {
+    const Real left = norm - rounding;
+    return left < 0 ? Real(0) : left * left;
+  }
+
+  /// ||F|| over ||q||, or over what rounding leaves of q where that is larger; absolute without
+  /// either.
+  static double relative(Real squares, Real q_squares, Real rounding_squares) {
+    const Real scale = std::sqrt(std::max(q_squares, rounding_squares));
+    const Real norm = std::sqrt(squares);
+    return static_cast<double>(scale > 0 ? norm / scale : norm);
+  }
+
+  Real squares_ = 0;
+  Real q_squares_ = 0;
+  Real rounding_squares_ = 0;
+  Real scaled_squares_ = 0;
+  Real scaled_q_ = 0;
+  Real scaled_rounding_ = 0;
+};
+
+}  // namespace fclib

@@ -12,6 +12,7 @@
 #include <string>
 
 #include "arrays.hpp"
+#include "fingerprints.hpp"
 #include "module.hpp"
 #include "solve/driver.hpp"
 
@@ -149,6 +150,9 @@ void bind_solvers(nb::module_& m) {
         return result;
       },
       nb::sig("def solvers() -> list[SolverInfo]"), "The solvers of the core, by name.");
+  m.def(
+      "fingerprints", &fingerprints,
+      "What tells two builds of a solver of the core apart: a digest of its sources, by its name.");
   m.def(
       "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
       nb::rv_policy::reference,

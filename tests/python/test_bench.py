@@ -11,6 +11,7 @@ import sqlite3
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from typer.testing import CliRunner
 import fclib
 from fclib import bench, cli
 from fclib.bench.campaign import parse_solver
-from fclib.bench.job import MERITS, Job
+from fclib.bench.job import MERITS, Job, Record
 from helpers import planted_global, planted_local
 
 KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))
@@ -68,7 +69,9 @@ def test_a_campaign_is_run_once(tmp_path: Path) -> None:
     for row in rows:
         assert row["error"] <= row["tol"]
         assert row["cpu_s"] > 0
-        assert row["version"] == fclib.__version__
+        assert row["version"].startswith(f"{fclib.__version__}-")
+        assert row["measured"]
+        assert row["said_cpu_s"] <= row["total_cpu_s"] + 0.1
         assert row["hash"]
 
 
@@ -409,33 +412,276 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "absent.sqlite").exists()
 
 
-def test_a_store_of_version_1_is_brought_up_to_date(small: Path, tmp_path: Path) -> None:
-    old = tmp_path / "old.sqlite"
-    shutil.copy(small, old)
-    with bench.Store(old) as store:
-        rows = store.results()
-        columns = [name for name in store.columns() if name != "merit"]
-    database = sqlite3.connect(old)
+ADDED = ("said_cpu_s", "measured", "warm", "pinned")
+
+
+def made_older(path: Path, version: int) -> None:
+    """Make of a store what an earlier fclib would have made; one of its runs was killed."""
+    database = sqlite3.connect(path)
     (view,) = database.execute("SELECT sql FROM sqlite_master WHERE name = 'results'").fetchone()
-    for statement in (
-        "DROP VIEW results",
-        "DROP TABLE certificates",
-        "ALTER TABLE runs DROP COLUMN merit",
-        view.replace("runs.merit, ", ""),
-        "PRAGMA user_version = 1",
-    ):
+    statements = ["DROP VIEW results", "DROP TABLE faults"]
+    statements += [f"ALTER TABLE runs DROP COLUMN {name}" for name in ADDED]
+    statements += ["UPDATE runs SET status = 'killed', solved = 0 WHERE id = 1"]
+    for name in ADDED:
+        view = view.replace(f"runs.{name}, ", "").replace(f"runs.{name},\n", "")
+    if version == 1:
+        statements += ["DROP TABLE certificates", "ALTER TABLE runs DROP COLUMN merit"]
+        view = view.replace("runs.merit, ", "")
+    for statement in (*statements, view, f"PRAGMA user_version = {version}"):
         database.execute(statement)
     database.commit()
     database.close()
+
+
+@pytest.mark.parametrize("version", [1, 2])
+@pytest.mark.parametrize("writable", [True, False])
+def test_a_store_of_an_earlier_version_is_brought_up_to_date(
+    version: int, writable: bool, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old = tmp_path / "old.sqlite"
+    shutil.copy(small, old)
     with bench.Store(old) as store:
-        again = store.results()
-        assert [{name: row[name] for name in columns} for row in again] == [
-            {name: row[name] for name in columns} for row in rows
-        ]
-        assert {row["merit"] for row in again} == {"natural"}
-        assert store.certificate(again[0]["run"]) is None
-    with bench.Store(old) as store:
-        assert len(store.results()) == len(rows)
+        first, *rows = store.results()
+        columns = [name for name in store.columns() if name not in (*ADDED, "merit")]
+    made_older(old, version)
+    before = old.read_bytes()
+    if not writable:
+        monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    for _ in range(2):
+        with bench.Store(old, create=False) as store:
+            again = store.results()
+            assert [{name: row[name] for name in columns} for row in again] == [
+                {name: row[name] for name in columns} for row in rows
+            ]
+            merits = {"natural"} if version == 1 else {"both"}
+            assert {row["merit"] for row in again} == merits
+            assert {row["measured"] for row in again} == {None}
+            assert store.certificate(again[0]["run"]) is None
+            # what was killed counts as not run
+            (fault,) = store.faults()
+            assert (fault["status"], fault["problem"]) == ("killed", first["problem"])
+    assert (old.read_bytes() == before) != writable
+
+
+def test_a_store_in_a_folder_that_cannot_be_written(
+    small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copy(small, tmp_path / "one.sqlite")
+    files = sorted(tmp_path.iterdir())
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    with bench.Store(tmp_path / "one.sqlite", create=False) as store:
+        assert len(store.results()) == 18
+        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+            store.begin("x", "", 0, 0, "")
+    assert sorted(tmp_path.iterdir()) == files
+
+
+def test_what_is_left_of_a_damaged_store_is_saved(small: Path, tmp_path: Path) -> None:
+    path = tmp_path / "damaged.sqlite"
+    with bench.Store(small) as store:
+        store.db.execute("VACUUM INTO ?", (str(path),))
+    data = bytearray(path.read_bytes())
+    size = int.from_bytes(data[16:18], "big")
+    database = sqlite3.connect(path)
+    (root,) = database.execute(
+        "SELECT rootpage FROM sqlite_master WHERE name = 'history'"
+    ).fetchone()
+    database.close()
+    data[(root - 1) * size : root * size] = b"\xff" * size
+    path.write_bytes(data)
+    with pytest.raises(bench.StoreError, match=r"damaged.*18 of its runs.*fclib bench merge"):
+        bench.Store(path)
+    with bench.Store(tmp_path / "saved.sqlite") as saved:
+        assert saved.merge([path]) == 18
+        assert {row["error"] for row in saved.results()} == {
+            row["error"] for row in bench.Store(small).results()
+        }
+    (tmp_path / "empty.sqlite").touch()
+    with pytest.raises(bench.StoreError, match="is empty"):
+        bench.Store(tmp_path / "empty.sqlite", create=False)
+
+
+# ---- what comes from outside
+
+
+def fake(outcome: Any, count: list[str]) -> Any:
+    """A runner that runs nothing: the records are those that `outcome(job, attempt)` says."""
+    attempts: Counter[str] = Counter()
+
+    def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
+        while (job := next(jobs, None)) is not None:
+            attempts[job.key] += 1
+            count.append(job.key)
+            status = outcome(job, attempts[job.key])
+            yield job, Record(status, "a word \ud800", machine={"node": "here"})
+
+    return run
+
+
+@pytest.fixture
+def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fclib.bench.runner.PAUSES", (0.0, 0.0))
+
+
+@pytest.mark.usefixtures("hasty")
+def test_what_is_spoilt_from_outside_is_tried_again(tmp_path: Path) -> None:
+    done: list[str] = []
+    runner = fake(lambda job, attempt: "converged" if attempt > 2 else "killed", done)
+    progress = bench.run_campaign(campaign(), tmp_path / "a.sqlite", runner=runner)
+    assert (progress.solved, len(done), progress.stopped) == (18, 3 * 18, "")
+    with bench.Store(tmp_path / "a.sqlite") as store:
+        assert {row["status"] for row in store.results()} == {"converged"}
+        assert store.faults() == []
+
+
+@pytest.mark.usefixtures("hasty")
+def test_what_cannot_be_run_is_no_failure_and_is_tried_by_the_next_campaign(
+    tmp_path: Path,
+) -> None:
+    done: list[str] = []
+    chosen = campaign(repeats=2)
+    unlucky = chosen.plan()[3].key
+    runner = fake(lambda job, _: "lost" if job.key == unlucky else "stalled", done)
+    progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=runner)
+    assert (sum(progress.statuses.values()), progress.not_run["lost"]) == (35, 1)
+    assert not progress.stopped
+    assert done.count(unlucky) == 3
+    with bench.Store(tmp_path / "a.sqlite") as store:
+        assert not store.has(unlucky)
+        (fault,) = store.faults()
+        assert (fault["status"], fault["message"]) == ("lost", "a word ?")
+    again = bench.run_campaign(
+        chosen, tmp_path / "a.sqlite", runner=fake(lambda *_: "converged", done)
+    )
+    assert (again.skipped, again.solved) == (35, 1)
+    with bench.Store(tmp_path / "a.sqlite") as store:
+        assert store.faults() == []
+    # and those of a status that is named
+    more = bench.run_campaign(
+        chosen,
+        tmp_path / "a.sqlite",
+        runner=fake(lambda *_: "converged", done),
+        retry=["stalled"],
+    )
+    assert (more.skipped, more.solved) == (1, 35)
+
+
+@pytest.mark.usefixtures("hasty")
+def test_a_campaign_of_which_a_tenth_cannot_run_stops(tmp_path: Path) -> None:
+    done: list[str] = []
+    chosen = campaign(repeats=10)
+    runner = fake(lambda *_: "unreadable", done)
+    progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=runner)
+    assert "could not be done" in progress.stopped
+    assert "unreadable: a word" in progress.stopped
+    assert len(done) == 3 * 18  # of 180
+
+
+def test_the_campaign_that_stops_says_so_and_exits_with_1(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
+    store = tmp_path / "store.sqlite"
+    arguments = ["bench", "--problems", str(tmp_path), "--solver", "cmd:sh -c 'kill -9 $$' {input}"]
+    arguments += ["--store", str(store), "--retries", "0"]
+    done = CliRunner().invoke(cli.app, arguments)
+    assert done.exit_code == 1
+    assert "stopped: 1 of 1 runs could not be done" in " ".join(done.stderr.split())
+    assert bench.Store(store).results() == []
+
+
+def test_nothing_in_the_current_folder_is_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("random", "signal", "re", "json", "numpy", "fclib"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')\n")
+    monkeypatch.chdir(tmp_path)
+    chosen = campaign(solvers=["nsgs"], tolerances=[1e-4])
+    progress = bench.run_campaign(chosen, tmp_path / "store.sqlite")
+    assert progress.solved == 3
+    assert not (tmp_path / "ran").exists()
+
+
+def test_a_module_does_not_take_the_place_of_another(tmp_path: Path) -> None:
+    (tmp_path / "random.py").write_text("raise SystemExit\n")
+    (tmp_path / "pytest.py").write_text("raise SystemExit\n")
+    for name in ("random.py", "pytest.py"):
+        with pytest.raises(bench.CampaignError, match=r"another module is called"):
+            campaign(modules=[str(tmp_path / name)])
+
+
+# ---- what ran
+
+
+OWN = """
+import fclib
+import own_helper
+
+@fclib.solver("own-fingerprint")
+def solve(problem, r, monitor):
+    return own_helper.solve(r)
+"""
+
+
+def test_the_version_of_a_solver_is_that_of_what_it_is_made_of(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    helper, own = tmp_path / "own_helper.py", tmp_path / "own_module.py"
+    own.write_text(OWN)
+    monkeypatch.syspath_prepend(tmp_path)
+    program = tmp_path / "program.py"
+    versions: list[tuple[str, ...]] = []
+    for text in ("def solve(r): return r", "def solve(r): return r", "def solve(r): return 2 * r"):
+        for path in (helper, program):
+            path.write_text(text)
+        for name in ("own_helper", "own_module"):
+            sys.modules.pop(name, None)
+        command = f"cmd:{sys.executable} {program} {{input}}"
+        chosen = campaign(solvers=["auto", "own-fingerprint", command], modules=[str(own)])
+        versions.append(tuple(choice.version for choice in chosen.solvers))
+    same, again, changed = versions
+    assert same == again
+    assert same[0] == changed[0] == f"{fclib.__version__}-{fclib._core.fingerprints()['auto']}"
+    assert same[1] != changed[1]
+    assert same[2] != changed[2]
+    digests = fclib._core.fingerprints()
+    assert set(digests) == {solver.name for solver in fclib._core.solvers()}
+    assert len(set(digests.values())) == len(digests)
+
+
+# ---- a budget
+
+
+def test_a_budget_is_spread_over_families_and_whole_problems(tmp_path: Path) -> None:
+    groups = [
+        {"planted": {"count": 4, "contacts": 4, "seed": 1}, "family": "a"},
+        {"planted": {"count": 2, "contacts": 5, "seed": 1}, "family": "b"},
+    ]
+    chosen = campaign(problems=groups, budget="54s", tolerances=[1e-4])
+    assert (chosen.budget, campaign(budget="2h").budget) == (54, 7200)
+
+    def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
+        while (job := next(jobs, None)) is not None:
+            yield job, Record("converged", total_cpu_s=6.0, wall_s=1.0, machine={"node": "here"})
+
+    progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=run)
+    # three problems of six, by all three solvers
+    assert (progress.solved, progress.left_over) == (9, 9)
+    with bench.Store(tmp_path / "a.sqlite") as store:
+        counts = Counter((row["family"], row["problem"]) for row in store.results())
+    assert sorted(family for family, _ in counts) == ["a", "a", "b"]
+    assert set(counts.values()) == {3}
+    # with more it goes on
+    more = campaign(problems=groups, budget=60, tolerances=[1e-4])
+    progress = bench.run_campaign(more, tmp_path / "a.sqlite", runner=run)
+    assert (progress.skipped, progress.solved, progress.left_over) == (9, 1, 8)
+
+
+def test_sets_of_the_collection_are_named() -> None:
+    pytest.importorskip("pyarrow")
+    plan = campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan()
+    assert len(plan) == len(fclib.collection("tiny"))
+    assert {Path(job.problem.path).is_absolute() for job in plan} == {True}
+    with pytest.raises(fclib.Error, match=r"set nowhere: .*tiny"):
+        campaign(problems=["set:nowhere"]).plan()
 
 
 # ---- what is asked for
@@ -453,6 +699,8 @@ def test_a_store_of_version_1_is_brought_up_to_date(small: Path, tmp_path: Path)
         ({"solvers": [{"options": {}}]}, "no name"),
         ({"problems": []}, r"no \[\[problems\]\]"),
         ({"problems": [{"family": "x"}]}, "neither files"),
+        ({"problems": [{"set": "tiny", "form": "square"}]}, r"problems\[0\]\.form"),
+        ({"budget": "long"}, "budget"),
         ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
         ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),
         ({"problems": ["a"]}, r"write \[\[problems\]\]"),

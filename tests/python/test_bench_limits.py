@@ -17,9 +17,9 @@ import pytest
 
 import fclib
 from fclib import analysis, bench
-from fclib.bench import problems
+from fclib.bench import problems, processes
 from fclib.bench.job import Job, Record
-from fclib.bench.pool import SupervisorClient
+from fclib.bench.pool import MARK, SupervisorClient
 from fclib.bench.supervisor import prove
 from helpers import planted_local
 
@@ -183,6 +183,118 @@ BAD = """
             monitor.stop(r)
 
 
+    def orphan(work):
+        # a grandchild in a session of its own, whose parent has ended
+        if os.fork() == 0:
+            os.setsid()
+            if os.fork() == 0:
+                work()
+            os._exit(0)
+        os.wait()
+
+
+    def burn(seconds=ASLEEP):
+        while time.process_time() < seconds:
+            pass
+
+
+    def solved(monitor, r):
+        monitor.stop(r)
+        r[:] = SOLUTION
+        monitor.stop(r)
+
+
+    @bad
+    def burns_in_an_orphan(problem, r, monitor):
+        orphan(burn)
+        time.sleep(ASLEEP)
+
+
+    @bad
+    def eats_in_an_orphan(problem, r, monitor):
+        orphan(lambda: eats(None, None, None))
+        time.sleep(ASLEEP)
+
+
+    @bad
+    def took_less_than_nothing(problem, r, monitor):
+        solved(monitor, r)
+        monitor.cpu_s = -5.0
+
+
+    @bad
+    def took_longer_than_it_ran(problem, r, monitor):
+        solved(monitor, r)
+        monitor.cpu_s = 1e6
+
+
+    @bad
+    def forges_an_answer(problem, r, monitor):
+        import json, socket
+        answer = {"status": "converged", "message": "", "vectors": [], "iterations": 1}
+        for fd in map(int, os.listdir("/proc/self/fd")):
+            if fd > 2 and os.readlink(f"/proc/self/fd/{fd}").startswith("socket"):
+                for word in ({"word": "done"}, answer, answer):
+                    text = json.dumps(word).encode()
+                    os.write(fd, len(text).to_bytes(8, "little") + text)
+        solved(monitor, r)
+
+
+    @bad
+    def stops_its_supervisor(problem, r, monitor):
+        os.kill(os.getppid(), 19)
+        time.sleep(ASLEEP)
+
+
+    # those that solve it, and leave something behind
+
+    @bad
+    def patches_clocks(problem, r, monitor):
+        for name in ("process_time", "perf_counter", "monotonic", "time", "thread_time"):
+            setattr(time, name, lambda: 0.0)
+        solved(monitor, r)
+
+
+    @bad
+    def leaves_a_thread(problem, r, monitor):
+        import threading
+        threading.Thread(target=burn, daemon=True).start()
+        solved(monitor, r)
+
+
+    @bad
+    def leaves_an_orphan(problem, r, monitor):
+        orphan(burn)
+        solved(monitor, r)
+
+
+    @bad
+    def leaves_files(problem, r, monitor):
+        import tempfile
+        tempfile.NamedTemporaryFile(delete=False).write(b"left behind")
+        solved(monitor, r)
+
+
+    @bad
+    def exits_at_exit(problem, r, monitor):
+        import atexit
+        atexit.register(os._exit, 3)
+        solved(monitor, r)
+
+
+    @bad
+    def works_elsewhere(problem, r, monitor):
+        # the clock of the thread sees nothing of it
+        code = "import time\\nwhile time.process_time() < 0.15: pass"
+        subprocess.run([sys.executable, "-I", "-c", code])
+        solved(monitor, r)
+
+
+    @bad
+    def has_no_room(problem, r, monitor):
+        raise OSError(28, "No space left on device")
+
+
     @fclib.solver("bad-flat", dimensions=(2,))
     def flat(problem, r, monitor):
         pass
@@ -202,14 +314,35 @@ EXPECTED = {
     "returns_words": "garbage",
     "returns_too_much": "garbage",
     "lies": "inaccurate",
-    "cheats": "inaccurate",
+    "cheats": "error",  # its second call is that of a process that it has broken itself
     "closes_everything": "garbage",  # what it returns cannot be read
     "raises": "error",
     "leaves_a_child": "wall_limit",
     "works_in_a_child": "cpu_limit",
     "eats_in_a_child": "memory",
     "flat": "unsuitable",
+    "burns_in_an_orphan": "cpu_limit",
+    "eats_in_an_orphan": "memory",
+    "took_less_than_nothing": "lied",
+    "took_longer_than_it_ran": "lied",
+    "forges_an_answer": "garbage",
+    "stops_its_supervisor": "lost",
+    "has_no_room": "no_space",
+    "patches_clocks": "converged",
+    "leaves_a_thread": "converged",
+    "leaves_an_orphan": "converged",
+    "leaves_files": "converged",
+    "exits_at_exit": "converged",
+    "works_elsewhere": "converged",
 }
+# that are measured by the processes themselves too, where there are no control groups
+WITHOUT_GROUPS = (
+    "burns_in_an_orphan",
+    "eats_in_an_orphan",
+    "leaves_an_orphan",
+    "works_elsewhere",
+    "works_in_a_child",
+)
 # of programs: what a shell does with {output}
 PROGRAMS = {
     "true {input} {output}": "nothing",
@@ -241,11 +374,22 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def supervisor(folder: Path) -> Iterator[SupervisorClient]:
-    os.environ["FCLIB_TEST_SPIN"] = str(folder / "spin.so")
-    supervisor = SupervisorClient(1)
+    yield from started(folder, FCLIB_TEST_SPIN=str(folder / "spin.so"))
+
+
+@pytest.fixture(scope="module")
+def supervisor_without_groups(folder: Path) -> Iterator[SupervisorClient]:
+    yield from started(folder, FCLIB_CGROUP="0")
+
+
+def started(folder: Path, **environment: str) -> Iterator[SupervisorClient]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in environment.items():
+            patch.setenv(name, value)
+        supervisor = SupervisorClient(1)
+        supervisor.do(job(folder, "auto"))
     yield supervisor
     supervisor.end()
-    del os.environ["FCLIB_TEST_SPIN"]
 
 
 def job(folder: Path, solver: str, **changes: Any) -> Job:
@@ -265,9 +409,20 @@ def job(folder: Path, solver: str, **changes: Any) -> Job:
 def test_what_no_solver_should_do_has_its_own_status(
     name: str, folder: Path, supervisor: SupervisorClient
 ) -> None:
+    ends(name, folder, supervisor)
+
+
+@pytest.mark.parametrize("name", WITHOUT_GROUPS)
+def test_and_without_control_groups(
+    name: str, folder: Path, supervisor_without_groups: SupervisorClient
+) -> None:
+    record = ends(name, folder, supervisor_without_groups)
+    assert record.measured == "processes"
+
+
+def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     # only who sleeps is to meet the clock on the wall, on a machine that is shared
     wall = LIMIT if EXPECTED[name] == "wall_limit" else 20 * LIMIT
-    supervisor.do(job(folder, "auto"))  # the worker is warm
     start = time.monotonic()
     record = supervisor.do(job(folder, f"bad-{name}", wall=wall))
     took = time.monotonic() - start
@@ -276,25 +431,27 @@ def test_what_no_solver_should_do_has_its_own_status(
     assert record.total_cpu_s is None or record.total_cpu_s < LIMIT + LATE
     # however busy it is, long before a solver that sleeps wakes up of its own accord
     assert took < ASLEEP / 2
-    assert not record.solved
+    if name == "works_elsewhere":
+        assert record.cpu_s is not None
+        assert record.cpu_s > 0.15
+    if record.ran:
+        # nothing is left of it: no process, no thread, no file
+        assert not left_over(supervisor)
+        assert list(Path(supervisor.folder).iterdir()) == []
     # the next one is not touched by it
     after = supervisor.do(job(folder, "auto"))
     assert after.status == "converged"
+    assert after.warm
     assert after.merits is not None
     assert after.merits["error"] <= 1e-8
-    assert not left_over()
+    return record
 
 
-def left_over() -> list[str]:
-    """Processes that a solver has left behind."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            if "12345" in path.read_text().replace("\0", " "):
-                found.append(path.read_text())
-        except OSError:
-            continue
-    return found
+def left_over(supervisor: SupervisorClient) -> list[int]:
+    """Processes and threads that a solver has left behind."""
+    assert supervisor.process is not None
+    pids = set(processes.marked(f"{MARK}={supervisor.mark}")) - {supervisor.process.pid}
+    return [pid for pid in pids if processes.state(pid) not in ("", "Z", "X")]
 
 
 @pytest.mark.parametrize("command", PROGRAMS)
@@ -348,9 +505,10 @@ def test_a_supervisor_that_is_killed_is_replaced(
     supervisor.give(job(folder, "auto"))
     assert supervisor.process is not None
     supervisor.process.kill()
-    while (taken := supervisor.take()) is None:
-        pass
-    assert taken[1].status == "converged"
+    _, record = supervisor.take()
+    assert (record.status, record.ran) == ("lost", False)
+    assert "SIGKILL" in record.message
+    assert supervisor.do(job(folder, "auto")).status == "converged"
 
 
 def closing_walls(folder: Path) -> Path:

@@ -11,14 +11,18 @@ campaign.py     what is to be run: a TOML file becomes jobs. Needs problems.py, 
 problems.py     the files that a campaign names, and what it knows of the problem in each
 made.py         problems that a campaign has made: steps of a scene, random ones
 modules.py      files of Python with solvers of the user's own
+fingerprint.py  what tells two versions of a solver apart
 job.py          what travels: a job there, a record back, and the statuses of a record
-runner.py       runs a campaign: what the store lacks goes to the pool or the cluster
+runner.py       runs a campaign: what the store lacks goes to the pool or the cluster, twice and
+                a third time where something from outside has spoilt it
 pool.py         supervisors on this machine, several at once
 cluster.py      the same in the workers of Dask, on many machines
 supervisor.py   the process that watches a worker, and judges. Knows no campaign
 worker.py       the process that solves
+warm_up.py      its first call of a solver, which is not measured
+meter.py        what the kernel says a run took: a control group, or the processes
 processes.py    processes as Linux shows them
-machine.py      what a record says of its machine
+machine.py      what a record says of its machine; cores for one run alone
 store.py        one SQLite file, one row a run
 profiles.py     what the runs of a store say. Knows rows alone
 plots.py        profiles as pictures

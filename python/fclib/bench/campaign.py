@@ -7,14 +7,13 @@ jobs of it.
 from __future__ import annotations
 
 import difflib
-import hashlib
 import importlib
-import importlib.metadata
 import math
 import random
+import re
 import shlex
-import shutil
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,6 +23,7 @@ from typing import Any
 from fclib import _core, _registry
 from fclib._solve import MeritKind
 from fclib.bench import made, problems
+from fclib.bench.fingerprint import version_of
 from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
 from fclib.bench.modules import load_modules
 from fclib.bench.store import Store
@@ -42,12 +42,16 @@ KNOWN = {
     "threads",
     "seed",
     "history",
+    "budget",
     "modules",
     "solvers",
     "problems",
 }
-KNOWN_OF_PROBLEMS = {"family", "files", "sample", "simulate", "planted", "tolerances", *NUMBERS}
+WHAT = {"files", "set", "simulate", "planted"}  # one of which a group of problems has
+KNOWN_OF_PROBLEMS = {"family", "form", "sample", "tolerances", *WHAT, *NUMBERS}
 KNOWN_OF_PROBLEMS |= {"optional", "published_mean"}
+SET = "set:"  # before the name of a set of the collection
+UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 KNOWN_OF_SOLVER = {"name", "options", "label", "optional"}
 MADE = {
     "simulate": {"family", "parameters", "steps", "seed"},
@@ -67,6 +71,8 @@ class Group:
     limits: Limits
     family: str = ""
     files: tuple[str, ...] = ()
+    set: str = ""  # of the collection, or a family of it
+    form: str | None = None  # of its problems, "global" or "local"
     sample: int | None = None
     simulate: Mapping[str, Any] | None = None
     planted: Mapping[str, Any] | None = None
@@ -87,6 +93,7 @@ class Campaign:
     history: bool = False
     modules: tuple[str, ...] = ()
     merit: MeritKind = "both"
+    budget: float | None = None  # [s] for all runs together
     base: Path = field(default_factory=Path.cwd)  # what paths are relative to
     text: str = ""  # as it was written
     missing: tuple[str, ...] = ()  # optional solvers that are not here, and why
@@ -97,6 +104,7 @@ class Campaign:
         path: str | Path,
         changes: Mapping[str, Any] = MappingProxyType({}),
         sample: int | None = None,
+        solvers: Sequence[str] = (),
     ) -> Campaign:
         """The campaign of a TOML file, or the published one of that name.
 
@@ -104,6 +112,7 @@ class Campaign:
             path: the file, or the name.
             changes: entries that take the place of the file's, in its groups of problems too.
             sample: so many problems of each group, where it is given.
+            solvers: besides those of the file.
 
         Raises:
             CampaignError: there is none, or it is not valid; the message names the entry.
@@ -129,7 +138,10 @@ class Campaign:
                 | ({"sample": sample} if sample else {})
                 for row in _tables(entries)
             ]
-            return cls.of({"name": file.stem, **entries, "problems": groups, **changes}, base, text)
+            more = {"name": file.stem, **entries, "problems": groups, **changes}
+            if solvers and isinstance(more.get("solvers"), list):
+                more["solvers"] = [*more["solvers"], *solvers]
+            return cls.of(more, base, text)
         except CampaignError as error:
             raise CampaignError(f"{file}: {error}") from None
 
@@ -163,6 +175,7 @@ class Campaign:
             history=bool(entries.get("history", False)),
             modules=modules,
             merit=_merit(entries.get("merit", "both")),
+            budget=_budget(entries["budget"]) if "budget" in entries else None,
             base=base,
             text=text,
             missing=missing,
@@ -173,13 +186,16 @@ class Campaign:
     ) -> list[Job]:
         """The jobs, in the order in which they are to be done: repeat by repeat, each shuffled.
 
+        Where there is a budget, problem after problem, so that what it suffices for is spread
+        evenly over the groups and families, and all solvers have run what was begun.
+
         Args:
             store: what it knows of files is not found out again.
             tell: is called with what is left out, and why.
 
         Raises:
             fclib.Error: a problem cannot be found, made or read.
-            ImportError: a problem is to be simulated, and MuJoCo is not there.
+            ImportError: a problem is to be simulated or of a set, and what that needs is not there.
         """
         found: list[tuple[ProblemFacts, Group]] = []
         for group in self.groups:
@@ -217,12 +233,16 @@ class Campaign:
                 for tol in group.tolerances
             ]
             random_order.shuffle(ours)
+            if self.budget is not None:
+                ours = spread(ours)
             for job in ours:
                 jobs.setdefault(job.key, job)  # one problem under two names is run once
         return list(jobs.values())
 
     def _paths(self, group: Group) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
+        if group.set:
+            paths += problems.of_set(group.set, group.form)
         if group.simulate is not None:
             paths += made.simulated(
                 family=group.simulate["family"],
@@ -240,6 +260,19 @@ class Campaign:
         return paths
 
 
+def spread(jobs: Sequence[Job]) -> list[Job]:
+    """Jobs in an order whose beginning has of each family its share, and of each problem all."""
+    families: dict[str, dict[str, list[Job]]] = defaultdict(lambda: defaultdict(list))
+    for job in jobs:
+        families[job.problem.family][job.problem.hash].append(job)
+    places = [
+        ((k + 0.5) / len(own), family, own[digest])
+        for family, own in families.items()
+        for k, digest in enumerate(own)
+    ]
+    return [job for *_, part in sorted(places, key=lambda place: place[:2]) for job in part]
+
+
 def published_means(store: str | Path) -> dict[tuple[str, float], float]:
     """Means of the fastest solver, by family and tolerance, which the campaigns quote."""
     found = {}
@@ -247,9 +280,11 @@ def published_means(store: str | Path) -> dict[tuple[str, float], float]:
         for text in opened.texts():
             campaign = toml().loads(text)
             for group in campaign.get("problems", ()):
-                for tol in group.get("tolerances", campaign.get("tolerances", ())):
-                    if "published_mean" in group:
-                        found[group.get("family", ""), float(tol)] = float(group["published_mean"])
+                if not isinstance(group, Mapping) or "published_mean" not in group:
+                    continue
+                tolerances = group.get("tolerances", campaign.get("tolerances", ()))
+                for tol in tolerances if isinstance(tolerances, list) else [tolerances]:
+                    found[group.get("family", ""), float(tol)] = float(group["published_mean"])
     return found
 
 
@@ -260,8 +295,15 @@ def toml() -> Any:
 
 def _tables(entries: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     rows = entries.get("problems", [])
+    if isinstance(rows, list):
+        rows = [
+            {"set": row.removeprefix(SET)} if isinstance(row, str) and row.startswith(SET) else row
+            for row in rows
+        ]
     if not isinstance(rows, list) or not all(isinstance(row, Mapping) for row in rows):
-        raise CampaignError("problems: write [[problems]], and files = [...] below it")
+        raise CampaignError(
+            'problems: write [[problems]], and files = [...] below it; or problems = ["set:NAME"]'
+        )
     if not rows:
         raise CampaignError("problems: there is no [[problems]]")
     return rows
@@ -326,11 +368,23 @@ def _merit(value: object) -> MeritKind:
     raise CampaignError(f"merit: {value!r} is neither 'both' nor 'natural'")
 
 
+def _budget(value: object) -> float:
+    """[s] of "90min", "2h" or a number of seconds."""
+    found = re.fullmatch(r"([0-9.]+) *(s|min|h|d)", value) if isinstance(value, str) else None
+    if found is None:
+        if isinstance(value, str):
+            raise CampaignError(f'budget: {value!r} is not of the form "90min", "2h" or "1d"')
+        return _positive(value, "budget")
+    return _positive(float(found[1]) * UNITS[found[2]], "budget")
+
+
 def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
     where = f"problems[{number}]."
     _only(row, KNOWN_OF_PROBLEMS, where)
-    if not {"files", "simulate", "planted"} & set(row):
-        raise CampaignError(f"{where[:-1]}: has neither files, simulate nor planted")
+    if not WHAT & set(row):
+        raise CampaignError(f"{where[:-1]}: has neither files, set, simulate nor planted")
+    if row.get("form") not in (None, "global", "local"):
+        raise CampaignError(f"{where}form: {row['form']!r} is neither 'global' nor 'local'")
     for kind, known in MADE.items():
         if kind in row:
             _only(row[kind], known, f"{where}{kind}.")
@@ -352,6 +406,8 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         ),
         family=str(row.get("family", "")),
         files=tuple(_texts(row, "files")),
+        set=str(row.get("set", "")).removeprefix(SET),
+        form=row.get("form"),
         sample=_count(row, "sample", 1) if "sample" in row else None,
         simulate=row.get("simulate"),
         planted=row.get("planted"),
@@ -411,18 +467,3 @@ def parse_solver(text: str) -> dict[str, Any]:
             raise CampaignError(f"solver {text!r}: '{pair}' is not of the form name=value")
         options[key] = value
     return {"name": name, "options": options}
-
-
-def version_of(info: _core.SolverInfo, modules: Sequence[str] = ()) -> str:
-    """What tells two versions of a solver apart: its package's, or the digest of its file."""
-    if info.origin == "fclib":
-        return _core.version
-    file: str | None = next((path for path in modules if Path(path).stem == info.origin), None)
-    if info.name.startswith("cmd:"):
-        file = shutil.which(shlex.split(info.name.removeprefix("cmd:"))[0])
-    if file is not None:
-        return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12]
-    try:
-        return importlib.metadata.version(info.origin)
-    except (importlib.metadata.PackageNotFoundError, ValueError):
-        return ""

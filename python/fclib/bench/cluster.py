@@ -43,7 +43,7 @@ def do(job: Job, data: bytes | None = None) -> Record:
         path = _kept(job.problem.hash, data)
         job = dataclasses.replace(job, problem=dataclasses.replace(job.problem, path=str(path)))
     with _lock:
-        supervisor = _idle.pop() if _idle else SupervisorClient(job.threads)
+        supervisor = _idle.pop() if _idle else SupervisorClient(job.threads, pin=False)
     try:
         return supervisor.do(job)
     finally:
@@ -116,7 +116,7 @@ def runner(client: Any, send: bool = False) -> Runner:
                 try:
                     record = future.result()
                 except KilledWorker as error:
-                    record = Record("killed", f"the workers of Dask that tried it died: {error}")
+                    record = Record("lost", f"the workers of Dask that tried it died: {error}")
                 future.release()
                 yield job, record
         finally:

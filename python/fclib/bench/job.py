@@ -32,10 +32,15 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "wall_limit": "was killed: the wall clock had run out, and it did not stop",
         "memory": "ran out of the memory that it was allowed",
         "crashed": "was ended by a signal of its own making, as a segmentation fault",
+        "lied": "said that it took less than nothing, or more than the kernel has seen",
         "killed": "was killed from outside, by the system or by a person",
-        "unreadable": "the problem cannot be read, or its file has changed: not the solver's fault",
+        "unreadable": "the problem cannot be read, or its file has changed",
+        "no_space": "a disk is full, or the system has no more files to give",
+        "lost": "the process that watches it, or the machine, has ended or does not answer",
     }
 )
+# faults of the surroundings: no solver's. Such a run is tried again, and then counts as not run
+SURROUNDINGS = ("killed", "unreadable", "no_space", "lost")
 # after these a worker is kept; after any other, who knows what the solver did to its process
 ORDERLY = frozenset(
     (
@@ -152,6 +157,7 @@ class Job:
             "merit": self.merit,
             "limits": asdict(self.limits),
             "history": self.history,
+            "threads": self.threads,
             "modules": list(self.modules),
         }
 
@@ -163,15 +169,19 @@ class Record:
     status: str
     message: str = ""
     iterations: int | None = None
-    cpu_s: float | None = None  # [s] of the solver alone, as the driver measures it
+    cpu_s: float | None = None  # [s] of the solver alone, as far as the kernel bears it out
+    said_cpu_s: float | None = None  # [s] of the solver alone, as the driver and it say
     setup_s: float | None = None  # [s] of conversions and judgement inside the solve
-    total_cpu_s: float | None = None  # [s] of all processes of the run, measured by the bench
+    total_cpu_s: float | None = None  # [s] of all processes of the run, counted by the kernel
     wall_s: float | None = None  # [s]
     memory: float | None = None  # [MB] by which the run's processes grew at most, together
     merits: Mapping[str, float] | None = None  # by MERITS, recomputed by the bench
     certificate: str | None = None  # JSON, the proof that there is no solution
     stages: str | None = None  # JSON, of a solver that chains others
     history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage
+    measured: str = ""  # by what: "cgroup", "cgroup, PSS" or "processes"
+    warm: bool = False  # whether the solver had been called before in this process
+    pinned: bool = False  # whether the run had cores for itself
     machine: Mapping[str, Any] | None = None
     load: float | None = None  # [1] mean load of the last minute, at the start
     frequency: float | None = None  # [MHz] at the start
@@ -181,6 +191,11 @@ class Record:
     def solved(self) -> bool:
         """Whether the error, recomputed, met the tolerance within the limits."""
         return self.status == "converged"
+
+    @property
+    def ran(self) -> bool:
+        """Whether it is the solver's own: nothing from outside has decided it."""
+        return self.status not in SURROUNDINGS
 
 
 # does jobs, here or elsewhere, and yields each with its record as it is done

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import functools
 import importlib.metadata
 import os
 import platform
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
@@ -75,3 +77,31 @@ def frequency() -> float | None:
             value = None
         _sampled = (now, value)
     return _sampled[1]
+
+
+def reserve(count: int) -> tuple[set[int], list[int]]:
+    """So many cores that no other campaign of this user has, and the locks that hold them.
+
+    None where fewer are free, or the system lets nobody choose.
+    """
+    held: dict[int, int] = {}
+    try:
+        folder = Path(tempfile.gettempdir()) / f"fclib-cores-{os.getuid()}"
+        folder.mkdir(exist_ok=True)
+        for core in sorted(os.sched_getaffinity(0)):
+            if len(held) == count:
+                break
+            lock = os.open(folder / str(core), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                os.close(lock)
+            else:
+                held[core] = lock
+    except (OSError, AttributeError):
+        pass
+    if len(held) < count or not count:
+        for lock in held.values():
+            os.close(lock)
+        return set(), []
+    return set(held), list(held.values())

@@ -1,16 +1,34 @@
-"""Jobs on this machine: several supervisors at once, each a process of its own."""
+"""Jobs on this machine: several supervisors at once, each a process of its own.
+
+A supervisor is started apart from the user's surroundings: Python's isolated mode, and the path of
+this process without the current folder. Where it is killed, stopped or silent, it is replaced, and
+what it was doing is `lost`; `fclib.bench.runner` tries that again.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
+import json
+import math
 import os
+import shutil
+import signal
+import site
 import socket
 import subprocess
 import sys
+import tempfile
+import time
+import uuid
 from collections.abc import Iterator
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 
+import fclib._core as _core
+from fclib.bench import meter, processes
 from fclib.bench.job import Job, Record
+from fclib.bench.supervisor import READY_LIMIT, WARM_LIMIT
 
 THREADS = (
     "OMP_NUM_THREADS",
@@ -21,67 +39,146 @@ THREADS = (
     "NUMEXPR_NUM_THREADS",
     "RAYON_NUM_THREADS",
 )
-ATTEMPTS = 3  # at a job whose supervisor is killed from outside
+LOOK = 0.5  # [s] between two looks at supervisors that are silent
+STOPPED = 1.0  # [s] that one may be stopped, as by SIGSTOP
+MARK = "FCLIB_BENCH_RUN"  # in the environment of all that a supervisor starts
+PREFIX = "fclib-bench-"  # of folders for temporary files
+START = """
+import json, site, sys
+path, user, link, folder, cores = json.loads(sys.argv[1])
+sys.path[:] = path
+if user:
+    site.addsitedir(user)
+from fclib.bench.supervisor import main
+main(link, folder, cores)
+"""
+
+
+def search_path() -> list[str]:
+    """Where a supervisor looks for modules: where this process does, but in the current folder."""
+    here = Path.cwd()
+    found = [
+        path
+        for entry in sys.path
+        if entry and (path := os.path.abspath(entry)) and Path(path) != here  # noqa: PTH100
+    ]
+    own = str(Path(_core.__file__).resolve().parent.parent)
+    package = str(Path(__file__).resolve().parents[2])
+    # fclib itself, where it is in the current folder: after all others
+    return [*found, *(path for path in dict.fromkeys((package, own)) if path not in found)]
+
+
+def temporary_folder() -> tuple[str, int]:
+    """A folder for what a worker writes, and the lock that says that it is used.
+
+    What campaigns that were killed have left is removed.
+    """
+    above = Path(tempfile.gettempdir())
+    for old in above.glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError):
+            if old.stat().st_uid != os.getuid() or time.time() - old.stat().st_mtime < 60:
+                continue
+            lock = os.open(old, os.O_RDONLY)
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                shutil.rmtree(old, ignore_errors=True)
+            finally:
+                os.close(lock)
+    folder = tempfile.mkdtemp(prefix=PREFIX, dir=above)
+    lock = os.open(folder, os.O_RDONLY)
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    return folder, lock
 
 
 class SupervisorClient:
     """The other end of a supervisor, which is started when it is needed."""
 
-    def __init__(self, threads: int) -> None:
+    def __init__(self, threads: int, pin: bool = True) -> None:
         self.threads = threads
+        self.pin = pin
         self.process: subprocess.Popen[bytes] | None = None
         self.link: Connection | None = None
         self.job: Job | None = None
-        self.attempts = 0
+        self.patience = math.inf  # [s] of the monotonic clock
+        self.stopped: float | None = None  # since when
+        self.mark = ""
+        self.folder, self.lock = "", -1
 
     def give(self, job: Job) -> None:
         """Have a job done."""
-        self.job, self.attempts = job, self.attempts + 1
+        self.job = job
         if self.link is None or self.threads != job.threads:
             self.end()
             self.threads = job.threads
             self._start()
         assert self.link is not None
+        # no answer by then: it hangs. Up to three phases wait for what the worker reads and sends
+        most = 4 * READY_LIMIT + WARM_LIMIT + 2 * job.limits.wall
+        self.patience, self.stopped = time.monotonic() + most, None
         with contextlib.suppress(OSError):  # it has ended, which taking finds out
             self.link.send(job.order())
 
     def _start(self) -> None:
+        self.folder, self.lock = temporary_folder()
+        self.mark = uuid.uuid4().hex
         ours, theirs = socket.socketpair()
+        user = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
+        cores = self.threads if self.pin else 0
+        words = json.dumps([search_path(), user, theirs.fileno(), self.folder, cores])
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "fclib.bench.supervisor", str(theirs.fileno())],
+                [sys.executable, "-I", "-c", START, words],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
-                env=os.environ | dict.fromkeys(THREADS, str(self.threads)),
+                env=os.environ | dict.fromkeys(THREADS, str(self.threads)) | {MARK: self.mark},
                 start_new_session=True,  # Ctrl-C is not for it
             )
         self.link = Connection(ours.detach())
 
-    def take(self) -> tuple[Job, Record] | None:
-        """What came of the job; None where the supervisor is gone, and the job given anew."""
+    def take(self) -> tuple[Job, Record]:
+        """What came of the job; `lost` where the supervisor is gone."""
         assert self.job is not None
         assert self.link is not None
         try:
             record: Record = self.link.recv()
         except (EOFError, OSError):
-            self.end()
-            if self.attempts < ATTEMPTS:
-                self.give(self.job)
-                return None
-            record = Record("killed", "its supervisor was killed, as often as it was tried")
-        job, self.job, self.attempts = self.job, None, 0
+            code = self.end()
+            how = f"by {signal.Signals(-code).name}" if code < 0 else f"with exit status {code}"
+            record = Record("lost", f"its supervisor ended {how}", started=time.time())
+        job, self.job = self.job, None
         return job, record
+
+    def hangs(self) -> bool:
+        """Whether the supervisor is stopped, or long silent: then it is killed."""
+        if self.process is None:
+            return False
+        now = time.monotonic()
+        if processes.state(self.process.pid) not in ("T", "t"):
+            self.stopped = None
+        elif self.stopped is None:
+            self.stopped = now
+        if now > self.patience or (self.stopped is not None and now - self.stopped > STOPPED):
+            self.kill()
+            return True
+        return False
 
     def do(self, job: Job) -> Record:
         """Have a job done, and wait for it."""
         self.give(job)
-        while (taken := self.take()) is None:
-            pass
-        return taken[1]
+        assert self.link is not None
+        while not wait([self.link], LOOK):
+            self.hangs()
+        return self.take()[1]
 
-    def end(self) -> None:
-        """Let the supervisor go, which kills what it runs."""
+    def kill(self) -> None:
+        """End the supervisor, and all that it has started."""
+        if self.process is not None:
+            processes.kill(processes.tree(self.process.pid)[::-1])
+
+    def end(self) -> int:
+        """Let the supervisor go, which kills what it runs; its exit status."""
+        code = 0
         if self.link is not None:
             self.link.close()
             self.link = None
@@ -89,44 +186,62 @@ class SupervisorClient:
             try:
                 self.process.wait(10)
             except subprocess.TimeoutExpired:
-                self.process.kill()
+                self.kill()
                 self.process.wait()
+            code = self.process.returncode
+            if code:  # it had no time to clean up
+                meter.sweep(self.process.pid)
+                processes.kill(processes.marked(f"{MARK}={self.mark}"))
             self.process = None
+        if self.folder:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            os.close(self.lock)
+            self.folder = ""
+        return code
 
 
 def run(jobs: Iterator[Job], processes: int) -> Iterator[tuple[Job, Record]]:
     """Do the jobs, so many at once; yields each with its record as it is done.
 
     Where the iteration is given up, what is running is killed.
+
+    Args:
+        jobs: is asked for more after each result, also when it had no more before.
+        processes: supervisors.
     """
-    supervisors = [SupervisorClient(0) for _ in range(processes)]
+    idle = [SupervisorClient(0) for _ in range(processes)]
+    everyone = list(idle)
     busy: dict[Connection, SupervisorClient] = {}
 
-    def next_one(supervisor: SupervisorClient) -> None:
-        job = next(jobs, None)
-        if job is not None:
+    def feed() -> None:
+        while idle and (job := next(jobs, None)) is not None:
+            supervisor = idle.pop()
             supervisor.give(job)
             assert supervisor.link is not None
             busy[supervisor.link] = supervisor
 
+    looked = time.monotonic()
     try:
-        for supervisor in supervisors:
-            next_one(supervisor)
+        feed()
         while busy:
-            for link in wait(list(busy)):
+            ready = wait(list(busy), LOOK)
+            if time.monotonic() - looked > LOOK:
+                looked = time.monotonic()
+                for supervisor in busy.values():
+                    supervisor.hangs()
+            for link in ready:
                 assert isinstance(link, Connection)
                 supervisor = busy.pop(link)
                 taken = supervisor.take()
-                if taken is None:
-                    assert supervisor.link is not None
-                    busy[supervisor.link] = supervisor
-                    continue
-                next_one(supervisor)  # the worker need not wait for what becomes of the record
+                idle.append(supervisor)
+                if taken[1].ran:
+                    feed()  # the worker need not wait for what becomes of the record
                 yield taken
+                feed()
     finally:
-        for supervisor in supervisors:
+        for supervisor in everyone:
             if supervisor.link is not None:
                 supervisor.link.close()
                 supervisor.link = None
-        for supervisor in supervisors:
+        for supervisor in everyone:
             supervisor.end()

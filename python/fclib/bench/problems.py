@@ -38,6 +38,27 @@ def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
     return list(found)
 
 
+def of_set(name: str, form: str | None = None) -> list[Path]:
+    """The files of a set of the collection, or of a family of it; built or fetched where needed.
+
+    Args:
+        name: as ``fclib collection list`` has it.
+        form: "global" or "local"; by default the global one of a problem that has both.
+
+    Raises:
+        fclib.Error: there is no such set, or it cannot be had.
+        ImportError: the collection needs a package that is not there.
+    """
+    from fclib.collections import library
+
+    try:
+        found = library.Collection(name)
+        return [found.path(k, form).resolve() for k in range(len(found))]
+    except (KeyError, OSError) as error:
+        word = error.args[0] if isinstance(error, KeyError) else error
+        raise _core.Error(f"set {name}: {word}") from None
+
+
 def _glob(path: Path) -> Iterator[Path]:
     parts = path.parts
     fixed = next((k for k, part in enumerate(parts) if any(c in part for c in "*?[")), len(parts))

@@ -75,35 +75,83 @@ def tree(pid: int) -> list[int]:
     return found
 
 
-def usage(pid: int) -> tuple[float, float]:
-    """CPU time [s] and resident memory [MB] of a process with all that descend from it.
+def cpu_clock(pid: int) -> float:
+    """[s] of CPU that a process has used itself, all its threads, ended ones too; 0 if it is gone.
 
-    The time includes that of descendants that have ended; its resolution is a tick of 10 ms.
+    The clock of another process, as clock_getcpuclockid(3) makes it; to the nanosecond.
     """
-    ticks, pages = 0, 0
-    for member in tree(pid):
-        fields = _stat(member)
-        if fields:
-            ticks += sum(map(int, fields[11:15]))
-            pages += int(fields[21])
-    return ticks / TICKS, pages * PAGE / 1e6
+    try:
+        return time.clock_gettime((~pid << 3) | 2)
+    except OSError:
+        return 0.0
 
 
-def cpu_of_children(pid: int) -> float:
-    """[s] of CPU that the living descendants of a process have used, where the kernel says."""
-    total = 0.0
-    for member in tree(pid)[1:]:
-        with contextlib.suppress(OSError, ValueError):
-            total += int(Path(f"/proc/{member}/schedstat").read_text().split()[0]) * 1e-9
-    return total
+def cpu_of_ended(pid: int) -> float:
+    """[s] of CPU of the children that a process has waited for, in ticks of 10 ms."""
+    fields = _stat(pid)
+    return sum(map(int, fields[13:15])) / TICKS if fields else 0.0
 
 
-def peak_memory() -> float:
-    """[MB] the largest resident size of this process since `forget_peak`."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmHWM:"):
-            return int(line.split()[1]) * 1024 / 1e6
+def resident(pid: int) -> float:
+    """[MB] in memory, pages that it shares with others too; 0 where it has ended."""
+    fields = _stat(pid)
+    return int(fields[21]) * PAGE / 1e6 if fields else 0.0
+
+
+def proportional(pid: int) -> float:
+    """[MB] in memory, of each page its share among those that have it (PSS)."""
+    try:
+        for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
+            if line.startswith("Pss:"):
+                return int(line.split()[1]) * 1024 / 1e6
+    except OSError:
+        return 0.0
+    return resident(pid)
+
+
+def peak_memory(pid: int) -> float:
+    """[MB] the largest resident size of a process since `forget_peak`."""
+    with contextlib.suppress(OSError):
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return int(line.split()[1]) * 1024 / 1e6
     return 0.0
+
+
+def forget_peak(pid: int) -> None:
+    """Let `peak_memory` begin anew."""
+    with contextlib.suppress(OSError):
+        Path(f"/proc/{pid}/clear_refs").write_text("5")
+
+
+def threads(pid: int) -> int:
+    """How many threads a process has."""
+    fields = _stat(pid)
+    return int(fields[17]) if fields else 0
+
+
+def state(pid: int) -> str:
+    """One letter of proc(5): R, S, D, Z, T for one that is stopped; empty where there is none."""
+    fields = _stat(pid)
+    return fields[0] if fields else ""
+
+
+def marked(mark: str) -> list[int]:
+    """The processes that were started with a text in their environment."""
+    found, word = [], mark.encode()
+    for entry in PROC.iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError):
+                if word in (entry / "environ").read_bytes():
+                    found.append(int(entry.name))
+    return found
+
+
+def kill(pids: list[int]) -> None:
+    """End processes, of which some may have ended."""
+    for pid in pids:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(pid, signal.SIGKILL)
 
 
 def address_space(pid: int) -> int:
@@ -134,12 +182,6 @@ def release_memory() -> None:
         trim(0)
 
 
-def forget_peak() -> None:
-    """Let `peak_memory` begin anew."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-
-
 def kill_all(pid: int, patience: float = 5.0) -> int | None:
     """Kill a child and all that descends from it, and wait for them; for a process that adopts.
 
@@ -152,9 +194,7 @@ def kill_all(pid: int, patience: float = 5.0) -> int | None:
         os.kill(pid, signal.SIGSTOP)  # what it starts from now on is not missed
     targets = tree(pid)
     while True:
-        for target in targets:
-            with contextlib.suppress(ProcessLookupError, PermissionError):
-                os.kill(target, signal.SIGKILL)
+        kill(targets)
         try:
             ended, how = os.waitpid(-1, os.WNOHANG)
         except ChildProcessError:
@@ -167,14 +207,3 @@ def kill_all(pid: int, patience: float = 5.0) -> int | None:
             time.sleep(1e-3)
         # orphans are ours by now
         targets = [member for child in children(os.getpid()) for member in tree(child)]
-
-
-def kill_orphans(but: int) -> None:
-    """Kill the children of this process except one: what a descendant of it left behind."""
-    for child in children(os.getpid()):
-        if child != but:
-            for member in tree(child):
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.kill(member, signal.SIGKILL)
-            with contextlib.suppress(ChildProcessError):
-                os.waitpid(child, 0)

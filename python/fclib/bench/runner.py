@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,10 +14,13 @@ from typing import Any
 from fclib import _core
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
-from fclib.bench.job import Job, Runner
+from fclib.bench.job import Job, Record, Runner
 from fclib.bench.store import Store
 
 BEAT = 2.0  # [s] between two signs of life in the store
+RETRIES = 2  # of a run that something from outside has spoilt
+PAUSES = (0.5, 5.0)  # [s] before the first and before each other of them
+TOO_MANY = 0.1  # share of the runs that cannot be done, at which a campaign stops
 
 
 @dataclass
@@ -26,6 +30,11 @@ class Progress:
     planned: int
     skipped: int  # were in the store before
     statuses: Counter[str] = field(default_factory=Counter)  # of the runs done now
+    not_run: Counter[str] = field(default_factory=Counter)  # by what kept them from it
+    reason: str = ""  # of the last of them
+    left_over: int = 0  # for which the budget does not suffice
+    stopped: str = ""  # why it has ended before its end
+    spent: float = 0.0  # [s] of its budget
     start: float = field(default_factory=time.monotonic)
     last: Job | None = None
 
@@ -45,12 +54,67 @@ class Progress:
         return sum(self.statuses.values()) / max(1e-9, time.monotonic() - self.start)
 
 
+class Queue(Iterator[Job]):
+    """The jobs that are to be done, each until it is done or was tried often enough.
+
+    It may have another job after it had none, when one comes back.
+    """
+
+    def __init__(self, jobs: Sequence[Job], wanted: Callable[[Job], bool], retries: int) -> None:
+        self.jobs = deque(jobs)
+        self.wanted = wanted  # whether a job is still to be done
+        self.retries = retries
+        self.again: deque[tuple[float, Job]] = deque()  # with the time before which it is not tried
+        self.attempts: Counter[str] = Counter()
+        self.many = max(1.0, TOO_MANY * len(jobs))
+        self.failed = 0
+
+    def __next__(self) -> Job:
+        """The next one; those that come back after all others, but not if they are too many."""
+        while self.jobs and not (self.again and self.troubled):
+            job = self.jobs.popleft()
+            if self.wanted(job):
+                return job
+        if not self.again:
+            raise StopIteration
+        moment, job = self.again.popleft()
+        time.sleep(max(0.0, moment - time.monotonic()))
+        return job
+
+    @property
+    def troubled(self) -> bool:
+        """Whether so many cannot be done that it is no use to begin others."""
+        return self.failed + len(self.again) >= self.many
+
+    def give_back(self, job: Job) -> bool:
+        """Take a job that was not done for another time; False where it was tried enough."""
+        self.attempts[job.key] += 1
+        count = self.attempts[job.key]
+        if count > self.retries:
+            self.failed += 1
+            return False
+        self.again.append((time.monotonic() + PAUSES[min(count, len(PAUSES)) - 1], job))
+        return True
+
+    def stop(self) -> None:
+        """Have no more jobs."""
+        self.jobs.clear()
+        self.again.clear()
+
+
+def cost(record: Record) -> float:
+    """[s] of a budget that a run takes: of CPU, or of waiting where that is more."""
+    return max(record.total_cpu_s or 0.0, record.wall_s or 0.0)
+
+
 def run_campaign(
     campaign: Campaign,
     store: str | Path,
     *,
     jobs: int = 1,
     runner: Runner | None = None,
+    retries: int = RETRIES,
+    retry: Sequence[str] = (),
     tell: Callable[[str], None] = lambda _: None,
     show: Callable[[Progress], Any] = lambda _: None,
 ) -> Progress:
@@ -61,7 +125,9 @@ def run_campaign(
         store: an SQLite file, made where there is none.
         jobs: runs at once, on this machine.
         runner: runs the jobs elsewhere instead, as `fclib.bench.cluster.runner` does.
-        tell: is called with what is left out of the campaign, and why.
+        retries: how often a run is tried again that something from outside has spoilt.
+        retry: statuses; runs of the campaign that ended so are done again.
+        tell: is called with what is left out of the campaign, and why, and with warnings.
         show: is called at the start, and after each run.
 
     Raises:
@@ -79,31 +145,52 @@ def run_campaign(
             if new:
                 opened.discard()
             raise
+        if retry:
+            opened.forget([job.key for job in plan], retry)
         there = opened.keys()
         left = [job for job in plan if job.key not in there]
         progress = Progress(planned=len(plan), skipped=len(plan) - len(left))
+        progress.spent = opened.spent([job.key for job in plan])
         node = machine.facts()["node"]
         number = opened.begin(campaign.name, campaign.text, len(plan), progress.skipped, node)
         show(progress)
+        if runner is None:
+            warn_of_load(jobs * campaign.threads, tell)
 
-        def fresh() -> Iterator[Job]:
-            """Those that no other campaign has done meanwhile."""
-            for job in left:
-                if opened.has(job.key):
-                    progress.skipped += 1
-                else:
-                    yield job
+        def wanted(job: Job) -> bool:
+            """Whether no other campaign has done it meanwhile, and it can be paid for."""
+            if opened.has(job.key):
+                progress.skipped += 1
+                return False
+            if campaign.budget is not None and progress.spent >= campaign.budget:
+                progress.left_over += 1
+                return False
+            return True
 
+        queue = Queue(left, wanted, retries)
         beat = time.monotonic()
         run = runner or (lambda waiting: pool.run(waiting, jobs))
         try:
-            with closing(run(fresh())) as done:  # type: ignore[type-var]
+            with closing(run(queue)) as done:  # type: ignore[type-var]
                 for job, record in done:
-                    if opened.add(job, record, number):
+                    progress.spent += cost(record)
+                    progress.last = job
+                    if not record.ran:
+                        if not queue.give_back(job):
+                            progress.not_run[record.status] += 1
+                            progress.reason = f"{record.status}: {record.message}"
+                            opened.fault(job, record, number)
+                            if queue.failed >= queue.many:
+                                progress.stopped = (
+                                    f"stopped: {queue.failed} of {len(left)} runs could not be"
+                                    f" done, the last one was {progress.reason}"
+                                )
+                                queue.stop()
+                                break
+                    elif opened.add(job, record, number):
                         progress.statuses[record.status] += 1
                     else:
                         progress.skipped += 1
-                    progress.last = job
                     show(progress)
                     if time.monotonic() - beat > BEAT:
                         opened.alive(number)
@@ -112,3 +199,15 @@ def run_campaign(
             # also where it is interrupted, so that nobody waits for it
             opened.alive(number, ended=True)
         return progress
+
+
+def warn_of_load(busy: int, tell: Callable[[str], None]) -> None:
+    """Say so where runs would share cores, with each other or with other work."""
+    cores, load = machine.facts()["usable_cores"] or os.cpu_count() or 1, os.getloadavg()[0]
+    if busy > cores:
+        tell(f"{busy} threads at once on {cores} cores: their times do not compare")
+    elif load + busy > cores + 0.5:
+        tell(
+            f"the machine has other work, load {load:.1f} on {cores} cores: times may be longer"
+            " than they would be, and are marked where the load was above the number of cores"
+        )

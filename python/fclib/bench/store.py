@@ -1,7 +1,8 @@
 """The store of a campaign: one SQLite file, one row a run.
 
 Tables: runs, and what they refer to by number: problems, solvers, machines, campaigns; history has
-the reports of runs for which they were asked. The view `results` has all of a run in one row. The
+the reports of runs for which they were asked; faults has what kept runs from being done, and is no
+solver's. The view `results` has all of a run in one row. The
 columns and their units are in docs/bench.md, and `SCHEMA` below is what that says.
 
 A run is identified by its key (`fclib.bench.job.Job.key`). `Store.add` inserts it in one statement
@@ -26,7 +27,9 @@ from typing import Any
 from fclib import _core
 from fclib.bench.job import MERITS, Job, ProblemFacts, Record
 
-VERSION = 2  # of the schema; 1 had neither certificates nor `merit`, which was "natural"
+# of the schema; 1 had neither certificates nor `merit`, which was "natural"; 2 had no faults, but
+# runs that were killed or unreadable, and does not say how a run was measured
+VERSION = 3
 APPLICATION = 0x46434C42  # "FCLB"
 PATIENCE = 60.0  # [s] to wait for another writer
 
@@ -54,9 +57,15 @@ CREATE TABLE runs (
     tol REAL, time_limit REAL, wall_limit REAL, memory_limit REAL, threads INTEGER, repeat INTEGER,
     merit TEXT NOT NULL DEFAULT 'natural',
     status TEXT NOT NULL, message TEXT, solved INTEGER NOT NULL, iterations INTEGER,
-    cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
-    {merits}, stages TEXT, load REAL, frequency_mhz REAL, started REAL,
+    cpu_s REAL, said_cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
+    {merits}, stages TEXT, measured TEXT, warm INTEGER, pinned INTEGER,
+    load REAL, frequency_mhz REAL, started REAL,
     UNIQUE (key, machine)
+);
+CREATE TABLE faults (
+    id INTEGER PRIMARY KEY, key TEXT NOT NULL, campaign INTEGER REFERENCES campaigns,
+    problem INTEGER NOT NULL REFERENCES problems, solver INTEGER NOT NULL REFERENCES solvers,
+    tol REAL, status TEXT NOT NULL, message TEXT, started REAL
 );
 CREATE INDEX runs_by_campaign ON runs (campaign);
 CREATE TABLE history (
@@ -76,10 +85,10 @@ CREATE VIEW results AS SELECT
     solvers.label AS solver, solvers.name AS solver_name, solvers.options, solvers.version,
     solvers.family AS solver_family, solvers.origin,
     runs.tol, runs.merit, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads,
-    runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s, runs.setup_s,
-    runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits}, runs.stages,
-    machines.node, machines.cpu, machines.hash AS machine, runs.load, runs.frequency_mhz,
-    runs.started
+    runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s,
+    runs.said_cpu_s, runs.setup_s, runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits},
+    runs.stages, runs.measured, runs.warm, runs.pinned, machines.node, machines.cpu,
+    machines.cores, machines.hash AS machine, runs.load, runs.frequency_mhz, runs.started
 FROM runs
 JOIN problems ON problems.id = runs.problem
 JOIN solvers ON solvers.id = runs.solver
@@ -90,13 +99,32 @@ LEFT JOIN campaigns ON campaigns.id = runs.campaign;
     run_merits=", ".join(f"runs.{name}" for name in MERITS),
 )
 STATEMENTS = SCHEMA.split(";\n")
-# what a store of version 1 lacks
-ADDED = (
-    "ALTER TABLE runs ADD COLUMN merit TEXT NOT NULL DEFAULT 'natural'",
-    *(one for one in STATEMENTS if one.strip().startswith("CREATE TABLE certificates")),
-    "DROP VIEW results",
-    *(one for one in STATEMENTS if one.strip().startswith("CREATE VIEW results")),
-)
+
+
+def _statement(start: str) -> str:
+    return next(one for one in STATEMENTS if one.strip().startswith(start))
+
+
+# what a store of each version lacks against the next one
+ADDED = {
+    1: (
+        "ALTER TABLE runs ADD COLUMN merit TEXT NOT NULL DEFAULT 'natural'",
+        _statement("CREATE TABLE certificates"),
+    ),
+    2: (
+        *(
+            f"ALTER TABLE runs ADD COLUMN {column}"
+            for column in ("said_cpu_s REAL", "measured TEXT", "warm INTEGER", "pinned INTEGER")
+        ),
+        _statement("CREATE TABLE faults"),
+        "INSERT INTO faults (key, campaign, problem, solver, tol, status, message, started)"
+        " SELECT key, campaign, problem, solver, tol, status, message, started FROM runs"
+        " WHERE status IN ('killed', 'unreadable')",
+        "DELETE FROM runs WHERE status IN ('killed', 'unreadable')",
+        "DROP VIEW IF EXISTS results",
+        _statement("CREATE VIEW results"),
+    ),
+}
 PROBLEM = tuple(field.name for field in dataclasses.fields(ProblemFacts))
 SOLVER = ("hash", "label", "name", "options", "version", "family", "origin")
 MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
@@ -104,13 +132,41 @@ RUN = (
     *("key", "campaign", "problem", "solver", "machine"),
     *("tol", "merit", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
     *("status", "message", "solved", "iterations"),
-    *("cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
-    *(*MERITS, "stages", "load", "frequency_mhz", "started"),
+    *("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
+    *(*MERITS, "stages", "measured", "warm", "pinned", "load", "frequency_mhz", "started"),
 )
+FAULT = ("key", "campaign", "problem", "solver", "tol", "status", "message", "started")
+
+
+def text_of(text: str) -> str:
+    """What SQLite takes for a text: without lone surrogates and null characters."""
+    return text.encode(errors="replace").decode().replace("\0", "?")
 
 
 class StoreError(_core.Error, ValueError):
     """A file is no store, or one of another version."""
+
+
+class DamagedError(StoreError):
+    """A store was damaged."""
+
+
+def _one_line(word: str) -> str:
+    return " ".join(word.split())
+
+
+def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
+    """The rows of a table, over what of it cannot be read."""
+    last, step = -1, 1
+    while step < 1 << 40:
+        query = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid"
+        try:
+            for number, *row in source.execute(query, (last,)):
+                last, step = number, 1
+                yield tuple(row)
+            return
+        except sqlite3.DatabaseError:
+            last, step = last + step, 2 * step
 
 
 @dataclass(frozen=True)
@@ -148,17 +204,32 @@ class Store:
         if not create and not self.path.exists():
             raise StoreError(f"{self.path}: there is no such store")
         self._ids: dict[tuple[str, str], int] = {}
+        self.read_only = self.path.exists() and not (
+            os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
+        )
+        if not create and not self.path.stat().st_size:
+            raise StoreError(f"{self.path}: is empty, and no store")
         try:
-            self.db = sqlite3.connect(self.path, timeout=PATIENCE, isolation_level=None)
+            self.db = sqlite3.connect(
+                # WAL wants to write beside the file, even to read it
+                f"{self.path.resolve().as_uri()}?mode=ro&immutable=1"
+                if self.read_only
+                else self.path,
+                timeout=PATIENCE,
+                isolation_level=None,
+                uri=self.read_only,
+            )
             self._prepare()
-        except sqlite3.DatabaseError as error:
+        except sqlite3.OperationalError as error:
             raise StoreError(f"{self.path}: {error}") from None
+        except sqlite3.DatabaseError as error:
+            raise self._damaged(str(error)) from None
 
     def _prepare(self) -> None:
         db = self.db
         version = db.execute("PRAGMA user_version").fetchone()[0]
         empty = not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone()
-        if not empty and version not in (1, VERSION):
+        if not empty and version not in (*ADDED, VERSION):
             db.close()
             if version == 0:
                 raise StoreError(f"{self.path}: is a database, but no store of fclib bench")
@@ -166,6 +237,13 @@ class Store:
                 f"{self.path}: is of version {version}, this fclib knows {VERSION}; "
                 "read it with the fclib that made it"
             )
+        if not empty:
+            (word,) = db.execute("PRAGMA quick_check(1)").fetchone()
+            if word != "ok":
+                raise self._damaged(word)
+        if self.read_only:
+            self._prepare_copy(empty, version)
+            return
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = NORMAL")
         if empty:
@@ -177,12 +255,69 @@ class Store:
                     db.execute(f"PRAGMA application_id = {APPLICATION}")
                     db.execute(f"PRAGMA user_version = {VERSION}")
         elif version < VERSION:
-            with self.transaction():
-                # another may have brought it up to date meanwhile
-                if db.execute("PRAGMA user_version").fetchone()[0] < VERSION:
-                    for statement in ADDED:
-                        db.execute(statement)
-                    db.execute(f"PRAGMA user_version = {VERSION}")
+            self._upgrade()
+
+    def _prepare_copy(self, empty: bool, version: int) -> None:
+        """Of a file that cannot be written an older one is brought up to date in memory."""
+        if empty:
+            raise StoreError(f"{self.path}: is empty, and cannot be written")
+        if version < VERSION:
+            copy = sqlite3.connect(":memory:", isolation_level=None)
+            self.db.backup(copy)
+            self.db.close()
+            self.db = copy
+            self._upgrade()
+
+    def _upgrade(self) -> None:
+        with self.transaction():
+            # another may have brought it up to date meanwhile
+            version = self.db.execute("PRAGMA user_version").fetchone()[0]
+            for known in range(version, VERSION):
+                for statement in ADDED[known]:
+                    self.db.execute(statement)
+            self.db.execute(f"PRAGMA user_version = {VERSION}")
+
+    def _damaged(self, word: str) -> DamagedError:
+        try:
+            with Store.recover(self.path) as saved:
+                runs = len(saved.keys())
+            what = f"{runs} of its runs can be read: fclib bench merge NEW.sqlite {self.path}"
+        except (StoreError, sqlite3.DatabaseError):
+            what = "nothing of it can be read"
+        return DamagedError(f"{self.path}: is damaged, or no store: {_one_line(word)}; {what}")
+
+    @classmethod
+    def recover(cls, path: str | Path) -> Store:
+        """What can be read of a damaged store, in memory.
+
+        Raises:
+            StoreError: nothing can.
+        """
+        made = cls.__new__(cls)
+        made.path, made.read_only, made._ids = Path(path), True, {}
+        made.db = sqlite3.connect(":memory:", isolation_level=None)
+        source = sqlite3.connect(f"{made.path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        try:
+            version = source.execute("PRAGMA user_version").fetchone()[0]
+            parts = source.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
+            if version not in (*ADDED, VERSION):
+                raise StoreError(f"{path}: is no store that this fclib knows")
+            tables = [(name, sql) for kind, name, sql in parts if kind == "table" and sql]
+            for name, sql in tables:
+                made.db.execute(sql)
+                for row in _rows(source, name):
+                    marks = ", ".join("?" * len(row))
+                    made.db.execute(f"INSERT OR IGNORE INTO {name} VALUES ({marks})", row)
+            made.db.execute(next(sql for kind, _, sql in parts if kind == "view"))
+            made.db.execute(f"PRAGMA user_version = {version}")
+            if version < VERSION:
+                made._upgrade()
+        except (sqlite3.DatabaseError, StopIteration) as error:
+            made.close()
+            raise StoreError(f"{path}: {_one_line(str(error))}") from None
+        finally:
+            source.close()
+        return made
 
     def __enter__(self) -> Store:
         return self
@@ -249,32 +384,77 @@ class Store:
         """The keys of all runs."""
         return {key for (key,) in self.db.execute("SELECT key FROM runs")}
 
+    def spent(self, keys: Sequence[str]) -> float:
+        """[s] that the runs of some keys have taken, of CPU, or of waiting where that is more."""
+        query = "SELECT key, MAX(COALESCE(total_cpu_s, 0), COALESCE(wall_s, 0)) FROM runs"
+        wanted = set(keys)
+        return float(sum(cost for key, cost in self.db.execute(query) if key in wanted))
+
+    def forget(self, keys: Sequence[str], statuses: Sequence[str]) -> int:
+        """Remove the runs of some keys that ended in one of the statuses; how many."""
+        marks = ", ".join("?" * len(statuses))
+        query = f"SELECT id, key FROM runs WHERE status IN ({marks})"
+        wanted = set(keys)
+        runs = [(run,) for run, key in self.db.execute(query, list(statuses)) if key in wanted]
+        with self.transaction():
+            for table, column in (("history", "run"), ("certificates", "run"), ("runs", "id")):
+                self.db.executemany(f"DELETE FROM {table} WHERE {column} = ?", runs)
+        return len(runs)
+
     def has(self, key: str) -> bool:
         """Whether there is a run of a key."""
         return self.db.execute("SELECT 1 FROM runs WHERE key = ?", (key,)).fetchone() is not None
+
+    def _of(self, job: Job) -> tuple[int, int]:
+        """The numbers of the problem and of the solver of a job."""
+        choice = job.solver
+        options = json.dumps(dict(choice.options), sort_keys=True)
+        values = (choice.title, choice.name, options, choice.version)
+        return (
+            self._id("problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM]),
+            self._id(
+                "solvers",
+                SOLVER,
+                ["\n".join(values), *values, choice.family, choice.origin],
+            ),
+        )
+
+    def fault(self, job: Job, record: Record, campaign: int | None = None) -> None:
+        """Note what has kept a run from being done, as often as it was tried."""
+        with self.transaction():
+            self.db.execute(
+                f"INSERT INTO faults ({', '.join(FAULT)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                (
+                    job.key,
+                    campaign,
+                    *self._of(job),
+                    job.tol,
+                    record.status,
+                    text_of(record.message),
+                    record.started,
+                ),
+            )
+
+    def faults(self) -> list[dict[str, Any]]:
+        """What was not run, for a cause from outside, and has not been run since."""
+        query = (
+            "SELECT solvers.label AS solver, problems.name AS problem, problems.family,"
+            " problems.hash, campaigns.name AS campaign, faults.tol, faults.status, faults.message,"
+            " MAX(faults.started) AS started FROM faults"
+            " JOIN problems ON problems.id = faults.problem"
+            " JOIN solvers ON solvers.id = faults.solver"
+            " LEFT JOIN campaigns ON campaigns.id = faults.campaign"
+            " WHERE faults.key NOT IN (SELECT key FROM runs) GROUP BY faults.key"
+        )
+        cursor = self.db.execute(query)
+        names = [column[0] for column in cursor.description]
+        return [dict(zip(names, row, strict=True)) for row in cursor]
 
     def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
         """Store a run; False where there is one of its key."""
         merits = record.merits or {}
         with self.transaction():
-            problem = self._id(
-                "problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM]
-            )
-            choice = job.solver
-            options = json.dumps(dict(choice.options), sort_keys=True)
-            solver = self._id(
-                "solvers",
-                SOLVER,
-                [
-                    "\n".join((choice.title, choice.name, options, choice.version)),
-                    choice.title,
-                    choice.name,
-                    options,
-                    choice.version,
-                    choice.family,
-                    choice.origin,
-                ],
-            )
+            problem, solver = self._of(job)
             facts = dict(record.machine or {})
             text = json.dumps(facts, sort_keys=True)
             machine = self._id(
@@ -294,16 +474,20 @@ class Store:
                 job.threads,
                 job.repeat,
                 record.status,
-                record.message,
+                text_of(record.message),
                 int(record.solved),
                 record.iterations,
                 record.cpu_s,
+                record.said_cpu_s,
                 record.setup_s,
                 record.total_cpu_s,
                 record.wall_s,
                 record.memory,
                 *(merits.get(name) for name in MERITS),
                 record.stages,
+                record.measured,
+                int(record.warm),
+                int(record.pinned),
                 record.load,
                 record.frequency,
                 record.started,
@@ -432,7 +616,11 @@ class Store:
         for path in others:
             if Path(path).resolve() == self.path.resolve():
                 raise StoreError(f"{path}: is the store that the others are to be merged into")
-            with Store(path, create=False) as other, self.transaction():
+            try:
+                other = Store(path, create=False)
+            except DamagedError:
+                other = Store.recover(path)
+            with other, self.transaction():
                 added += self._take(other)
         return added
 
@@ -453,17 +641,28 @@ class Store:
                     f"INSERT INTO campaigns ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row
                 ).lastrowid
             )
+
+        def refer(row: dict[str, Any], columns: Sequence[str]) -> bool:
+            row["campaign"] = campaigns.get(row["campaign"])
+            for column in columns:
+                row[column] = numbers[f"{column}s"].get(row[column])
+            return all(row[column] is not None for column in columns)
+
+        for values in other.db.execute(f"SELECT {', '.join(FAULT)} FROM faults"):
+            fault = dict(zip(FAULT, values, strict=True))
+            same = "SELECT 1 FROM faults WHERE key = ? AND started IS ?"
+            known = self.db.execute(same, (fault["key"], fault["started"])).fetchone()
+            if not known and refer(fault, ("problem", "solver")):
+                self.db.execute(
+                    f"INSERT INTO faults ({', '.join(FAULT)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                    list(fault.values()),
+                )
         added = 0
         marks = ", ".join("?" * len(RUN))
         for number, *values in other.db.execute(f"SELECT id, {', '.join(RUN)} FROM runs"):
             run = dict(zip(RUN, values, strict=True))
-            run["campaign"] = campaigns[run["campaign"]]
-            for column, table in (
-                ("problem", "problems"),
-                ("solver", "solvers"),
-                ("machine", "machines"),
-            ):
-                run[column] = numbers[table][run[column]]
+            if not refer(run, ("problem", "solver", "machine")):
+                continue  # of a damaged one
             cursor = self.db.execute(
                 f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({marks}) ON CONFLICT DO NOTHING",
                 list(run.values()),

@@ -1,9 +1,12 @@
 """The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
 
-``python -m fclib.bench.supervisor FD`` serves jobs from a socket until that is closed. The
-supervisor never runs a solver: that is done by the worker that it forks, and renews after every
-failure. The solution comes back as numbers, and the supervisor recomputes every merit from its own
-copy of the problem, so that nothing a solver does in its process changes the verdict.
+``serve(FD, FOLDER)`` serves jobs from a socket until that is closed. The supervisor never runs a
+solver: that is done by the worker that it forks, and renews after every failure and whenever it is
+not as it was: another process is left, or a thread, or code of the user's has been in it. The
+solution comes back as numbers, and the supervisor recomputes every merit from its own copy of the
+problem, so that nothing a solver does in its process changes the verdict. What a run took is what
+the kernel counted between two words of the worker (meter.py); what the solver says of its time must
+fit in there.
 
 A run is killed with all processes that descend from it, in whatever group or session they are: what
 loses its parent becomes a child of the supervisor.
@@ -11,30 +14,50 @@ loses its parent becomes a child of the supervisor.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 import resource
 import select
+import shutil
 import signal
 import socket
-import sys
 import time
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fclib import _core
 from fclib.bench import machine, processes
-from fclib.bench.job import MERITS, ORDERLY, Record
-from fclib.bench.worker import CERTIFICATE, Problems, of_signal, one_line, send, serve
+from fclib.bench.job import MERITS, ORDERLY, STATUSES, Record
+from fclib.bench.meter import Meter
+from fclib.bench.worker import (
+    CERTIFICATE,
+    GO,
+    HISTORY,
+    VECTORS,
+    Problems,
+    built_in,
+    of_signal,
+    one_line,
+    send,
+    serve,
+)
+from fclib.external import adapters, command
 
 READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
+WARM_LIMIT = 5.0  # [s] for the first call of a solver, at most
 PAUSES = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
 GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
 LIMIT_CPU_AFTER = 1.0  # [s] of CPU after which the kernel has the limit too: Watch.limit_cpu
-LONGEST = 1 << 40  # [bytes] of a message
+LONGEST = 1 << 26  # [bytes] of a message that is no array
+OUTPUT = 1e9  # [bytes] that a run may write into one file, where its memory is not more
+# what a solver says of its time may differ from what the kernel says by so much
+SLACK, SHARE = 0.02, 0.02  # [s], [1]
+UNSEEN = 0.1  # [1] of the CPU time that a thread's clock may miss before the kernel's counts
 
 
 class CampaignGone(Exception):  # noqa: N818 (no error)
@@ -53,19 +76,30 @@ class Watch:
     """What a worker may take from now on, and what it takes."""
 
     def __init__(
-        self, pid: int, wall: float = READY_LIMIT, cpu: float = math.inf, memory: float = math.inf
+        self,
+        meter: Meter,
+        wall: float = READY_LIMIT,
+        cpu: float = math.inf,
+        memory: float = math.inf,
     ) -> None:
-        self.pid = pid
+        self.meter = meter
         self.limits = wall, cpu, memory
-        self.start = time.monotonic()
-        self.cpu_before, self.memory_before = processes.usage(pid)
-        self.cpu, self.memory = 0.0, self.memory_before
+        self.measured = min(cpu, memory) < math.inf
+        self.cpu, self.memory = 0.0, 0.0
+        if self.measured:
+            processes.forget_peak(meter.pid)
+            self.memory_before = self.memory = meter.memory()
+            self.own_before = processes.cpu_clock(meter.pid)
+            self.cpu_before = meter.cpu()
+        self.own = 0.0  # [s] of CPU of the worker alone
         self.cpu_limited = False
+        self.start = time.monotonic()
+        self.end: float | None = None
 
     @property
     def wall(self) -> float:
         """[s] since the start."""
-        return time.monotonic() - self.start
+        return (self.end or time.monotonic()) - self.start
 
     def check(self) -> None:
         """Look at the worker and what it has started.
@@ -73,18 +107,27 @@ class Watch:
         Raises:
             WorkerEnded: it has overrun.
         """
-        cpu, memory = processes.usage(self.pid)
-        self.cpu = max(self.cpu, cpu - self.cpu_before)
-        self.memory = max(self.memory, memory)
         most_wall, most_cpu, most_memory = self.limits
-        if self.cpu > LIMIT_CPU_AFTER and not self.cpu_limited and math.isfinite(most_cpu):
-            self.limit_cpu(math.ceil(most_cpu - self.cpu + GRACE) + 1)
-        if self.memory - self.memory_before > most_memory:
-            raise WorkerEnded("memory", f"killed above {most_memory:g} MB")
-        if self.cpu > most_cpu + GRACE:
-            raise WorkerEnded("cpu_limit", f"killed after {self.cpu:.1f} s of CPU time")
+        if self.measured:
+            self.cpu = max(self.cpu, self.meter.cpu() - self.cpu_before)
+            self.memory = max(self.memory, self.meter.memory())
+            if self.cpu > LIMIT_CPU_AFTER and not self.cpu_limited and math.isfinite(most_cpu):
+                self.limit_cpu(math.ceil(most_cpu - self.cpu + GRACE) + 1)
+            if self.memory - self.memory_before > most_memory:
+                raise WorkerEnded("memory", f"killed above {most_memory:g} MB")
+            if self.cpu > most_cpu + GRACE:
+                raise WorkerEnded("cpu_limit", f"killed after {self.cpu:.1f} s of CPU time")
         if self.wall > most_wall + GRACE:
             raise WorkerEnded("wall_limit", f"killed after {self.wall:.1f} s")
+
+    def stop(self) -> None:
+        """The worker says that it is done, and waits."""
+        self.end = time.monotonic()
+        self.cpu = max(self.cpu, self.meter.cpu() - self.cpu_before)
+        self.own = processes.cpu_clock(self.meter.pid) - self.own_before
+        peaks = (self.meter.memory(), processes.peak_memory(self.meter.pid))
+        # that of a process says nothing of a group which a controller counts
+        self.memory = max(self.memory, *peaks[: 1 if self.meter.by_group else 2])
 
     def limit_cpu(self, seconds: int) -> None:
         """Set RLIMIT_CPU of each process, for the case that this one is held up.
@@ -94,19 +137,21 @@ class Watch:
         after it is lifted, and those who measure short solves by it would read 0.
         """
         self.cpu_limited = True
-        for pid in processes.tree(self.pid):
-            used = math.ceil(processes.own_cpu(pid))
+        for pid in self.meter.members():
+            used = math.ceil(processes.cpu_clock(pid))
             processes.lower(pid, resource.RLIMIT_CPU, used + max(1, seconds))
 
 
 class Supervisor:
     """A worker, and the problems that its answers are judged by."""
 
-    def __init__(self, campaign: Connection) -> None:
+    def __init__(self, campaign: Connection, folder: str) -> None:
         self.campaign = campaign
+        self.folder = folder  # for the temporary files of the worker
         self.problems = Problems()
-        self.pid = 0
+        self.cores: set[int] = set()  # that the worker has for itself
         self.link: socket.socket | None = None  # to the worker
+        self.meter: Meter | None = None
         self.stderr = -1  # the standard error of the worker
         self.stderr_tail = b""
         self.cpu_limited = False  # whether the worker has a limit of CPU time
@@ -117,9 +162,11 @@ class Supervisor:
             return self.link
         ours, theirs = socket.socketpair()
         reading, writing = os.pipe()
-        self.pid = os.fork()
-        if self.pid == 0:
+        self.meter = meter = Meter()
+        pid = os.fork()
+        if pid == 0:
             try:
+                meter.enter()
                 for unused in (ours, self.campaign):
                     unused.close()
                 os.close(reading)
@@ -127,28 +174,55 @@ class Supervisor:
                 for number, to in enumerate((nothing, nothing, writing)):
                     os.dup2(to, number)
                 os.setpgid(0, 0)
-                serve(theirs, self.problems)
+                if self.cores:
+                    os.sched_setaffinity(0, self.cores)
+                serve(theirs, self.problems, self.folder)
             except BaseException as error:
                 os.write(2, f"{type(error).__name__}: {error}\n".encode())
             finally:
                 os._exit(1)
         theirs.close()
         os.close(writing)
+        meter.watch(pid)
         self.stderr, self.stderr_tail = reading, b""
         self.link = ours
         return ours
 
     def stop(self) -> int | None:
         """Kill the worker and all that it has started; its exit status where it has one."""
-        if self.link is None:
+        if self.link is None or self.meter is None:
             return None
-        status = processes.kill_all(self.pid)
+        status = self.meter.kill()
         while select.select([self.stderr], [], [], 0)[0] and self.listen():
             pass
         self.link.close()
         os.close(self.stderr)
-        self.link, self.pid, self.cpu_limited = None, 0, False
+        self.link, self.meter, self.cpu_limited = None, None, False
+        self.clear()
         return status
+
+    def clear(self) -> None:
+        """Remove the temporary files of a run."""
+        with contextlib.suppress(OSError):
+            for path in Path(self.folder).iterdir():
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path, ignore_errors=True)
+                else:
+                    path.unlink(missing_ok=True)
+
+    def clean(self, order: dict[str, Any]) -> bool:
+        """Whether nothing of a run is left in the worker, which may serve another."""
+        if self.link is None or self.meter is None or self.cpu_limited:
+            return False
+        name = order["solver"]
+        ours = name in built_in()
+        if not (ours or any(name.startswith(one.PREFIX) for one in adapters())):
+            return False  # code of a user's was in the process: who knows what it has changed
+        if select.select([self.link], [], [], 0)[0]:
+            return False
+        if processes.threads(self.meter.pid) > 1 and not (ours and order["threads"] > 1):
+            return False
+        return self.meter.members() == [self.meter.pid]
 
     def listen(self) -> bool:
         """Take what the worker says on its standard error, whose end is kept; False at the last."""
@@ -161,7 +235,7 @@ class Supervisor:
         lines = self.stderr_tail.decode(errors="replace").strip().splitlines()
         return f": {lines[-1][:300]}" if lines else ""
 
-    def receive(self, watch: Watch) -> bytes:
+    def receive(self, watch: Watch, longest: int = LONGEST) -> bytes:
         """The next message of the worker, which is watched meanwhile.
 
         Raises:
@@ -190,7 +264,7 @@ class Supervisor:
                 if len(got) == size and not whole:
                     size, whole = int.from_bytes(got, "little"), True
                     got.clear()
-                    if size > LONGEST:
+                    if size > longest:
                         raise WorkerEnded("garbage", "the worker sent no answer")
                 if len(got) == size and whole:
                     return bytes(got)
@@ -198,11 +272,26 @@ class Supervisor:
                 watch.check()
                 pause = min(1.5 * pause, PAUSES[1])
 
+    def said(self, order: dict[str, Any], watch: Watch) -> dict[str, Any]:
+        """The next word of the worker on this order.
+
+        Raises:
+            WorkerEnded: there will be none, or it is on no order of ours.
+        """
+        try:
+            said = json.loads(self.receive(watch))
+            if said.pop("nonce") == order["nonce"]:
+                return dict(said)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+            pass
+        raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
+
     def ended(self) -> WorkerEnded:
         """Why a worker that has closed its link has ended."""
+        assert self.meter is not None
         end = time.monotonic() + 1.0
         leave = os.WEXITED | os.WNOHANG | os.WNOWAIT
-        while os.waitid(os.P_PID, self.pid, leave) is None:
+        while os.waitid(os.P_PID, self.meter.pid, leave) is None:
             if time.monotonic() > end:
                 return WorkerEnded("garbage", "the worker closed its link, and went on")
             time.sleep(1e-3)
@@ -222,17 +311,21 @@ class Supervisor:
             load=os.getloadavg()[0],
             frequency=machine.frequency(),
             machine=machine.facts(),
+            pinned=bool(self.cores),
         )
+        vectors: dict[str, Any] = {}
         try:
-            vectors = self.ask(order, record)
+            vectors = self.ask(order | {"warm": True}, record)
         except WorkerEnded as end:
             self.stop()
             record.status, record.message = end.status, str(end)
-            return record
+        except OSError as error:  # no process, no room, no file
+            self.stop()
+            record.status, record.message = "lost", one_line(error)
         if vectors:
             self.judge(order, record, vectors)
-        if record.status in ORDERLY and not self.cpu_limited:
-            processes.kill_orphans(but=self.pid)
+        if record.status in ORDERLY and self.clean(order):
+            self.clear()
         else:
             self.stop()
         return record
@@ -244,36 +337,76 @@ class Supervisor:
             WorkerEnded: it has ended, or was to be ended; what is known of it is in the record.
         """
         link = self.start()
+        meter = self.meter
+        assert meter is not None
+        record.measured = meter.how
         self.stderr_tail = b""
+        order["nonce"] = os.urandom(8).hex()
+        limits = order["limits"]
         try:
             send(link, json.dumps(order).encode())
         except OSError:
             raise self.ended() from None
-        reply = self.receive(Watch(self.pid))
-        if reply == b"started":
-            limits = order["limits"]
-            watch = Watch(self.pid, limits["wall"], limits["time"], limits["memory"])
+        said = self.said(order, Watch(meter))
+        if said.get("word") == "warming":
+            wall, cpu = (min(WARM_LIMIT, limits[name]) for name in ("wall", "time"))
             try:
-                reply = self.receive(watch)
+                said = self.said(order, Watch(meter, wall, cpu, limits["memory"]))
+            except WorkerEnded:
+                # the solver may do better on the problem that it is asked for
+                self.stop()
+                return self.ask(order | {"warm": False}, record)
+        if said.get("word") == "ready":
+            self.limit(meter, limits["memory"])
+            watch = Watch(meter, limits["wall"], limits["time"], limits["memory"])
+            try:
+                send(link, GO)
+                word = self.said(order, watch)
+                watch.stop()
+                if word != {"word": "done"}:
+                    raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
+            except OSError:
+                raise self.ended() from None
             finally:
                 record.wall_s, record.total_cpu_s = watch.wall, watch.cpu
                 record.memory = watch.memory - watch.memory_before
                 self.cpu_limited = watch.cpu_limited
-        said = json.loads(reply)
-        known = [one for one in (said.get("memory"), record.memory) if one is not None]
-        said["memory"] = max(known, default=None)
-        names = said.pop("vectors", [])
-        for name, value in said.items():
-            setattr(record, name, value)
-        return {name: np.frombuffer(self.receive(Watch(self.pid))) for name in names}
+            self.limit(meter, math.inf)
+            try:
+                send(link, GO)
+            except OSError:
+                raise self.ended() from None
+            said = self.said(order, Watch(meter))
+            names = take(said, record)
+            check_times(order["solver"], record, said.get("reported") is True, watch)
+        else:
+            names = take(said, record)
+        room = int(max(limits["memory"], 100.0) * 1e6) if limits["memory"] < 1e9 else 1 << 40
+        return {name: numbers(self.receive(Watch(meter), room)) for name in names}
+
+    @staticmethod
+    def limit(meter: Meter, memory: float) -> None:
+        """A limit of the kernel on the address space, at twice the memory that a run is killed at.
+
+        It is that of the worker and of what it has left from earlier runs, as the interpreter of
+        another package's solver; what it starts later inherits it.
+        """
+        most = memory < 1e12
+        for pid in meter.members():
+            size = processes.address_space(pid) + int(2 * memory * 1e6) if most else -1
+            processes.lower(pid, resource.RLIMIT_AS, size)
+            output = int(max(memory * 1e6, OUTPUT)) if most else -1
+            processes.lower(pid, resource.RLIMIT_FSIZE, output)
 
     def judge(self, order: dict[str, Any], record: Record, vectors: dict[str, Any]) -> None:
         """Recompute every merit, and let it decide."""
         proof = [vectors.pop(name, None) for name in CERTIFICATE]
+        if record.status in ("lied", "garbage"):
+            return
         try:
             problem = self.problems.get(order)
             merit = _core.merit(problem, _core.Solution(**vectors))
-        except _core.FileError as error:
+        except (_core.FileError, OSError, MemoryError) as error:
             record.status, record.message = "unreadable", one_line(error)
             return
         except (_core.Error, TypeError, ValueError) as error:
@@ -289,6 +422,89 @@ class Supervisor:
             record.status = "inaccurate"
         elif (record.cpu_s or 0.0) > limits["time"] or (record.wall_s or 0.0) > limits["wall"]:
             record.status, record.message = "time_limit", "solved, but too late"
+
+
+def numbers(message: bytes) -> Any:
+    """The array of a message.
+
+    Raises:
+        WorkerEnded: it is none.
+    """
+    if len(message) % 8:
+        raise WorkerEnded("garbage", "the worker sent what is no array")
+    return np.frombuffer(message)
+
+
+def take(said: dict[str, Any], record: Record) -> list[str]:
+    """Put what a worker says into the record, where it can be so; the names of arrays that follow.
+
+    Raises:
+        WorkerEnded: it cannot.
+    """
+    number = (int, float)
+    try:
+        status, names = said["status"], said.get("vectors", [])
+        message = str(said["message"]).encode(errors="replace").decode()[:500]
+        iterations, stages = said.get("iterations"), said.get("stages")
+        times = [said.get(name) for name in ("cpu_s", "setup_s")]
+        history = said.get("history")
+        right = (
+            status in STATUSES
+            and set(names) <= {*VECTORS, *CERTIFICATE}
+            and len(set(names)) == len(names)
+            and (iterations is None or type(iterations) is int)
+            and all(time is None or isinstance(time, number) for time in times)
+            and (stages is None or isinstance(stages, str))
+            and (history is None or len(history) <= HISTORY + 2)
+        )
+        if history is not None:
+            record.history = [
+                (int(k), float(error), float(time), str(stage)) for k, error, time, stage in history
+            ]
+    except (KeyError, TypeError, ValueError, OverflowError):
+        right = False
+    if not right:
+        raise WorkerEnded("garbage", "the worker sent what is no answer")
+    record.status, record.message, record.stages = status, message, stages
+    record.warm = said.get("warm") is True
+    record.iterations = iterations
+    record.cpu_s, record.setup_s = (None if t is None else float(t) for t in times)
+    return list(names)
+
+
+def check_times(solver: str, record: Record, reported: bool, watch: Watch) -> None:
+    """Hold what a solver says of its time and iterations against what the kernel has seen.
+
+    More than that, or less than nothing, is a lie. The clock of the driver is that of the thread
+    that calls the solver: where the kernel has seen clearly more, in other threads or processes, it
+    is that which counts. A program that says itself what its solve took, and an adapter of another
+    package, may leave out their start.
+    """
+    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu
+    record.said_cpu_s = said
+    if said is None:
+        return
+    most = seen + SLACK + SHARE * seen
+    whole = 0 <= (record.iterations or 0) < 1 << 62
+    if not (0 <= said <= most and 0 <= setup + said <= most + SLACK and whole):
+        record.status = "lied"
+        record.message = (
+            f"says that it took {said:g} s and {record.iterations} iterations;"
+            f" the kernel saw {seen:.3g} s of CPU time"
+        )
+        record.iterations = record.iterations if whole else None
+        record.cpu_s = seen
+        return
+    if reported:
+        return
+    if solver.startswith(command.PREFIX):
+        own = seen - watch.own
+    elif any(solver.startswith(one.PREFIX) for one in adapters()):
+        return
+    else:
+        own = seen - setup
+    if own - said > SLACK + UNSEEN * seen:
+        record.cpu_s = own
 
 
 def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
@@ -309,12 +525,19 @@ def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
         record.message += f", for reactions up to {proof.bound:.1e}"
 
 
-def main() -> None:
-    """Serve the campaign at the other end of a socket."""
-    campaign = Connection(int(sys.argv[1]))
+def main(link: int, folder: str, cores: int) -> None:
+    """Serve the campaign at the other end of a socket.
+
+    Args:
+        link: the socket.
+        folder: for temporary files of the worker.
+        cores: how many the worker is to have for itself, where they are free.
+    """
+    campaign = Connection(link)
     processes.adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    supervisor = Supervisor(campaign)
+    supervisor = Supervisor(campaign, folder)
+    supervisor.cores, held = machine.reserve(cores)
     try:
         while True:
             order = campaign.recv()
@@ -323,7 +546,5 @@ def main() -> None:
         pass
     finally:
         supervisor.stop()
-
-
-if __name__ == "__main__":
-    main()
+        for lock in held:
+            os.close(lock)

@@ -1,19 +1,27 @@
 """The process that solves: it is limited, watched and never trusted.
 
-It is forked by a supervisor, and talks to it over a socket, in JSON and in the bytes of arrays. It
-reads the problem, sets its own limits, says that it starts, runs the solver, and sends what that
-returned; the supervisor judges it.
+It is forked by a supervisor, and talks to it over a socket, in JSON and in the bytes of arrays:
+
+    worker: warming     a solver that it has not called before is called on a small problem
+    worker: ready       the problem is read, the solver is known
+    supervisor: go      it has read the clocks, and set the limits
+    worker: done        the solver has returned, or raised
+    supervisor: go      it has read the clocks
+    worker: an answer   what the solver returned; the supervisor judges it
+
+Each word of the worker carries the number of the order, drawn by lot.
 """
 
 from __future__ import annotations
 
+import errno
+import functools
 import json
-import math
 import os
 import re
 import resource
 import signal
-import time
+import tempfile
 from collections import OrderedDict
 from pathlib import Path
 from socket import MSG_WAITALL, socket
@@ -23,8 +31,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core, _digest, _registry, _solve
-from fclib.bench import processes
+from fclib.bench import processes, warm_up
 from fclib.bench.modules import load_modules
+from fclib.external import command
 
 CACHE = 256e6  # [bytes] of problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
@@ -32,6 +41,9 @@ CERTIFICATE = ("certificate_y", "certificate_z")
 STAGE = ("name", "calls", "solved", "iterations", "time")
 HISTORY = 500  # reports that are kept of a run, the first and the last among them
 
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.ENFILE)
+NO_SPACE = (*map(os.strerror, FULL), "No usable temporary directory")
+GO = b"go"
 # what solvers that are not of the core say through fclib.SolverError
 BY_SIGNAL = re.compile(r"(?:was ended by signal|ended with signal) (\d+)")
 NOTHING = ("made no output", "wrote no /solution")
@@ -81,70 +93,62 @@ def receive(link: socket) -> bytes:
     return exactly(int.from_bytes(exactly(8), "little"))
 
 
-def limit(order: dict[str, Any]) -> None:
-    """A limit of the kernel on the address space, at twice the memory that the supervisor kills at.
-
-    It is that of this process and of what it has left from earlier runs, as the interpreter of
-    another package's solver; what it starts later inherits it.
-    """
-    memory = order["limits"]["memory"]
-    if math.isfinite(memory):
-        for pid in processes.tree(os.getpid()):
-            size = processes.address_space(pid) + int(2 * memory * 1e6)
-            processes.lower(pid, resource.RLIMIT_AS, size)
-
-
-def unlimit() -> None:
-    """Lift the limit between runs."""
-    for pid in processes.tree(os.getpid()):
-        processes.lower(pid, resource.RLIMIT_AS, resource.RLIM_INFINITY)
-
-
-def serve(supervisor: socket, problems: Problems) -> None:
+def serve(supervisor: socket, problems: Problems, folder: str) -> None:
     """Do what comes, until the supervisor is gone."""
     processes.die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the campaign's
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    os.environ["TMPDIR"] = tempfile.tempdir = folder
+    warm: set[str] = set()  # solvers that were called before
     while True:
         try:
             order = json.loads(receive(supervisor))
+            reply, arrays = answer(order, problems, supervisor, warm)
+            reply["nonce"] = order["nonce"]
+            send(supervisor, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
+            for array in arrays:
+                send(supervisor, array.tobytes())
         except (EOFError, OSError):
             os._exit(0)
-        reply, arrays = answer(order, problems, supervisor)
-        unlimit()
-        send(supervisor, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
-        for array in arrays:
-            send(supervisor, array.tobytes())
 
 
 def answer(
-    order: dict[str, Any], problems: Problems, supervisor: socket
+    order: dict[str, Any], problems: Problems, supervisor: socket, warm: set[str]
 ) -> tuple[dict[str, Any], list[npt.NDArray[np.float64]]]:
     """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
+
+    def say(word: str) -> None:
+        send(supervisor, json.dumps({"nonce": order["nonce"], "word": word}).encode())
+
+    def wait() -> None:
+        if receive(supervisor) != GO:
+            raise EOFError
+
+    name = order["solver"]
     try:
         problem = problems.get(order)
     except (_core.Error, OSError, MemoryError) as error:
         return {"status": "unreadable", "message": one_line(error)}, []
     try:
-        load_modules(order["modules"])
-        solver = _registry.find_solver(order["solver"])
+        if name not in built_in():
+            load_modules(order["modules"])
+        solver = _registry.find_solver(name)
         solver.check_options(order["options"])
     except _core.Error as error:
         return {"status": "error", "message": one_line(error)}, []
-
+    if order["warm"] and name not in warm and not name.startswith(command.PREFIX):
+        say("warming")
+        warm_up.call(problem, name, order["options"])
+        warm.add(name)
     processes.release_memory()
-    processes.forget_peak()
-    resident = processes.peak_memory()
-    me = os.getpid()
-    limit(order)
-    send(supervisor, b"started")
-    before = total_cpu(me)
-    start = time.perf_counter()
+    command.reported = False
+    say("ready")
+    wait()
     result: _core.Result | None = None
     try:
         result = _solve.solve(
             problem,
-            order["solver"],
+            name,
             order["tol"],
             time_limit=order["limits"]["wall"],
             history=order["history"],
@@ -154,14 +158,13 @@ def answer(
         status, message = result.status, ""
     except Exception as error:
         status, message = classify(error), one_line(error)
-    wall = time.perf_counter() - start
-    unlimit()
+    say("done")
+    wait()
     reply: dict[str, Any] = {
         "status": status,
         "message": message,
-        "wall_s": wall,
-        "total_cpu_s": total_cpu(me) - before,
-        "memory": processes.peak_memory() - resident,
+        "warm": name in warm,
+        "reported": command.reported,
     }
     arrays: list[npt.NDArray[np.float64]] = []
     if result is not None:
@@ -191,11 +194,10 @@ def answer(
     return reply, arrays
 
 
-def total_cpu(pid: int) -> float:
-    """[s] of CPU that this process and its descendants have used, all threads."""
-    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
-    own = time.process_time() + ended.ru_utime + ended.ru_stime
-    return own + processes.cpu_of_children(pid)
+@functools.cache
+def built_in() -> frozenset[str]:
+    """The solvers of the core, whose names no module can take."""
+    return frozenset(solver.name for solver in _core.solvers())
 
 
 def classify(error: Exception) -> str:
@@ -208,6 +210,10 @@ def classify(error: Exception) -> str:
     if any(isinstance(cause, MemoryError) for cause in causes):
         return "memory"
     text = str(error)
+    if any(isinstance(cause, OSError) and cause.errno in FULL for cause in causes) or any(
+        words in text for words in NO_SPACE
+    ):
+        return "no_space"
     if found := BY_SIGNAL.search(text):
         return of_signal(int(found[1]))
     if any(words in text for words in NOTHING):
@@ -226,12 +232,12 @@ def of_signal(number: int) -> str:
     """The status of a process that a signal has ended, where the supervisor has not sent it."""
     if number == signal.SIGXCPU:
         return "cpu_limit"
-    return "killed" if number in (signal.SIGKILL, signal.SIGTERM) else "crashed"
+    return "killed" if number in (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP) else "crashed"
 
 
 def one_line(error: BaseException) -> str:
     """What an exception says."""
-    text = " ".join(str(error).split())
+    text = " ".join(str(error).encode(errors="replace").decode().split())
     known = isinstance(error, (_core.Error, OSError))
     return (text if known and text else f"{type(error).__name__}: {text}")[:500]
 

@@ -15,7 +15,8 @@ from typer.core import TyperGroup
 import fclib
 from fclib import bench
 from fclib.bench import machine
-from fclib.bench.campaign import parse_solver
+from fclib.bench.campaign import SET, parse_solver
+from fclib.bench.runner import RETRIES
 from fclib.bench.store import Status
 from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
 from fclib.cli._progress import duration, live
@@ -52,10 +53,11 @@ def run(
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="Runs at once.", min=1)] = 1,
     problems: Annotated[
-        list[str] | None, typer.Option("--problems", help="Files, folders, globs.")
+        list[str] | None, typer.Option("--problems", help="Files, folders, globs; set:NAME.")
     ] = None,
     solver: Annotated[
-        list[str] | None, typer.Option(help='A solver: "nsgs relaxation=1.2".')
+        list[str] | None,
+        typer.Option(help='A solver: "nsgs relaxation=1.2"; besides those of a campaign.'),
     ] = None,
     tol: Annotated[list[float] | None, typer.Option(help="Tolerances.")] = None,
     time_limit: Annotated[
@@ -75,6 +77,15 @@ def run(
     module: Annotated[
         list[str] | None, typer.Option(help="A file of Python with solvers of your own.")
     ] = None,
+    budget: Annotated[
+        str | None, typer.Option(help='For all runs together: "90min", "2h".')
+    ] = None,
+    retry: Annotated[
+        list[str] | None, typer.Option(help="Do runs again that ended with this status.")
+    ] = None,
+    retries: Annotated[
+        int, typer.Option(help="Of a run that something from outside has spoilt.", min=0)
+    ] = RETRIES,
     scheduler: Annotated[
         str | None, typer.Option(help="Run on the Dask cluster of this address.")
     ] = None,
@@ -101,24 +112,30 @@ def run(
         "memory": memory,
         "repeats": repeats,
         "history": history or None,
-        "modules": module,
+        "budget": budget,
+        "modules": module and [str(Path(path).resolve()) for path in module],
     }
     flags = {name: value for name, value in flags.items() if value}
     try:
         if campaign is not None:
-            if problems or solver:
-                raise bench.CampaignError("a campaign names its own problems and solvers")
+            if problems:
+                raise bench.CampaignError("a campaign names its own problems")
             # where the published ones look for their problems
             os.environ.setdefault(library.FOLDER, str(library.default_folder()))
-            chosen = bench.Campaign.read(campaign, flags, sample)
+            chosen = bench.Campaign.read(campaign, flags, sample, solver or ())
         else:
             if not problems or not solver:
                 raise bench.CampaignError("name a campaign, or give --problems and --solver")
-            group: dict[str, Any] = {"files": problems} | ({"sample": sample} if sample else {})
             rows = [parse_solver(text) for text in solver]
+            groups = group_problems(problems, sample)
             chosen = bench.Campaign.of(
-                {"name": "bench", "solvers": rows, "problems": [group], **flags}
+                {"name": "bench", "solvers": rows, "problems": groups, **flags}
             )
+        for name in retry or ():
+            if name not in bench.STATUSES:
+                raise bench.CampaignError(
+                    f"--retry {name}: is no status; there is: {', '.join(bench.STATUSES)}"
+                )
     except bench.CampaignError as error:
         usage_error(error)
 
@@ -145,7 +162,14 @@ def run(
                     fail(f'{error}; pip install "fclib[bench]"')
             show = stack.enter_context(live(chosen.name, as_json))
             progress = bench.run_campaign(
-                chosen, path, jobs=jobs, runner=runner, show=show, tell=tell
+                chosen,
+                path,
+                jobs=jobs,
+                runner=runner,
+                retries=retries,
+                retry=retry or (),
+                show=show,
+                tell=tell,
             )
     except KeyboardInterrupt:
         there = path.exists()
@@ -160,11 +184,32 @@ def run(
         "solved": progress.solved,
         **{name: count for name, count in progress.statuses.most_common() if name != "converged"},
     }
+    if progress.not_run:
+        record["not run"] = progress.not_run.total()
+    if progress.left_over:
+        record["beyond the budget"] = progress.left_over
     report = Report(as_json)
     report.add(record)
     if not as_json:
         out.print(make_table([record]))
         out.print(f"fclib profile {path}", highlight=False)
+    if progress.not_run:
+        causes = ", ".join(f"{n} {name}" for name, n in progress.not_run.most_common())
+        tell(
+            f"not run, for causes outside of the solvers: {causes}; the last one was"
+            f" {progress.reason}. The same command tries them again"
+        )
+    if progress.stopped:
+        fail(progress.stopped)
+
+
+def group_problems(problems: list[str], sample: int | None) -> list[dict[str, Any]]:
+    """The groups of problems of --problems: files together, each set for itself."""
+    sets = [name for name in problems if name.startswith(SET)]
+    files = [name for name in problems if not name.startswith(SET)]
+    groups: list[dict[str, Any]] = [{"set": name} for name in sets]
+    groups += [{"files": files}] if files else []
+    return [group | ({"sample": sample} if sample else {}) for group in groups]
 
 
 def is_alive(status: Status) -> bool:

@@ -37,6 +37,7 @@ from fclib._registry import make_solver
 PREFIX = "cmd:"
 SOLVERS = "cmd:PROGRAM {input} {output}"
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
+reported = False  # whether the program that was run last has said what its solve took
 PLACES = ("input", "output", "tol", "time_limit", "max_iterations")
 
 

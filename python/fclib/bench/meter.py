@@ -1,0 +1,169 @@
+"""What a run takes, by the kernel's word: a control group of its own, or the tree of processes.
+
+A control group (cgroup v2) counts the CPU time of all that was ever in it, and none of its
+processes leaves it by forking. It is made below the group of the supervisor, where the system lets
+us. With the memory controller it knows the memory, too, each page once. Else the supervisor adopts
+whatever loses its parent, so that all that a run starts are its descendants, and their clocks are
+added up; memory is the resident size of one process, or the proportional one (PSS) of several.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+import resource
+import time
+from pathlib import Path
+
+from fclib.bench import processes
+
+PREFIX = "fclib-bench-"
+SHARE = 0.05  # of the time at most that goes into reading proportional sizes
+NUMBER = iter(range(1 << 62))
+
+
+@functools.cache
+def home() -> Path | None:
+    """The cgroup v2 of this process, where it may have groups below it.
+
+    None where FCLIB_CGROUP is 0.
+    """
+    if os.environ.get("FCLIB_CGROUP") == "0":
+        return None
+    try:
+        lines = Path("/proc/self/cgroup").read_text().splitlines()
+        own = next(line[3:] for line in lines if line.startswith("0::"))
+        mounts = Path("/proc/self/mountinfo").read_text().splitlines()
+    except (OSError, StopIteration):
+        return None
+    for mount in mounts:
+        fields, _, kind = mount.partition(" - ")
+        if kind.startswith("cgroup2 "):
+            root, point = fields.split()[3:5]
+            path = Path(point) / os.path.relpath(own, root)
+            trial = path / f"{PREFIX}{os.getpid()}-{next(NUMBER)}"
+            try:
+                trial.mkdir()
+                there = (trial / "cpu.stat").exists() and (trial / "cgroup.kill").exists()
+                trial.rmdir()
+            except OSError:
+                continue
+            if there:
+                return path
+    return None
+
+
+class Meter:
+    """What a worker with all that it has started takes; made by its supervisor before it forks."""
+
+    def __init__(self) -> None:
+        self.pid = 0
+        self.group: Path | None = None
+        if (above := home()) is not None:
+            group = above / f"{PREFIX}{os.getpid()}-{next(NUMBER)}"
+            with contextlib.suppress(OSError):
+                group.mkdir()
+                self.group = group
+        self.by_group = self.group is not None and (self.group / "memory.current").exists()
+        # [s] of descendants that had ended before
+        self._ended = self._own_ended()
+        self._offset = 0.0  # [MB] of resident size that is not in the proportional one
+        self._next = 0.0  # when the proportional size may be read again
+        self._last = 0.0
+
+    @property
+    def how(self) -> str:
+        """By what, as a store has it."""
+        if self.group is None:
+            return "processes"
+        return "cgroup" if self.by_group else "cgroup, PSS"
+
+    def enter(self) -> None:
+        """Have the calling process measured; before it does anything."""
+        if self.group is not None:
+            (self.group / "cgroup.procs").write_text("0")
+
+    def watch(self, pid: int) -> None:
+        """Measure this process, a child that has entered."""
+        self.pid = pid
+        self._offset = processes.resident(pid) - self._proportional([pid])
+
+    def members(self) -> list[int]:
+        """The worker and all that it has started, and that has not ended."""
+        found = {self.pid}
+        if self.group is not None:
+            with contextlib.suppress(OSError):
+                found |= set(map(int, (self.group / "cgroup.procs").read_text().split()))
+        for child in processes.children(os.getpid()):
+            if child not in found or self.group is None:
+                found |= set(processes.tree(child))
+        return [pid for pid in found if processes.state(pid) not in ("", "Z", "X")]
+
+    def cpu(self) -> float:
+        """[s] of CPU of all that was ever started, the worker too."""
+        if self.group is not None:
+            with contextlib.suppress(OSError, ValueError, IndexError):
+                text = (self.group / "cpu.stat").read_text()
+                return int(text.split(maxsplit=2)[1]) * 1e-6
+        total = self._own_ended() - self._ended
+        for child in processes.children(os.getpid()):
+            for member in processes.tree(child):
+                total += processes.cpu_clock(member) + processes.cpu_of_ended(member)
+        return total
+
+    def memory(self) -> float:
+        """[MB] in memory, each page once."""
+        if self.by_group:
+            assert self.group is not None
+            with contextlib.suppress(OSError, ValueError):
+                return int((self.group / "memory.current").read_text()) / 1e6
+        members = self.members()
+        if len(members) <= 1:
+            return processes.resident(self.pid)
+        now = time.monotonic()
+        if now >= self._next:
+            self._last = self._proportional(members) + self._offset
+            self._next = now + (time.monotonic() - now) / SHARE
+        return self._last
+
+    def _proportional(self, members: list[int]) -> float:
+        """[MB] of some processes and of this one, from which they were forked."""
+        return sum(map(processes.proportional, [os.getpid(), *members]))
+
+    @staticmethod
+    def _own_ended() -> float:
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return ended.ru_utime + ended.ru_stime
+
+    def kill(self) -> int | None:
+        """End all of it, and wait for them; the exit status of the worker where it can be had."""
+        if self.group is not None:
+            with contextlib.suppress(OSError):
+                (self.group / "cgroup.kill").write_text("1")
+        status = processes.kill_all(self.pid)
+        if self.group is not None:
+            remove(self.group)
+        return status
+
+
+def remove(group: Path) -> None:
+    """End what is left in a control group, and remove it."""
+    for _ in range(200):
+        try:
+            group.rmdir()
+        except FileNotFoundError:
+            return
+        except OSError:
+            with contextlib.suppress(OSError):
+                (group / "cgroup.kill").write_text("1")
+            time.sleep(5e-3)
+        else:
+            return
+
+
+def sweep(supervisor: int) -> None:
+    """Remove the control groups that a supervisor, which was killed, has left behind."""
+    if (above := home()) is not None:
+        for group in above.glob(f"{PREFIX}{supervisor}-*"):
+            remove(group)

@@ -1,0 +1,42 @@
+"""The first call of a solver in a process: slower than all others, and therefore not measured.
+
+It loads what is loaded when it is needed, and has the processor see the code. The problem is a
+small one of the same kind, not the one that is measured: a solver may remember what it has solved.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from fclib import _core, _solve
+
+CONTACTS = 6
+LIMIT = 1.0  # [s] of wall clock that the solver is told
+
+
+def small(problem: _solve.Problem) -> _solve.Problem:
+    """A small problem of the class and dimension of another one."""
+    d = problem.spacedim
+    m = d * CONTACTS
+    friction: dict[str, Any] = {"mu": np.full(CONTACTS, 0.5)}
+    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
+        friction["mu_r"] = np.full(CONTACTS, 0.1)
+    # all columns depend on each other, contacts stick and slide
+    A = np.sin(np.arange(1.0, m * m + 1)).reshape(m, m)
+    q = np.cos(np.arange(1.0, m + 1))
+    q[::d] = -1.0
+    if isinstance(problem, (_core.LocalProblem, _core.LocalRollingProblem)):
+        return type(problem)(spacedim=d, W=A @ A.T / m + 0.5 * np.eye(m), q=q, **friction)
+    return type(problem)(
+        spacedim=d, M=np.eye(m), H=A / np.sqrt(m) + np.eye(m), f=np.zeros(m), w=q, **friction
+    )
+
+
+def call(problem: _solve.Problem, solver: str, options: Mapping[str, Any]) -> None:
+    """Call a solver on a small problem, whatever comes of it."""
+    with contextlib.suppress(Exception):
+        _solve.solve(small(problem), solver, 1e-6, time_limit=LIMIT, **options)

@@ -118,7 +118,7 @@ void bind_solvers(nb::module_& m) {
           nb::kw_only(), "name"_a, "type"_a, "default"_a, "unit"_a, "doc"_a, "choices"_a,
           "lowest"_a, "highest"_a)
       .def_ro("name", &OptionInfo::name)
-      .def_ro("type", &OptionInfo::type, "bool, int, float or choice")
+      .def_ro("type", &OptionInfo::type, "bool, int, float, choice or text")
       .def_ro("default", &OptionInfo::default_value)
       .def_ro("unit", &OptionInfo::unit)
       .def_ro("doc", &OptionInfo::doc)
@@ -160,9 +160,9 @@ void bind_solvers(nb::module_& m) {
   bind_python_solvers(m);
 
   nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
-      .def_prop_ro("name", [](const Stage& s) { return std::string(s.kind.name); })
+      .def_prop_ro("name", [](const Stage& s) { return s.kind.name; })
       .def_prop_ro(
-          "families", [](const Stage& s) { return std::string(s.kind.families); },
+          "families", [](const Stage& s) { return s.kind.families; },
           "of solvers whose methods it uses, separated by ', '")
       .def_ro("calls", &Stage::calls, "how often it was entered: once for each island in need")
       .def_ro("solved", &Stage::solved, "of these, how many it brought to the tolerance")
@@ -170,9 +170,8 @@ void bind_solvers(nb::module_& m) {
       .def_ro("factorisations", &Stage::factorisations)
       .def_ro("time", &Stage::time, "[s] wall clock")
       .def("__repr__", [](const Stage& s) {
-        return "<Stage " + std::string(s.kind.name) + ": solved " + std::to_string(s.solved) +
-               " of " + std::to_string(s.calls) + ", " + std::to_string(s.iterations) +
-               " iterations>";
+        return "<Stage " + s.kind.name + ": solved " + std::to_string(s.solved) + " of " +
+               std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
       });
   nb::class_<Result>(m, "Result", "What fclib.solve returns.")
       .def_ro("solution", &Result::solution)

@@ -329,7 +329,7 @@ struct fclib_solve_options {
   int max_iterations;  /**< 0 for the solver's own */
   double time_limit;   /**< wall clock [s]; 0 for none */
   const double* guess; /**< reactions to start from (m), or NULL */
-  const char* options; /**< options of the solver, "name=value name=value", or NULL */
+  const char* options; /**< of the solver, "name=value name=\"a text\"", or NULL */
   /** (nc) and (p), or NULL: filled where the status is FCLIB_INFEASIBLE, by a proof that there is
    * no solution; see fclib_certificate_global() */
   double* certificate_y;

@@ -495,6 +495,19 @@ def planted_rolling(d: int, seed: int, nc: int = 6) -> tuple[fclib.LocalRollingP
     return problem, r.ravel()
 
 
+def auto_chain() -> list[str]:
+    """The stages of `auto`, a line each."""
+    (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")
+    lines = str(text).splitlines()
+    return [line for line in lines if line.strip() and not line.startswith("#")]
+
+
+def last_resort(limit: int) -> list[str]:
+    """The chain of `auto` whose last resort takes so many factorisations."""
+    stages = [line for line in auto_chain() if "wander=true" not in line]
+    return [*stages, f"proximal point : proximal_point from=associated wander=true limit={limit}"]
+
+
 def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fclib.LocalProblem:
     """A local problem from a dense W; its spacedim follows from the sizes."""
     q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)

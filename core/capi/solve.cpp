@@ -13,7 +13,8 @@ namespace fclib::c {
 
 namespace {
 
-/// "name=value name=value", separated by spaces, commas or semicolons.
+/// "name=value name=value", separated by spaces, commas or semicolons; a value that has them stands
+/// in double quotes.
 OptionValues parse_values(std::string_view list) {
   constexpr std::string_view separators = " \t\n,;";
   OptionValues values;
@@ -21,6 +22,16 @@ OptionValues parse_values(std::string_view list) {
     const auto start = list.find_first_not_of(separators);
     if (start == std::string_view::npos) return values;
     list.remove_prefix(start);
+    if (const auto at = list.find("=\""); at < list.find_first_of(separators)) {
+      const auto end = list.find('"', at + 2);
+      if (end == std::string_view::npos || at == 0) {
+        throw Error(ErrorKind::option, "'" + std::string(list) + "' is not name=\"value\"",
+                    "options");
+      }
+      values[std::string(list.substr(0, at))] = std::string(list.substr(at + 2, end - at - 2));
+      list.remove_prefix(end + 1);
+      continue;
+    }
     const std::string_view pair = list.substr(0, list.find_first_of(separators));
     const auto equals = pair.find('=');
     if (equals == std::string_view::npos || equals == 0) {

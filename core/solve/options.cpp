@@ -58,6 +58,7 @@ OptionValue parse_option(const OptionInfo& info, const OptionValue& value) {
   }
   if (info.type == "int") return parse_number<std::int64_t>(info, text, "an integer");
   if (info.type == "float") return parse_number<double>(info, text, "a number");
+  if (info.type == "text") return text;
   if (std::find(info.choices.begin(), info.choices.end(), text) == info.choices.end()) {
     bad_option(info.name, "'" + text + "' is not one of: " + listed(info.choices));
   }
@@ -77,6 +78,7 @@ OptionValues parse_options(const std::vector<OptionInfo>& infos, const OptionVal
   for (const OptionInfo& info : infos) {
     known.push_back(info.name);
     const auto found = values.find(info.name);
+    if (found != values.end() && info.check != nullptr) info.check(to_text(found->second));
     result[info.name] =
         parse_option(info, found != values.end() ? found->second : info.default_value);
   }

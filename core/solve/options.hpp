@@ -25,13 +25,14 @@ using OptionValues = std::map<std::string, OptionValue, std::less<>>;
 /// An option as it is shown to a user.
 struct OptionInfo {
   std::string name;
-  std::string type;  ///< "bool", "int", "float" or "choice"
+  std::string type;  ///< "bool", "int", "float", "choice" or "text"
   OptionValue default_value;
   std::string unit;
   std::string doc;
   std::vector<std::string> choices;
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+  void (*check)(std::string_view) = nullptr;  ///< of a text: throws Error (option) at what is wrong
 
   /// The place of a choice in `choices`.
   [[nodiscard]] std::size_t place_of(const OptionValue& choice) const;
@@ -41,7 +42,8 @@ struct OptionInfo {
 /// Throws Error (option) for an unknown name, a value of the wrong type or out of range.
 OptionValues parse_options(const std::vector<OptionInfo>& infos, const OptionValues& values);
 
-/// A numeric (double, int64 or bool) option, or an enumeration with the names of its values.
+/// A numeric (double, int64 or bool) option, a text, or an enumeration with the names of its
+/// values.
 template <class Options, class Value>
 struct OptionField {
   std::string_view name;
@@ -51,6 +53,7 @@ struct OptionField {
   std::span<const std::string_view> choices = {};
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
+  void (*check)(std::string_view) = nullptr;
 };
 
 namespace detail {
@@ -73,6 +76,10 @@ OptionInfo describe_option(const OptionField<Options, Value>& field, const Optio
   } else if constexpr (std::is_same_v<Value, double>) {
     info.type = "float";
     info.default_value = value;
+  } else if constexpr (std::is_same_v<Value, std::string>) {
+    info.type = "text";
+    info.default_value = value;
+    info.check = field.check;
   } else {
     info.type = "int";
     info.default_value = std::int64_t{value};
@@ -84,7 +91,8 @@ template <class Value>
 Value value_of(const OptionInfo& info, const OptionValue& parsed) {
   if constexpr (std::is_enum_v<Value>) {
     return static_cast<Value>(info.place_of(parsed));
-  } else if constexpr (std::is_same_v<Value, bool> || std::is_same_v<Value, double>) {
+  } else if constexpr (std::is_same_v<Value, bool> || std::is_same_v<Value, double> ||
+                       std::is_same_v<Value, std::string>) {
     return std::get<Value>(parsed);
   } else {
     return static_cast<Value>(std::get<std::int64_t>(parsed));

@@ -129,8 +129,8 @@ class Monitor {
 
 /// A method that is a stage of solvers that chain others.
 struct StageKind {
-  std::string_view name;
-  std::string_view families;  ///< of solvers whose methods it uses, separated by ", "
+  std::string name;
+  std::string families;  ///< of solvers whose methods it uses, separated by ", "
 };
 
 /// A part of a solve, by a method of its own.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -19,6 +20,7 @@ Problem: TypeAlias = (
 )
 
 MeritKind: TypeAlias = Literal["both", "natural"]
+Value: TypeAlias = bool | int | float | str | Path | list[str]
 
 
 def solve(
@@ -32,7 +34,7 @@ def solve(
     callback: Callable[[int, float, float, str], bool | None] | None = None,
     history: bool = False,
     merit: MeritKind = "both",
-    **options: bool | int | float | str,
+    **options: Value,
 ) -> _core.Result:
     """Solve a frictional contact problem of any formulation.
 
@@ -49,7 +51,8 @@ def solve(
         history: whether ``Result.history`` keeps all that a callback is told.
         merit: what ``tol`` bounds: ``both`` the natural map and the scaled one, which is the same
             in any units, or ``natural`` alone, to compare with the literature.
-        **options: the solver's own options, see ``fclib solvers``.
+        **options: the solver's own options, see ``fclib solvers``. A text may be given by the path
+            of its file or as a list of its lines.
 
     Returns:
         The solution with its status: ``converged`` means that the merit, recomputed on the problem
@@ -85,7 +88,14 @@ def solve(
 
 
 def _plain(name: str, value: object) -> bool | int | float | str:
-    """An option's value as a Python scalar; NumPy's scalars are taken too."""
+    """An option's value as a Python scalar; NumPy's scalars are taken too, lines and a file's."""
+    if isinstance(value, Path):
+        try:
+            return value.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise _core.OptionError(f"option {name}: {value}: {error}") from error
+    if isinstance(value, list) and all(isinstance(line, str) for line in value):
+        return "\n".join(value)
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, (bool, float, str)):

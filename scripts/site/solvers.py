@@ -108,12 +108,15 @@ def page(family: str, members: list[fclib.SolverInfo], notes: dict[str, str]) ->
         if not solver.options:
             continue
         lines += ["| option | default | values | meaning |", "|---|---|---|---|"]
-        lines += [
-            f"| `{option.name}` | {default_of(option)} | {cell(domain_of(option))} "
-            f"| {cell(option.doc)} |"
-            for option in solver.options
-        ]
+        for option in solver.options:
+            default = "below" if option.type == "text" else default_of(option)
+            lines.append(
+                f"| `{option.name}` | {default} | {cell(domain_of(option))} | {cell(option.doc)} |"
+            )
         lines.append("")
+        for option in solver.options:
+            if option.type == "text":
+                lines += [f"`{option.name}`:", "", "```text", default_of(option).strip(), "```", ""]
     return "\n".join(lines)
 
 

@@ -388,9 +388,9 @@ def test_says_what_it_is(solver: str) -> None:
     for option in entry.options:
         assert option.name.isidentifier()
         assert option.doc.strip(), option.name
-        assert option.type in {"bool", "int", "float", "choice"}
+        assert option.type in {"bool", "int", "float", "choice", "text"}
         assert bool(option.choices) == (option.type == "choice")
-        assert option.unit or option.type in {"bool", "choice"}, option.name
+        assert option.unit or option.type in {"bool", "choice", "text"}, option.name
 
 
 def problem_for(solver: str) -> Any:

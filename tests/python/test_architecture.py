@@ -33,6 +33,7 @@ LAYERS: list[set[str]] = [
     {"solve"},
     {"embed"},
     {"methods"},
+    {"chain"},
     {"solvers", "solver_table.cpp"},
     {"capi"},
 ]
@@ -41,6 +42,7 @@ FORBIDDEN = {
     # a solver sees neither file nor formulation, and does not judge itself
     "solvers": {"io", "convert", "merit", "proof", "problems", "problem.hpp"},
     # what solvers are made of knows no formulation
+    "chain": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
     "methods": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
     "systems": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},
     "reduced": {"io", "convert", "merit", "proof", "problems", "problem.hpp", "solution.hpp"},

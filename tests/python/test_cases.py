@@ -14,6 +14,7 @@ import pytest
 
 import fclib
 from fclib import analysis
+from helpers import last_resort
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -46,7 +47,7 @@ def test_a_light_body_under_a_heavy_one_is_not_infeasible(power: int, extra: boo
     y = np.ones(problem.nc)
     y[2:] = 0
     assert analysis.farkas(problem, y) is None
-    assert fclib.solve(problem, time_limit=5, last_resort=50).status != "infeasible"
+    assert fclib.solve(problem, time_limit=5, chain=last_resort(50)).status != "infeasible"
     # it would be, were it not for the last digit
     W = np.array(problem.W.toarray() if hasattr(problem.W, "toarray") else problem.W)
     W[3:6, 3:6] = np.eye(3)

@@ -86,13 +86,21 @@ def usage_error(error: Exception) -> NoReturn:
 
 
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:
-    """``["relaxation=1.2"]`` as a dictionary; anything else is a usage error."""
+    """``["relaxation=1.2"]`` as a dictionary; anything else is a usage error.
+
+    ``name=@FILE`` is the text of a file.
+    """
     options: dict[str, str] = {}
     for pair in pairs:
         name, equals, value = pair.partition("=")
         if not (name and equals and value):
             raise typer.BadParameter(f"'{pair}' is not of the form name=value")
         options[name] = value
+        if value.startswith("@"):
+            try:
+                options[name] = Path(value[1:]).read_text(encoding="utf-8")
+            except (OSError, UnicodeDecodeError) as error:
+                raise typer.BadParameter(f"'{pair}': {error}") from error
     return options
 
 

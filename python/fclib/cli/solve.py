@@ -64,7 +64,7 @@ def command(
         bool, typer.Option("--write", help="Store solutions that converged in their files.")
     ] = False,
     option: Annotated[
-        list[str] | None, typer.Option(help="An option of the solver, name=value.")
+        list[str] | None, typer.Option(help="An option of the solver, name=value, or name=@FILE.")
     ] = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Show the iterations and the stages.")

@@ -86,7 +86,11 @@ def show(solver: fclib.SolverInfo) -> None:
         if text:
             out.print(f"  {name:10}  {text}", highlight=False)
     for option in solver.options:
-        out.print(Text.assemble("  ", (option.name, "bold"), f" = {default_of(option)}"))
+        lines_of = default_of(option).strip().splitlines() or [""]
+        value = "" if len(lines_of) > 1 else lines_of[0]
+        out.print(Text.assemble("  ", (option.name, "bold"), f" = {value}"))
+        for line in lines_of if len(lines_of) > 1 else []:
+            out.print(Padding(Text(line), (0, 0, 0, 4), expand=False), soft_wrap=True)
         for line in (domain_of(option), option.doc):
             out.print(Padding(Text(line), (0, 0, 0, 6), expand=False))
     if solver.options:

@@ -459,7 +459,7 @@ def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
             [
                 option.name,
                 " | ".join(option.choices) or option.type,
-                str(option.default),
+                "see there" if option.type == "text" else str(option.default),
                 option.unit,
                 option.doc,
             ]

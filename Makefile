@@ -12,7 +12,7 @@ NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
-        collection-wheel deb clean help
+        collection-wheel deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -34,6 +34,7 @@ help:
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make deb     the C library as Debian packages, into dist/"
+	@echo "make release  check all, build and try all that is released, into dist/, with checksums and SBOM"
 	@echo "make clean   remove what was built (not $(VENV))"
 
 # ninja knows what was edited; Python is imported from where it lies
@@ -118,6 +119,14 @@ deb:
 	mkdir -p dist && cp $(BUILD)/deb/packages/*.deb dist
 	for package in dist/*.deb; do dpkg-deb -x $$package $(BUILD)/deb/unpacked; done
 	sh scripts/check_c_library.sh $(BUILD)/deb/unpacked/usr
+
+# everything from an empty dist/; the tag is set by hand, on the commit that this has passed on
+release: $(VENV)/.package-tools
+	$(BIN)/python scripts/release.py check
+	rm -rf dist
+	$(MAKE) lint test docs
+	$(MAKE) wheels collection-wheel deb
+	$(BIN)/python scripts/release.py finish dist
 
 clean:
 	rm -rf $(BUILD) demo dist man $(VENV)/.installed python/fclib/_core.*

@@ -1,10 +1,13 @@
 """What the scripts around the build make of what the tools print; the development install."""
 
+import hashlib
 import importlib.util
+import json
 import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 import rebuild
@@ -201,3 +204,64 @@ def test_a_python_takes_the_wheel_of_its_tags(root: Path) -> None:
         14: wheels[2],
     }
     assert try_wheels.wheel_for(11, wheels[:1]) is None, "without abi3 it is for one version"
+
+
+# ---- a release
+
+
+def test_a_release_names_its_version_everywhere(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release = script(root, "release")
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "git", lambda *words: "")
+    (tmp_path / "recipe").mkdir()
+    (tmp_path / "CMakeLists.txt").write_text("project(fclib VERSION 2.3.4 LANGUAGES C)")
+    (tmp_path / "CHANGELOG.md").write_text("# Changelog\n\n## 2.3.4\n")
+    (tmp_path / "CITATION.cff").write_text("version: 2.3.4\n")
+    (tmp_path / "recipe/recipe.yaml").write_text('  version: "2.3.3"\n')
+    assert release.version() == "2.3.4"
+    (fault,) = release.faults("2.3.4")
+    assert fault.startswith("recipe/recipe.yaml")
+    monkeypatch.setattr(
+        release, "git", lambda *words: {"rev-list": "a", "rev-parse": "b"}.get(words[0], "")
+    )
+    assert any("never changes" in fault for fault in release.faults("2.3.4"))
+
+
+def test_a_release_has_checksums_and_a_list_of_parts(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("cyclonedx", reason="a tool of the tests that is not installed")
+    release = script(root, "release")
+    dist = tmp_path / "dist"
+    (dist / "collection").mkdir(parents=True)
+    name = release.version()
+    for file in (
+        f"fclib-{name}.tar.gz",
+        f"fclib-{name}.whl",
+        "libfclib0.deb",
+        "collection/data.whl",
+    ):
+        (dist / file).write_text(file)
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    monkeypatch.setattr(release, "version", lambda: name)
+    with pytest.raises(SystemExit, match="there is no site"):
+        release.finish(dist)
+    (tmp_path / "build/site").mkdir(parents=True)
+    (tmp_path / "build/site/index.html").write_text("<p>")
+    release.finish(dist)
+    sums = dict(
+        reversed(line.split("  ")) for line in (dist / "SHA256SUMS").read_text().splitlines()
+    )
+    assert set(sums) == {path.name for path in dist.iterdir() if path.is_file()} - {"SHA256SUMS"}
+    for file, digest in sums.items():
+        assert hashlib.sha256((dist / file).read_bytes()).hexdigest() == digest
+    parts = json.loads((dist / f"fclib-{name}.cdx.json").read_text())
+    names = {part["name"]: part.get("version") for part in parts["components"]}
+    assert names["numpy"] == np.__version__
+    assert {"hdf5", "eigen", "nanobind", "data.whl"} <= set(names)
+    assert parts["bomFormat"] == "CycloneDX"
+    (dist / "libfclib0.deb").unlink()
+    with pytest.raises(SystemExit, match=r"has no \*.deb"):
+        release.finish(dist)

@@ -194,6 +194,8 @@ def look_up_other(line: str, root: Path) -> None:
         assert re.search(rf"^{words[1]}:", (root / "Makefile").read_text(), re.MULTILINE), line
     elif words[0] in (".venv/bin/python", "python"):
         script = (root / words[1]).read_text()
+        if "_results.add_option(" in script:
+            script += (root / "benchmarks/_results.py").read_text()
         for word in words[2:]:
             assert not word.startswith("--") or f'"{word}"' in script, f"{line}: no option {word}"
     elif words[:2] == ["pip", "install"]:

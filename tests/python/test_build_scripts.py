@@ -251,9 +251,8 @@ def test_a_release_has_checksums_and_a_list_of_parts(
     (tmp_path / "build/site").mkdir(parents=True)
     (tmp_path / "build/site/index.html").write_text("<p>")
     release.finish(dist)
-    sums = dict(
-        reversed(line.split("  ")) for line in (dist / "SHA256SUMS").read_text().splitlines()
-    )
+    lines = (dist / "SHA256SUMS").read_text().splitlines()
+    sums = {file: digest for digest, file in (line.split("  ") for line in lines)}
     assert set(sums) == {path.name for path in dist.iterdir() if path.is_file()} - {"SHA256SUMS"}
     for file, digest in sums.items():
         assert hashlib.sha256((dist / file).read_bytes()).hexdigest() == digest

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -12,10 +13,12 @@ from fclib import collections
 from fclib.bench import Store
 from fclib.cli._output import fail, out
 from fclib.cli._progress import many_bars
-from fclib.collections import choose
+from fclib.collections import choose, known, select
+from fclib.collections.candidates import candidates
 
 app = typer.Typer(
-    help="Make the lists of chosen problems: the sets hard and tiny, the family LocalProblems.",
+    help="Make the lists of chosen problems: the sets standard, hard and tiny, the family"
+    " LocalProblems.",
     no_args_is_help=True,
 )
 
@@ -48,6 +51,65 @@ def choose_hard(
     rule = {"tol": tol, "share": share, "per_family": per_family}
     choose.write_list(target, chosen, rule | {"solvers": solvers, "time_limits": limits})
     tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
+
+
+@app.command("standard")
+def choose_standard(
+    folder: Annotated[
+        Path, typer.Option("--candidates", help="Folder of candidates; simulated what it lacks.")
+    ],
+    target: List,
+    table: Annotated[Path, typer.Option(help="Features of all candidates, CSV.")],
+    states: Annotated[
+        Path | None, typer.Option(help="Folder that the chosen states are written into.")
+    ] = None,
+    version: Annotated[str, typer.Option(help="Of the states that are written.")] = "1",
+    kept: Annotated[
+        Path | None,
+        typer.Option("--keep", help="A list that stays; problems of other families come to it."),
+    ] = None,
+    problems: Annotated[int, typer.Option(help="That are chosen.", min=1)] = select.Rule.problems,
+    clusters: Annotated[int, typer.Option(help="Of like problems.", min=1)] = select.Rule.clusters,
+) -> None:
+    """Problems of all families, few of a kind: by their features and what solvers make of them.
+
+    Goes on after a kill. Families that changed, or are new, are simulated; of others the features
+    are read from the table where it is there. A problem of a list that is kept stays as it is,
+    whatever its family is by now.
+    """
+    rule = select.Rule(problems=problems, clusters=clusters)
+    held = known.Choice.read(kept) if kept is not None else ()
+    try:
+        rows = select.read_table(table) if table.is_file() else []
+        sources = {}
+        names = set(collections.families()) - {choice.family for choice in held}
+        if not names:
+            fail(f"{kept}: has problems of all families, there is nothing to add")
+        with many_bars() as bars:
+            for found in candidates(folder, sorted(names), progress=bars):
+                name = found.plan.scene.name
+                sources[name] = found
+                own = [row for row in rows if row["family"] == name]
+                if not select.describes(own, found):
+                    rows = [row for row in rows if row["family"] != name]
+                    rows += select.described(found, bars)
+                    select.write_table(table, rows)
+        # by the digits that are stored: whoever has the table chooses the same
+        rows = select.read_table(table)
+        fixed = sorted({(choice.family, choice.number) for choice in held})
+        chosen = [rows[k] for k in select.choose(rows, rule, fixed)]
+        new = [row for row in chosen if row["family"] in names]
+        choices = [*held, *select.choices_of(sources, new)]
+        choices.sort(key=lambda choice: (choice.family, choice.number))
+        choose.write_list(target, choices, rule.record() | {"kept": fixed})
+        if states is not None:
+            select.publish(sources, choices, "standard", version, states)
+    except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
+        fail(str(error))
+    counts = Counter(choice.family for choice in choices)
+    for name, count in counts.items():
+        out.print(f"{name} {count}", highlight=False)
+    out.print(f"{len(choices)} problems of {len(rows)} candidates:  {target}")
 
 
 @app.command("local")

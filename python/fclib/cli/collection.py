@@ -5,12 +5,15 @@ from __future__ import annotations
 import dataclasses
 from collections import Counter
 from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+import fclib
 from fclib import collections
+from fclib.bench import Store
 from fclib.cli import choose
 from fclib.cli._build import (
     Analyze,
@@ -26,6 +29,7 @@ from fclib.cli._build import (
 )
 from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
 from fclib.cli._progress import many_bars
+from fclib.collections import standing
 from fclib.collections.archives import FetchError
 from fclib.collections.known import KNOWN, choices
 
@@ -35,6 +39,7 @@ app = typer.Typer(
 app.add_typer(choose.app, name="choose")
 
 
+Rating = Enum("Rating", {name: name for name in standing.CLASSES}, type=str)  # type: ignore[misc]
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
 Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
@@ -196,7 +201,7 @@ def build(
     if every == bool(names):
         raise typer.BadParameter("name sets or families, or say --all")
     try:
-        folders = collections.folders(names or ["rt444"])
+        folders = collections.folders(names or ["rt444"], version)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     try:
@@ -329,6 +334,151 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         for origin, words in said.items():
             if origins[origin]:
                 out.print(f"{origins[origin]} problems {words}")
+    raise typer.Exit(int(report.failed))
+
+
+@app.command()
+def status(
+    name: Annotated[
+        str, typer.Argument(help="A set, or a problem SET/FAMILY/NUMBER.")
+    ] = standing.FIRST,
+    only: Annotated[
+        Rating | None, typer.Option("--class", help="Each problem of one class.")
+    ] = None,
+    every: Annotated[bool, typer.Option("--all", help="Each problem.")] = False,
+    stores: Annotated[
+        list[Path] | None, typer.Option("--add", help="A store of fclib bench: take its runs in.")
+    ] = None,
+    target: Annotated[
+        Path | None,
+        typer.Option("--out", help="Of a problem: write it with the best solution known."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Which problems are easy, hard or open; of open ones the best error known, and by whom.
+
+    Classes follow from the stored runs of campaigns; the first line says which.
+    """
+    try:
+        if name.count("/") == 2:
+            tell_problem(name, target, as_json)
+            return
+        if target is not None:
+            usage_error(ValueError("--out takes one problem: SET/FAMILY/NUMBER"))
+        if stores:
+            digests = {
+                digest: member.partition("/")[2]
+                for member, digest in standing.members(name).items()
+            }
+            count = 0
+            for path in stores:
+                with Store(path, create=False) as store:
+                    count += standing.add(store.results(), digests)
+            err.print(f"{count} runs taken in", highlight=False)
+        rows, basis = standing.standings(name)
+    except KeyError as error:
+        usage_error(ValueError(error.args[0]))
+    except (standing.StandingError, fclib.Error, OSError) as error:
+        fail(str(error))
+    report = Report(as_json)
+    wanted = [row for row in rows if only is None or row.rating == only.value]
+    if as_json:
+        for row in wanted:
+            report.add(record_of(row))
+        return
+    if basis is None:
+        fail(
+            f"{name}: none of its {len(rows)} problems was run; --add takes a store of fclib bench"
+        )
+    out.print(f"Classes {basis}", highlight=False)
+    if only is not None or every:
+        if wanted:
+            out.print(make_table([record_of(row) for row in wanted]))
+        else:
+            out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
+        return
+    families: dict[str, Counter[str]] = {}
+    for row in rows:
+        families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
+    families["all"] = sum(families.values(), Counter())
+    columns = [*standing.CLASSES, *(["not run"] if families["all"]["not run"] else [])]
+    out.print(
+        make_table(
+            [
+                {"family": family, **{column: counts[column] for column in columns}}
+                for family, counts in families.items()
+            ]
+        )
+    )
+    open_ones = [row for row in rows if row.rating == "open"]
+    if open_ones:
+        out.print()
+        out.print(make_table([record_of(row) for row in open_ones], title="Open"))
+        out.print(
+            f"fclib collection status {open_ones[0].id} --out FILE writes what is known of one"
+        )
+
+
+def record_of(row: standing.Standing) -> dict[str, Any]:
+    """A problem and how it stands, for a table."""
+    best = row.best
+    return {
+        "problem": row.id,
+        "class": row.rating or "not run",
+        "solved": f"{row.solved} of {row.voters}",
+        "best error": best.error if best is not None else None,
+        "by": best.solver if best is not None else "",
+        "version": best.version if best is not None else "",
+        "date": best.date if best is not None else "",
+        "solution": row.solution.name if row.solution is not None else "",
+    }
+
+
+def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
+    """How one problem stands; written with the best solution that is known."""
+    rows, _ = standing.standings(name.split("/")[0])
+    found = [row for row in rows if row.id == name]
+    if not found:
+        fail(
+            f"{name}: there is no such problem; fclib collection status names those that there are"
+        )
+    if target is not None:
+        problem, solution, said = standing.known_solution(name)
+        fclib.write(target, problem, solution)
+        err.print(f"error {said['error']:.3g}, by {said['by']}, {said['date']}", highlight=False)
+    report = Report(as_json)
+    report.add(record_of(found[0]))
+    if not as_json:
+        out.print(make_table(report.records))
+
+
+@app.command()
+def take(
+    files: Annotated[list[Path], typer.Argument(help="FCLIB files with problem and solution.")],
+    by: Annotated[str, typer.Option(help="Who found it, and how: a name, a solver, its version.")],
+    name: Annotated[
+        str | None,
+        typer.Option("--problem", help="SET/FAMILY/NUMBER; by default by the digest of its data."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Take in a solution of an open problem that is better than the best one known.
+
+    It is judged on the collection's own problem; the table and the solution's file are stored in
+    the package of trajectories, to be committed with it.
+    """
+    report = Report(as_json)
+    for path in files:
+        try:
+            taken, error, before = standing.take(path, by, name)
+        except (standing.StandingError, fclib.Error, OSError, KeyError) as reason:
+            words = str(reason.args[0]) if isinstance(reason, KeyError) else str(reason)
+            err.print(f"fclib: {words}", style="red", highlight=False)
+            report.add({"problem": str(path), "taken": False, "error": None, "before": None}, False)
+            continue
+        report.add({"problem": taken, "taken": True, "error": error, "before": before})
+    if not as_json:
+        out.print(make_table(report.records))
     raise typer.Exit(int(report.failed))
 
 

@@ -22,6 +22,10 @@ figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
 choose.py     the lists of chosen problems, by rules that anyone can repeat
+candidates.py states of all families, of which `standard` is chosen. Needs known.py, record.py
+features.py   what tells problems apart: their data, and what solvers make of them
+select.py     the set `standard` from a table of features. Needs candidates.py, features.py
+standing.py   which problems are easy, hard or open, by stored runs. Needs known.py
 """
 
 from fclib.collections.archives import get, publish

@@ -4,7 +4,7 @@ Every family has the set that it names; its problems are SET/FAMILY/NUMBER. Two 
 others:
 
 extended      all the families that came after RT-0444
-hard, tiny    chosen problems, in folders of their own; `hard.json` and `tiny.json` list them
+standard, hard, tiny    chosen problems, in folders of their own; lists in data/ have them
 
 A version changes when a problem of the set does, or when one comes or goes. Problems of a version
 whose trajectory is stored do not change (`published.py`).
@@ -38,6 +38,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "local": ("2", "problems of one contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("6", "all families that came after RT-0444"),
+    "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("6", "what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
@@ -92,8 +93,12 @@ def sets() -> dict[str, list[str]]:
     return dict(sorted(found.items()))
 
 
-def folders(names: Sequence[str]) -> list[str]:
+def folders(names: Sequence[str], version: str | None = None) -> list[str]:
     """Names of sets, of families and of families in a set as folders SET/FAMILY, each once.
+
+    Args:
+        names: of these.
+        version: of a list: the families of which it has states, which may be others by now.
 
     Raises:
         KeyError: a name is none of these.
@@ -102,9 +107,12 @@ def folders(names: Sequence[str]) -> list[str]:
     every = {folder for own in known.values() for folder in own}
     found: dict[str, None] = {}
     for name in names:
-        if name in known:
+        if name in known and version is not None and choices(name):
+            stored = [own for own in published.folders(name) if version in published.versions(own)]
+            found.update(dict.fromkeys(stored or known[name]))
+        elif name in known:
             found.update(dict.fromkeys(known[name]))
-        elif name in every:
+        elif name in every or (version is not None and version in published.versions(name)):
             found[name] = None
         elif name in families():
             found[f"{families()[name].collection}/{name}"] = None
@@ -133,7 +141,7 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
         ValueError: settings that the plan does not take, or a list that contradicts itself.
         OSError, TrajectoryError: the stored trajectory cannot be read.
     """
-    wanted = version or version_of(folder)
+    wanted, family = version or version_of(folder), folder.partition("/")[2]
     stored = published.path_of(folder, wanted)
     if version is not None and stored is None:
         there = ", ".join(published.versions(folder)) or "none"
@@ -144,6 +152,12 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
     plan = fresh_plan(folder, seed, **{"version": wanted, **settings})
     if stored is not None:
         frozen, _ = trajectory.read_origin(stored)
+        listed = [choice for choice in choices(plan.collection) if choice.family == family]
+        if choices(plan.collection) and (wanted != version_of(folder) or not listed):
+            # the list was another one then
+            numbers = tuple(published.digests(folder, wanted))
+            own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
+            return replace(plan, scene=frozen, trajectory=stored, **own)
         if frozen.seed == plan.scene.seed:
             return replace(plan, scene=frozen, trajectory=stored)
     return plan

@@ -160,4 +160,20 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
             path = known.DATA / f"{name}-{own}.hdf5"
             if path.is_file():
                 return _core.read(path)
+    older = older_versions(name)
+    if older:
+        raise published.VersionError(
+            f"{name}: the present version of {parts[0]} has no such problem, version {older[-1]}"
+            f" had: fclib collection build {parts[0]} --version {older[-1]} makes its files"
+        )
     return _core.read(Collection(f"{parts[0]}/{parts[1]}", folder).path(name, form))
+
+
+def older_versions(name: str) -> list[str]:
+    """The stored versions of a list that have a problem, where the present one has it not."""
+    own, _, number = name.rpartition("/")
+    listed = known.choices(own.partition("/")[0])
+    if not listed or not number.isdecimal():
+        return []
+    there = any(f"{own.partition('/')[0]}/{c.family}/{c.number:04d}" == name for c in listed)
+    return [] if there else published.versions_with(own, int(number))

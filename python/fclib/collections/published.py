@@ -36,6 +36,13 @@ def root() -> Path | None:
     return Path(spec.origin).parent / FOLDER
 
 
+def folders(name: str) -> list[str]:
+    """The folders SET/FAMILY of a set of which any version is stored."""
+    base = root()
+    found = sorted((base / name).glob(f"*-*{trajectory.SUFFIX}")) if base is not None else []
+    return list(dict.fromkeys(f"{name}/{path.stem.rpartition('-')[0]}" for path in found))
+
+
 def versions(folder: str) -> list[str]:
     """The stored versions of SET/FAMILY, the oldest first."""
     base = root()
@@ -64,6 +71,11 @@ def digests(folder: str, version: str) -> dict[int, str]:
     """The digest of each problem of a version of SET/FAMILY; none where it is not stored here."""
     path = path_of(folder, version)
     return _digests(path) if path is not None else {}
+
+
+def versions_with(folder: str, number: int) -> list[str]:
+    """The stored versions of SET/FAMILY that have a problem, the oldest first."""
+    return [one for one in versions(folder) if number in digests(folder, one)]
 
 
 def seed(folder: str, version: str) -> int | None:

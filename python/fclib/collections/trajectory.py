@@ -33,7 +33,7 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -66,6 +66,9 @@ PER_SIZE: Final = -24  # of the smallest body's size
 ELASTIC: Final = -40
 LARGEST: Final = 2**53  # integers that a double holds
 DIFFERENCES: Final = 2  # along the steps
+# of a trajectory, with a row for each state
+ARRAYS: Final = ("number", "step", "position", "velocity", "sketch")
+HEXES: Final = ("digest", "structure")
 
 
 class TrajectoryError(ValueError):
@@ -142,6 +145,15 @@ class Trajectory:
         if _digest.structure(problem) != self.structure[place]:
             return dict.fromkeys(_digest.parts(problem), math.inf)
         return _digest.distance(problem, self.sketch[place])
+
+
+def part(states: Trajectory, numbers: Iterable[int], collection: str, version: str) -> Trajectory:
+    """Some problems of a trajectory, as those of a version of another set. KeyError."""
+    places = [states.index(number) for number in sorted(numbers)]
+    values: dict[str, Any] = {name: getattr(states, name)[places] for name in ARRAYS}
+    values |= {name: tuple(getattr(states, name)[i] for i in places) for name in HEXES}
+    origin = {**states.origin, "collection": collection, "version": version}
+    return replace(states, origin=origin, **values)
 
 
 # ---- rounding

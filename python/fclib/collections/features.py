@@ -1,0 +1,204 @@
+"""What tells problems apart: features of a problem's structure, and of what solvers make of it.
+
+The behaviour is that of solvers of different kinds, each given few iterations: what a step of
+Newton's method or a sweep costs is another matter, and another machine gives the same figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fclib import _core, _solve, scenes
+from fclib.analysis._data import Data, columns
+from fclib.analysis._spectrum import spectrum
+
+Array = npt.NDArray[np.float64]
+
+TOLERANCE: Final = 1e-8
+# a solver of each kind, and its iterations at most: sweeps, steps of a gradient method, Newton's
+SOLVERS: Final[Mapping[str, int]] = {
+    "nsgs": 100,
+    "apgd": 200,
+    "admm": 200,
+    "nsn-ac": 20,
+    "nsip": 20,
+    "ppa-nsn": 60,
+    "auto": 200,
+}
+TIME_LIMIT: Final = 0.5  # [s] of each; large problems end by it
+DENSE: Final = 1500  # contact components of which W's spectrum is found
+NEAR: Final = 1e-3  # of W and of q, relative: below it two problems are nearly the same
+
+
+class Matrix:
+    """W and q of a problem, as they are compared."""
+
+    def __init__(self, problem: Any) -> None:
+        """Of a problem of any form."""
+        local = problem.condense() if problem.kind.startswith("global") else problem
+        self.problem = problem
+        self.local = local
+        self.W = columns(local.W)
+        self.q = np.asarray(local.q, dtype=float)
+        self.mu = np.asarray(local.mu, dtype=float)
+
+    def near(self, other: Matrix, bound: float = NEAR) -> bool:
+        """Whether W and q of both differ by less than `bound` of their norms, and mu does not."""
+        if self.W.shape != other.W.shape or self.problem.kind != other.problem.kind:
+            return False
+        if not np.array_equal(self.mu, other.mu):
+            return False
+        if np.linalg.norm(self.q - other.q) > bound * np.linalg.norm(self.q):
+            return False
+        return bool(sp.linalg.norm(self.W - other.W) <= bound * sp.linalg.norm(self.W))
+
+
+def thinned(matrices: Iterable[tuple[int, Matrix]]) -> list[tuple[int, Matrix]]:
+    """Those that are not nearly the same as an earlier one."""
+    kept: list[tuple[int, Matrix]] = []
+    for number, matrix in matrices:
+        if not any(matrix.near(other) for _, other in kept):
+            kept.append((number, matrix))
+    return kept
+
+
+def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
+    """Features of a problem's data; None where they are not known.
+
+    Args:
+        matrix: of the problem.
+        source: the scene that it is of, or the family.
+    """
+    problem, W = matrix.problem, matrix.W
+    d, nc = problem.spacedim, problem.nc
+    m = d * nc
+    rolling = problem.kind.endswith("rolling")
+    trace = W.diagonal().reshape(nc, d).sum(axis=1)
+    positive = trace[trace > 0]
+    blocks = sp.coo_array(W)
+    pairs = sp.coo_array(
+        (np.ones(blocks.nnz), (blocks.row // d, blocks.col // d)), shape=(nc, nc)
+    ).tocsr()
+    _, label = connected_components(pairs, directed=False)
+    sizes = np.bincount(label)
+    normal = matrix.q.reshape(nc, d)[:, 0]
+    total = float(np.linalg.norm(matrix.q))
+    rank, conditioning = spectrum_of(problem, m)
+    simulated = isinstance(source, scenes.Scene)
+    return {
+        "nc": nc,
+        "n": problem.n,
+        "p": problem.p,
+        "spacedim": d,
+        "rolling": float(rolling),
+        "planar": float(d == (3 if rolling else 2)),
+        "elastic": float(simulated and source.solids is not None),
+        "gaps": float(simulated and source.law == "gap"),
+        "periodic": float(simulated and source.period is not None),
+        "density": m / problem.n if problem.n else None,
+        "rank_ratio": m / rank if rank else None,
+        "conditioning": conditioning or None,
+        "neighbours": pairs.nnz / nc - 1,
+        "islands": float(len(sizes)),
+        "largest_island": float(sizes.max() / nc),
+        "mu": float(matrix.mu.mean()),
+        "mu_spread": float(matrix.mu.max() - matrix.mu.min()),
+        "frictionless": float((matrix.mu == 0).mean()),
+        "diagonal_spread": float(positive.max() / positive.min()) if positive.size else 1.0,
+        "approaching": float((normal < 0).mean()),
+        "normal_part": float(np.linalg.norm(normal) / total) if total else 0.0,
+    }
+
+
+def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
+    """Rank and conditioning of W, without its bilateral constraints; None where m is large."""
+    if m > DENSE:
+        return None, None
+    try:
+        reduced = Data.of(problem).reduced
+    except _core.Error:
+        return None, None
+    if reduced is None:
+        return None, None
+    found = spectrum(reduced.W, rounding=reduced.rounding)
+    return found.rank, found.conditioning
+
+
+def behaviour(matrix: Matrix) -> dict[str, float | None]:
+    """What each of SOLVERS reaches, and after how many iterations; None where it takes it not."""
+    found: dict[str, float | None] = {}
+    for name, iterations in SOLVERS.items():
+        try:
+            # condensed once for all of them
+            result = _solve.solve(
+                matrix.local,
+                name,
+                TOLERANCE,
+                max_iterations=iterations,
+                time_limit=TIME_LIMIT,
+            )
+        except _core.UnsuitableError:
+            error, effort = None, None
+        else:
+            error = result.error if np.isfinite(result.error) else 1e3
+            effort = float(min(result.iterations, iterations) if result.converged else iterations)
+        found |= {f"{name}_error": error, f"{name}_iterations": effort}
+    return found
+
+
+# how features are measured against each other: name, whether by logarithm, least value, weight
+SCALES: Final[tuple[tuple[str, bool, float, float], ...]] = (
+    ("nc", True, 1.0, 2.0),
+    ("n", True, 1.0, 1.0),
+    ("p", True, 1.0, 0.5),
+    ("spacedim", False, 0.0, 1.0),
+    ("rolling", False, 0.0, 1.0),
+    ("planar", False, 0.0, 1.0),
+    ("elastic", False, 0.0, 1.0),
+    ("gaps", False, 0.0, 0.5),
+    ("periodic", False, 0.0, 0.5),
+    ("density", False, 0.0, 1.0),
+    ("rank_ratio", False, 0.0, 1.0),
+    ("conditioning", True, 1.0, 1.0),
+    ("neighbours", True, 0.1, 1.0),
+    ("islands", True, 1.0, 1.0),
+    ("largest_island", False, 0.0, 1.0),
+    ("mu", False, 0.0, 1.0),
+    ("mu_spread", False, 0.0, 1.0),
+    ("frictionless", False, 0.0, 0.5),
+    ("diagonal_spread", True, 1.0, 1.0),
+    ("approaching", False, 0.0, 0.5),
+    ("normal_part", False, 0.0, 0.5),
+)
+
+
+def points(rows: list[dict[str, Any]]) -> Array:
+    """Rows of features as points (rows x features): logarithms, mean 0, deviation its weight.
+
+    What is not known takes the mean. A solver's features count half each, all together as much as
+    seven of the structure.
+    """
+    made = [column(rows, name, log, least) * weight for name, log, least, weight in SCALES]
+    for name in SOLVERS:
+        if any(row.get(f"{name}_error") is not None for row in rows):
+            made.append(0.5 * column(rows, f"{name}_error", True, 1e-8))
+            made.append(0.5 * column(rows, f"{name}_iterations", True, 1.0))
+    return np.array(made).T
+
+
+def column(rows: list[dict[str, Any]], name: str, log: bool, least: float) -> Array:
+    """A feature of all rows, with mean 0 and deviation 1."""
+    values = np.array([np.nan if row.get(name) is None else float(row[name]) for row in rows])
+    if log:
+        values = np.log10(np.maximum(values, least))
+    known = values[~np.isnan(values)]
+    if not known.size:
+        return np.zeros(len(rows))
+    deviation = float(known.std()) or 1.0
+    return np.where(np.isnan(values), 0.0, (values - known.mean()) / deviation)

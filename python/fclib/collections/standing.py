@@ -1,0 +1,382 @@
+"""How problems stand: easy, hard or open, by runs that are stored and solutions that are known.
+
+In the data package `fclib-collection`, beside the trajectories:
+
+    results/runs.csv                        a row for each run of a campaign, and for each solution
+    results/solutions/DIGEST.npz            r and l of the best solution of an open problem
+
+A problem is known by the digest of its data, of which 16 digits are stored, whatever its name is in
+however many sets. Of the runs to TOLERANCE those at one limit of CPU time have a vote, the limit at
+which most runs were done, of the newest version of each solver:
+
+easy    at least half of the solvers that take such problems solved it
+hard    fewer did
+open    no run and no solution that was taken in has an error within TOLERANCE
+
+Runs at a longer limit have no vote; what they solved is no longer open.
+"""
+
+from __future__ import annotations
+
+import csv
+import functools
+import io
+import json
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fclib import _core, _digest, scenes
+from fclib.collections import catalog, known, published, trajectory
+
+TOLERANCE: Final = 1e-8
+DIGITS: Final = 16  # of a digest
+TAKEN: Final = "taken"  # the status of a solution that came from elsewhere
+BETTER: Final = 0.9  # times the best error known: what a new solution must reach
+FOLDER: Final = "results"
+FIRST: Final = "standard"  # the set that most runs are of
+CLASSES: Final = ("easy", "hard", "open")
+
+
+class StandingError(ValueError):
+    """A solution that is not taken, and why; or results that cannot be stored."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of a campaign, or a solution that was taken in; a row of runs.csv."""
+
+    problem: str  # FAMILY/NUMBER, to be read by people
+    digest: str  # of its data
+    solver: str  # or who found the solution, and how
+    version: str  # of the solver; empty for a solution
+    limit: float | None  # [s] of CPU time
+    status: str  # of the bench, or TAKEN
+    error: float | None  # of the tolerance's merits the largest; None: there is no solution
+    cpu: float | None  # [s]
+    date: str
+
+    @property
+    def solved(self) -> bool:
+        """Whether the error is within TOLERANCE, in time."""
+        return self.status in ("converged", TAKEN) and self.within
+
+    @property
+    def within(self) -> bool:
+        """Whether the error is within TOLERANCE."""
+        return self.error is not None and self.error <= TOLERANCE
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A problem, and what is known of how hard it is."""
+
+    id: str
+    digest: str
+    rating: str  # easy, hard or open; empty where it was not run
+    solved: int  # by so many
+    voters: int  # of so many solvers
+    best: Run | None  # the one with the least error
+    solution: Path | None  # where it is stored
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What the classes of a set rest on."""
+
+    limit: float | None  # [s] of CPU time
+    solvers: tuple[str, ...]  # with a vote
+    versions: tuple[str, ...]
+    dates: tuple[str, str]  # the first and the last
+
+    def __str__(self) -> str:
+        """In a sentence."""
+        return (
+            f"to {TOLERANCE:g} within {self.limit:g} s of CPU a run, by {len(self.solvers)} solvers"
+            f" ({', '.join(self.solvers)}; version {', '.join(self.versions)}),"
+            f" {' to '.join(dict.fromkeys(self.dates))}"
+        )
+
+
+# ---- the table
+
+
+def folder() -> Path:
+    """Where results lie. StandingError where the package of trajectories is not here."""
+    root = published.root()
+    if root is None:
+        raise StandingError(
+            "no results are stored here: they come with the package fclib-collection"
+        )
+    return root.parent / FOLDER
+
+
+def runs() -> tuple[Run, ...]:
+    """All runs that are stored. StandingError, OSError."""
+    path = folder() / "runs.csv"
+    return _read(path, path.stat().st_mtime_ns) if path.is_file() else ()
+
+
+@functools.lru_cache(maxsize=1)
+def _read(path: Path, _changed: int) -> tuple[Run, ...]:
+    with path.open(newline="", encoding="utf-8") as file:
+        rows: list[dict[str, Any]] = list(csv.DictReader(file))
+    for row in rows:
+        row |= {name: float(row[name]) if row[name] else None for name in NUMBERS}
+    return tuple(Run(**row) for row in rows)
+
+
+NUMBERS: Final = ("limit", "error", "cpu")
+
+
+def write(rows: Iterable[Run]) -> Path:
+    """Store all runs, in order; the file is whole, or the old one. StandingError, OSError."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([field.name for field in fields(Run)])
+    for row in sorted(set(rows), key=lambda run: (run.problem, run.digest, run.solver, run.date)):
+        values = asdict(row)
+        numbers = {k: "" if values[k] is None else f"{values[k]:.6g}" for k in NUMBERS}
+        writer.writerow((values | numbers).values())
+    path = folder() / "runs.csv"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    catalog.replace_file(path, lambda beside: beside.write_text(text.getvalue(), encoding="utf-8"))
+    return path
+
+
+def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> int:
+    """Add the runs of campaigns to the table; how many it has taken.
+
+    A run of the same solver in the same version at the same limit is replaced.
+
+    Args:
+        results: rows of the view `results` of stores of the bench.
+        problems: FAMILY/NUMBER by the digest of those that are wanted.
+    """
+    new: dict[tuple[Any, ...], Run] = {}
+    for row in results:
+        if row["tol"] != TOLERANCE or row["hash"] not in problems or row["merit"] != "both":
+            continue
+        error = row["error"]
+        run = Run(
+            problem=problems[row["hash"]],
+            digest=row["hash"][:DIGITS],
+            solver=row["solver"],
+            version=row["version"],
+            limit=row["time_limit"],
+            status=row["status"],
+            error=None if error is None or not np.isfinite(error) else error,
+            cpu=row["cpu_s"],
+            date=datetime.fromtimestamp(row["started"], timezone.utc).date().isoformat(),
+        )
+        new[identity(run)] = run
+    write([*(run for run in runs() if identity(run) not in new), *new.values()])
+    return len(new)
+
+
+def identity(run: Run) -> tuple[Any, ...]:
+    """What makes two runs the same."""
+    return run.digest, run.solver, run.version, run.limit
+
+
+# ---- the classes
+
+
+def members(name: str) -> dict[str, str]:
+    """The digests of the problems of a set, by their names; of a list, or of stored states."""
+    listed = known.choices(name)
+    if listed:
+        return {f"{name}/{c.family}/{c.number:04d}": c.digest for c in listed}
+    found = {}
+    for own in known.folders([name]):
+        for number, digest in published.digests(own, known.version_of(own)).items():
+            found[f"{own}/{number:04d}"] = digest
+    return found
+
+
+def standings(name: str) -> tuple[list[Standing], Basis | None]:
+    """How each problem of a set stands, and what that rests on; None where nothing was run.
+
+    Raises:
+        KeyError: there is no such set.
+        StandingError, OSError: results cannot be read.
+    """
+    stored: dict[str, list[Run]] = defaultdict(list)
+    for run in runs():
+        stored[run.digest].append(run)
+    problems = members(name)
+    own = [run for digest in problems.values() for run in stored[digest[:DIGITS]]]
+    limits = Counter(run.limit for run in own if run.limit is not None)
+    limit = max(limits, key=lambda value: (limits[value], -value), default=None)
+    rows = []
+    voting: list[Run] = []
+    for name_, digest in problems.items():
+        mine = stored[digest[:DIGITS]]
+        # of several versions of a solver the last one has the vote
+        last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
+        voters = [run for run in last.values() if run.status != "unsuitable"]
+        voting += voters
+        rows.append(standing(name_, digest, mine, voters))
+    if limit is None:
+        return rows, None
+    dates = sorted(run.date for run in voting)
+    return rows, Basis(
+        limit,
+        tuple(sorted({run.solver for run in voting})),
+        tuple(sorted({run.version for run in voting})),
+        (dates[0], dates[-1]),
+    )
+
+
+def when(run: Run) -> str:
+    """Of runs the later one counts."""
+    return run.date
+
+
+def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]) -> Standing:
+    """Of one problem."""
+    solved = sum(run.solved for run in voters)
+    judged = [run for run in mine if run.error is not None]
+    best = min(judged, key=lambda run: run.error or 0.0, default=None)
+    if not voters:
+        rating = ""
+    elif not any(run.within for run in mine):
+        rating = "open"
+    else:
+        rating = "easy" if 2 * solved >= len(voters) else "hard"
+    path = solution_path(digest)
+    return Standing(
+        name, digest, rating, solved, len(voters), best, path if path.is_file() else None
+    )
+
+
+# ---- solutions
+
+
+def solution_path(digest: str) -> Path:
+    """Where the best solution of a problem is stored, if it is."""
+    return folder() / "solutions" / f"{digest[:DIGITS]}.npz"
+
+
+def problem_of(name: str) -> Any:
+    """The problem SET/FAMILY/NUMBER of a set with stored states, or assembled directly."""
+    own, _, number = name.rpartition("/")
+    plan = known.plan_of(own)
+    if isinstance(plan.scene, scenes.Assembled):
+        return plan.scene.problem(int(number))
+    if plan.trajectory is None:
+        raise StandingError(f"{own}: its states are not stored")
+    states = trajectory.read(plan.trajectory)
+    return states.problem(states.index(int(number))).problem
+
+
+def known_solution(name: str) -> tuple[Any, _core.Solution, dict[str, Any]]:
+    """An open problem, the best solution known, and who found it. StandingError without one."""
+    digest = members(name.split("/")[0]).get(name)
+    if digest is None:
+        raise StandingError(f"{name}: there is no such problem")
+    path = solution_path(digest)
+    if not path.is_file():
+        raise StandingError(f"{name}: no solution of it is stored")
+    with np.load(path) as arrays:
+        said: dict[str, Any] = json.loads(str(arrays["origin"]))
+        r = arrays["r"]
+        multipliers = arrays["l"] if "l" in arrays.files else None
+    return problem_of(name), solution_of(r, multipliers), said
+
+
+def solution_of(r: Any, multipliers: Any) -> _core.Solution:
+    """Of reactions, and the multipliers of bilateral constraints where there are any."""
+    return _core.Solution(r=r) if multipliers is None else _core.Solution(r=r, l=multipliers)
+
+
+def take(path: Path, by: str, name: str | None = None) -> tuple[str, float, float]:
+    """Verify the solution of an open problem that a file holds, and keep it if it is better.
+
+    It is judged on the collection's own problem, assembled from its state; of the file's problem
+    nothing but the digest is used.
+
+    Args:
+        path: an FCLIB file with a problem, in its global or local form, and a solution.
+        by: who found it, and how.
+        name: SET/FAMILY/NUMBER; by default by the digest of the file's problem.
+
+    Returns:
+        The name, the error, and the best one that was known before.
+
+    Raises:
+        StandingError: it is of no open problem, or not better.
+        fclib.Error, OSError: the file cannot be read, or the results not written.
+    """
+    problem, solution = _core.read(path), _core.read_solution(path)
+    if solution is None:
+        raise StandingError(f"{path}: holds no solution")
+    name = name or recognised(path, problem)
+    rated = {row.id: row for row in standings(name.split("/")[0])[0]}
+    if name not in rated:
+        raise StandingError(f"{name}: there is no such problem")
+    row = rated[name]
+    if row.rating != "open":
+        words = f"is {row.rating}" if row.rating else "was not run"
+        raise StandingError(f"{name}: {words}, and solutions are taken of open problems")
+    own = problem_of(name)
+    if solution.r.size != own.spacedim * own.nc:
+        raise StandingError(
+            f"{path}: r has {solution.r.size} entries, and {name} has {own.spacedim * own.nc}"
+        )
+    error = float(_core.merit(own, solution_of(solution.r, solution.l)).error)
+    best = row.best.error if row.best is not None and row.best.error is not None else np.inf
+    if not error < BETTER * best:
+        raise StandingError(
+            f"{name}: the error of this solution is {error:.3g}, and {best:.3g} is known"
+            + (f" by {row.best.solver}" if row.best is not None else "")
+        )
+    date = datetime.now(timezone.utc).date().isoformat()
+    store_solution(own, row.digest, solution, {"by": by, "error": error, "date": date})
+    family = name.partition("/")[2]
+    new = Run(family, row.digest[:DIGITS], by, "", None, TAKEN, error, None, date)
+    write([*runs(), new])
+    return name, error, best
+
+
+def store_solution(
+    problem: Any, digest: str, solution: _core.Solution, said: Mapping[str, Any]
+) -> None:
+    """Write r and l of the best solution of a problem."""
+    arrays: dict[str, Any] = {"r": solution.r} | ({"l": solution.l} if problem.p else {})
+    content = io.BytesIO()
+    np.savez_compressed(content, origin=json.dumps(dict(said), sort_keys=True), **arrays)
+    path = solution_path(digest)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    catalog.replace_file(path, lambda beside: beside.write_bytes(content.getvalue()))
+
+
+def recognised(path: Path, problem: Any) -> str:
+    """The name of a file's problem in a list, by its digest. StandingError where it has none."""
+    own = _digest.digest(problem)
+    lists = [name for name in known.sets() if known.choices(name)]
+    # the set that classes are made for before others
+    for name in sorted(lists, key=lambda name: name != FIRST):
+        rows, _ = standings(name)
+        for row in rows:
+            if row.digest == own or (row.rating == "open" and condenses_to(row.id, problem, own)):
+                return row.id
+    raise StandingError(
+        f"{path}: its problem is none of {', '.join(lists)}; name it, if it differs from one by the"
+        " rounding of another machine"
+    )
+
+
+def condenses_to(name: str, local: Any, digest: str) -> bool:
+    """Whether a local problem is the local form of a problem of the collection."""
+    if not local.kind.startswith("local"):
+        return False
+    own = problem_of(name)
+    if not own.kind.startswith("global") or (own.nc, own.p) != (local.nc, local.p):
+        return False
+    return _digest.digest(own.condense()) == digest

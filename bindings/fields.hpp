@@ -11,6 +11,7 @@
 #include "error.hpp"
 #include "field.hpp"
 #include "problem_info.hpp"
+#include "tables.hpp"
 
 namespace fclib::bindings {
 
@@ -138,6 +139,8 @@ enum class Fill { all, changes };
 template <class Struct>
 void fill(Struct& self, const nb::dict& values, Fill what = Fill::all) {
   std::size_t used = 0;
+  [[maybe_unused]] Index before = 0;
+  if constexpr (requires { self.info; }) before = self.size(Dim::nc);
   for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
     const std::string name(field.name);
     if (values.contains(name.c_str())) {
@@ -163,6 +166,17 @@ void fill(Struct& self, const nb::dict& values, Fill what = Fill::all) {
       ++used;
       set_matrix_info(self, values["matrix_info"]);
     }
+    // what is known of other contacts goes
+    if (what == Fill::changes && self.size(Dim::nc) != before) self.geometry.reset();
+    Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
+      const std::string name(table);
+      if (!values.contains(name.c_str())) return;
+      ++used;
+      auto changed =
+          self.geometry ? std::make_shared<Geometry>(*self.geometry) : std::make_shared<Geometry>();
+      (*changed).*member = table_from(values[name.c_str()], table);
+      self.geometry = std::move(changed);
+    });
   }
   if (used < values.size()) {
     for (const auto& [key, value] : values) {
@@ -184,6 +198,9 @@ nb::dict to_dict(nb::handle self) {
   if constexpr (requires { value.info; }) {
     result["info"] = nb::cast(value.info);
     result["matrix_info"] = matrix_info_of(value);
+    Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
+      result[std::string(table).c_str()] = geometry_of<Struct>(self, table, member);
+    });
   }
   return result;
 }
@@ -205,6 +222,8 @@ std::string signature_of(const std::string& method, const std::string& result, F
   if constexpr (requires(Struct s) { s.info; }) {
     text += ", info: ProblemInfo = ...";
     text += ", matrix_info: collections.abc.Mapping[str, MatrixInfo] = ...";
+    text += ", contacts: Contacts | None = ...";
+    text += ", bodies: Bodies | None = ...";
   }
   return text + ") -> " + result;
 }

@@ -48,6 +48,15 @@ void bind_problem(nb::module_& m) {
       nb::sig("def matrix_info(self, /) -> collections.abc.Mapping[str, MatrixInfo]"),
       "What is known of a matrix and cannot be read off its entries, by its name: "
       "matrix_info[\"W\"].rank. Matrices of which nothing is known are left out.");
+  Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
+    const std::string own(table);
+    const std::string type = "def " + own + "(self, /) -> " + geometry_class(own) + " | None";
+    cls.def_prop_ro(
+        own.c_str(), [own, member](nb::handle self) { return geometry_of<P>(self, own, member); },
+        nb::sig(type.c_str()),
+        own == "contacts" ? "where each contact is, and between what; None where it is not known"
+                          : "the bodies, their shapes and where they are; None where not known");
+  });
   const auto def_size = [&](const char* dim_name, Dim dim, const char* doc) {
     cls.def_prop_ro(dim_name, [dim](const P& p) { return p.size(dim); }, doc);
   };

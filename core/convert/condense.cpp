@@ -13,6 +13,7 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
   local_.spacedim = problem.spacedim;
   local_.mu = problem.mu;
   local_.info = problem.info;
+  local_.geometry = problem.geometry;
 
   const Vector free_velocity = mass_.solve(problem.f);
   local_.q = problem.w;

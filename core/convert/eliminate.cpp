@@ -101,6 +101,7 @@ Elimination::Elimination(const LocalProblem& problem, const GlobalProblem* bodie
   plain_.spacedim = problem.spacedim;
   plain_.mu = problem.mu;
   plain_.info = problem.info;
+  plain_.geometry = problem.geometry;
   const SparseColumns r = to_eigen(problem.R);
   v_ = to_eigen(problem.V);
   s_ = problem.s;

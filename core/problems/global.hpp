@@ -16,6 +16,7 @@
 #include <tuple>
 
 #include "field.hpp"
+#include "geometry.hpp"
 #include "linalg/matrix.hpp"
 #include "problem_info.hpp"
 
@@ -40,6 +41,7 @@ struct GlobalProblem {
   Vector mu;
   Vector b;
   ProblemInfo info;
+  GeometryPointer geometry;
 
   /// `P` is this struct, or one that adds to it.
   template <class P = GlobalProblem>

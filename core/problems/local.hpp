@@ -18,6 +18,7 @@
 #include <tuple>
 
 #include "field.hpp"
+#include "geometry.hpp"
 #include "linalg/matrix.hpp"
 #include "problem_info.hpp"
 
@@ -41,6 +42,7 @@ struct LocalProblem {
   Vector mu;
   Vector s;
   ProblemInfo info;
+  GeometryPointer geometry;
 
   /// `P` is this struct, or one that adds to it.
   template <class P = LocalProblem>

@@ -47,6 +47,7 @@ from fclib._core import (
 )
 from fclib._core import version as __version__
 from fclib._digest import digest
+from fclib._geometry import Bodies, Contacts
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
@@ -94,6 +95,8 @@ def load(name: str, form: str | None = None, folder: "str | Path | None" = None)
 
 __all__ = [
     "BatchResult",
+    "Bodies",
+    "Contacts",
     "Error",
     "FileError",
     "GlobalProblem",

@@ -21,7 +21,7 @@ LAYERS: list[set[str]] = [
         "merit_kind.hpp",
         "version.hpp",
     },
-    {"problem_info.hpp"},
+    {"problem_info.hpp", "geometry.hpp"},
     {"contact"},
     {"linalg"},
     {"solution.hpp", "problems"},
@@ -56,6 +56,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 # the parts of the Python package in one order, and what each may import of those above it: wherever
 # in a file an import stands, it counts. "__init__" is what `import fclib` gives
 PYTHON: dict[str, set[str]] = {
+    "_geometry": set(),
     "_core": set(),
     "_digest": set(),
     "_registry": {"_core"},
@@ -63,10 +64,10 @@ PYTHON: dict[str, set[str]] = {
     "_batch": {"_core"},
     "external": {"_core", "_registry"},
     "analysis": {"_core", "_digest", "_registry", "_solve"},
-    "scenes": {"_core"},
-    "simulate": {"_core", "_solve", "scenes"},
+    "scenes": {"_core", "_geometry"},
+    "simulate": {"_core", "_geometry", "_solve", "scenes"},
     "collections": {"_core", "_digest", "_solve", "analysis", "scenes", "simulate"},
-    "__init__": {"_batch", "_core", "_digest", "_registry", "_solve", "collections"},
+    "__init__": {"_batch", "_core", "_digest", "_geometry", "_registry", "_solve", "collections"},
     "bench": {
         "_core",
         "_digest",

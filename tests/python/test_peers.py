@@ -18,6 +18,7 @@ import pytest
 import scipy.sparse as sp
 
 import fclib
+from fclib import scenes
 from helpers import dense, judge, planted_global, planted_local
 
 # prints a file as JSON, every number of it; or writes a problem of known numbers
@@ -278,6 +279,22 @@ def test_libfclib_reads_a_title(peer: Peer, tmp_path: Path) -> None:
     assert seen["title"] == "Ten boxes"
 
 
+@pytest.mark.parametrize("form", ["local", "global"])
+def test_libfclib_passes_over_contacts_and_bodies(peer: Peer, tmp_path: Path, form: str) -> None:
+    problem, solution = with_geometry(form)
+    fclib.write(tmp_path / "p.hdf5", problem, solution)
+    assert_seen(problem, solution, json.loads(peer("show", form, tmp_path / "p.hdf5", "solution")))
+
+
+def with_geometry(form: str) -> tuple[Any, fclib.Solution]:
+    """A problem that says where its contacts and bodies are, and a solution."""
+    wall = scenes.Assembled(family=scenes.assemblies()["Wall"](), seed=0).problem(2)
+    problem = wall if form == "global" else wall.condense()
+    assert problem.contacts is not None
+    assert problem.bodies is not None
+    return problem, fclib.solve(problem, tol=1e-6).solution
+
+
 def test_libfclib_reads_a_problem_without_contacts(peer: Peer, tmp_path: Path) -> None:
     for d, kind in itertools.product([2, 3], ["local", "global"]):
         problem: fclib.Problem = (
@@ -440,6 +457,18 @@ def test_siconos_reads_ours(tmp_path: Path, kind: str) -> None:
     lines = {line.split()[0]: line.split()[1:] for line in output.splitlines() if line.split()}
     assert lines["sizes"] == ["3", "3"]
     np.testing.assert_array_equal([float(x) for x in lines["mu"]], problem.mu)
+
+
+@pytest.mark.parametrize("kind", ["local", "global"])
+def test_siconos_passes_over_contacts_and_bodies(tmp_path: Path, kind: str) -> None:
+    problem, solution = with_geometry(kind)
+    fclib.write(tmp_path / "ours.hdf5", problem, solution)
+    output = siconos(READS_HDF5, tmp_path / "ours.hdf5", kind)
+    if "without fclib" in output:
+        pytest.skip("this Siconos is built without fclib")
+    sizes, mu = (line.split()[1:] for line in output.splitlines())
+    assert [int(size) for size in sizes] == [3, problem.nc]
+    np.testing.assert_array_equal([float(value) for value in mu], problem.mu)
 
 
 @pytest.mark.parametrize("kind", ["local", "global"])

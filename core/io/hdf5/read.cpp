@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "io/hdf5/contents.hpp"
+#include "io/hdf5/geometry_groups.hpp"
 #include "io/hdf5/raw.hpp"
 
 namespace fclib {
@@ -120,6 +121,7 @@ P read_fields(const Group& root) {
                              }
                            });
   problem.info = read_info(group, "", "");
+  problem.geometry = read_geometry(root);
   return problem;
 }
 

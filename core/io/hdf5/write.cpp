@@ -5,6 +5,7 @@
 #include <variant>
 
 #include "io/hdf5/contents.hpp"
+#include "io/hdf5/geometry_groups.hpp"
 #include "io/hdf5/raw.hpp"
 #include "io/hdf5/transaction.hpp"
 
@@ -158,8 +159,16 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
       // those of another problem stay
       if (owned) make_room(root, "solution", options.replace);
       if (owned) make_room(root, "guesses", options.replace);
+      if (owned) remove_geometry(root);
     }
-    std::visit([&](const auto* p) { write_fields(root, *p, options); }, problem);
+    std::visit(
+        [&](const auto* p) {
+          write_fields(root, *p, options);
+          if (!p->geometry) return;
+          remove_geometry(root);
+          write_geometry(root, *p->geometry);
+        },
+        problem);
     if (options.validate) {
       require_owner(root, kind, owned, solution != nullptr || !guesses.empty());
     }

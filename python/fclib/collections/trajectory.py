@@ -126,14 +126,17 @@ class Trajectory:
 
         Raises as `fclib.simulate.simulate` does where the scene cannot be assembled.
         """
-        from fclib.simulate import describe, problem_at
+        from fclib.simulate import describe, geometry_of, problem_at
 
         known = {name: self.origin[name] for name in ("collection", "version")}
         settings = self.origin["settings"] | known | {"number": int(self.number[place])}
         info = describe(
             self.scene, self.scheme, settings, int(self.step[place]), self.model.left_out
         )
-        return problem_at(self.model, self.scheme, self.position[place], self.velocity[place], info)
+        state = self.position[place], self.velocity[place]
+        part = problem_at(self.model, self.scheme, *state, info)
+        contacts, bodies = geometry_of(self.model, part.contacts)
+        return replace(part, problem=part.problem.replace(contacts=contacts, bodies=bodies))
 
     def differences(self, place: int, problem: Any) -> dict[str, float]:
         """How far a problem is from the published one: of each matrix and vector that is not equal.

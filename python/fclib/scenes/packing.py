@@ -54,7 +54,7 @@ class Packing:
         difference = centres[pairs[:, 1]] - centres[pairs[:, 0]]
         normals = [difference / np.linalg.norm(difference, axis=1, keepdims=True)]
         points = [0.5 * (centres[pairs[:, 1]] + centres[pairs[:, 0]])]
-        first, second = [pairs[:, 0]], [pairs[:, 1]]
+        ones, others = [pairs[:, 0]], [pairs[:, 1]]
         # floor, then the four sides: axis, layer of the lattice that touches, direction inwards
         for axis, layer, sign in (
             (2, 0, 1),
@@ -68,9 +68,14 @@ class Packing:
             normal[axis] = sign
             normals.append(np.tile(normal, (len(touching), 1)))
             points.append(centres[touching] - 0.5 * SPACING * normal)
-            first.append(np.full(len(touching), -1))
-            second.append(touching)
+            ones.append(np.full(len(touching), -1))
+            others.append(touching)
         radii = 0.5 * SPACING * random.uniform(0.8, 1.0, len(centres))
+        first, second = np.concatenate(ones), np.concatenate(others)
+        # of a wall half a spacing, of two spheres their distance
+        width = np.full(len(first), 0.5 * SPACING)
+        width[: len(pairs)] = np.linalg.norm(difference, axis=1)
+        gaps = width - radii[second] - np.where(first >= 0, radii[first], 0.0)
         masses = 2500 * 4 / 3 * np.pi * radii**3
         impulses = np.zeros((len(centres), 3))
         pushed = np.flatnonzero(grid[:, 0] == side - 1)
@@ -80,10 +85,22 @@ class Packing:
             masses=masses,
             inertias=np.repeat((0.4 * masses * radii**2)[:, None], 3, axis=1),
             centres=centres,
-            first=np.concatenate(first),
-            second=np.concatenate(second),
+            first=first,
+            second=second,
             normals=np.concatenate(normals),
             points=np.concatenate(points),
             impulses=impulses,
+            kind="sphere",
+            sizes=np.repeat(radii[:, None], 3, axis=1),
+            planes=box(side),
+            gaps=gaps,
         )
         return bodies.problem(self.mu, f"{len(centres)} spheres, push {push:g}")
+
+
+def box(side: int) -> Any:
+    """The floor and the four walls (5 x 6): a point and the normal inwards."""
+    width = SPACING * side
+    sides: list[Any] = [((0, 0, 0), (0, 0, 1)), ((0, 0, 0), (1, 0, 0)), ((width, 0, 0), (-1, 0, 0))]
+    sides += [((0, 0, 0), (0, 1, 0)), ((0, width, 0), (0, -1, 0))]
+    return np.array([[*point, *normal] for point, normal in sides], dtype=float)

@@ -15,6 +15,7 @@ plane.py          contacts of bodies that move in a plane
 periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
 control.py        controls from outside: a file's rows, a function of time and state
 simulation.py     the loop, warm starts, and what each problem says of its origin
+geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
 render.py         a picture of a state with its reactions
 
 Importing this package needs MuJoCo, in the version that `_mujoco.py` pins; deformable scenes need
@@ -23,6 +24,7 @@ scikit-fem, in that of `_skfem.py`.
 
 from fclib.simulate.control import control_of
 from fclib.simulate.deformable import DeformableModel
+from fclib.simulate.geometry import geometry_of
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import UnsupportedSceneError
@@ -57,6 +59,7 @@ __all__ = [
     "control_of",
     "describe",
     "engine",
+    "geometry_of",
     "model_of",
     "problem_at",
     "provenance",

@@ -251,6 +251,7 @@ def describe(
         **settings,
         "step": index,
         "time": index * scheme.h,
+        "units": {"length": "m", "mass": "kg", "time": "s"},
     }
     words = [scene.description]
     words += [

@@ -7,13 +7,15 @@ ground is -1), its normal from the first to the second, and its point.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
 from fclib import _core
+from fclib._geometry import KINDS, Contacts
+from fclib._geometry import Bodies as BodyTable
 
 Vector: TypeAlias = npt.NDArray[np.float64]
 
@@ -22,6 +24,8 @@ STEP = 5e-3  # h [s]
 # numbers of contacts of a ladder, about
 SIZES = (10, 30, 100, 300, 1000, 3000, 10000, 30000, 100000)
 ROUNDING = 1e-15  # entries of H below are none
+LENGTH_NAMES: Final = {1e-3: "mm", 1.0: "m", 1e3: "km"}
+MASS_NAMES: Final = {1e-3: "g", 1.0: "kg", 1e3: "t"}
 
 
 @dataclass(frozen=True)
@@ -36,11 +40,25 @@ class Bodies:
     normals: Vector  # (nc x 3)
     points: Vector  # (nc x 3) [m]
     impulses: Vector  # (n x 3) [N s]
+    sizes: Vector  # (n x 3) half edges of a box, or radii of a sphere [m]
+    # (k x 6) a point [m] and the outward normal of each plane that the ground consists of
+    planes: Vector
+    kind: str = "box"  # or sphere
+    gaps: Any = 0.0  # (nc), or of all contacts [m]
     gravity: float = GRAVITY  # [m/s^2]
+    length: float = 1.0  # unit of all lengths here [m]
+    mass: float = 1.0  # unit of all masses here [kg]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The names of the units."""
+        return {"length": LENGTH_NAMES[self.length], "mass": MASS_NAMES[self.mass], "time": "s"}
 
     def problem(self, mu: Any, title: str) -> _core.GlobalProblem:
         """The problem G3DFC of a step from rest; mu is a number or (nc)."""
         count, nc = len(self.masses), len(self.normals)
+        length, mass = self.units["length"], self.units["mass"]
+        impulse = "N s" if (length, mass) == ("m", "kg") else f"{mass} {length}/s"
         parts = [self._rows(self.second, 1.0), self._rows(self.first, -1.0)]
         rows, columns, values = (np.concatenate([part[k] for part in parts]) for k in range(3))
         transposed = sp.csr_array((values, (rows, columns)), shape=(3 * nc, 6 * count))
@@ -61,9 +79,66 @@ class Bodies:
                 title=title,
                 math_info=(
                     f"one step from rest, h = {STEP:g} s; M v = H r + f, u = H^T v + w;"
-                    " v in m/s and rad/s, r in N s, components N, T1, T2"
+                    f" v in {length}/s and rad/s, r in {impulse}, components N, T1, T2"
                 ),
             ),
+            contacts=self._contacts(),
+            bodies=self._table(),
+        )
+
+    def _frames(self) -> Vector:
+        """Rows N, T1, T2 of each contact (nc x 3 x 3)."""
+        helper = np.where(np.abs(self.normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
+        t1 = np.cross(self.normals, helper)
+        t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
+        return np.stack([self.normals, t1, np.cross(self.normals, t1)], axis=1)
+
+    def _contacts(self) -> Contacts:
+        """Where the contacts are: body 0 is the ground; features count the contacts of a pair."""
+        body = 1 + np.column_stack((self.first, self.second))
+        # the ground's shapes come first: the plane in which the contact lies
+        arms = self.points[:, None] - self.planes[:, :3]
+        plane = np.abs(np.einsum("ckj,kj->ck", arms, self.planes[:, 3:])).argmin(axis=1)
+        shape = np.where(body == 0, plane[:, None], body - 1 + len(self.planes))
+        order = np.lexsort(shape.T)
+        ranked = shape[order]
+        new = np.append(True, (ranked[1:] != ranked[:-1]).any(axis=1))[: len(order)]
+        feature = np.zeros(len(order), np.int32)
+        feature[order] = np.arange(len(order)) - np.flatnonzero(new)[new.cumsum() - 1]
+        return Contacts(
+            body=body.astype(np.int32),
+            shape=shape.astype(np.int32),
+            feature=feature,
+            point=self.points,
+            normal=self.normals,
+            tangent=self._frames()[:, 1],
+            gap=np.broadcast_to(np.asarray(self.gaps, dtype=float), (len(order),)).copy(),
+        )
+
+    def _table(self) -> BodyTable:
+        """The bodies, the ground before them."""
+        count, planes = len(self.masses), len(self.planes)
+        upright = (1.0, 0.0, 0.0, 0.0)
+        # the turn that takes z to a plane's normal
+        normal = self.planes[:, 3:]
+        turn = np.column_stack((1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(planes)))
+        turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+        length, mass = self.units["length"], self.units["mass"]
+        return BodyTable(
+            name="\n".join(["ground", *(f"{self.kind} {i}" for i in range(count))]),
+            moves=np.array([0] + [1] * count, np.int32),
+            place=np.concatenate((np.zeros((1, 3)), self.centres)),
+            turn=np.tile(upright, (1 + count, 1)),
+            shape_body=np.concatenate((np.zeros(planes), 1 + np.arange(count))).astype(np.int32),
+            shape_kind=np.repeat(
+                [KINDS.index("plane"), KINDS.index(self.kind)], [planes, count]
+            ).astype(np.int32),
+            shape_size=np.concatenate((np.zeros((planes, 3)), self.sizes)),
+            shape_place=np.concatenate((self.planes[:, :3], np.zeros((count, 3)))),
+            shape_turn=np.concatenate((turn, np.tile(upright, (count, 1)))),
+            shape_mesh=np.full(planes + count, -1, np.int32),
+            unit="" if length == "m" else length,
+            mass_unit="" if mass == "kg" else mass,
         )
 
     def in_units(self, length: float, mass: float) -> Bodies:
@@ -76,6 +151,11 @@ class Bodies:
             points=self.points / length,
             impulses=self.impulses / (mass * length),
             gravity=self.gravity / length,
+            sizes=self.sizes / length,
+            gaps=self.gaps / length,
+            planes=self.planes / ([length] * 3 + [1.0] * 3),
+            length=length,
+            mass=mass,
         )
 
     def repeated(self, times: int) -> Bodies:
@@ -87,16 +167,14 @@ class Bodies:
             second=self.second[which],
             normals=self.normals[which],
             points=self.points[which],
+            gaps=np.broadcast_to(self.gaps, (len(self.normals),))[which],
         )
 
     def _rows(
         self, bodies: npt.NDArray[np.int64], sign: float
     ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], Vector]:
         """Entries of H^T (rows, columns, values) for one side of the contacts."""
-        helper = np.where(np.abs(self.normals[:, :1]) < 0.7, [[1.0, 0, 0]], [[0, 1.0, 0]])
-        t1 = np.cross(self.normals, helper)
-        t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
-        frames = np.stack([self.normals, t1, np.cross(self.normals, t1)], axis=1)
+        frames = self._frames()
         moving = np.flatnonzero(bodies >= 0)
         arms = self.points[moving] - self.centres[bodies[moving]]
         directions = frames[moving]
@@ -159,4 +237,6 @@ def running_bond(
         normals=np.tile([0.0, 0.0, 1.0], (len(first), 1)),
         points=np.array(points),
         impulses=impulses,
+        sizes=np.tile([1.0, 0.5, 0.5], (len(centres), 1)),
+        planes=np.array([[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]]),
     )

@@ -192,6 +192,7 @@ class Assembled:
             "parameters": self.parameters,
             "seed": self.seed,
             "step": number,
+            "units": units_of(problem),
         }
         words = [
             family.description,
@@ -205,6 +206,13 @@ class Assembled:
             math_info=problem.info.math_info,
         )
         return problem.replace(info=info)
+
+
+def units_of(problem: Any) -> dict[str, str]:
+    """The units of a problem of bodies, as its file says them; SI elsewhere."""
+    length = problem.bodies.unit if problem.bodies is not None else ""
+    mass = problem.bodies.mass_unit if problem.bodies is not None else ""
+    return {"length": length or "m", "mass": mass or "kg", "time": "s"}
 
 
 class Described(Protocol):

@@ -1,0 +1,2 @@
+_core.__prefix__:
+    from fclib._geometry import Bodies, Contacts

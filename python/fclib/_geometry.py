@@ -1,0 +1,280 @@
+"""Where the contacts of a problem are, and what touches there: the groups /contacts and /bodies.
+
+    problem.contacts, problem.bodies        None where a file has none
+    problem.replace(contacts=..., bodies=...)
+
+Each column is a dataset of the group, row after row; `docs/format.md` lists them. Lengths are in
+the unit that the bodies name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+Integers = npt.NDArray[np.int32]
+Numbers = npt.NDArray[np.float64]
+
+# kinds of shapes, by their numbers in a file
+KINDS: Final = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+
+
+def column(
+    count: str, width: int, kind: Any, doc: str, *, optional: bool = False
+) -> dict[str, Any]:
+    """What a field is, of `count` rows of `width` numbers each; kind: int, float or str."""
+    return {"count": count, "width": width, "kind": kind, "doc": doc, "optional": optional}
+
+
+def nothing(kind: Any, width: int = 1) -> Callable[[], Any]:
+    """What makes an absent column."""
+    return lambda: np.zeros((0, width) if width > 1 else 0, _type(kind))
+
+
+def _type(kind: Any) -> Any:
+    return np.int32 if kind is int else np.float64
+
+
+class _Table:
+    """What both tables have: columns of a file, checked when they are made."""
+
+    @classmethod
+    def _made(cls, columns: Mapping[str, Any], group: str) -> Any:
+        """Of the columns of a file. ValueError names the one that is wrong; others are ignored."""
+        values = {}
+        for own in fields(cls):  # type: ignore[arg-type]
+            known = own.metadata
+            if own.name not in columns:
+                if known.get("optional"):
+                    continue
+                raise ValueError(f"/{group}/{own.name}: the dataset is missing")
+            value = columns[own.name]
+            if known["kind"] is str:
+                if not isinstance(value, str):
+                    raise ValueError(f"/{group}/{own.name}: does not hold text")
+            elif isinstance(value, str) or (known["kind"] is int and value.dtype != np.int32):
+                raise ValueError(f"/{group}/{own.name}: does not hold numbers of type int")
+            elif value.size % known["width"]:
+                raise ValueError(
+                    f"/{group}/{own.name}: has {value.size} entries, no multiple of"
+                    f" {known['width']}"
+                )
+            elif known["width"] > 1:
+                value = value.reshape(-1, known["width"])
+            values[own.name] = value
+        return cls(**values)
+
+    def columns(self) -> dict[str, Any]:
+        """The columns as a file has them: one dimension, empty ones left out."""
+        found = {}
+        for own in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, own.name)
+            if own.metadata["kind"] is not str:
+                value = np.ascontiguousarray(value, dtype=_type(own.metadata["kind"])).ravel()
+                # /contacts/gap of no contact is there, what is optional is not
+                if own.metadata.get("optional") and not value.size:
+                    continue
+            elif own.metadata.get("optional") and not value:
+                continue
+            found[own.name] = value
+        return found
+
+    def _check(self, group: str, counts: Mapping[str, int]) -> None:
+        for own in fields(self):  # type: ignore[arg-type]
+            known = own.metadata
+            value = getattr(self, own.name)
+            if known["kind"] is str or (known.get("optional") and not len(value)):
+                continue
+            if known["count"] in counts and len(value) != counts[known["count"]]:
+                raise ValueError(
+                    f"/{group}/{own.name}: has {len(value)} rows, expected {known['count']} ="
+                    f" {counts[known['count']]}"
+                )
+            if value.dtype.kind == "f" and not np.isfinite(value).all():
+                raise ValueError(f"/{group}/{own.name}: has a value that is not finite")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Contacts(_Table):
+    """Where nc contacts are, in the order of the problem.
+
+    Bodies, shapes and feature of a contact are its identity: the same in the next step.
+    """
+
+    body: Integers = field(
+        metadata=column("nc", 2, int, "the two; the normal points to the second")
+    )
+    shape: Integers = field(
+        metadata=column("nc", 2, int, "their shapes; -1 for the limit of a joint")
+    )
+    feature: Integers = field(metadata=column("nc", 1, int, "which contact of these two it is"))
+    point: Numbers = field(metadata=column("nc", 3, float, "midway between the two, in the world"))
+    normal: Numbers = field(metadata=column("nc", 3, float, "N, in the world; 0 for a limit"))
+    tangent: Numbers = field(
+        metadata=column("nc", 3, float, "T1; T2 = N x T1, in the plane T1 is T")
+    )
+    gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 where they overlap"))
+
+    def __post_init__(self) -> None:
+        """ValueError where the columns contradict each other."""
+        self._check("contacts", {"nc": len(self.gap)})
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Any], count: int | None = None) -> Contacts:
+        """Of the columns of a file, for so many contacts. ValueError."""
+        made: Contacts = cls._made(columns, "contacts")
+        if count is not None and len(made) != count:
+            raise ValueError(f"/contacts: has {len(made)} rows, and the problem {count} contacts")
+        return made
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @property
+    def frame(self) -> Numbers:
+        """(nc x 3 x 3) rows N, T1, T2 in the world; 0 for a limit."""
+        return np.stack((self.normal, self.tangent, np.cross(self.normal, self.tangent)), axis=1)
+
+    @property
+    def identity(self) -> list[tuple[int, ...]]:
+        """(nc) what names each contact in all steps: bodies, shapes, feature."""
+        rows = np.column_stack((self.body, self.shape, self.feature))
+        return [tuple(row) for row in rows.tolist()]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Bodies(_Table):
+    """Bodies, their shapes, and where they are.
+
+    A shape lies at `shape_place`, turned by `shape_turn`, in its body, which lies at `place`,
+    turned by `turn`, in the world. Turns are quaternions w, x, y, z.
+    """
+
+    name: str = field(metadata=column("nb", 1, str, "the names of the bodies, a line for each"))
+    moves: Integers = field(metadata=column("nb", 1, int, "1 where something moves it, 0: fixed"))
+    place: Numbers = field(metadata=column("nb", 3, float, "of the body's frame, in the world"))
+    turn: Numbers = field(metadata=column("nb", 4, float, "of the body's frame"))
+    shape_body: Integers = field(metadata=column("ns", 1, int, "the body of each shape"))
+    shape_kind: Integers = field(
+        metadata=column("ns", 1, int, f"{', '.join(f'{i} {k}' for i, k in enumerate(KINDS))}")
+    )
+    shape_size: Numbers = field(
+        metadata=column("ns", 3, float, "half edges, radii, ...; docs/format.md")
+    )
+    shape_place: Numbers = field(metadata=column("ns", 3, float, "in the body"))
+    shape_turn: Numbers = field(metadata=column("ns", 4, float, "in the body"))
+    shape_mesh: Integers = field(metadata=column("ns", 1, int, "its mesh, -1 for another kind"))
+    mesh_first: Integers = field(
+        default_factory=nothing(int, 2),
+        metadata=column(
+            "nm + 1",
+            2,
+            int,
+            "the first vertex and the first face of each mesh, and their numbers",
+            optional=True,
+        ),
+    )
+    vertex: Numbers = field(
+        default_factory=nothing(float, 3),
+        metadata=column("", 3, float, "of all meshes, in the shape", optional=True),
+    )
+    displacement: Numbers = field(
+        default_factory=nothing(float, 3),
+        metadata=column(
+            "", 3, float, "of an elastic body's vertices since it was without stress", optional=True
+        ),
+    )
+    face: Integers = field(
+        default_factory=nothing(int, 4),
+        metadata=column(
+            "",
+            4,
+            int,
+            "vertices of a face of its mesh about the outward normal; -1: three only",
+            optional=True,
+        ),
+    )
+    period: Numbers = field(
+        default_factory=nothing(float),
+        metadata=column(
+            "2",
+            1,
+            float,
+            "edges of a cell about the origin that repeats along x and y",
+            optional=True,
+        ),
+    )
+    planar: Integers = field(
+        default_factory=nothing(int),
+        metadata=column(
+            "1", 1, int, "1 where all moves in the plane x, z; absent elsewhere", optional=True
+        ),
+    )
+    unit: str = field(
+        default="", metadata=column("1", 1, str, "of lengths; absent where it is m", optional=True)
+    )
+    mass_unit: str = field(
+        default="", metadata=column("1", 1, str, "of masses; absent where it is kg", optional=True)
+    )
+
+    def __post_init__(self) -> None:
+        """ValueError where the columns contradict each other."""
+        counts = {"nb": len(self.moves), "ns": len(self.shape_kind), "1": 1, "2": 2}
+        self._check("bodies", counts)
+        if len(self.names) != counts["nb"]:
+            raise ValueError(f"/bodies/name: has {len(self.names)} lines, expected {counts['nb']}")
+        for name, values, bound in (
+            ("shape_body", self.shape_body, counts["nb"]),
+            ("shape_kind", self.shape_kind, len(KINDS)),
+            ("shape_mesh", self.shape_mesh, max(len(self.mesh_first) - 1, 0)),
+        ):
+            if len(values) and not (values.min() >= -1 and values.max() < bound):
+                raise ValueError(f"/bodies/{name}: has a number that is out of range")
+
+    @classmethod
+    def of(cls, columns: Mapping[str, Any]) -> Bodies:
+        """Of the columns of a file. ValueError."""
+        made: Bodies = cls._made(columns, "bodies")
+        return made
+
+    def __len__(self) -> int:
+        return len(self.moves)
+
+    @property
+    def names(self) -> list[str]:
+        """(nb) of the bodies."""
+        return self.name.split("\n")
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether all moves in the plane x, z."""
+        return bool(len(self.planar) and self.planar[0])
+
+    def mesh(self, shape: int) -> tuple[Numbers, Integers] | None:
+        """Vertices (k x 3) in the shape and faces (f x 4) of a shape; None where it has no mesh."""
+        which = self.shape_mesh[shape]
+        if which < 0:
+            return None
+        (vertex, face), (end, last) = self.mesh_first[which], self.mesh_first[which + 1]
+        return self.vertex[vertex:end], self.face[face:last]
+
+    def poses(self) -> tuple[Numbers, Numbers]:
+        """Where the shapes are in the world: places (ns x 3) and rotations (ns x 3 x 3)."""
+        body = rotations(self.turn)[self.shape_body]
+        place = self.place[self.shape_body] + np.einsum("sij,sj->si", body, self.shape_place)
+        return place, body @ rotations(self.shape_turn)
+
+
+def rotations(turn: Numbers) -> Numbers:
+    """The rotations (k x 3 x 3) of unit quaternions w, x, y, z (k x 4)."""
+    w, x, y, z = turn.T
+    rows = (
+        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
+        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
+        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

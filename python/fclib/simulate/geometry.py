@@ -1,0 +1,307 @@
+"""What a file says of its contacts and bodies: /contacts and /bodies of a simulated problem.
+
+    contacts, bodies = geometry_of(model, part.contacts)    right after `problem_at`
+
+The identity of a contact follows from the state alone, like the problem: its two shapes, and its
+feature. Of rigid bodies that is where on the two shapes it lies, each axis of the box of a shape in
+three parts; of elastic ones the node. A shape that is round about an axis is divided along it
+alone, a sphere not at all: they may roll.
+
+Shapes are those that collide, and primitives that are only seen; of a mesh its convex hull, which
+is what collides.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib._geometry import KINDS, Bodies, Contacts
+from fclib.simulate import moreau_jean
+from fclib.simulate._mujoco import mujoco
+from fclib.simulate.deformable import FACES, DeformableModel
+from fclib.simulate.mujoco_model import MujocoModel
+
+Integers = npt.NDArray[np.int32]
+Vector = npt.NDArray[np.float64]
+
+PARTS: Final = 3  # of an axis of a shape
+LIMITS: Final = 16  # more than MuJoCo has kinds of constraints
+ROUNDED: Final = 2.0**-30  # what is stored is a multiple of it [m], as states are
+ELASTIC: Final = 2.0**-40  # displacements likewise
+KIND_OF: Final = {
+    int(mujoco.mjtGeom.mjGEOM_PLANE): KINDS.index("plane"),
+    int(mujoco.mjtGeom.mjGEOM_SPHERE): KINDS.index("sphere"),
+    int(mujoco.mjtGeom.mjGEOM_CAPSULE): KINDS.index("capsule"),
+    int(mujoco.mjtGeom.mjGEOM_ELLIPSOID): KINDS.index("ellipsoid"),
+    int(mujoco.mjtGeom.mjGEOM_CYLINDER): KINDS.index("cylinder"),
+    int(mujoco.mjtGeom.mjGEOM_BOX): KINDS.index("box"),
+    int(mujoco.mjtGeom.mjGEOM_MESH): KINDS.index("mesh"),
+    int(mujoco.mjtGeom.mjGEOM_HFIELD): KINDS.index("mesh"),
+}
+# axes of a shape along which a contact has a place of its own
+AXES: Final = {"capsule": (2,), "cylinder": (2,), "box": (0, 1, 2), "mesh": (0, 1, 2)}
+UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)  # quaternion of no turn
+
+
+def geometry_of(
+    model: MujocoModel | DeformableModel, contacts: moreau_jean.Contacts
+) -> tuple[Contacts, Bodies]:
+    """The tables of a problem of a model, which is in the state of the problem."""
+    if isinstance(model, DeformableModel):
+        return elastic(model, contacts)
+    return rigid(model, contacts)
+
+
+def rounded(values: Any, quantum: float = ROUNDED) -> Vector:
+    """Multiples of a quantum: a nanometre is enough for a picture, and takes half of the room."""
+    numbers: Vector = np.rint(np.asarray(values, dtype=float) / quantum) * quantum
+    return numbers + 0.0  # no -0
+
+
+def table_of(
+    contacts: moreau_jean.Contacts, body: Any, shape: Any, feature: npt.NDArray[Any]
+) -> Contacts:
+    """The table of contacts, with what names them (nc x 2), (nc x 2), (nc)."""
+    return Contacts(
+        body=np.asarray(body, np.int32),
+        shape=np.asarray(shape, np.int32),
+        feature=feature.astype(np.int32),
+        point=rounded(contacts.point),
+        normal=rounded(contacts.frame[:, 0]),
+        tangent=rounded(contacts.frame[:, 1]),
+        gap=rounded(contacts.gap),
+    )
+
+
+# ---- rigid bodies
+
+
+def rigid(model: MujocoModel, contacts: moreau_jean.Contacts) -> tuple[Contacts, Bodies]:
+    """The tables of an MJCF scene."""
+    m, d = model.model, model.data
+    static = shapes_of(model)
+    bodies = Bodies(
+        **static.columns,
+        place=rounded(d.xpos[static.bodies]),
+        turn=rounded(d.xquat[static.bodies]),
+    )
+    limit = contacts.pair[:, 0] < 0
+    geom = np.where(limit[:, None], 0, contacts.pair)
+    shape = np.where(limit[:, None], -1, static.shape_of[geom])
+    body = static.body_of[m.geom_bodyid[geom]]
+    # of a joint's limit or dry friction the joint's body and its parent; of a tendon's the world
+    kind = -1 - contacts.pair[:, 0]
+    number = contacts.pair[:, 1]
+    body[limit] = 0
+    types = mujoco.mjtConstraint
+    for which, bodies_of in (
+        (types.mjCNSTR_LIMIT_JOINT, m.jnt_bodyid),
+        (types.mjCNSTR_FRICTION_DOF, m.dof_bodyid),
+    ):
+        joint = limit & (kind == int(which))
+        own = bodies_of[number[joint]]
+        body[joint] = static.body_of[np.column_stack((m.body_parentid[own], own))]
+    feature = features(model, contacts, geom)
+    # a joint may have two limits at once, the lower and the upper one
+    again = repeated(contacts.pair[limit])
+    feature[limit] = LIMITS * (2 * number[limit] + again) + kind[limit]
+    return table_of(contacts, body, shape, feature), bodies
+
+
+def repeated(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Of equal rows (k x 2) the how manieth each is, from 0."""
+    seen: dict[tuple[int, ...], int] = {}
+    found = np.zeros(len(pair), np.int64)
+    for i, row in enumerate(pair.tolist()):
+        found[i] = seen.get(tuple(row), 0)
+        seen[tuple(row)] = int(found[i]) + 1
+    return found
+
+
+def features(
+    model: MujocoModel, contacts: moreau_jean.Contacts, geom: npt.NDArray[np.int64]
+) -> npt.NDArray[np.int64]:
+    """Where on its two shapes (nc x 2) each contact lies, as a number (nc); different in a pair."""
+    m, d = model.model, model.data
+    static = shapes_of(model)
+    code = np.zeros(len(contacts), np.int64)
+    local = np.zeros((len(contacts), 3))
+    for side in (0, 1):
+        which = geom[:, side]
+        arm = contacts.point - d.geom_xpos[which]
+        if model.scene.period is not None:
+            edges = np.array(model.scene.period)
+            arm[:, :2] -= edges * np.rint(arm[:, :2] / edges)
+        local = np.einsum("cji,cj->ci", d.geom_xmat[which].reshape(-1, 3, 3), arm)
+        box = m.geom_aabb[which]
+        # a third of the half width and more is an end of its own
+        place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
+        third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
+        part = np.where(static.divided[which], third, 1).astype(np.int64)
+        code = PARTS**3 * code + part @ np.array((1, PARTS, PARTS**2))
+    # several in one part, in the order of their places on the second shape
+    order = np.lexsort((*np.round(local, 6).T, code, geom[:, 1], geom[:, 0]))
+    key = np.column_stack((geom, code))[order]
+    number = np.zeros(len(contacts), np.int64)
+    number[order] = repeated_in_order(key)
+    return code + PARTS**6 * number
+
+
+def repeated_in_order(rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """The same of rows of which equal ones stand together."""
+    if not len(rows):
+        return np.zeros(0, np.int64)
+    new = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))
+    start = np.flatnonzero(new)
+    count: npt.NDArray[np.int64] = np.arange(len(rows)) - start[new.cumsum() - 1]
+    return count
+
+
+class Shapes:
+    """What of a compiled model does not change with its state."""
+
+    def __init__(self, model: MujocoModel) -> None:
+        m = model.model
+        ghosts = m.body_mocapid >= 0 if model.scene.period is not None else np.zeros(m.nbody, bool)
+        self.bodies = np.flatnonzero(~ghosts)  # (nb) MuJoCo's numbers
+        self.body_of = np.full(m.nbody, -1)
+        self.body_of[self.bodies] = np.arange(len(self.bodies))
+        collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
+        collides[np.concatenate((m.pair_geom1, m.pair_geom2)).astype(int)] = True
+        kind = np.array([KIND_OF.get(int(t), -1) for t in m.geom_type])
+        seen = (kind >= 0) & (collides | (kind != KINDS.index("mesh")))
+        geoms = np.flatnonzero(seen & ~ghosts[m.geom_bodyid])
+        self.shape_of = np.full(m.ngeom, -1)
+        self.shape_of[geoms] = np.arange(len(geoms))
+        self.divided = np.zeros((m.ngeom, 3), dtype=bool)
+        for name, axes in AXES.items():
+            for axis in axes:
+                self.divided[kind == KINDS.index(name), axis] = True
+
+        meshes: dict[tuple[int, int], int] = {}  # kind and number of a mesh or field
+        vertices: list[Vector] = [np.zeros((0, 3))]
+        faces: list[npt.NDArray[np.int64]] = [np.zeros((0, 4), np.int64)]
+        own = np.full(len(geoms), -1)
+        for i, geom in enumerate(geoms.tolist()):
+            if kind[geom] == KINDS.index("mesh"):
+                key = (int(m.geom_type[geom]), int(m.geom_dataid[geom]))
+                if key not in meshes:
+                    field = key[0] == int(mujoco.mjtGeom.mjGEOM_HFIELD)
+                    vertex, face = field_of(m, key[1]) if field else hull_of(m, key[1])
+                    vertices.append(rounded(vertex))
+                    faces.append(face)
+                    meshes[key] = len(meshes)
+                own[i] = meshes[key]
+        size = m.geom_size[geoms].copy()
+        size[own >= 0] = 0
+        moves = (m.body_weldid != 0) & (m.body_dofnum[m.body_weldid] > 0)
+        # what hangs on what moves does too
+        for body in range(1, m.nbody):
+            moves[body] |= moves[m.body_parentid[body]]
+        first = np.array([[len(v), len(f)] for v, f in zip(vertices, faces, strict=True)])
+        self.columns: dict[str, Any] = {
+            "name": "\n".join(
+                (m.body(i).name or f"body {i}").replace("\n", " ") for i in self.bodies.tolist()
+            ),
+            "moves": moves[self.bodies].astype(np.int32),
+            "shape_body": self.body_of[m.geom_bodyid[geoms]].astype(np.int32),
+            "shape_kind": kind[geoms].astype(np.int32),
+            "shape_size": rounded(size),
+            "shape_place": rounded(m.geom_pos[geoms]),
+            "shape_turn": rounded(m.geom_quat[geoms]),
+            "shape_mesh": own.astype(np.int32),
+        }
+        if meshes:
+            self.columns |= {
+                "mesh_first": first.cumsum(axis=0).astype(np.int32),
+                "vertex": np.concatenate(vertices),
+                "face": np.concatenate(faces).astype(np.int32),
+            }
+        if model.scene.planar:
+            self.columns["planar"] = np.ones(1, np.int32)
+        if model.scene.period is not None:
+            self.columns["period"] = np.array(model.scene.period, dtype=float)
+
+
+_known: WeakKeyDictionary[MujocoModel, Shapes] = WeakKeyDictionary()
+
+
+def shapes_of(model: MujocoModel) -> Shapes:
+    """The shapes of a model, found once."""
+    if model not in _known:
+        _known[model] = Shapes(model)
+    return _known[model]
+
+
+def hull_of(m: Any, mesh: int) -> tuple[Vector, npt.NDArray[np.int64]]:
+    """Vertices and faces of a mesh's convex hull, or of the mesh where MuJoCo made none."""
+    vertex = m.mesh_vert[m.mesh_vertadr[mesh] :][: m.mesh_vertnum[mesh]]
+    if m.mesh_graphadr[mesh] < 0:
+        face = m.mesh_face[m.mesh_faceadr[mesh] :][: m.mesh_facenum[mesh]]
+    else:
+        graph = m.mesh_graph[m.mesh_graphadr[mesh] :]
+        nvert, nface = int(graph[0]), int(graph[1])
+        own = graph[2 + nvert : 2 + 2 * nvert]
+        face = graph[2 + 3 * nvert + 3 * nface :][: 3 * nface].reshape(-1, 3)
+        new = np.zeros(int(own.max(initial=0)) + 1, np.int64)
+        new[own] = np.arange(nvert)
+        vertex, face = vertex[own], new[face]
+    return vertex.astype(float), np.column_stack((face, np.full(len(face), -1))).astype(np.int64)
+
+
+def field_of(m: Any, field: int) -> tuple[Vector, npt.NDArray[np.int64]]:
+    """Vertices and faces of the surface of a height field."""
+    rows, columns = int(m.hfield_nrow[field]), int(m.hfield_ncol[field])
+    a, b, height, _ = m.hfield_size[field]
+    y, x = np.meshgrid(np.linspace(-b, b, rows), np.linspace(-a, a, columns), indexing="ij")
+    z = m.hfield_data[m.hfield_adr[field] :][: rows * columns].reshape(rows, columns) * height
+    number = np.arange(rows * columns).reshape(rows, columns)
+    corners = (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
+    return (
+        np.column_stack((x.ravel(), y.ravel(), z.ravel())),
+        np.column_stack([corner.ravel() for corner in corners]),
+    )
+
+
+# ---- elastic bodies
+
+
+def elastic(model: DeformableModel, contacts: moreau_jean.Contacts) -> tuple[Contacts, Bodies]:
+    """The tables of elastic blocks: body 0 is the ground, block b is body 1 + b."""
+    count, floor = len(model.meshes), model.solids.floor
+    displaced = model.places()
+    vertices, moved, faces = [], [], []
+    for mesh in model.meshes:
+        quads = np.concatenate([mesh.quads[face] for face in FACES])
+        nodes, local = np.unique(quads, return_inverse=True)
+        vertices.append(displaced[nodes])
+        moved.append(displaced[nodes] - model.reference[nodes])
+        faces.append(local.reshape(-1, 4))
+    first = np.array([[0, 0], *[[len(v), len(f)] for v, f in zip(vertices, faces, strict=True)]])
+    # the floor's shape first, where there is one
+    shapes = int(floor) + count
+    kind = np.full(shapes, KINDS.index("mesh"))
+    kind[: int(floor)] = KINDS.index("plane")
+    bodies = Bodies(
+        name="\n".join(["ground", *(f"block {i}" for i in range(count))]),
+        moves=np.array([0] + [1] * count, np.int32),
+        place=np.zeros((1 + count, 3)),
+        turn=np.tile(UPRIGHT, (1 + count, 1)),
+        shape_body=np.arange(1 - int(floor), 1 + count, dtype=np.int32),
+        shape_kind=kind.astype(np.int32),
+        shape_size=np.zeros((shapes, 3)),
+        shape_place=np.zeros((shapes, 3)),
+        shape_turn=np.tile(UPRIGHT, (shapes, 1)),
+        shape_mesh=np.arange(-int(floor), count, dtype=np.int32),
+        mesh_first=first.cumsum(axis=0).astype(np.int32),
+        vertex=rounded(np.concatenate(vertices)),
+        displacement=rounded(np.concatenate(moved), ELASTIC),
+        face=np.concatenate(faces).astype(np.int32),
+    )
+    slave = contacts.pair[:, 1]
+    body = np.column_stack((contacts.pair[:, 0], 1 + model.body[slave]))
+    return table_of(contacts, body, body - 1 + int(floor), slave), bodies

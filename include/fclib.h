@@ -238,8 +238,15 @@ enum fclib_write_mode {
 /** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */
 int fclib_set_write_mode(enum fclib_write_mode mode);
 
-/** New. Sets the level of compression of all writes of the process, 0 (none) to 9; 6 at first. The
- *  filters are those that every HDF5 has. Returns 1, or 0 for a level outside. */
+/** New. A level of compression that costs little: large arrays that shrink to a 16th are packed,
+ *  at level 1, all others are stored as they are. */
+#define FCLIB_COMPRESS_CHEAPLY (-1)
+
+/** New. Sets the level of compression of all writes of the process: FCLIB_COMPRESS_CHEAPLY, which
+ * it is at first unless the environment's FCLIB_COMPRESSION says 0 to 9; 0 (none); 1 to 9, of which
+ * 6 is for archives. The filters are those that every HDF5 has. Returns 1, or 0 for a level
+ * outside.
+ */
 int fclib_set_compression(int level);
 
 /** New. Whether all reads of the process hand out dense matrices as they are (nz = -3), or by
@@ -256,6 +263,12 @@ void fclib_delete_local_rolling(struct fclib_local_rolling* problem);   /* new *
 
 /** Frees the members of solutions or guesses (count structs), and the array (or NULL) itself. */
 void fclib_delete_solutions(struct fclib_solution* data, int count);
+
+/* ---- version --------------------------------------------------------------------------------- */
+
+/** New. The version of the library that runs, "3.2.0": not to be freed. That of the header is in
+ *  FCLIB_VERSION_MAJOR, _MINOR and _PATCH. */
+const char* fclib_version(void);
 
 /* ---- errors ---------------------------------------------------------------------------------- */
 

@@ -1,5 +1,6 @@
 // The functions of fclib.h that read, write and free.
 #include <atomic>
+#include <cstdlib>
 #include <memory>
 
 #include "capi/errors.hpp"
@@ -8,13 +9,23 @@
 #include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
 
+#define FCLIB_TEXT(x) #x
+#define FCLIB_TEXT_OF(x) FCLIB_TEXT(x)
+
 namespace fclib::c {
 
 namespace {
 
+/// The level that the environment names, or one that costs a client next to nothing.
+int first_compression() {
+  const char* const named = std::getenv("FCLIB_COMPRESSION");
+  const bool level = named != nullptr && *named >= '0' && *named <= '9' && named[1] == '\0';
+  return level ? *named - '0' : compress_cheaply;
+}
+
 // settings of the process
 std::atomic<bool> replace{false};
-std::atomic<int> compression{WriteOptions{}.compression};
+std::atomic<int> compression{first_compression()};
 std::atomic<bool> keep_dense{false};
 
 /// 3.1 checks no value and converts no matrix.
@@ -181,12 +192,18 @@ int fclib_set_write_mode(fclib_write_mode mode) {
 
 int fclib_set_compression(int level) {
   return guarded(0, [&] {
-    if (level < 0 || level > 9) {
-      fail("compression level", std::to_string(level) + " is outside 0..9");
+    if (level < FCLIB_COMPRESS_CHEAPLY || level > 9) {
+      fail("compression level",
+           std::to_string(level) + " is neither in 0..9 nor FCLIB_COMPRESS_CHEAPLY");
     }
     compression = level;
     return 1;
   });
+}
+
+const char* fclib_version(void) {
+  return FCLIB_TEXT_OF(FCLIB_VERSION_MAJOR) "." FCLIB_TEXT_OF(
+      FCLIB_VERSION_MINOR) "." FCLIB_TEXT_OF(FCLIB_VERSION_PATCH);
 }
 
 int fclib_keep_dense(int keep) {

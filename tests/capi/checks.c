@@ -119,6 +119,13 @@ static void errors(void) {
   fclib_delete_local(&empty);
 }
 
+static void version(void) {
+  char header[32];
+  snprintf(header, sizeof header, "%d.%d.%d", FCLIB_VERSION_MAJOR, FCLIB_VERSION_MINOR,
+           FCLIB_VERSION_PATCH);
+  CHECK(!strcmp(fclib_version(), header));
+}
+
 static int told;
 static void handler(const char* message, void* context) {
   CHECK(strstr(message, "missing") && context == &told);
@@ -167,9 +174,11 @@ static void modes(void) {
   CHECK(fclib_set_write_mode(FCLIB_WRITE_ADD));
 
   CHECK(!fclib_set_compression(10));
-  CHECK(!fclib_set_compression(-1));
+  CHECK(!fclib_set_compression(-2));
   CHECK(fclib_set_compression(0));
   CHECK(fclib_write_local(&a, path_of("plain")));
+  CHECK(fclib_set_compression(FCLIB_COMPRESS_CHEAPLY));
+  CHECK(fclib_write_local(&a, path_of("cheap")));
   CHECK(fclib_set_compression(4));
 }
 
@@ -361,6 +370,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   snprintf(folder, sizeof folder, "%s", argv[1]);
   fclib_set_error_handler(NULL, NULL); /* which is silent */
+  version();
   errors();
   handlers();
   modes();

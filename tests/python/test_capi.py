@@ -15,6 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import capi_abi
 import fclib
 from capi_library import (
     CAPI,
@@ -77,8 +78,30 @@ def test_only_the_interface_is_exported() -> None:
         [tool, "--dynamic", "--defined-only", library], capture_output=True, text=True, check=True
     )
     exported = {line.split()[-1] for line in names.stdout.splitlines()}
-    assert {name for name in exported if not name.startswith("fclib_")} == set()
-    assert len(exported) > 40
+    versions = set(capi_abi.exported().values())
+    assert versions == {"FCLIB_3.1", "FCLIB_3.2"}
+    if sys.platform == "linux":
+        expected = {f"{name}@@{version}" for name, version in capi_abi.exported().items()}
+        assert {name for name in exported if name.partition("@")[0] not in versions} == expected
+    else:
+        assert {name.lstrip("_") for name in exported} == set(capi_abi.exported())
+
+
+def test_what_the_header_declares_is_exported() -> None:
+    declared = {re.findall(r"fclib_\w+(?=\()", line)[0] for line in capi_abi.declared()}
+    assert declared == set(capi_abi.exported()), "cmake/fclib.map has the names"
+
+
+def test_the_binary_interface_is_the_recorded_one(tmp_path: Path) -> None:
+    if shutil.which("abidw") is None or shutil.which("abidiff") is None:
+        pytest.skip("there is no libabigail")
+    now = capi_abi.describe(tmp_path)
+    done = subprocess.run(
+        ["abidiff", "--no-added-syms", capi_abi.RECORDED, now], capture_output=True, text=True
+    )
+    assert done.returncode == 0, (
+        f"{done.stdout}\ndocs/compiled.md has the policy; python tests/capi_abi.py --write"
+    )
 
 
 def test_the_header_compiles_as_cxx(programs: Path) -> None:

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "io/hdf5/write.hpp"
 #include "io/replace_file.hpp"
 #include "version.hpp"
 
@@ -119,7 +120,7 @@ class MemoryFile {
 };
 
 void require_level(int compression) {
-  if (compression < 0 || compression > 9) {
+  if (compression < compress_cheaply || compression > 9) {
     throw Error(ErrorKind::option, "is " + std::to_string(compression) + ", but must be 0 to 9",
                 "the compression level");
   }

@@ -14,6 +14,10 @@ constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 constexpr std::size_t index_bytes = 254;
 /// What filters are tried on.
 constexpr std::size_t sample_entries = std::size_t{1} << 16;
+constexpr std::size_t cheap_sample_entries = std::size_t{1} << 12;
+/// What is packed cheaply shrinks to this part: the time that deflate takes goes with what it
+/// leaves.
+constexpr double cheap_part = 1.0 / 16;
 /// Datasets up to this many bytes lie in their own header.
 constexpr std::size_t compact_bytes = 4096;
 /// Groups of up to this many members keep them in their own header: all of ours do.
@@ -50,7 +54,7 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
     const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
     H5Pset_chunk(layout.id(), 1, &chunk);
     if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
-    H5Pset_deflate(layout.id(), static_cast<unsigned>(compression));
+    H5Pset_deflate(layout.id(), compression < 0 ? 1U : static_cast<unsigned>(compression));
   } else if (array.bytes() <= compact_bytes) {
     H5Pset_layout(layout.id(), H5D_COMPACT);
   }
@@ -67,11 +71,14 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
 /// The filter that makes an array smallest, found by trying them on its beginning. Shuffling
 /// gathers the bytes that numbers of one size share, but hides numbers that come again.
 Filter best_filter(const Target& group, const Array& array) {
+  const bool cheap = group.compression < 0;
+  if (cheap && array.size < 8 * cheap_sample_entries) return Filter::none;  // not worth a trial
   if (array.size < chunked_from || group.compression == 0) return Filter::none;
   Array sample = array;
-  sample.size = std::min(array.size, sample_entries);
+  sample.size = std::min(array.size, cheap ? cheap_sample_entries : sample_entries);
   Filter best = Filter::none;
   std::size_t least = sample.bytes();
+  if (cheap) least = static_cast<std::size_t>(cheap_part * static_cast<double>(least));
   for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
     std::size_t size = index_bytes;
     {

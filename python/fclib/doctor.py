@@ -196,7 +196,7 @@ def check_work() -> Finding:
 def check_adapter(adapter: external.Adapter, known: Sequence[str]) -> Finding | None:
     """Solvers of others that are no package of the extras."""
     name = adapter.PREFIX.rstrip(":")
-    if name in known or name == "cmd":
+    if name in known or name in ("cmd", "plugin"):
         return None
     code = (
         "import json\n"

@@ -3,6 +3,7 @@
 import importlib.util
 import os
 import signal
+import sqlite3
 import subprocess
 import sys
 import textwrap
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 
 import fclib
-from capi_library import compile_program
+from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
 from fclib.external import command, siconos
 from helpers import local_problem, planted_global, planted_local
@@ -608,3 +609,82 @@ def test_a_worker_that_dies_is_said_and_replaced() -> None:
 def test_unknown_solvers_of_siconos_come_with_the_known_ones() -> None:
     with pytest.raises(fclib.OptionError, match="siconos:nsgs"):
         fclib.find_solver("siconos:magic")
+
+
+# ---- shared objects
+
+
+@pytest.fixture(scope="module")
+def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Plugins: the example, as C++ too, one that refuses, and one without the function."""
+    folder = tmp_path_factory.mktemp("plugins")
+    (folder / "pgs.cpp").write_text((ROOT / "examples/plugin/pgs.c").read_text())
+    (folder / "refuse.c").write_text(
+        "#include <fclib_plugin.h>\nint fclib_plugin_solve(const struct fclib_plugin_problem *p, "
+        "double *r) {\n  (void)p, (void)r;\n  return 7;\n}\n"
+    )
+    (folder / "other.c").write_text("int other(void) { return 0; }\n")
+    sources = {
+        "pgs": ROOT / "examples/plugin/pgs.c",
+        "pgs-cpp": folder / "pgs.cpp",
+        "refuse": folder / "refuse.c",
+        "other": folder / "other.c",
+    }
+    for name, source in sources.items():
+        tool = compiler("C++" if source.suffix == ".cpp" else "C")
+        options = ["-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", f"-I{HEADERS}"]
+        target = folder / f"lib{name}.so"
+        subprocess.run([tool, *options, str(source), "-o", str(target), "-lm"], check=True)
+    return folder
+
+
+@pytest.mark.parametrize("name", ["pgs", "pgs-cpp"])
+def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
+    for d in (2, 3):
+        problem = planted_local(3, d=d, nc=5).problem
+        seen: list[float] = []
+
+        def hear(iteration: int, error: float, seconds: float, stage: str, to: Any = seen) -> None:
+            to.append(error)
+
+        result = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", callback=hear)
+        assert result.status == "converged"
+        assert fclib.merit(problem, result.solution).error <= 1e-8
+        assert len(seen) == result.iterations + 1 > 1
+    limited = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", tol=0, max_iterations=3)
+    assert (limited.status, limited.iterations) == ("iteration_limit", 3)
+
+
+def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
+    problem = planted_local(3, nc=2).problem
+    for name, error in {
+        "libnone.so": "no such file",
+        "pgs.cpp": "cannot be loaded",
+        "libother.so": "has no function fclib_plugin_solve",
+    }.items():
+        with pytest.raises(fclib.OptionError, match=error):
+            fclib.solve(problem, f"plugin:{shared_objects}/{name}")
+    with pytest.raises(fclib.SolverError, match="returned 7"):
+        fclib.solve(problem, f"plugin:{shared_objects}/librefuse.so")
+
+    def stop(*_: object) -> bool:
+        raise KeyError("mine")
+
+    with pytest.raises(KeyError, match="mine"):
+        fclib.solve(problem, f"plugin:{shared_objects}/libpgs.so", callback=stop)
+
+
+def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -> None:
+    fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
+    done = subprocess.run(
+        [
+            *(sys.executable, "-m", "fclib", "bench", "--problems", "a.hdf5"),
+            *("--solver", f"plugin:{shared_objects}/libpgs.so", "--store", "store.db"),
+        ],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    with sqlite3.connect(tmp_path / "store.db") as store:
+        assert store.execute("select status from runs").fetchall() == [("converged",)]

@@ -456,8 +456,8 @@ def _solvers(
 
 
 def parse_solver(text: str) -> dict[str, Any]:
-    """A solver as one text: "nsgs relaxation=1.2"; a command, "cmd:...", is taken as it is."""
-    if text.startswith("cmd:"):
+    """A solver as one text: "nsgs relaxation=1.2"; what follows cmd: or plugin: is one name."""
+    if text.startswith(("cmd:", "plugin:")):
         return {"name": text}
     name, *pairs = shlex.split(text) or [""]
     options = {}

@@ -37,9 +37,15 @@ PURPOSE: Final = {
     "bench": "campaigns on a cluster, profiles",
     "report": "the site, figures for a paper",
     "solvers": "solvers to compare with",
+    "recorders": "simulators whose steps are recorded",
 }
 # a package whose module bears another name
-MODULE: Final = {"dask-jobqueue": "dask_jobqueue", "scikit-fem": "skfem"}
+MODULE: Final = {
+    "dask-jobqueue": "dask_jobqueue",
+    "scikit-fem": "skfem",
+    "drake": "pydrake",
+    "pin": "pinocchio",
+}
 
 
 @dataclass(frozen=True)

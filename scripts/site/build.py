@@ -35,7 +35,7 @@ AS_THEY_ARE = {
 MENU = {
     "Start": ["first-steps", "examples/index"],
     "The problem": ["mathematics", "format", "analysis", "glossary"],
-    "The collection": ["collection", "families/index", "families-of-your-own"],
+    "The collection": ["collection", "families/index", "families-of-your-own", "recorders"],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
     "Interfaces": ["command-line", "python", "compiled", "embedding", "c-api"],

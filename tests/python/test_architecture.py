@@ -66,6 +66,7 @@ PYTHON: dict[str, set[str]] = {
     "analysis": {"_core", "_digest", "_registry", "_solve"},
     "scenes": {"_core", "_geometry"},
     "simulate": {"_core", "_geometry", "_solve", "scenes"},
+    "recorders": {"_core", "_solve"},
     "collections": {"_core", "_digest", "_solve", "analysis", "scenes", "simulate"},
     "__init__": {"_batch", "_core", "_digest", "_geometry", "_registry", "_solve", "collections"},
     "bench": {
@@ -88,6 +89,7 @@ PYTHON: dict[str, set[str]] = {
         "analysis",
         "scenes",
         "simulate",
+        "recorders",
         "collections",
         "bench",
         "report",

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from helpers import planted_local
 
 import fclib
+from helpers import planted_local
 
 TOLERANCE = 1e-7
 
@@ -49,8 +49,8 @@ def test_pinocchio_is_called_as_by_hand(which: str, seed: int) -> None:
     name = f"pinocchio:{which.lower()}"
     try:
         fclib.find_solver(name)
-    except fclib.OptionError as error:
-        pytest.skip(str(error))
+    except fclib.OptionError as absent:
+        pytest.skip(str(absent))
     problem = planted_local(seed, d=3, nc=40).problem
     result = fclib.solve(problem, name, TOLERANCE)
     assert result.converged

@@ -28,7 +28,7 @@ def run(*command: object, **environment: str) -> str:
 def test_the_help_fits_a_screen() -> None:
     text = run(sys.executable, "-m", "fclib", "--help", COLUMNS="80")
     lines = text.rstrip().splitlines()
-    assert len(lines) < 24
+    assert len(lines) <= 24
     assert max(map(len, lines)) <= 80
     assert "..." not in text.split("\n", 1)[1], "what a command does is cut short"
     assert "  doctor " in text

@@ -4,11 +4,11 @@ Carpentier, Le Lidec & Montaut, "From compliant to rigid contact simulation: a u
 approach" (2024).
 
 It takes spatial contacts, their normal component last. The numbers are scaled: the mean of the
-diagonal of W and ||q|| become 1. It is called once, with its own defaults and the caller's limit of
-iterations. Its tolerances are on feasibility and complementarity; where they are met before the error
-is, it runs again from the same point with tighter ones, and time and iterations are those of that
-run. It knows no time limit: iterations are limited to those that W times a vector leaves time for,
-so that none is cut off early; a solve that factorises often ends later than asked.
+diagonal of W and ||q|| become 1. It is called once, with its own defaults and the caller's limit
+of iterations. Its tolerances are on feasibility and complementarity; where they are met before the
+error is, it runs again from the same point with tighter ones, and time and iterations are those of
+that run. It knows no time limit: iterations are limited to those that W times a vector leaves time
+for, so that none is cut off early; a solve that factorises often ends later than asked.
 
 W is passed dense. Pinocchio copies it to the stack, and ends the process where that is too small:
 larger problems are refused. A sparse W only ADMM would take, at seconds an iteration.

@@ -1,0 +1,47 @@
+"""The problems of other simulators' steps: a step of theirs becomes a `GlobalProblem`.
+
+    recorded = fclib.recorders.drake(plant, context)
+    recorded.problem, recorded.guess, recorded.mismatch
+    recorded.write("step.hdf5")
+
+_assemble.py   what is common: order of rows, redundant joints, limits, dry friction, compliance
+_recorded.py   a recorded step, what is exact in it, and a folder of them
+_scripts.py    steps of somebody's script, while it runs
+_drake.py, _pinocchio.py, _pybullet.py, ...        one engine each
+
+An engine is imported where its adapter is called.
+"""
+
+from fclib.recorders._assemble import (
+    Assembled,
+    Contacts,
+    DryFriction,
+    Joints,
+    Limits,
+    assemble,
+    associated_error,
+    solve_associated,
+)
+from fclib.recorders._drake import drake
+from fclib.recorders._pinocchio import pinocchio
+from fclib.recorders._pybullet import pybullet
+from fclib.recorders._recorded import Recorded, Recording
+from fclib.recorders._scripts import ENGINES, record_script
+
+__all__ = [
+    "ENGINES",
+    "Assembled",
+    "Contacts",
+    "DryFriction",
+    "Joints",
+    "Limits",
+    "Recorded",
+    "Recording",
+    "assemble",
+    "associated_error",
+    "drake",
+    "pinocchio",
+    "pybullet",
+    "record_script",
+    "solve_associated",
+]

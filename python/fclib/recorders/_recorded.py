@@ -1,0 +1,130 @@
+"""One recorded step, and a folder of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from fclib import _core
+from fclib.recorders._assemble import Assembled, Contacts
+
+Origin = Literal["exact", "reconstructed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorded:
+    """The problem of one step of another engine, and what that made of it."""
+
+    assembled: Assembled
+    engine: str  # its name
+    version: str
+    licence: str
+    law: str  # what the engine solves, in words
+    time: float  # at the start of the step [s]
+    h: float  # [s]
+    fields: Mapping[str, Origin]  # of M, f, H, w, mu, G, b: from the engine, or by our formulas
+    guess: _core.Solution | None = None  # the engine's own reaction
+    velocity: Any = None  # (n) after the step, as the engine has it; None: it does not tell
+    contacts: Contacts | None = None
+    notes: tuple[str, ...] = ()
+    more: Mapping[str, Any] = field(default_factory=dict)  # in JSON's types
+
+    @property
+    def problem(self) -> _core.GlobalProblem:
+        """With a description whose last line, JSON, says where it is from."""
+        origin = {
+            "generator": "fclib.recorders",
+            "fclib": _core.version,
+            "engine": self.engine,
+            "version": self.version,
+            "licence": self.licence,
+            "law": self.law,
+            "time": self.time,
+            "time_step": self.h,
+            "fields": dict(self.fields),
+            "redundant": list(self.assembled.redundant),
+            **dict(self.more),
+        }
+        if self.contacts is not None and self.contacts.bodies is not None:
+            origin["bodies"] = np.asarray(self.contacts.bodies).tolist()
+        words = [
+            f"A step of {self.engine} {self.version} ({self.licence}), recorded.",
+            f"Law of the engine: {self.law}.",
+            *self.notes,
+        ]
+        info = _core.ProblemInfo(
+            title=f"{self.engine}, t = {self.time:g} s",
+            description="\n".join([*words, json.dumps(origin)]),
+            math_info=(
+                "M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0; v in m/s and rad/s, r in"
+                f" N s over h = {self.h:g} s, components N, T1, T2"
+            ),
+        )
+        return self.assembled.problem.replace(info=info)
+
+    @property
+    def mismatch(self) -> float | None:
+        """How far the engine's velocity is from the one that its reaction gives [m/s]; the largest.
+
+        None where it tells no reaction or no velocity.
+        """
+        problem = self.assembled.problem
+        untold = self.guess is None and problem.m
+        if untold or self.velocity is None or problem.p:
+            return None
+        import scipy.sparse as sp
+        import scipy.sparse.linalg as spl
+
+        pushed = problem.f if self.guess is None else problem.H @ self.guess.r + problem.f
+        v = spl.spsolve(sp.csc_array(problem.M), pushed)
+        found = np.atleast_1d(v)[: self.assembled.dofs]
+        return float(np.abs(found - np.asarray(self.velocity)).max(initial=0.0))
+
+    def write(self, path: str | Path) -> None:
+        """An FCLIB file: the problem, and the engine's reaction as a guess. FileError."""
+        guesses = [] if self.guess is None else [self.guess]
+        _core.write(path, self.problem, None, guesses)
+
+
+class Recording:
+    """A folder into which every so manieth recorded step with contacts is written.
+
+    with Recording("steps", every=10) as recording:
+        ...
+        recording.add(recorded)
+    """
+
+    def __init__(self, folder: str | Path, every: int = 1) -> None:
+        """ValueError where `every` is below 1, FileExistsError where files are there already."""
+        if every < 1:
+            raise ValueError(f"every must be at least 1, not {every}")
+        self.folder, self.every = Path(folder), every
+        self.seen = self.written = 0
+        if self.folder.is_dir() and any(self.folder.glob("*.hdf5")):
+            raise FileExistsError(f"{self.folder}: has files already; name another folder")
+
+    def __enter__(self) -> Recording:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        return None
+
+    @property
+    def wanted(self) -> bool:
+        """Whether the next step is one that is kept; others need not be assembled."""
+        return self.seen % self.every == 0
+
+    def add(self, recorded: Recorded | None) -> None:
+        """Count a step, and write it where it is one of those kept and something touches."""
+        number, kept = self.seen, self.wanted
+        self.seen += 1
+        if not kept or recorded is None or not recorded.assembled.problem.nc:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        recorded.write(self.folder / f"{recorded.engine.lower()}-{number:06d}.hdf5")
+        self.written += 1

@@ -1,0 +1,112 @@
+"""Somebody's script, run as it is, while steps of its engine are recorded."""
+
+from __future__ import annotations
+
+import importlib
+import runpy
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from fclib.recorders import _drake, _pybullet
+from fclib.recorders._recorded import Recording
+
+
+@contextmanager
+def _steps_of_pybullet(recording: Recording) -> Iterator[None]:
+    p: Any = importlib.import_module("pybullet")
+    original = p.stepSimulation
+
+    def step(physicsClientId: int = 0) -> Any:
+        if not recording.wanted:
+            recording.add(None)
+            return original(physicsClientId=physicsClientId)
+        result: list[Any] = []
+
+        def once(**options: Any) -> None:
+            result.append(original(**options))
+
+        recording.add(_pybullet.record(p, physicsClientId, None, None, once))
+        return result[0]
+
+    p.stepSimulation = step
+    try:
+        yield
+    finally:
+        p.stepSimulation = original
+
+
+@contextmanager
+def _steps_of_drake(recording: Recording) -> Iterator[None]:
+    drakes: Any = importlib.import_module("pydrake.all")
+    kind = drakes.Simulator
+    original = kind.AdvanceTo
+
+    def advance(self: Any, *arguments: Any, **options: Any) -> Any:
+        system = self.get_system()
+        systems = system.GetSystems() if hasattr(system, "GetSystems") else [system]
+        plant = next(
+            (one for one in systems if isinstance(one, drakes.MultibodyPlant) and one.time_step()),
+            None,
+        )
+        last = [None]
+
+        def monitor(root: Any) -> Any:
+            if plant is not None and root.get_time() != last[0]:
+                last[0] = root.get_time()
+                context = plant.GetMyContextFromRoot(root)
+                wanted = recording.wanted
+                recording.add(_drake.drake(plant, context) if wanted else None)
+            return drakes.EventStatus.DidNothing()
+
+        self.set_monitor(monitor)
+        try:
+            return original(self, *arguments, **options)
+        finally:
+            self.clear_monitor()
+
+    kind.AdvanceTo = advance
+    try:
+        yield
+    finally:
+        kind.AdvanceTo = original
+
+
+ENGINES: Final[dict[str, Callable[[Recording], Any]]] = {
+    "drake": _steps_of_drake,
+    "pybullet": _steps_of_pybullet,
+}
+
+
+def record_script(
+    engine: str,
+    script: str | Path,
+    folder: str | Path,
+    *,
+    every: int = 1,
+    arguments: Sequence[str] = (),
+) -> Recording:
+    """Run a script, and write every so manieth step of its engine that has contacts.
+
+    Raises:
+        ValueError: the engine is not one of `ENGINES`, or `every` is below 1.
+        ImportError: the engine is not installed.
+        OSError: the script cannot be read, or the folder not written; it may hold no files.
+    """
+    if engine not in ENGINES:
+        raise ValueError(f"no engine {engine!r} is recorded; there is: {', '.join(ENGINES)}")
+    script = Path(script)
+    if not script.is_file():
+        raise FileNotFoundError(f"{script}: there is no such script")
+    recording = Recording(folder, every)
+    before, path = sys.argv, list(sys.path)
+    sys.argv = [str(script), *arguments]
+    sys.path.insert(0, str(script.parent))
+    try:
+        with ENGINES[engine](recording):
+            runpy.run_path(str(script), run_name="__main__")
+    finally:
+        sys.argv, sys.path[:] = before, path
+    return recording

@@ -23,7 +23,7 @@ def command(
     ),
     every: Annotated[int, typer.Option(help="Keep one step in so many.", min=1)] = 1,
 ) -> None:
-    """Run a script of another simulator, and store the problems of its steps.
+    """Store the problems of the steps of another simulator.
 
     The script runs as it is. Each step that is kept and has contacts becomes an FCLIB file, with
     the engine's own reaction as a guess.

@@ -75,9 +75,9 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF or URDF file, and store the problem of each step.
+    """Simulate an MJCF file, and store the problem of each step.
 
-    What no problem can hold is left out, and said in a line each, in the catalogue and in each
+    A URDF file is taken too. What no problem can hold is left out, and said in a line each, in the catalogue and in each
     file's description.
 
     The scheme is that of Moreau and Jean; the solutions are stored too. Steps without contact give

@@ -77,8 +77,8 @@ def command(
 ) -> None:
     """Simulate an MJCF file, and store the problem of each step.
 
-    A URDF file is taken too. What no problem can hold is left out, and said in a line each, in the catalogue and in each
-    file's description.
+    A URDF file is taken too. What no problem can hold is left out, and said in a line each, in the
+    catalogue and in each file's description.
 
     The scheme is that of Moreau and Jean; the solutions are stored too. Steps without contact give
     no problem. What is stored is a collection: fclib collection verify and publish take it.

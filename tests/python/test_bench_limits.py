@@ -6,6 +6,7 @@ import dataclasses
 import os
 import shutil
 import subprocess
+import sys
 import textwrap
 import time
 from collections.abc import Iterator
@@ -458,6 +459,40 @@ def left_over(supervisor: SupervisorClient) -> list[int]:
 def test_programs_too(command: str, folder: Path, supervisor: SupervisorClient) -> None:
     record = supervisor.do(job(folder, f"cmd:{command}", wall=20 * LIMIT))
     assert record.status == PROGRAMS[command], record
+
+
+TELLS = """
+import sys, time
+import numpy as np
+import fclib
+while time.process_time() < 0.02: pass
+fclib.write_solution(sys.argv[1], fclib.Solution(r=np.array(SOLUTION)))
+fclib.write_attributes(sys.argv[1], "solution", {"cpu_s": float(sys.argv[2]), "iterations": 7})
+"""
+
+
+@pytest.mark.parametrize(
+    ("said", "status"), [("0.01", "converged"), ("-1.0", "lied"), ("1e3", "lied")]
+)
+def test_a_program_may_say_what_its_solve_took(
+    said: str, status: str, folder: Path, supervisor: SupervisorClient
+) -> None:
+    solution = planted_local(3, nc=5).solution.r.tolist()
+    program = folder / "tells.py"
+    program.write_text(TELLS.replace("SOLUTION", repr(solution)))
+    command = f"cmd:{sys.executable} {program} {{input}} {said}"
+    record = supervisor.do(
+        dataclasses.replace(job(folder, command), limits=bench.Limits(9, 60, 4e3))
+    )
+    assert record.status == status, record
+    assert record.iterations == 7
+    assert record.total_cpu_s is not None
+    if status == "converged":
+        # without its start, that of Python
+        assert (record.cpu_s, record.said_cpu_s) == (0.01, 0.01)
+        assert record.total_cpu_s > 0.02
+    else:
+        assert record.message.startswith(f"says that it took {float(said):g} s and 7 iterations")
 
 
 def test_words_on_the_standard_streams_do_no_harm(

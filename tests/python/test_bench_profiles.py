@@ -164,11 +164,14 @@ def test_families_by_hand(store: Path) -> None:
     assert [row["published"] for row in rows] == [7, None]
 
 
-def test_repeats_count_by_their_median(store: Path) -> None:
+def test_repeats_count_by_the_quickest_and_keep_their_spread(store: Path) -> None:
     fill(store, {"A": [3.0, None, 4.0, None]}, repeat=1)
     fill(store, {"A": [9.0, 2.0, 4.0, None]}, repeat=2)
-    values = profiles.costs(profiles.load(store, solvers=["A"])).values[:, 0]
-    assert values.tolist() == [3, 2, 4, math.inf]
+    costs = profiles.costs(profiles.load(store, solvers=["A"]))
+    assert costs.values[:, 0].tolist() == [1, 2, 4, math.inf]
+    assert costs.spread is not None
+    np.testing.assert_array_equal(costs.spread[:, 0], [8, 0, 0, math.nan])
+    assert profiles.summary(costs)[1]["spread"] == 0
 
 
 def test_work_precision_and_convergence_by_hand(store: Path) -> None:
@@ -180,8 +183,28 @@ def test_work_precision_and_convergence_by_hand(store: Path) -> None:
     assert points[1]["mean"] == pytest.approx((3 * 5 * 9 * 101) ** 0.25 - 1)
     assert points[0]["error"] == pytest.approx(0.5e-6)
     first = profiles.load(store, tolerances=[1e-6])
-    curves = profiles.convergence(store, first, np.array([0.5, 2.5]))
-    assert curves["A"].tolist() == [1.0, 0.5e-6]  # two of three have arrived
+    curves = profiles.convergence(store, first, np.array([0.5, 2.5, 4.5]))
+    assert curves["A"].tolist() == [1.0, 1.0, 0.5e-6]  # two and three of four have arrived
+    assert curves["B"].tolist() == [math.inf] * 3  # that has solved two of four
+    with pytest.raises(profiles.ProfileError, match="one tolerance"):
+        profiles.convergence(store, rows, np.ones(1))
+
+
+def test_runtimes_to_targets_use_every_run(store: Path) -> None:
+    assert profiles.targets(1e-3).tolist() == [0.1, 0.01, 1e-3]
+    assert profiles.targets(5e-3).tolist() == [0.1, 0.01, 5e-3]
+    times = profiles.runtimes(store, profiles.load(store), 1e-6)
+    # six targets: A reaches all at 1, 2 and 4 s on three problems, none on the fourth
+    assert np.sort(times["A"]).tolist() == [1.0] * 6 + [2.0] * 6 + [4.0] * 6 + [math.inf] * 6
+    shares = profiles.share_within(times["A"][:, None], np.array([1.0, 3.0, 9.0]))
+    assert shares.tolist() == [[0.25, 0.5, 0.75]]
+
+
+def test_times_of_a_history_are_of_cpu(store: Path) -> None:
+    with bench.Store(store) as opened:
+        opened.db.execute("UPDATE history SET time = 10 * time")
+    rows = profiles.load(store, solvers=["A"])
+    assert profiles.convergence(store, rows, np.array([4.5]))["A"].tolist() == [0.5e-6]
 
 
 def test_what_is_compared(store: Path) -> None:
@@ -326,26 +349,94 @@ def test_a_failure_costs_nothing_less_than_everything() -> None:
     assert profiles.costs(rows).values.tolist() == [[math.inf], [math.inf], [5]]
 
 
-def test_an_unreadable_problem_is_no_instance() -> None:
-    rows = [row("A", 0, None, status="unreadable"), row("A", 1, 1.0), row("A", 2, 2.0)]
-    found = profiles.gather(rows)
-    assert [instance.problem for instance in found.instances] == ["problem1", "problem2"]
-    assert profiles.gather(rows[:1]).solvers == ("A",)
-    assert profiles.gather(rows[:1]).values.shape == (0, 1)
+def test_what_was_not_run_is_no_instance() -> None:
+    for status in ("unreadable", "killed", "no_space", "lost"):
+        rows = [row("A", 0, None, status=status), row("A", 1, 1.0), row("A", 2, 2.0)]
+        found = profiles.gather(rows)
+        assert [instance.problem for instance in found.instances] == ["problem1", "problem2"]
+        assert profiles.gather(rows[:1]).solvers == ("A",)
+        assert profiles.gather(rows[:1]).values.shape == (0, 1)
 
 
-def test_an_even_number_of_repeats_counts_by_the_two_in_the_middle() -> None:
-    cases: list[tuple[list[float | None], float]] = [
-        ([4.0, 1.0], 2.5),
-        ([9.0, 1.0, 3.0, 2.0], 2.5),
-        ([8.0, None, 1.0, 3.0], 5.5),
-        ([1.0, None], math.inf),
-        ([2.0, None, 1.0, None], math.inf),
-        ([7.0, 1.0, 3.0, None, 2.0, 5.0], 4.0),
+def test_what_a_solver_does_not_take_is_left_out_for_it() -> None:
+    rows = [
+        *(row("A", 0, 1.0), row("B", 0, 2.0)),
+        *(row("A", 1, 3.0), row("B", 1, None, status="unsuitable")),
+        *(row(name, 2, None, status="unsuitable") for name in "AB"),
     ]
-    for times, median in cases:
+    costs = profiles.costs(rows)
+    np.testing.assert_array_equal(costs.values, [[1, 2], [3, math.nan]])
+    assert costs.unsuitable is not None
+    assert costs.unsuitable.tolist() == [[False, False], [False, True]]
+    np.testing.assert_array_equal(profiles.ratios(costs.values), [[1, 2], [1, math.nan]])
+    shares = profiles.performance_profile(costs.values, np.array([1.0, 2.0]))
+    assert shares.tolist() == [[1, 1], [0, 1]]
+    best, a, b = profiles.summary(costs, shift=1.0)
+    assert (best["of"], a["of"], b["of"], b["unsuitable"]) == (2, 2, 1, 1)
+    assert (b["mean"], b["to best"]) == (pytest.approx(2), pytest.approx(2))
+    (pair,) = profiles.pairs(costs)
+    assert (pair.both, pair.only_first, pair.only_second) == (1, 0, 0)
+    (family,) = profiles.families(costs)
+    assert (family["unsolved"], family["most often fastest"]) == (0, "A")
+    # or it counts as a failure
+    counted = profiles.costs(rows, count_unsuitable=True)
+    assert counted.values.tolist() == [[1, 2], [3, math.inf], [math.inf, math.inf]]
+
+
+def test_a_failure_among_repeats_counts_where_it_is_most_of_them() -> None:
+    cases: list[tuple[list[float | None], float]] = [
+        ([4.0, 1.0], 1.0),
+        ([8.0, None, 1.0, 3.0], 1.0),
+        ([7.0, None], 7.0),
+        ([2.0, None, None], math.inf),
+        ([None, None], math.inf),
+    ]
+    for times, expected in cases:
         rows = [row("A", 0, time) for time in times]
-        assert profiles.costs(rows).values.tolist() == [[median]]
+        assert profiles.costs(rows).values.tolist() == [[expected]]
+
+
+def test_under_several_limits_that_of_the_most_solvers_counts_then_the_largest() -> None:
+    rows = [row(name, 0, 1.0, time_limit=1.0) for name in "AB"]
+    rows += [row(name, 0, 2.0, time_limit=9.0) for name in "AB"]
+    costs = profiles.costs(rows)
+    assert (costs.values.tolist(), costs.instances[0].limit) == ([[2, 2]], 9)
+    assert profiles.costs(rows[:3]).values.tolist() == [[1, 1]]
+
+
+def test_the_wall_clock_is_charged_its_own_limit() -> None:
+    rows = [row("A", 0, None, wall_limit=7.0), row("A", 1, None, wall_limit=None)]
+    assert profiles.costs(rows, "wall_s").charges.tolist() == [7, LIMIT]
+    assert profiles.costs(rows).charges.tolist() == [LIMIT, LIMIT]
+
+
+def test_the_bootstrap_draws_problems() -> None:
+    # one problem at twenty tolerances is no more than one problem
+    rows = [row(s, 0, t * k, tol=10.0**-k) for s, t in (("A", 1), ("B", 2)) for k in range(1, 21)]
+    rows += [row("A", 1, 4.0), row("B", 1, 1.0)]
+    (pair,) = profiles.pairs(profiles.costs(rows))
+    assert (pair.low, pair.high) == (pytest.approx(0.5), pytest.approx(4))
+    costs = profiles.costs([row("A", 0, 1.0), row("A", 1, None)])
+    low, high = profiles.bands(costs, lambda own: profiles.share_within(own, np.array([1.0])))
+    assert (low.tolist(), high.tolist()) == ([[0]], [[1]])
+
+
+def test_success_is_by_the_error_that_was_reached() -> None:
+    rows = [
+        row("A", 0, 1.0, error=1e-7),
+        row("A", 1, 1.0, solved=0, status="inaccurate", error=1e-3),
+        row("A", 2, None, error=1e-9),  # killed at its limit
+        row("A", 3, None, status="unsuitable", error=None),
+    ]
+    (found,) = profiles.accuracies(rows, 1e-6)
+    assert (found["runs"], found["error <= 0.01"], found["error <= 1e-06"]) == (3, 2 / 3, 1 / 3)
+
+
+def test_the_influence_of_the_shift_is_shown() -> None:
+    rows = [*(row("A", k, 1e-3) for k in range(2)), row("B", 0, 1e-5), row("B", 1, 2e-3)]
+    a, b = profiles.shifts(profiles.costs(rows), shift=1e-3)
+    assert {a["solver"], b["solver"]} == {"A", "B"}
+    assert list(a) == ["solver", "shift 0.0001", "shift 0.001", "shift 0.01"]
 
 
 def test_instances_are_in_order_of_family_problem_and_growing_accuracy() -> None:
@@ -353,12 +444,10 @@ def test_instances_are_in_order_of_family_problem_and_growing_accuracy() -> None
         row("A", 0, 1.0, family="b"),
         *(row("A", 2, 1.0, tol=tol) for tol in (1e-8, 1e-4, 1e-6)),
         row("A", 1, 1.0, time_limit=7.0),
-        row("A", 1, 1.0, time_limit=3.0),
     ]
     found = [(i.family, i.problem, i.tol, i.limit) for i in profiles.costs(rows).instances]
     assert found == [
         ("b", "problem0", 1e-6, LIMIT),
-        ("family", "problem1", 1e-6, 3),
         ("family", "problem1", 1e-6, 7),
         ("family", "problem2", 1e-4, LIMIT),
         ("family", "problem2", 1e-6, LIMIT),
@@ -415,21 +504,25 @@ def test_the_columns_of_the_summary() -> None:
         "solver": "virtual best",
         "solved": 2,
         "of": 3,
+        "unsuitable": 0,
         "fastest": 2,
         "mean": pytest.approx(best),
         "to best": pytest.approx(1),
         "median ratio": 1,
         "worst ratio": 1,
+        "spread": None,
     }
     assert found[2] == {
         "solver": "slow",
         "solved": 2,
         "of": 3,
+        "unsuitable": 0,
         "fastest": 0,
         "mean": pytest.approx(slow),
         "to best": pytest.approx(slow / best),
         "median ratio": pytest.approx((3 + 15 / 7) / 2),
         "worst ratio": 3,
+        "spread": None,
     }
     assert (found[4]["median ratio"], found[4]["worst ratio"]) == (None, None)
     assert [line["fastest"] for line in found] == [2, 2, 0, 1, 0]
@@ -622,7 +715,7 @@ def test_convergence_counts_what_was_reached_at_the_time_itself(store: Path) -> 
     times = np.array([-1.0, 0.0, 1.0, 2.0, 4.0])
     rows = profiles.load(store, solvers=["A"])
     curves = profiles.convergence(store, rows[::-1], times)
-    assert curves["A"].tolist() == [math.inf, 1, 1, 0.5e-6, 0.5e-6]
+    assert curves["A"].tolist() == [math.inf, 1, 1, 1, 0.5e-6]
     assert curves["A"].dtype == float
     assert profiles.convergence(store, rows[3:], times) == {}
 
@@ -637,15 +730,61 @@ def test_the_tables_and_the_pictures(store: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     for word in ("virtual best", "cpu_limit", "95 % interval", "CPU time [s]", "few", "<= 2x"):
         assert word in done.stdout
-    names = ["performance-cpu_s", "data-cpu_s", "data-cpu_s-per-contact", "work-precision-cpu_s"]
-    for name in [*names, "convergence"]:
+    # one tolerance a curve
+    names = ["performance-cpu_s", "data-cpu_s", "data-cpu_s-per-contact", "convergence", "runtimes"]
+    names = [f"{name}-{tol}" for name in names for tol in ("1e-06", "1e-09")]
+    for name in [*names, "work-precision-cpu_s"]:
         for kind, start in (("pdf", b"%PDF"), ("png", b"\x89PNG"), ("svg", b"<?xml")):
             assert (tmp_path / "out" / f"{name}.{kind}").read_bytes().startswith(start)
-    with (tmp_path / "out" / "performance-cpu_s.csv").open() as file:
+    with (tmp_path / "out" / "performance-cpu_s-1e-06.csv").open() as file:
         steps = list(csv.DictReader(file))
     assert [float(step["tau"]) for step in steps] == [1, 2, 4, 8]
     assert [float(step["A"]) for step in steps] == [0.25, 0.5, 0.75, 0.75]
     assert not list((tmp_path / "out").glob(".*"))
+
+
+def test_names_that_matplotlib_would_read_otherwise(store: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    with bench.Store(store) as opened:
+        for name, other in (("A", "_hidden"), ("B", "$x^$ cost"), ("C", r"C:\\x_{")):
+            opened.db.execute("UPDATE solvers SET label = ? WHERE label = ?", (other, name))
+    refused = CliRunner().invoke(app, ["profile", str(store), "--out", str(tmp_path / "out"),
+                                       "--format", "svg"])  # fmt: skip
+    assert refused.exit_code == 0, refused.output
+    drawn = (tmp_path / "out" / "performance-cpu_s.svg").read_text()
+    assert "_hidden" in drawn
+    assert "$x^$ cost" in drawn
+    # what a figure is of stands below it
+    for word in ("4 instances", "tolerance 1e-06", "limit 100 s", "4 of 12 runs failed"):
+        assert word in drawn
+
+
+def test_machines_of_one_name_are_two(store: Path) -> None:
+    fill(store, tol=1e-7)
+    with bench.Store(store) as opened:
+        opened.db.execute(
+            "INSERT INTO machines (hash, node, cpu, cores) VALUES ('x', 'here', 'B', 4)"
+        )
+        opened.db.execute(
+            "UPDATE runs SET machine = (SELECT id FROM machines WHERE hash = 'x') WHERE tol = 1e-7"
+        )
+    with pytest.raises(profiles.ProfileError, match=r"here \(4 x B\), here \(None x None\)"):
+        profiles.load(store)
+    assert len(profiles.load(store, machine="here (4 x B)")) == 12
+
+
+def test_what_was_not_run_in_the_same_way_is_no_repeat(store: Path) -> None:
+    with bench.Store(store) as opened:
+        opened.db.execute("UPDATE runs SET threads = 4 WHERE id <= 2")
+        opened.db.execute("UPDATE runs SET memory_limit = 50 WHERE id > 10")
+    labels = {row["solver"] for row in profiles.load(store)}
+    assert labels == {"A (1 threads)", "A (4 threads)", "B", "C (1000 MB)", "C (50 MB)"}
+
+
+def test_tolerances_that_are_one_number(tmp_path: Path) -> None:
+    with bench.Store(tmp_path / "one.sqlite") as opened:
+        opened.begin("x", "tolerances = 1e-4\n[[problems]]\npublished_mean = 2", 0, 0, "here")
+    assert campaign.published_means(tmp_path / "one.sqlite") == {("", 1e-4): 2.0}
 
 
 def test_json(store: Path) -> None:

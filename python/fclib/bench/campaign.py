@@ -282,7 +282,7 @@ def published_means(store: str | Path) -> dict[tuple[str, float], float]:
             for group in campaign.get("problems", ()):
                 if not isinstance(group, Mapping) or "published_mean" not in group:
                     continue
-                tolerances = group.get("tolerances", campaign.get("tolerances", ()))
+                tolerances = group.get("tolerances", campaign.get("tolerances", []))
                 for tol in tolerances if isinstance(tolerances, list) else [tolerances]:
                     found[group.get("family", ""), float(tol)] = float(group["published_mean"])
     return found

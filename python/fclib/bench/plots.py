@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -46,9 +47,18 @@ def stroke(number: int) -> dict[str, Any]:
     return {"color": colour, "linestyle": STROKES[number // len(COLOURS) % len(STROKES)]}
 
 
+def label(text: str) -> str:
+    """A name as Matplotlib shows it: it takes $ for mathematics, and hides what begins with _."""
+    text = text.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
+
+
 @contextmanager
-def figure(folder: Path, name: str, formats: Sequence[str]) -> Iterator[Any]:
-    """Axes to draw in; written to the folder in each of the formats, then closed."""
+def figure(folder: Path, name: str, formats: Sequence[str], caption: str = "") -> Iterator[Any]:
+    """Axes to draw in; written to the folder in each of the formats, then closed.
+
+    The caption stands below, in as many lines as it needs.
+    """
     import matplotlib
 
     matplotlib.use("Agg", force=False)
@@ -58,6 +68,8 @@ def figure(folder: Path, name: str, formats: Sequence[str]) -> Iterator[Any]:
         drawn, axes = plt.subplots(figsize=SIZE, layout="constrained")
         try:
             yield axes
+            if caption:
+                drawn.supxlabel(label("\n".join(textwrap.wrap(caption, 110))), fontsize=5.5)
             folder.mkdir(parents=True, exist_ok=True)
             for kind in formats:
                 part = folder / f".{name}.part.{kind}"
@@ -78,17 +90,25 @@ def _order(costs: Costs, heights: Array) -> list[int]:
     return sorted(range(len(costs.solvers)), key=lambda k: (-heights[k].mean(), k))
 
 
-def performance(costs: Costs, folder: Path, formats: Sequence[str]) -> None:
-    """Dolan & More's profiles, the ratio on a logarithmic axis."""
+def performance(
+    costs: Costs, folder: Path, formats: Sequence[str], caption: str = "", ending: str = ""
+) -> None:
+    """Dolan & More's profiles, the ratio on a logarithmic axis, with their 95 % bands."""
     quotients = profiles.ratios(costs.values)
     finite = quotients[np.isfinite(quotients)]
     end = min(ENDS, 1.3 * float(finite.max(initial=2.0)))
     taus = np.unique(np.concatenate([[1.0, end], finite[finite <= end]]))
+    spaced = np.geomspace(1, end, 200)
     curves = profiles.performance_profile(costs.values, taus)
-    grid = profiles.performance_profile(costs.values, np.geomspace(1, end, 200))
-    with figure(folder, f"performance-{costs.metric}", formats) as axes:
+    grid = profiles.performance_profile(costs.values, spaced)
+    low, high = profiles.bands(costs, lambda own: profiles.performance_profile(own, spaced))
+    with figure(folder, f"performance-{costs.metric}{ending}", formats, caption) as axes:
         for rank, k in enumerate(_order(costs, grid)):
-            axes.step(taus, curves[k], where="post", label=costs.solvers[k], **stroke(rank))
+            name, style = label(costs.solvers[k]), stroke(rank)
+            axes.step(taus, curves[k], where="post", label=name, **style)
+            axes.fill_between(
+                spaced, low[k], high[k], step="post", alpha=0.1, color=style["color"], linewidth=0
+            )
         axes.set_xscale("log")
         axes.set_xlim(1.0, end)
         axes.set_ylim(0.0, 1.02)
@@ -97,8 +117,16 @@ def performance(costs: Costs, folder: Path, formats: Sequence[str]) -> None:
         _legend(axes)
 
 
-def data(costs: Costs, folder: Path, formats: Sequence[str], per_contact: bool) -> None:
-    """The share of problems solved within a cost, or a cost per contact."""
+def data(
+    costs: Costs,
+    folder: Path,
+    formats: Sequence[str],
+    *,
+    per_contact: bool,
+    caption: str = "",
+    ending: str = "",
+) -> None:
+    """The share solved within a cost, or within a cost per contact."""
     shown = costs.per_contact() if per_contact else costs
     finite = shown.values[np.isfinite(shown.values)]
     if not finite.size:
@@ -107,10 +135,12 @@ def data(costs: Costs, folder: Path, formats: Sequence[str], per_contact: bool) 
     bounds = np.unique(np.concatenate([ends, finite]))
     curves = profiles.share_within(shown.values, bounds)
     grid = profiles.share_within(shown.values, np.geomspace(*ends, 200))
-    name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "")
-    with figure(folder, name, formats) as axes:
+    name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "") + ending
+    with figure(folder, name, formats, caption) as axes:
         for rank, k in enumerate(_order(shown, grid)):
-            axes.step(bounds, curves[k], where="post", label=costs.solvers[k], **stroke(rank))
+            axes.step(
+                bounds, curves[k], where="post", label=label(costs.solvers[k]), **stroke(rank)
+            )
         axes.set_xscale("log")
         axes.set_xlim(*ends)
         axes.set_ylim(0.0, 1.02)
@@ -120,19 +150,23 @@ def data(costs: Costs, folder: Path, formats: Sequence[str], per_contact: bool) 
 
 
 def work_precision(
-    points: Sequence[Mapping[str, Any]], metric: str, folder: Path, formats: Sequence[str]
+    points: Sequence[Mapping[str, Any]],
+    metric: str,
+    folder: Path,
+    formats: Sequence[str],
+    caption: str = "",
 ) -> None:
     """The mean cost at each tolerance; hollow marks where not all problems were solved."""
     solvers = list(dict.fromkeys(point["solver"] for point in points))
     least = {s: min(p["mean"] for p in points if p["solver"] == s) for s in solvers}
-    with figure(folder, f"work-precision-{metric}", formats) as axes:
+    with figure(folder, f"work-precision-{metric}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(solvers, key=lambda s: least[s])):
             own = [point for point in points if point["solver"] == solver]
             style = stroke(rank)
             marker = MARKERS[rank % len(MARKERS)]
             x, y = [p["mean"] for p in own], [p["tol"] for p in own]
             fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
-            axes.plot(x, y, **style, label=solver, marker=marker, markersize=4)
+            axes.plot(x, y, **style, label=label(solver), marker=marker, markersize=4)
             axes.scatter(
                 x,
                 y,
@@ -154,16 +188,47 @@ def work_precision(
 
 
 def convergence(
-    curves: Mapping[str, Array], times: Array, folder: Path, formats: Sequence[str]
+    curves: Mapping[str, Array],
+    times: Array,
+    folder: Path,
+    formats: Sequence[str],
+    caption: str = "",
+    ending: str = "",
 ) -> None:
-    """The least error that was reached, over time."""
+    """The least error that was reached, over time; at one tolerance."""
     ends = {solver: float(curve[-1]) for solver, curve in curves.items()}
-    with figure(folder, "convergence", formats) as axes:
+    with figure(folder, f"convergence{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: ends[s])):
             curve = np.where(np.isfinite(curves[solver]), curves[solver], np.nan)
-            axes.step(times, curve, where="post", label=solver, **stroke(rank))
+            axes.step(times, curve, where="post", label=label(solver), **stroke(rank))
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_xlabel("time [s]")
+        axes.set_xlabel("CPU time [s]")
         axes.set_ylabel("median of the least relative error")
+        _legend(axes)
+
+
+def runtimes(
+    times: Mapping[str, Array],
+    folder: Path,
+    formats: Sequence[str],
+    caption: str = "",
+    ending: str = "",
+) -> None:
+    """The share of pairs of a run and an error that were reached within a time."""
+    finite = np.concatenate([own[np.isfinite(own) & (own > 0)] for own in times.values()])
+    if not finite.size:
+        return
+    ends = 0.8 * float(finite.min()), 1.2 * float(finite.max())
+    bounds = np.unique(np.concatenate([ends, finite]))
+    curves = {name: profiles.share_within(own[:, None], bounds)[0] for name, own in times.items()}
+    with figure(folder, f"runtimes{ending}", formats, caption) as axes:
+        for rank, solver in enumerate(sorted(curves, key=lambda s: -curves[s].mean())):
+            style = stroke(rank)
+            axes.step(bounds, curves[solver], where="post", label=label(solver), **style)
+        axes.set_xscale("log")
+        axes.set_xlim(*ends)
+        axes.set_ylim(0.0, 1.02)
+        axes.set_xlabel("CPU time [s]")
+        axes.set_ylabel("share of runs and errors reached")
         _legend(axes)

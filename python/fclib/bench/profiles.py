@@ -1,7 +1,9 @@
 """What the runs of a store say: profiles, means, ratios. Knows rows and numbers, no problem.
 
-An instance is a problem at a tolerance. The cost of a solver on an instance is infinite where it
-failed, and the median of its repeats. Sources:
+An instance is a problem at a tolerance, under one limit. The cost of a solver on an instance is
+infinite where it failed, and the least of its repeats, where at least half of them solved it; their
+spread is kept. Where the solver does not take such problems there is no cost, and the instance does
+not count for it. What was not run for a cause from outside is not there. Sources:
 
 - performance profiles: Dolan & More, "Benchmarking optimization software with performance
   profiles" (2002): rho_s(tau) is the share of instances that s solves within tau times the cost of
@@ -10,11 +12,19 @@ failed, and the median of its repeats. Sources:
   share of instances solved within a cost, here by contact if wanted.
 - shifted geometric means, exp(mean(log(t + s))) - s: Mittelmann's benchmarks; failures are charged
   a multiple of the limit.
+- runtimes to fixed targets: Hansen et al., "COCO: a platform for comparing continuous optimizers"
+  (2021): the share of pairs of an instance and an error that were reached within a time, from the
+  histories of all runs, also of those that failed.
+- success at an accuracy: qpbenchmark (Caron et al.): the error that was reached decides, whatever
+  the solver said.
+- intervals: the bootstrap draws problems, with all that was run on each (Efron & Tibshirani 1993).
 """
 
 from __future__ import annotations
 
+import json
 import math
+import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -27,6 +37,7 @@ import numpy.typing as npt
 
 from fclib import _core
 from fclib._solve import MeritKind
+from fclib.bench.job import ORDERLY, SURROUNDINGS
 from fclib.bench.store import Store
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -42,6 +53,10 @@ TIMES = ("cpu_s", "total_cpu_s", "wall_s")
 PENALTY = 10.0  # times the limit, for a failure in a mean
 SHIFT = 1e-3  # [s]
 RESAMPLES = 2000
+BANDS = 400  # the same for the bands of curves
+SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is marked
+MARK = "~"  # of such a figure, and of one whose runs were done under load
+ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 VIRTUAL_BEST = "virtual best"
 
 
@@ -58,7 +73,8 @@ class Instance:
     family: str
     nc: int
     tol: float
-    limit: float  # [s]
+    limit: float  # [s] of CPU
+    wall_limit: float = math.inf  # [s]
 
 
 @dataclass(frozen=True)
@@ -67,9 +83,11 @@ class Costs:
 
     instances: tuple[Instance, ...]
     solvers: tuple[str, ...]
-    values: Array  # (instances, solvers), inf where it failed; of `gather` nan where it did not run
+    values: Array  # (instances, solvers), inf where it failed, nan where it has none
     metric: str
     left_out: int = 0  # instances that some solver has not run
+    spread: Array | None = None  # of the repeats, relative to the least; nan where there is one
+    unsuitable: npt.NDArray[np.bool_] | None = None  # where the solver does not take such problems
 
     @property
     def solved(self) -> npt.NDArray[np.bool_]:
@@ -79,7 +97,7 @@ class Costs:
     @property
     def best(self) -> Array:
         """(instances) of the virtual best solver; inf where none solves it."""
-        return np.asarray(self.values.min(axis=1))
+        return least(self.values)
 
     @property
     def charges(self) -> Array:
@@ -88,6 +106,9 @@ class Costs:
         For a time it is the limit of the run; for another metric the largest cost of a solver that
         solves the instance, or any instance where none does.
         """
+        if self.metric == "wall_s":
+            limits = [(one.wall_limit, one.limit) for one in self.instances]
+            return np.array([wall if math.isfinite(wall) else cpu for wall, cpu in limits])
         if self.metric in TIMES:
             return np.array([instance.limit for instance in self.instances])
         finite = np.where(self.solved, self.values, -np.inf)
@@ -99,29 +120,44 @@ class Costs:
         """The costs over the number of contacts; instances without any are left out."""
         contacts = np.array([instance.nc for instance in self.instances])
         there = contacts > 0
-        chosen = tuple(i for i, keep in zip(self.instances, there, strict=True) if keep)
-        return replace(self, instances=chosen, values=self.values[there] / contacts[there, None])
+        part = self.of(np.flatnonzero(there))
+        return replace(part, values=part.values / contacts[there, None])
 
     def shared(self, solvers: Sequence[str] | None = None) -> Costs:
         """Of some solvers, all by default, on the instances that all of these have run."""
         names = self.solvers if solvers is None else tuple(solvers)
-        values = self.values[:, [self.solvers.index(name) for name in names]]
-        ran = ~np.isnan(values)
-        kept = np.flatnonzero(ran.all(axis=1))
-        return replace(
+        columns = [self.solvers.index(name) for name in names]
+        part = replace(
             self,
-            instances=tuple(self.instances[k] for k in kept),
             solvers=names,
-            values=values[kept],
-            left_out=int(ran.any(axis=1).sum()) - kept.size,
+            values=self.values[:, columns],
+            spread=None if self.spread is None else self.spread[:, columns],
+            unsuitable=None if self.unsuitable is None else self.unsuitable[:, columns],
         )
+        has = ~np.isnan(part.values)
+        ran = has if part.unsuitable is None else has | part.unsuitable
+        kept = np.flatnonzero(ran.all(axis=1) & has.any(axis=1))
+        return replace(part.of(kept), left_out=int(has.any(axis=1).sum()) - kept.size)
 
     def of(self, chosen: Iterable[int]) -> Costs:
         """Some of the instances."""
         numbers = list(chosen)
         return replace(
-            self, instances=tuple(self.instances[k] for k in numbers), values=self.values[numbers]
+            self,
+            instances=tuple(self.instances[k] for k in numbers),
+            values=self.values[numbers],
+            spread=None if self.spread is None else self.spread[numbers],
+            unsuitable=None if self.unsuitable is None else self.unsuitable[numbers],
         )
+
+    def at(self, tol: float) -> Costs:
+        """Those at a tolerance."""
+        return self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
+
+    @property
+    def tolerances(self) -> list[float]:
+        """The largest first."""
+        return sorted({instance.tol for instance in self.instances}, reverse=True)
 
 
 def load(
@@ -151,6 +187,7 @@ def load(
     """
     with Store(store, create=False) as opened:
         rows = opened.results()
+    _name_machines(rows)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
         ("family", families),
@@ -180,14 +217,62 @@ def load(
             f"{store}: the tolerance of some runs bounds both natural maps, of others that of the"
             " literature alone, which does not compare; choose one by merit: both, natural"
         )
-    versions: dict[str, set[tuple[str, str]]] = defaultdict(set)
-    for row in rows:
-        versions[row["solver"]].add((row["version"], row["options"]))
-    for row in rows:
-        if len(versions[row["solver"]]) > 1:
-            row["solver"] = f"{row['solver']} ({row['version']})"
+    rows = one_limit(rows)
+    _name_solvers(rows)
     order = {name: k for k, name in enumerate(solvers)}
     return sorted(rows, key=lambda row: order.get(row["solver"], len(order)))
+
+
+def _name_machines(rows: Sequence[dict[str, Any]]) -> None:
+    """Give machines of one name different ones, where they have other processors."""
+    kinds: dict[str, set[tuple[Any, Any]]] = defaultdict(set)
+    for row in rows:
+        kinds[row["node"] or ""].add((row["cpu"], row["cores"]))
+    for row in rows:
+        if len(kinds[row["node"] or ""]) > 1:
+            row["node"] = f"{row['node']} ({row['cores']} x {row['cpu']})"
+
+
+def _name_solvers(rows: Sequence[dict[str, Any]]) -> None:
+    """Give solvers of one label different ones, where they were not run in the same way."""
+
+    def of(row: Mapping[str, Any]) -> dict[str, str]:
+        options = json.loads(row["options"] or "{}")
+        return {
+            "version": row["version"] or "?",
+            "options": " ".join(f"{k}={v}" for k, v in options.items()) or "no options",
+            "threads": f"{row['threads']} threads",
+            "memory": f"{row['memory_limit']:g} MB" if row["memory_limit"] else "",
+        }
+
+    ways: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for row in rows:
+        for name, value in of(row).items():
+            ways[row["solver"]][name].add(value)
+    for row in rows:
+        own = ways[row["solver"]]
+        if differing := [value for name, value in of(row).items() if len(own[name]) > 1]:
+            row["solver"] = f"{row['solver']} ({', '.join(differing)})"
+
+
+def one_limit(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Of each problem at a tolerance the runs under one limit: that of the most solvers.
+
+    Of several such the largest: where a limit was raised, the runs before do not count.
+    """
+    solvers: dict[tuple[Any, ...], dict[tuple[float, float], set[str]]] = defaultdict(
+        lambda: defaultdict(set)
+    )
+
+    def limit(row: Mapping[str, Any]) -> tuple[float, float]:
+        return row["time_limit"] or 0.0, row.get("wall_limit") or 0.0
+
+    for row in rows:
+        solvers[row["hash"], row["tol"]][limit(row)].add(row["solver"])
+    chosen = {
+        key: max(own, key=lambda each: (len(own[each]), each)) for key, own in solvers.items()
+    }
+    return [row for row in rows if limit(row) == chosen[row["hash"], row["tol"]]]
 
 
 JUDGED = {
@@ -196,19 +281,28 @@ JUDGED = {
 }
 
 
-def costs(rows: Sequence[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
-    """The costs of the solvers of some rows; runs that the solver does not take count as failures.
+def costs(
+    rows: Sequence[Mapping[str, Any]], metric: str = "cpu_s", count_unsuitable: bool = False
+) -> Costs:
+    """The costs of the solvers of some rows, on what all of them have run or do not take.
+
+    Args:
+        rows: as `load` gives them.
+        metric: one of `METRICS`.
+        count_unsuitable: whether a problem that a solver does not take is a failure of it.
 
     Raises:
         ProfileError: the metric is unknown, or no instance was run by all solvers.
     """
-    found = gather(rows, metric).shared()
+    found = gather(rows, metric, count_unsuitable).shared()
     if not found.instances:
         raise ProfileError("there is no problem that all of these solvers have run")
     return found
 
 
-def gather(rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
+def gather(
+    rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s", count_unsuitable: bool = False
+) -> Costs:
     """As `costs`, of all instances that one of the solvers has run; nan where another has not.
 
     Raises:
@@ -217,15 +311,15 @@ def gather(rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
     if metric not in METRICS:
         raise ProfileError(f"there is no metric {metric}; there is: {', '.join(METRICS)}")
     floor = METRICS[metric][1]
-    instances: dict[tuple[str, float, float], Instance] = {}
-    numbers: dict[tuple[str, float, float], int] = {}
+    instances: dict[tuple[str, float], Instance] = {}
+    numbers: dict[tuple[str, float], int] = {}
     solvers: dict[str, int] = {}
-    lines, columns, spent = [], [], []
-    for row in rows:
+    lines, columns, spent, refused = [], [], [], []
+    for row in one_limit([dict(row) for row in rows]):
         column = solvers.setdefault(row["solver"], len(solvers))
-        if row["status"] == "unreadable":
+        if row["status"] in SURROUNDINGS:
             continue
-        key = row["hash"], row["tol"], row["time_limit"]
+        key = row["hash"], row["tol"]
         if key not in instances:
             numbers[key] = len(instances)
             instances[key] = Instance(
@@ -235,39 +329,67 @@ def gather(rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s") -> Costs:
                 nc=row["nc"],
                 tol=row["tol"],
                 limit=row["time_limit"],
+                wall_limit=row.get("wall_limit") or math.inf,
             )
+        if row["status"] == "unsuitable" and not count_unsuitable:
+            refused.append((numbers[key], column))
+            continue
         value = row[metric]
         lines.append(numbers[key])
         columns.append(column)
         good = row["solved"] and value is not None
         spent.append(max(float(value), floor) if good else math.inf)
-    found = np.full((len(instances), len(solvers)), np.nan)
+    shape = len(instances), len(solvers)
+    found, spread = np.full(shape, np.nan), np.full(shape, np.nan)
+    unsuitable = np.zeros(shape, dtype=bool)
     if spent:
         # the repeats of a run beside each other, the quickest first
         values, cells = np.array(spent), np.array(lines) * len(solvers) + np.array(columns)
         order = np.lexsort((values, cells))
         cells, first, count = np.unique(cells[order], return_index=True, return_counts=True)
-        # the median; of an even number with a failure in the middle, the failure
-        low, high = values[order[first + (count - 1) // 2]], values[order[first + count // 2]]
-        found.flat[cells] = (low + high) / 2
-    ordered = sorted(instances.values(), key=lambda i: (i.family, i.problem, -i.tol, i.limit))
-    rank = [numbers[i.hash, i.tol, i.limit] for i in ordered]
-    return Costs(tuple(ordered), tuple(solvers), found[rank], metric)
+        solved = np.add.reduceat(np.isfinite(values[order]), first)
+        quickest = values[order[first]]
+        found.flat[cells] = np.where(2 * solved >= count, quickest, np.inf)
+        slowest = values[order[first + np.maximum(solved, 1) - 1]]
+        with np.errstate(invalid="ignore"):
+            own = np.where((solved > 1) & np.isfinite(quickest), slowest / quickest - 1, np.nan)
+        spread.flat[cells] = own
+    for place in refused:
+        unsuitable[place] = bool(np.isnan(found[place]))
+    ordered = sorted(instances.values(), key=lambda i: (i.family, i.problem, -i.tol))
+    rank = [numbers[i.hash, i.tol] for i in ordered]
+    return Costs(
+        tuple(ordered),
+        tuple(solvers),
+        found[rank],
+        metric,
+        spread=spread[rank],
+        unsuitable=unsuitable[rank],
+    )
 
 
 # ---- profiles
 
 
+def least(values: Array) -> Array:
+    """(instances) the least cost of each; inf where no solver has one."""
+    return np.asarray(np.where(np.isnan(values), np.inf, values).min(axis=1, initial=np.inf))
+
+
 def ratios(values: Array) -> Array:
-    """r_ps = t_ps / min_s t_ps (instances, solvers); inf where s fails."""
-    best = values.min(axis=1, keepdims=True)
+    """r_ps = t_ps / min_s t_ps (instances, solvers); inf where s fails, nan where it has none."""
+    best = least(values)[:, None]
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.where(np.isfinite(values), values / best, np.inf))
+        found = np.where(np.isfinite(values), values / best, np.inf)
+    return np.asarray(np.where(np.isnan(values), np.nan, found))
 
 
 def share_within(values: Array, bounds: Array) -> Array:
-    """The share of instances whose value is at most each bound (solvers, bounds)."""
-    count = max(1, values.shape[0])
+    """The share of instances whose value is at most each bound (solvers, bounds).
+
+    Of a solver those instances count for which it has a value.
+    """
+    count = np.maximum(1, (~np.isnan(values)).sum(axis=0))[:, None]
     found = [np.searchsorted(np.sort(column), bounds, side="right") for column in values.T]
     return np.asarray(np.array(found).reshape(values.shape[1], len(bounds)) / count)
 
@@ -277,15 +399,47 @@ def performance_profile(values: Array, taus: Array) -> Array:
     return share_within(ratios(values), taus)
 
 
+def bands(costs: Costs, curve: Any, seed: int = 0) -> tuple[Array, Array]:
+    """The ends of 95 % intervals of curves (solvers, bounds), by drawing problems `BANDS` times.
+
+    Args:
+        costs: what the curves are of.
+        curve: makes them of values (instances, solvers).
+        seed: of the bootstrap.
+    """
+    own = _by_problem([instance.hash for instance in costs.instances])
+    random = np.random.Generator(np.random.PCG64([seed, len(own)]))
+    drawn = []
+    for _ in range(BANDS):
+        chosen = np.concatenate([own[k] for k in random.integers(0, len(own), len(own))])
+        drawn.append(curve(costs.values[chosen]))
+    low, high = np.quantile(np.array(drawn), [0.025, 0.975], axis=0)
+    return np.asarray(low), np.asarray(high)
+
+
+def _by_problem(hashes: Sequence[str]) -> list[npt.NDArray[np.int64]]:
+    """The places of each problem."""
+    found: dict[str, list[int]] = defaultdict(list)
+    for k, digest in enumerate(hashes):
+        found[digest].append(k)
+    return [np.array(own) for own in found.values()]
+
+
 # ---- means
 
 
 def shifted_geometric_mean(
     values: Array, charges: Array, penalty: float = PENALTY, shift: float = SHIFT
 ) -> Array:
-    """(solvers) of costs (instances, solvers); a failure counts as penalty times its charge."""
-    whole = np.where(np.isfinite(values), values, penalty * charges[:, None])
-    return np.asarray(np.expm1(np.log1p(whole / shift).mean(axis=0)) * shift)
+    """(solvers) of costs (instances, solvers); a failure counts as penalty times its charge.
+
+    Of a solver those instances count for which it has a cost; nan where there is none.
+    """
+    whole = np.where(np.isinf(values), penalty * charges[:, None], values)
+    there = ~np.isnan(values)
+    logs = np.where(there, np.log1p(np.where(there, whole, 0.0) / shift), 0.0).sum(axis=0)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.expm1(logs / there.sum(axis=0)) * shift)
 
 
 @dataclass(frozen=True)
@@ -298,7 +452,7 @@ class Pair:
     only_first: int
     only_second: int
     ratio: float  # geometric mean of t_first / t_second, nan where there is none
-    low: float  # 95 % interval of it, by bootstrap over the instances
+    low: float  # 95 % interval of it, by bootstrap over the problems
     high: float
 
 
@@ -308,7 +462,7 @@ def pairs(costs: Costs, against: str | None = None, seed: int = 0) -> list[Pair]
     Args:
         costs: of all.
         against: the one, as the second of each pair.
-        seed: of the bootstrap, which draws the instances `RESAMPLES` times.
+        seed: of the bootstrap, which draws the problems `RESAMPLES` times.
     """
     names = costs.solvers
     chosen = [
@@ -325,10 +479,15 @@ def pairs(costs: Costs, against: str | None = None, seed: int = 0) -> list[Pair]
         ratio = low = high = math.nan
         if logs.size:
             random = np.random.Generator(np.random.PCG64([seed, a, b]))
-            drawn = random.integers(0, logs.size, (RESAMPLES, logs.size))
+            own = _by_problem([costs.instances[k].hash for k in np.flatnonzero(both)])
+            sums = np.array([logs[part].sum() for part in own])
+            sizes = np.array([len(part) for part in own])
+            drawn = random.integers(0, len(own), (RESAMPLES, len(own)))
             ratio = float(np.exp(logs.mean()))
-            low, high = np.exp(np.quantile(logs[drawn].mean(axis=1), [0.025, 0.975])).tolist()
-        only_a, only_b = int((good_a & ~good_b).sum()), int((good_b & ~good_a).sum())
+            means = sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1)
+            low, high = np.exp(np.quantile(means, [0.025, 0.975])).tolist()
+        failed_a, failed_b = np.isinf(costs.values[:, a]), np.isinf(costs.values[:, b])
+        only_a, only_b = int((good_a & failed_b).sum()), int((good_b & failed_a).sum())
         found.append(Pair(names[a], names[b], int(both.sum()), only_a, only_b, ratio, low, high))
     return found
 
@@ -344,21 +503,80 @@ def summary(costs: Costs, penalty: float = PENALTY, shift: float = SHIFT) -> lis
     quotients = ratios(values)
     rows: list[dict[str, Any]] = []
     for k, name in enumerate((VIRTUAL_BEST, *costs.solvers)):
+        there = ~np.isnan(values[:, k])
         solved = np.isfinite(values[:, k])
         own = quotients[solved, k]
+        # of the best on the same instances
+        (least_mean,) = shifted_geometric_mean(
+            best[there, None], costs.charges[there], penalty, shift
+        )
         rows.append(
             {
                 "solver": name,
                 "solved": int(solved.sum()),
-                "of": len(solved),
+                "of": int(there.sum()),
+                "unsuitable": _count(costs.unsuitable, k - 1),
                 "fastest": int((own == 1).sum()) if k else int(solved.sum()),
                 "mean": float(means[k]),
-                "to best": float(means[k] / means[0]) if means[0] > 0 else math.nan,
+                "to best": float(means[k] / least_mean) if least_mean > 0 else math.nan,
                 "median ratio": float(np.median(own)) if own.size else None,
                 "worst ratio": float(own.max()) if own.size else None,
+                "spread": _median(costs.spread, k - 1),
             }
         )
     return [rows[0], *sorted(rows[1:], key=lambda row: (-row["solved"], row["mean"]))]
+
+
+def _count(marks: npt.NDArray[np.bool_] | None, k: int) -> int:
+    return 0 if marks is None or k < 0 else int(marks[:, k].sum())
+
+
+def _median(spread: Array | None, k: int) -> float | None:
+    """The median spread of the repeats of a solver, where there are any."""
+    if spread is None or k < 0:
+        return None
+    own = spread[np.isfinite(spread[:, k]), k]
+    return float(np.median(own)) if own.size else None
+
+
+def shifts(costs: Costs, penalty: float = PENALTY, shift: float = SHIFT) -> list[dict[str, Any]]:
+    """A row a solver: its mean over that of the virtual best, for other shifts too."""
+    tables = {
+        f"shift {s:g}": {row["solver"]: row["to best"] for row in summary(costs, penalty, s)}
+        for s in (shift / 10, shift, 10 * shift)
+    }
+    order = [row["solver"] for row in summary(costs, penalty, shift)[1:]]
+    return [
+        {"solver": name, **{title: own[name] for title, own in tables.items()}} for name in order
+    ]
+
+
+def accuracies(rows: Sequence[Mapping[str, Any]], tol: float) -> list[dict[str, Any]]:
+    """A row a solver: the share of its runs at a tolerance that reached an error, within limits.
+
+    The recomputed error decides, whatever the solver said.
+    """
+    found = []
+    for solver in dict.fromkeys(row["solver"] for row in rows):
+        own = [
+            row
+            for row in rows
+            if row["solver"] == solver and row["tol"] == tol and row["status"] != "unsuitable"
+        ]
+        if not own:
+            continue
+        entry: dict[str, Any] = {"solver": solver, "tol": tol, "runs": len(own)}
+        for bound in ACCURACIES:
+            reached = [
+                row["error"] is not None
+                and row["error"] <= bound
+                and row["status"] in (*ORDERLY, "inaccurate")
+                and (row["cpu_s"] or 0.0) <= row["time_limit"]
+                for row in own
+            ]
+            entry[f"error <= {bound:g}"] = sum(reached) / len(own)
+        found.append(entry)
+    return found
 
 
 def failures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -389,7 +607,8 @@ def families(
     for (family, tol, limit), numbers in sorted(groups.items()):
         part = costs.of(numbers)
         best = part.best[np.isfinite(part.best)]
-        wins = Counter(part.solvers[k] for k in part.values.argmin(axis=1)[np.isfinite(part.best)])
+        quickest = np.where(np.isnan(part.values), np.inf, part.values).argmin(axis=1)
+        wins = Counter(part.solvers[k] for k in quickest[np.isfinite(part.best)])
         contacts = [instance.nc for instance in part.instances]
         rows.append(
             {
@@ -413,6 +632,7 @@ def work_precision(
     metric: str = "cpu_s",
     penalty: float = PENALTY,
     shift: float = SHIFT,
+    count_unsuitable: bool = False,
 ) -> list[dict[str, Any]]:
     """A row a solver and tolerance: what the accuracy costs, over problems that all have run.
 
@@ -422,7 +642,7 @@ def work_precision(
     for tol in sorted({row["tol"] for row in rows}, reverse=True):
         own = [row for row in rows if row["tol"] == tol]
         try:
-            part = costs(own, metric)
+            part = costs(own, metric, count_unsuitable)
         except ProfileError:
             continue
         means = shifted_geometric_mean(part.values, part.charges, penalty, shift)
@@ -437,32 +657,135 @@ def work_precision(
                     "mean": float(means[k]),
                     "error": float(np.exp(np.log(errors).mean())) if errors else None,
                     "solved": int(part.solved[:, k].sum()),
-                    "of": len(part.instances),
+                    "of": int((~np.isnan(part.values[:, k])).sum()),
                 }
             )
     return found
 
 
+# ---- from histories
+
+
+def curves(
+    store: str | Path, rows: Sequence[Mapping[str, Any]]
+) -> dict[str, list[tuple[Array, Array]]]:
+    """For each run of each solver the times [s] and the least errors until then.
+
+    The times are of CPU: those of the history, which are of the wall clock, in proportion. A run
+    that left no history, as one that was killed, has reached nothing. Empty where no run has one.
+    """
+    found: dict[str, list[tuple[Array, Array]]] = defaultdict(list)
+    some = False
+    with Store(store, create=False) as opened:
+        for row in rows:
+            if row["status"] == "unsuitable":
+                continue
+            history = opened.history(row["run"])
+            times = np.array([time for _, _, time, _ in history], dtype=float)
+            errors = np.array([error for _, error, _, _ in history], dtype=float)
+            if times.size:
+                some = True
+                if row["cpu_s"] is not None and times[-1] > 0:
+                    times *= row["cpu_s"] / times[-1]
+                errors = np.minimum.accumulate(errors)
+            found[row["solver"]].append((times, errors))
+    return dict(found) if some else {}
+
+
 def convergence(
     store: str | Path, rows: Sequence[Mapping[str, Any]], times: Array
 ) -> dict[str, Array]:
-    """The least error reached by a time, its median over the runs with a history, by solver.
+    """The least error reached by a time, its median over all runs, by solver.
+
+    Args:
+        store: the file that the rows are of.
+        rows: as `load` gives them, at one tolerance.
+        times: (k) [s] of CPU, growing.
+
+    Returns:
+        For each solver an array (k), inf before half of its runs have reported; of an even number
+        of runs the larger error in the middle. Empty where no run has a history.
+
+    Raises:
+        ProfileError: the runs are at several tolerances: they end at different errors.
+    """
+    if len({row["tol"] for row in rows}) > 1:
+        raise ProfileError("convergence is of runs at one tolerance")
+    found = {}
+    for solver, own in curves(store, rows).items():
+        reached = np.full((len(own), len(times)), np.inf)
+        for k, (moments, errors) in enumerate(own):
+            if moments.size:
+                at = np.searchsorted(moments, times, side="right") - 1
+                reached[k] = np.where(at >= 0, errors[np.maximum(at, 0)], np.inf)
+        found[solver] = np.sort(reached, axis=0)[len(own) // 2]
+    return found
+
+
+def targets(tol: float) -> Array:
+    """The errors that runtimes are to: powers of ten from 0.1 on, the tolerance last."""
+    last = math.floor(math.log10(tol) + 1e-9)
+    return np.array([*(10.0**k for k in range(-1, last, -1)), tol])
+
+
+def runtimes(store: str | Path, rows: Sequence[Mapping[str, Any]], tol: float) -> dict[str, Array]:
+    """For each solver the times [s] of CPU to the `targets` of all its runs; inf where not reached.
 
     Args:
         store: the file that the rows are of.
         rows: as `load` gives them.
-        times: (k) [s], growing.
-
-    Returns:
-        For each solver with histories an array (k), inf before half of its runs have reported.
+        tol: only runs at this tolerance.
     """
-    curves: dict[str, list[Array]] = defaultdict(list)
-    with Store(store, create=False) as opened:
-        for row in rows:
-            history = opened.history(row["run"])
-            if not history:
-                continue
-            errors = np.minimum.accumulate([error for _, error, _, _ in history])
-            at = np.searchsorted([time for _, _, time, _ in history], times, side="right") - 1
-            curves[row["solver"]].append(np.where(at >= 0, errors[np.maximum(at, 0)], np.inf))
-    return {solver: np.median(np.array(own), axis=0) for solver, own in curves.items()}
+    wanted = targets(tol)
+    found = {}
+    for solver, own in curves(store, [row for row in rows if row["tol"] == tol]).items():
+        times = np.full((len(own), len(wanted)), np.inf)
+        for k, (moments, errors) in enumerate(own):
+            # the errors fall: the first that is small enough
+            first = np.searchsorted(-errors, -wanted, side="left")
+            reached = first < len(errors)
+            times[k, reached] = moments[first[reached]]
+        found[solver] = times.ravel()
+    return found
+
+
+# ---- what a figure says of itself
+
+
+def caption(costs: Costs, rows: Sequence[Mapping[str, Any]]) -> str:
+    """Instances, tolerances, limits, failures, machine, date and version, in one line."""
+
+    def span(values: Iterable[float]) -> str:
+        known = sorted(set(values))
+        return f"{known[0]:g}" if len(known) == 1 else f"{known[0]:g} to {known[-1]:g}"
+
+    first = rows[0]
+    failed = int(np.isinf(costs.values).sum())
+    count = int((~np.isnan(costs.values)).sum())
+    started = [row["started"] for row in rows if row.get("started")]
+    days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in started})
+    # of the core; modules and programs have digests of their own
+    versions = sorted({str(row.get("version") or "").partition("-")[0] for row in rows
+                       if row.get("origin") == "fclib"})  # fmt: skip
+    words = [
+        f"{len(costs.instances)} instances",
+        f"tolerance {', '.join(f'{tol:g}' for tol in costs.tolerances)}",
+        f"limit {span(one.limit for one in costs.instances)} s of CPU",
+        f"{failed} of {count} runs failed",
+    ]
+    if refused := int(costs.unsuitable.sum()) if costs.unsuitable is not None else 0:
+        words.append(f"{refused} left out as unsuitable")
+    words += [f"{first.get('cpu') or '?'} ({first.get('node') or '?'})"]
+    words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
+    words += [f"fclib {', '.join(versions)}"] if versions else []
+    return "; ".join(words)
+
+
+def loaded(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+    """How many runs of each solver were begun while the load was above the number of cores."""
+    found = Counter(
+        row["solver"]
+        for row in rows
+        if row.get("load") and row.get("cores") and row["load"] > row["cores"]
+    )
+    return dict(found)

@@ -12,6 +12,7 @@ import numpy as np
 
 from fclib.bench import MeritKind, profiles
 from fclib.bench.campaign import published_means
+from fclib.bench.store import Store
 from fclib.cli._output import Report, err, make_table, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
@@ -30,6 +31,7 @@ def print_profile(
     merit: MeritKind | None = None,
     penalty: float = profiles.PENALTY,
     shift: float = profiles.SHIFT,
+    count_unsuitable: bool = False,
     formats: Sequence[str] = ("pdf", "svg", "png"),
     as_json: bool = False,
     quiet: bool = False,
@@ -44,15 +46,24 @@ def print_profile(
         machine=machine,
         merit=merit,
     )
-    costs = profiles.costs(rows, metric)
+    costs = profiles.costs(rows, metric, count_unsuitable)
     published = published_means(store)
+    with Store(store, create=False) as opened:
+        faults = [
+            fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
+        ]
     tables: dict[str, list[dict[str, Any]]] = {
         "summary": profiles.summary(costs, penalty, shift),
         "profile": shares_within(costs),
         "statuses": profiles.failures(rows),
         "families": profiles.families(costs, published),
         "pairs": [dataclasses.asdict(pair) for pair in profiles.pairs(costs)],
-        "work-precision": profiles.work_precision(rows, metric, penalty, shift),
+        "shifts": profiles.shifts(costs, penalty, shift) if metric in profiles.TIMES else [],
+        "accuracies": [
+            entry for each in costs.tolerances for entry in profiles.accuracies(rows, each)
+        ],
+        "work-precision": profiles.work_precision(rows, metric, penalty, shift, count_unsuitable),
+        "not run": profiles.failures(faults),
     }
     if not quiet and as_json:
         report = Report(True)
@@ -60,7 +71,7 @@ def print_profile(
             for record in records:
                 report.add({"table": table, **record})
     elif not quiet:
-        show(tables, costs, penalty, shift, profiles.JUDGED[rows[0]["merit"]])
+        show(tables, costs, rows, penalty, shift)
     if folder is not None:
         draw(tables, costs, rows, store, folder, formats)
         err.print(f"Pictures and tables: {folder}", highlight=False)
@@ -69,29 +80,56 @@ def print_profile(
 def show(
     tables: dict[str, list[dict[str, Any]]],
     costs: profiles.Costs,
+    rows: Sequence[dict[str, Any]],
     penalty: float,
     shift: float,
-    judged: str,
 ) -> None:
     """The tables, for people."""
     words = profiles.METRICS[costs.metric][0]
-    several = len({instance.tol for instance in costs.instances}) > 1
+    judged = profiles.JUDGED[rows[0]["merit"]]
     out.print(
-        f"{len(costs.instances)} problems{' at a tolerance' if several else ''}, {words};"
-        f" shifted geometric means, shift {shift:g}, failures as {penalty:g} x the limit; {judged}",
+        f"{words}: {profiles.caption(costs, rows)}; shifted geometric means, shift {shift:g},"
+        f" failures as {penalty:g} x the limit; {judged}",
         highlight=False,
     )
     if costs.left_out:
         out.print(f"{costs.left_out} left out, which not all solvers have run", highlight=False)
+    busy = profiles.loaded(rows)
+    marked, unsteady = [], False
+    for row in tables["summary"]:
+        wide = row["spread"] is not None and row["spread"] > profiles.SPREAD
+        unsteady = unsteady or wide
+        of = f"{row['mean']:.3g}"
+        marked.append(row | {"mean": f"{of} {profiles.MARK}" if wide else of})
+    if all(row["spread"] is None for row in marked):
+        marked = [{name: row[name] for name in row if name != "spread"} for row in marked]
+    if not any(row["unsuitable"] for row in marked):
+        marked = [{name: row[name] for name in row if name != "unsuitable"} for row in marked]
     titles = {
         "summary": None,
         "profile": "Performance profile: solved within a multiple of the best",
         "statuses": "How the runs ended",
+        "not run": "Not run, for causes outside of the solvers",
+        "shifts": "Means over that of the best, by the shift of the mean",
         "families": "The fastest solver of each problem, by family",
     }
     for name, title in titles.items():
-        out.print()
-        out.print(make_table(tables[name], title))
+        shown_rows = marked if name == "summary" else tables[name]
+        if shown_rows:
+            out.print()
+            out.print(make_table(shown_rows, title))
+        if name == "summary" and unsteady:
+            out.print(
+                f"{profiles.MARK}: repeats differ by more than {100 * profiles.SPREAD:.0f} %"
+                " in the median",
+                highlight=False,
+            )
+        if name == "summary" and busy:
+            out.print(
+                f"{sum(busy.values())} of {len(rows)} runs were begun while the load was above the"
+                " number of cores: their times are longer than on a quiet machine",
+                highlight=False,
+            )
     best = tables["summary"][1]["solver"]
     shown = [pair for pair in profiles.pairs(costs, against=best) if pair.both]
     if shown:
@@ -124,20 +162,27 @@ def draw(
     folder.mkdir(parents=True, exist_ok=True)
     for table, records in tables.items():
         if table != "profile":
-            write_csv(folder / f"{table}.csv", records)
-    steps = curve_rows(costs, profiles.ratios(costs.values), "tau")
-    write_csv(folder / f"performance-{costs.metric}.csv", steps)
-    write_csv(folder / f"data-{costs.metric}.csv", curve_rows(costs, costs.values, costs.metric))
-    plots.performance(costs, folder, formats)
-    plots.data(costs, folder, formats, per_contact=False)
-    plots.data(costs, folder, formats, per_contact=True)
-    if len({row["tol"] for row in rows}) > 1:
-        plots.work_precision(tables["work-precision"], costs.metric, folder, formats)
-    longest = max((row["wall_s"] or 0.0 for row in rows), default=0.0)
-    times = np.geomspace(1e-5, max(longest, 1e-4), 300)
-    curves = profiles.convergence(store, rows, times)
-    if curves:
-        plots.convergence(curves, times, folder, formats)
+            write_csv(folder / f"{table.replace(' ', '-')}.csv", records)
+    several = len(costs.tolerances) > 1
+    for tol in costs.tolerances:
+        part, own = costs.at(tol), [row for row in rows if row["tol"] == tol]
+        words, ending = profiles.caption(part, own), f"-{tol:g}" if several else ""
+        name = f"{costs.metric}{ending}"
+        steps = curve_rows(part, profiles.ratios(part.values), "tau")
+        write_csv(folder / f"performance-{name}.csv", steps)
+        write_csv(folder / f"data-{name}.csv", curve_rows(part, part.values, costs.metric))
+        plots.performance(part, folder, formats, words, ending)
+        for per_contact in (False, True):
+            plots.data(part, folder, formats, per_contact=per_contact, caption=words, ending=ending)
+        longest = max((row["cpu_s"] or 0.0 for row in own), default=0.0)
+        times = np.geomspace(1e-5, max(longest, 1e-4), 300)
+        if curves := profiles.convergence(store, own, times):
+            plots.convergence(curves, times, folder, formats, words, ending)
+            reached = profiles.runtimes(store, own, tol)
+            plots.runtimes(reached, folder, formats, words, ending)
+    if several:
+        words = profiles.caption(costs, rows)
+        plots.work_precision(tables["work-precision"], costs.metric, folder, formats, words)
 
 
 def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:

@@ -33,6 +33,12 @@ def command(
     shift: Annotated[
         float, typer.Option(help="Of the geometric means, in the unit of the metric.", min=1e-12)
     ] = profiles.SHIFT,
+    count_unsuitable: Annotated[
+        bool,
+        typer.Option(
+            "--count-unsuitable", help="What a solver does not take is a failure, not left out."
+        ),
+    ] = False,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and CSV.")
     ] = None,
@@ -56,6 +62,7 @@ def command(
             merit=merit.value if merit else None,
             penalty=penalty,
             shift=shift,
+            count_unsuitable=count_unsuitable,
             formats=formats.split(","),
             as_json=as_json,
         )

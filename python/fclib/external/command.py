@@ -11,14 +11,16 @@ The words are those of a command line, without a shell. In them stand for
 
 The program ends with exit status 0, and leaves /solution in the output, an FCLIB file or a bare
 one, or in the input where there is no {output}. At the time limit it is killed with all that it
-has started. The time of the result is the CPU time of the program and of what it waited for; how
-many iterations it took is not known, and stated as 0. The answer is judged like any other; a
+has started. The time of the result is the CPU time of the program and of what it waited for, with
+its start; its iterations are not known, and stated as 0. A program may say both itself, by the
+attributes `cpu_s` [s] and `iterations` of its /solution. The answer is judged like any other; a
 program that is given {tol} is asked again, for more, where it was content too early.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import shlex
 import shutil
@@ -27,7 +29,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
@@ -88,6 +90,7 @@ def find(name: str) -> _core.SolverInfo:
 
 
 def _solve(words: list[str], problem: Local, r: Any, monitor: _core.Monitor) -> Any:
+    global reported
     if monitor.stop(r):
         return r
     with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
@@ -103,15 +106,27 @@ def _solve(words: list[str], problem: Local, r: Any, monitor: _core.Monitor) -> 
             return r
         writes = any("{output}" in word for word in words)
         solution = _solution(made if writes else given, words[0])
+        told = _core.read_attributes(made if writes else given, "solution")
     if solution.r.shape != r.shape:
         raise _registry.SolverError(
             f"{words[0]}: its solution has r of length {solution.r.size}, expected {r.size}"
         )
     stop = monitor.stop(solution.r)
-    monitor.iterations = 0
+    monitor.iterations = int(_number(told, "iterations", words[0]) or 0)
+    if (cpu_s := _number(told, "cpu_s", words[0])) is not None:
+        monitor.cpu_s, reported = cpu_s, True
     if not stop and not any("{tol}" in word for word in words):
         monitor.status = "inaccurate"  # it would do the same again
     return solution.r
+
+
+def _number(told: Mapping[str, float | str], name: str, program: str) -> float | None:
+    value = told.get(name)
+    if value is None:
+        return None
+    if not (isinstance(value, (int, float)) and math.isfinite(value) and abs(value) < 2**62):
+        raise _registry.SolverError(f"{program}: its solution has {name} = {value!r}, no number")
+    return float(value)
 
 
 def _filled(word: str, values: dict[str, str]) -> str:

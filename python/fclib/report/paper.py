@@ -36,9 +36,10 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
             continue
         own = folder / f"tol-{tol:g}"
         own.mkdir(parents=True, exist_ok=True)
-        plots.performance(costs, own, FORMATS)
-        plots.data(costs, own, FORMATS, per_contact=False)
-        plots.data(costs, own, FORMATS, per_contact=True)
+        words = profiles.caption(costs, campaigns.at(tol))
+        plots.performance(costs, own, FORMATS, words)
+        plots.data(costs, own, FORMATS, per_contact=False, caption=words)
+        plots.data(costs, own, FORMATS, per_contact=True, caption=words)
         _write(own / "summary.tex", latex(profiles.summary(costs)))
         _write(own / "families.tex", latex(profiles.families(costs)))
         _write(own / "statuses.tex", latex(profiles.failures(campaigns.at(tol))))

@@ -219,18 +219,25 @@ class Campaigns:
         found = {key: row[key] for key in (*keys, "cpu_s", "wall_s", "memory_mb", "time_limit")}
         found["form"] = row["formulation"]
         if row["run"] in reported:
-            found["history"] = _thinned(store.history(row["run"]))
+            found["history"] = _thinned(store.history(row["run"]), row["cpu_s"])
         return dict(rounded(found, DIGITS))
 
 
-def _thinned(history: Sequence[tuple[int, float, float, str]]) -> list[list[float]]:
-    """Iteration, error and time [s] of some reports, evenly on a logarithmic axis, the last too."""
+def _thinned(
+    history: Sequence[tuple[int, float, float, str]], cpu_s: float | None
+) -> list[list[float]]:
+    """Iteration, error and time of some reports, evenly on a logarithmic axis, the last too.
+
+    The time [s] is of CPU, as that of the tables: of the wall clock in proportion.
+    """
     count = len(history)
+    last = history[-1][2]
+    scale = cpu_s / last if cpu_s is not None and last > 0 else 1.0
     chosen = list(range(count))
     if count > REPORTS:
         spread = np.geomspace(1, count, REPORTS).round().astype(int) - 1
         chosen = sorted({*spread.tolist(), count - 1})
-    return [[history[k][0], history[k][1], history[k][2]] for k in chosen]
+    return [[history[k][0], history[k][1], scale * history[k][2]] for k in chosen]
 
 
 def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
@@ -241,6 +248,7 @@ def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
         own = costs.values[:, k]
         if count > 1:
             others = costs.values[:, [j for j in range(count) if j != k]]
+            others = np.where(np.isnan(others), np.inf, others)
             rival, best = others.argmin(axis=1), others.min(axis=1)
         else:
             rival, best = np.zeros(len(own), int), np.full(len(own), np.inf)

@@ -5,6 +5,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 BUILD := build
 SECONDS := 60
+BUDGET ?= 10min
+CAMPAIGNS ?= rt444 scaling faf2018
 JOBS ?= auto
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
@@ -12,7 +14,7 @@ NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
-        collection-wheel deb release clean help
+        collection-wheel campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -33,6 +35,7 @@ help:
 	@echo "             sources of HDF5, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
+	@echo "make campaigns  run the published campaigns, BUDGET=10min each, and pack stores and tables"
 	@echo "make deb     the C library as Debian packages, into dist/"
 	@echo "make release  check all, build and try all that is released, into dist/, with checksums and SBOM"
 	@echo "make clean   remove what was built (not $(VENV))"
@@ -106,6 +109,13 @@ wheels: sdist
 	$(BIN)/python scripts/try_wheels.py --build $(BUILD)/bundled $(CHROOTS:%=--chroot %)
 
 # tried as it is installed: every stored trajectory is found in it and read
+campaigns: setup
+	set -e; for name in $(CAMPAIGNS); do \
+	  $(BIN)/python benchmarks/published_campaigns.py $$name --budget $(BUDGET); done
+	mkdir -p dist
+	tar -czf dist/fclib-campaigns.tar.gz -C $(BUILD) campaigns -C .. docs/results
+	@echo dist/fclib-campaigns.tar.gz
+
 collection-wheel: setup $(VENV)/.package-tools
 	rm -rf dist/collection
 	$(BIN)/python -m build --wheel --outdir dist/collection collection

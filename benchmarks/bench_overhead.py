@@ -1,20 +1,31 @@
-"""What the bench itself costs a run: small problems, many runs, the time that is not the solver's.
+"""What the bench itself costs a run: small problems, many runs, what is not the solver's.
 
     .venv/bin/python benchmarks/bench_overhead.py --runs 10000 --jobs 2
 
-The overhead is the wall clock times the jobs, less the wall clock of the solves, over the runs. No
-run may be lost or doubled.
+The overhead is the CPU time of the campaign and its supervisors, with their start, less what the
+runs took, over the runs; the memory is that of the process that conducts the campaign. No run may
+be lost or doubled.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
 import tempfile
 import time
 from pathlib import Path
 
+import _results
+
 from fclib import bench
+from fclib.bench import profiles
+
+
+def spent() -> float:
+    """[s] of CPU of this process and of those that it has waited for."""
+    kinds = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    return sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, kinds))
 
 
 def main() -> None:
@@ -22,6 +33,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=10_000)
     parser.add_argument("--jobs", type=int, default=1)
+    _results.add_option(parser)
     arguments = parser.parse_args()
     campaign = bench.Campaign.of(
         {
@@ -34,19 +46,37 @@ def main() -> None:
     )
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "overhead.sqlite"
-        start = time.perf_counter()
+        start, before = time.perf_counter(), spent()
         progress = bench.run_campaign(campaign, path, jobs=arguments.jobs)
-        wall = time.perf_counter() - start
+        wall, cpu = time.perf_counter() - start, spent() - before
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
         with bench.Store(path) as store:
             rows = store.results()
+        start, before = time.perf_counter(), spent()
+        loaded = profiles.load(path)
+        costs = profiles.costs(loaded)
+        profiles.summary(costs)
+        profiles.pairs(costs)
+        profile, profile_cpu = time.perf_counter() - start, spent() - before
     count, keys = len(rows), len({row["key"] for row in rows})
     assert count == keys == progress.planned, (count, keys, progress.planned)
-    solves = sum(row["wall_s"] for row in rows)
-    overhead = (wall * arguments.jobs - solves) / count
-    print(
-        f"{count} runs, {progress.solved} solved, {wall:.1f} s; the solves {solves:.1f} s; "
-        f"overhead {1e3 * overhead:.1f} ms a run; load {os.getloadavg()[0]:.1f}"
-    )
+    runs = sum(row["total_cpu_s"] for row in rows)
+    entry = {
+        "runs": count,
+        "solved": progress.solved,
+        "at once": arguments.jobs,
+        "CPU of the runs [s]": runs,
+        "overhead a run, CPU [ms]": 1e3 * (cpu - runs) / count,
+        "wall clock [s]": wall,
+        "memory of the campaign [MB]": memory,
+        "profile, CPU [s]": profile_cpu,
+        "profile, wall clock [s]": profile,
+        "load": os.getloadavg()[0],
+    }
+    for name, value in entry.items():
+        print(f"{name}: {value:.4g}")
+    if arguments.results:
+        _results.store(arguments.results, [entry], title="What the bench costs a run")
 
 
 if __name__ == "__main__":

@@ -103,8 +103,9 @@ class Queue(Iterator[Job]):
 
 
 def cost(record: Record) -> float:
-    """[s] of a budget that a run takes: of CPU, or of waiting where that is more."""
-    return max(record.total_cpu_s or 0.0, record.wall_s or 0.0)
+    """[s] of a budget that a run takes: of CPU, or of waiting where that ended it."""
+    waited = record.status == "wall_limit"
+    return (record.wall_s if waited else record.total_cpu_s) or 0.0
 
 
 def run_campaign(

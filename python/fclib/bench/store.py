@@ -385,8 +385,9 @@ class Store:
         return {key for (key,) in self.db.execute("SELECT key FROM runs")}
 
     def spent(self, keys: Sequence[str]) -> float:
-        """[s] that the runs of some keys have taken, of CPU, or of waiting where that is more."""
-        query = "SELECT key, MAX(COALESCE(total_cpu_s, 0), COALESCE(wall_s, 0)) FROM runs"
+        """[s] that the runs of some keys have taken, of CPU, or of waiting where that ended it."""
+        cost = "CASE status WHEN 'wall_limit' THEN wall_s ELSE total_cpu_s END"
+        query = f"SELECT key, COALESCE({cost}, 0) FROM runs"
         wanted = set(keys)
         return float(sum(cost for key, cost in self.db.execute(query) if key in wanted))
 

@@ -1,0 +1,106 @@
+"""Run a published campaign within a budget, and store the tables that pages quote.
+
+    .venv/bin/python benchmarks/published_campaigns.py rt444 --budget 10min --time-limit 1
+    .venv/bin/python benchmarks/published_campaigns.py rt444 --tables      # from the store alone
+
+The store is build/campaigns/NAME.sqlite; the same command goes on with it. The tables are
+docs/results/campaign-NAME.csv (solvers) and campaign-NAME-families.csv; `make campaigns` packs
+stores and tables. A budget bounds the time of the runs, and each run ends at --time-limit; what
+that leaves out is said in the note of the tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import _results
+import numpy as np
+
+from fclib import bench
+from fclib.bench import campaign, profiles
+
+STORES = _results.ROOT / "build" / "campaigns"
+
+
+def main() -> None:
+    """Run it, and write the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("name", help="a campaign of campaigns/")
+    parser.add_argument("--budget", default="10min")
+    parser.add_argument("--time-limit", help="[s] of CPU a run, instead of the campaign's own")
+    parser.add_argument("--sample", help="so many problems of each group")
+    parser.add_argument("--repeats", help="instead of the campaign's own")
+    parser.add_argument("--jobs", default="1")
+    parser.add_argument("--tables", action="store_true", help="run nothing")
+    arguments = parser.parse_args()
+    store = STORES / f"{arguments.name}.sqlite"
+    if not arguments.tables:
+        STORES.mkdir(parents=True, exist_ok=True)
+        command = [str(Path(sys.executable).with_name("fclib")), "bench", arguments.name]
+        command += ["--store", str(store), "--budget", arguments.budget, "-j", arguments.jobs]
+        for option in ("time_limit", "sample", "repeats"):
+            if (value := getattr(arguments, option)) is not None:
+                command += [f"--{option.replace('_', '-')}", value]
+        subprocess.run(command, check=True)
+    write(arguments.name, store)
+
+
+def write(name: str, store: Path) -> None:
+    """The tables of a store."""
+    rows = profiles.load(store)
+    whole = profiles.costs(rows)
+    with bench.Store(store, create=False) as opened:
+        (first, *_) = opened.status()
+        spent = opened.spent(list(opened.keys()))
+    note = (
+        f"{profiles.caption(whole, rows)}. {first.done} of the campaign's {first.planned} runs, in"
+        f" {spent / 60:.0f} min of runs; {len(whole.instances)} instances were run by all solvers,"
+        f" {whole.left_out} that were not are left out."
+    )
+    if busy := sum(profiles.loaded(rows).values()):
+        note += f" {busy} of {len(rows)} runs were begun under a load above the number of cores."
+    solvers: list[dict[str, Any]] = []
+    for tol in whole.tolerances:
+        costs = whole.at(tol)
+        within = profiles.performance_profile(costs.values, np.array([2.0, 10.0]))
+        shares = dict(zip(costs.solvers, within.tolist(), strict=True))
+        for row in profiles.summary(costs):
+            two, ten = shares.get(row["solver"], (1.0, 1.0))
+            solvers.append(
+                {
+                    "tolerance": _results.power(tol),
+                    "solver": row["solver"].partition(" (")[0],
+                    "solved": f"{row['solved']} of {row['of']}",
+                    "fastest": row["fastest"],
+                    "mean [s]": row["mean"],
+                    "to best": row["to best"],
+                    "within 2x": f"{100 * two:.0f} %",
+                    "within 10x": f"{100 * ten:.0f} %",
+                }
+            )
+    _results.store(f"campaign-{name}", solvers, title=f"Campaign {name}: the solvers", note=note)
+    families = [
+        {
+            "family": row["family"],
+            "problems": row["problems"],
+            "contacts": row["contacts"],
+            "tolerance": _results.power(row["tol"]),
+            "mean of the fastest [s]": row["mean of fastest"],
+            **({"published [s]": row["published"] or ""} if "published" in row else {}),
+            "unsolved": row["unsolved"],
+            "most often the fastest": row["most often fastest"].partition(" (")[0],
+        }
+        for row in profiles.families(whole, campaign.published_means(store))
+    ]
+    title = f"Campaign {name}: the fastest solver of each problem"
+    _results.store(f"campaign-{name}-families", families, title=title, note=note)
+
+
+if __name__ == "__main__":
+    main()

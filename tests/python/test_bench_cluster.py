@@ -113,6 +113,22 @@ def test_problems_that_are_sent(
     assert {fclib.digest(fclib.read(path)) for path in kept} == {path.stem for path in kept}
 
 
+def test_a_cluster_without_workers_is_waited_for_aloud(
+    scheduler: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words: list[str] = []
+    # as it is before the first worker has joined
+    seen: list[dict[str, int]] = [{}]
+    there = scheduler.nthreads
+    monkeypatch.setattr(scheduler, "nthreads", lambda: seen.pop() if seen else there())
+    runner = cluster.runner(scheduler, tell=words.append)
+    chosen = campaign(tmp_path, solvers=["nsgs"], repeats=1)
+    progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=runner)
+    assert progress.solved == 4
+    (word,) = words
+    assert "has no worker yet; dask worker tcp://" in word
+
+
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "PATIENCE", 1.0)
     with (

@@ -15,9 +15,10 @@ import importlib
 import os
 import signal
 import subprocess
+import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -67,12 +68,18 @@ def _kept(name: str, data: bytes) -> Path:
 # ---- in the campaign
 
 
-def runner(client: Any, send: bool = False) -> Runner:
+def say(word: str) -> None:
+    """Say something to who waits for a cluster."""
+    print(word, file=sys.stderr, flush=True)
+
+
+def runner(client: Any, send: bool = False, tell: Callable[[str], None] = say) -> Runner:
     """What `run_campaign` needs to run its jobs on a cluster.
 
     Args:
         client: a ``distributed.Client``.
         send: whether the problems are sent, because the machines share no folder.
+        tell: is called where there is no worker to do the jobs.
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
@@ -105,6 +112,9 @@ def runner(client: Any, send: bool = False) -> Runner:
 
         done = as_completed()
         try:
+            if not client.nthreads():
+                address = client.scheduler.address
+                tell(f"waiting: {address} has no worker yet; dask worker {address} starts one")
             while True:
                 # workers may come and go
                 while len(waiting) < capacity() and (future := submit()) is not None:

@@ -70,7 +70,7 @@ def rows_of(path: Path) -> list[dict[str, Any]]:
 def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
     """A row a solver."""
     sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
-    trials = importlib.import_module("test_bench_limits")
+    trials: Any = importlib.import_module("test_bench_limits")
     trials.BAD += textwrap.indent(FLOOD, "    ")
     trials.EXPECTED["floods"] = "cpu_limit or wall_limit"
     prepared = folder / "bad"
@@ -79,8 +79,9 @@ def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bo
     os.environ["FCLIB_TEST_SPIN"] = str(prepared / "spin.so")
     supervisor = pool.SupervisorClient(1)
     found, good = [], True
-    (problem, *_) = {job.problem.name: job.problem for job in campaign().plan()}.values()
-    usual = dataclasses.replace(trials.job(prepared, "nsn-ac"), problem=problem)
+    usual = dataclasses.replace(
+        trials.job(prepared, "nsn-ac"), problem=campaign().plan()[0].problem
+    )
     for name, expected in trials.EXPECTED.items():
         wall = trials.LIMIT if expected == "wall_limit" else 10 * trials.LIMIT
         before = least(supervisor, usual)

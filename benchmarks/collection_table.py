@@ -8,6 +8,10 @@ over the smallest that is not zero) are computed by fclib.analysis for a sample 
 evenly spread, of the problems that have at most LIMIT contact components; docs/analysis.md has
 methods and thresholds.
 
+The last column says whether ours has the published range: both ends of each figure are met to 10 %
+(conditioning: of its logarithm). Else it names what is not, with the share by which the worse end
+is off.
+
 published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
 contact problems with Coulomb friction: formulations and numerical comparisons, 2018, table
 "Description of the test sets of FCLib library (v1.0)".
@@ -29,7 +33,12 @@ from fclib import collections
 from fclib.analysis import analyze
 
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
-HEAD = ("set", "mu", "problems", "dof", "contacts", "density", "rank ratio", "conditioning")
+HEAD = (
+    *("set", "mu", "problems", "dof", "contacts", "density", "rank ratio", "conditioning"),
+    "within",
+)
+COMPARED = ("dof", "contacts", "density", "rank_ratio", "conditioning")
+CLOSE = 0.1
 
 
 def span(values: Iterable[Any]) -> str:
@@ -62,7 +71,37 @@ def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: in
     return found
 
 
-def line(name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any]) -> str:
+def off(published: str, values: Sequence[float], *, logarithm: bool) -> float:
+    """By how much of them the ends of ours differ from the published ones; 0 where none are."""
+    known = [float(value) for value in values if value is not None and np.isfinite(value)]
+    if not published or not known:
+        return 0.0
+    low, _, high = published.partition(" to ")
+    pairs = ((float(low), min(known)), (float(high or low), max(known)))
+    if logarithm:
+        pairs = tuple((np.log10(theirs), np.log10(ours)) for theirs, ours in pairs)  # type: ignore[assignment]
+    return max(abs(ours - theirs) / max(abs(theirs), 1e-9) for theirs, ours in pairs)
+
+
+def within(row: dict[str, str], rows: Sequence[dict[str, Any]], figures: Sequence[Any]) -> str:
+    """Of a published set and ours: yes, or what is off and by how much."""
+    ours = {
+        "dof": [row["n"] for row in rows],
+        "contacts": [row["nc"] for row in rows],
+        "density": [row["density"] for row in rows],
+        "rank_ratio": [ratio for ratio, _ in figures],
+        "conditioning": [conditioning for _, conditioning in figures],
+    }
+    shares = {
+        name: off(row[name], ours[name], logarithm=name == "conditioning") for name in COMPARED
+    }
+    words = [f"{name.replace('_', ' ')} {s:.0%}" for name, s in shares.items() if s > CLOSE]
+    return ", ".join(words) or "yes"
+
+
+def line(
+    name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any], verdict: str = ""
+) -> str:
     """The line of a family of ours."""
     cells = [
         name,
@@ -73,6 +112,7 @@ def line(name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any]) -> s
         span(row["density"] for row in rows),
         span(ratio for ratio, _ in figures),
         span(conditioning for _, conditioning in figures),
+        verdict,
     ]
     return "| " + " | ".join(cells) + " |"
 
@@ -92,19 +132,20 @@ def main() -> None:
             if where.setdefault(name, folder) == folder:
                 families[name].append(row)
 
-    def ours(name: str) -> str:
+    def ours(name: str, published: dict[str, str] | None = None) -> str:
         rows = families.pop(name)
-        return line(name, rows, spectra(where[name], rows, arguments.sample, arguments.limit))
+        figures = spectra(where[name], rows, arguments.sample, arguments.limit)
+        return line(name, rows, figures, within(published, rows, figures) if published else "")
 
     print("| " + " | ".join(HEAD) + " |")
     print("|" + "---|" * len(HEAD), flush=True)
     with PUBLISHED.open(newline="") as file:
         for row in csv.DictReader(file):
             beside = row.pop("ours")
-            row["set"] = f"*{row['set']}*"
-            print("| " + " | ".join(row.values()) + " |", flush=True)
+            cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
+            print("| " + " | ".join(cells) + " |", flush=True)
             if beside in families:
-                print(ours(beside), flush=True)
+                print(ours(beside, row), flush=True)
     for name in sorted(families):
         print(ours(name), flush=True)
 

@@ -36,13 +36,19 @@ KNOWN: dict[str, tuple[str, str]] = {
     "mixed": ("6", "mechanisms and robots, with bilateral constraints"),
     "planar": ("5", "bodies in a plane"),
     "local": ("2", "problems of one contact"),
+    "impacts": ("1", "bodies that strike and bounce, restitution 0 to 1"),
+    "existence": ("1", "without a solution, or with several, and known to be so"),
+    "dynamics": ("1", "silo, rope, spinning bodies, friction that differs by contact"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("6", "all families that came after RT-0444"),
+    "extended": ("7", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("6", "what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
-EXTENDED = ("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local")
+EXTENDED = (
+    *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
+    *("impacts", "existence", "dynamics"),
+)
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,8 @@ def sets() -> dict[str, list[str]]:
     found["extended"] = [folder for name in EXTENDED for folder in found.get(name, [])]
     for path in sorted(DATA.glob("*.json")):
         names = dict.fromkeys(choice.family for choice in choices(path.stem))
-        found[path.stem] = [f"{path.stem}/{name}" for name in names]
+        listed = [f"{path.stem}/{name}" for name in names]
+        found[path.stem] = [*listed, *found.get(path.stem, [])]
     return dict(sorted(found.items()))
 
 

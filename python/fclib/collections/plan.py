@@ -180,6 +180,7 @@ def origin(scene: Source) -> dict[str, Any]:
         "activation": scene.activation,
         "begin": scene.begin,
         "theta": scene.theta,
+        **({"gyroscopic": True} if scene.gyroscopic else {}),
         "time_step": scene.time_step,
         "ignore": list(scene.ignore),
         "planar": scene.planar,

@@ -45,6 +45,9 @@ class Aqueduct:
     split: bool = parameter(
         False, "1", "whether voussoirs, spandrels and every second slab are of two stones across"
     )
+    bond: bool = parameter(
+        False, "1", "whether voussoirs and columns are of two and three stones across in turn"
+    )
     settlement: float = parameter(0.8, "m/s", "speed at which a plinth sinks; 0: fixed")
     density: float = parameter(2200.0, "kg/m^3", "mass density of the stones")
     mu: float = parameter(0.8, "1", "coefficient of friction")
@@ -106,8 +109,7 @@ class Aqueduct:
                     ]
             for i, (name, outline) in enumerate(stones):
                 colour = mjcf.shade(i + tier % 2 * len(stones), 2 * len(stones))
-                joint = self._joint(name)
-                leaves = [front, back] if joint is None else [front, joint, back]
+                leaves = [front, *self._joints(name), back]
                 for k, (near, far) in enumerate(pairwise(leaves)):
                     built.stone(f"tier{tier}.{name}.{k}", outline, near, far, colour)
             for side, wall in walls.items():
@@ -143,21 +145,28 @@ class Aqueduct:
             focus=(0.0, 0.0, 0.5 * bottom, 0.45 * bottom),
         )
 
-    def _joint(self, name: str) -> float | None:
-        """Where a stone is divided across, y [m]; None: it is not.
+    def _joints(self, name: str) -> list[float]:
+        """Where a stone is divided across, y [m].
 
         Two stones that meet never have their joints at the same place: front and back halves that
         only meet in an edge must not touch.
         """
-        if not self.split:
-            return None
         kind = name.rstrip("0123456789.")
         odd = int(name[-1]) % 2 == 1
+        if self.bond:
+            sixth = self.width / 6
+            if kind in ("voussoir", "column"):
+                return [0.0] if odd == (kind == "voussoir") else [-sixth, sixth]
+            if kind in ("slab", "backing"):
+                return [-2 * sixth, 2 * sixth] if odd else [-1.5 * sixth, 1.5 * sixth]
+            return []
+        if not self.split:
+            return []
         aside = 0.1 * self.width
         if kind == "voussoir":
-            return aside if odd else -aside
+            return [aside if odd else -aside]
         if kind == "column":
-            return -aside if odd else aside
+            return [-aside if odd else aside]
         if kind == "slab":
-            return 0.0 if odd else None
-        return None
+            return [0.0] if odd else []
+        return []

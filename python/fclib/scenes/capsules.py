@@ -45,16 +45,25 @@ class Capsules:
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(2.5e-3, "s", "time step h")
     activation: float = parameter(1e-3, "m", "gap of an end that counts as closed")
+    gaps: bool = parameter(
+        False, "1", "law of gaps: every contact within a step's reach, open ones too"
+    )
+    margin: float = parameter(0.0, "m", "with the law of gaps: a gap up to this is a contact too")
+    gyroscopic: bool = parameter(
+        False, "1", "whether M has the derivative of gyroscopic terms, and W is not symmetric"
+    )
 
     def __post_init__(self) -> None:
         mjcf.check(
             self,
             positive=("length", "radius", "mass", "width", "time_step"),
-            non_negative=("mu", "activation", "tilt", "gap", "speed"),
+            non_negative=("mu", "activation", "tilt", "gap", "speed", "margin"),
             at_least={"capsules": 1},
         )
         if not self.length > 2 * self.radius:
             raise ValueError(f"Capsules: length must be above {2 * self.radius}, not {self.length}")
+        if self.gaps and (self.restitution or self.activation):
+            raise ValueError("Capsules: by the law of gaps, restitution and activation must be 0")
         if not self.width >= self.length:
             raise ValueError(f"Capsules: width must be at least {self.length}, not {self.width}")
 
@@ -96,5 +105,7 @@ class Capsules:
                 floor_mu=self.mu,
                 tile=0.25 * self.width,
                 velocity=np.column_stack((velocities, np.zeros_like(velocities))).ravel(),
+                rest=mjcf.margins(self.margin),
             ),
+            law="gap" if self.gaps else "velocity",
         )

@@ -48,6 +48,13 @@ class Chute:
     across: int = parameter(6, "1", "grains of the bed from wall to wall, at least 1")
     layers: int = parameter(5, "1", "layers of the bed, at least 1")
     trough: float = parameter(1.2, "m", "length of the floor below the slope")
+    hexahedra: bool = parameter(
+        False, "1", "whether polyhedra have six flat faces, which touch in several points"
+    )
+    gaps: bool = parameter(
+        False, "1", "law of gaps: every contact within a step's reach, open ones too"
+    )
+    margin: float = parameter(0.0, "m", "with the law of gaps: a gap up to this is a contact too")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(4e-3, "s", "time step h")
 
@@ -56,7 +63,7 @@ class Chute:
         mjcf.check(
             self,
             positive=("radius", "density", "slope", "trough", "time_step"),
-            non_negative=("mu", "spread", "spheres"),
+            non_negative=("mu", "spread", "spheres", "margin"),
             at_least={"grains": 1, "shapes": 1, "across": 1, "layers": 1},
         )
         for what, bound in (("spread", 1), ("slope", math.pi / 2)):
@@ -64,11 +71,13 @@ class Chute:
                 raise ValueError(f"{name}: {what} must be < {bound:g}, not {getattr(self, what)}")
         if not self.spheres <= 1:
             raise ValueError(f"{name}: spheres must be <= 1, not {self.spheres}")
+        if self.gaps and self.restitution:
+            raise ValueError(f"{name}: restitution must be 0 by the law of gaps")
 
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the grains and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
-        corners = mjcf.polyhedra(random, self.shapes)
+        corners = (mjcf.hexahedra if self.hexahedra else mjcf.polyhedra)(random, self.shapes)
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         draws = random.uniform(size=(self.grains, 3))
         turned = mjcf.rotations(random, self.grains)
@@ -112,7 +121,9 @@ class Chute:
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=2 * pitch,
+                rest=mjcf.margins(self.margin),
             ),
+            law="gap" if self.gaps else "velocity",
         )
 
     def _surface(self) -> str:

@@ -42,6 +42,10 @@ class PeriodicBox:
     mu: float = parameter(0.8, "1", "coefficient of friction")
     restitution: float = parameter(0.0, "1", "0: the law of gaps is inelastic")
     period: float = parameter(25.0, "m", "edge of the cell, along x and along y")
+    hexahedra: bool = parameter(
+        False, "1", "whether polyhedra have six flat faces, on one of which each begins"
+    )
+    margin: float = parameter(0.0, "m", "a gap up to this is a contact too")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.02, "s", "time step h")
 
@@ -49,7 +53,7 @@ class PeriodicBox:
         mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
-            non_negative=("mu", "spread"),
+            non_negative=("mu", "spread", "margin"),
             at_least={"polyhedra": 1, "shapes": 1, "period": 4.2 * self.radius},
         )
         if self.restitution:
@@ -60,21 +64,32 @@ class PeriodicBox:
     def scene(self, seed: int = 0) -> Scene:
         """The scene; the seed draws the polyhedra and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
-        corners = mjcf.polyhedra(random, self.shapes)
+        corners = (mjcf.hexahedra if self.hexahedra else mjcf.polyhedra)(random, self.shapes)
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         kinds = random.integers(self.shapes, size=self.polyhedra)
         turned = mjcf.rotations(random, self.polyhedra)
+        lift = random.uniform(size=self.polyhedra)
+        if self.hexahedra:
+            # about the vertical only, and little, so that they lie close to each other
+            half = 0.1 * turned[:, 3]
+            turned = np.column_stack((np.cos(half), 0 * half, 0 * half, np.sin(half)))
+            corners = mjcf.on_a_face(corners)
+            depth, rise = -corners[:, :, 2].min(axis=1), np.ptp(corners[:, :, 2], axis=1).max()
 
-        side = math.floor(self.period / (2.05 * self.radius))
+        side = math.floor(self.period / ((1.22 if self.hexahedra else 2.05) * self.radius))
         pitch, height = self.period / side, 2.05 * self.radius
         bodies = mjcf.posts(0.5 * self.period, self.period)
         for i in range(self.polyhedra):
             layer, cell = divmod(i, side * side)
             x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
+            # on a face, each a little higher than its layer
+            z = height * (layer + 0.5)
+            if self.hexahedra:
+                z = 1.2 * rise * layer + depth[kinds[i]] + 0.2 * rise * lift[i]
             bodies.append(
                 mjcf.grain(
                     f"polyhedron{i}",
-                    (x, y, height * (layer + 0.5)),
+                    (x, y, z),
                     f'type="mesh" mesh="shape{kinds[i]}" density="{self.density!r}"',
                     mjcf.surface(self.mu),
                     mjcf.shade(i, self.polyhedra),
@@ -92,6 +107,7 @@ class PeriodicBox:
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=0.125 * self.period,
+                rest=mjcf.margins(self.margin),
             ),
             law="gap",
             period=(self.period, self.period),

@@ -41,6 +41,7 @@ class SpheresBox:
     offset: float = parameter(0.05, "1", "largest offset to a side, in radii, at most 0.2")
     gap: float = parameter(2e-3, "m", "between two layers, at the start")
     load: float = parameter(0.2, "1", "mass of the lid, for that of all spheres")
+    margin: float = parameter(0.0, "m", "a gap up to this is a contact too")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.02, "s", "time step h")
 
@@ -48,7 +49,7 @@ class SpheresBox:
         mjcf.check(
             self,
             positive=("radius", "density", "load", "time_step"),
-            non_negative=("mu", "offset", "gap"),
+            non_negative=("mu", "offset", "gap", "margin"),
             at_least={"spheres": 1, "along_x": 1, "along_y": 1},
         )
         if not self.offset <= 0.2:
@@ -98,6 +99,7 @@ class SpheresBox:
                 gravity=self.gravity,
                 floor_mu=self.mu,
                 tile=4 * self.radius,
+                rest=mjcf.margins(self.margin),
             ),
             law="gap",
         )

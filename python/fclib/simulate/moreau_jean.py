@@ -148,7 +148,7 @@ class System:
 
     M: Sparse  # (n x n) mass matrix
     force: Vector  # (n) F(q, v): all but the reactions, gyroscopic terms included
-    C: Sparse  # (n x n) damping, -dF/dv of the dampers
+    C: Sparse  # (n x n) damping, -dF/dv of the dampers; of gyroscopic terms too where asked for
     K: Sparse  # (n x n) stiffness, -dF/dq of the springs
     H: Sparse  # (n x d nc) contact directions, d = 2, 3 or 5
     contacts: Contacts  # nc

@@ -176,6 +176,8 @@ class MujocoModel:
             d.ctrl[:] = self._gait.controls(d.time + h)
         force = self._force()
         C, K = linear_forces(m, d)
+        if self.scene.gyroscopic:
+            C = sp.csc_array(C + gyroscopic(m, d))
         return System(
             self._pattern.fill(d.M),
             force,
@@ -360,6 +362,32 @@ def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
         mass=1 / np.where(inverse > 0, inverse, 1.0),
         pair=np.column_stack((-1 - d.efc_type[which].astype(np.int64), index)),
     )
+
+
+def gyroscopic(m: Any, d: Any) -> Sparse:
+    """Gamma = dc/dv (n x n) of the bias c(q, v), not symmetric; by trees of bodies.
+
+    c is quadratic in v, so that half the difference of c(v + e) and c(v - e) is exact. Trees do not
+    act on each other, and one dof of each is moved at a time.
+    """
+    v, bias = d.qvel.copy(), np.zeros(m.nv)
+    place = np.arange(m.nv) - m.tree_dofadr[m.dof_treeid]  # in its tree
+    rows, columns, values = [], [], []
+    for k in range(place.max(initial=-1) + 1):
+        derivative = np.zeros(m.nv)
+        for sign in (0.5, -0.5):
+            d.qvel[:] = v + 2 * sign * (place == k)
+            mujoco.mj_comVel(m, d)
+            mujoco.mj_rne(m, d, 0, bias)
+            derivative += sign * bias
+        moved = np.flatnonzero(derivative)
+        rows.append(moved)
+        columns.append(m.tree_dofadr[m.dof_treeid[moved]] + k)
+        values.append(derivative[moved])
+    d.qvel[:] = v
+    mujoco.mj_comVel(m, d)
+    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+    return sp.csc_array(entries, shape=(m.nv, m.nv))
 
 
 def frictionless_to_frictional(d: Any) -> None:

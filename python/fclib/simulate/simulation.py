@@ -18,6 +18,7 @@ from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, Vector
 from fclib.simulate.mujoco_model import MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
+GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
 STABILIZATION: Final = 0.2  # share of a violation undone in a step
 
 
@@ -247,6 +248,7 @@ def describe(
         "law": scheme.law,
         **({"activation": scheme.activation} if scheme.activation else {}),
         "theta": scheme.theta,
+        **({"gyroscopic": True} if scene.gyroscopic else {}),
         "stabilization": scheme.stabilization,
         **settings,
         "step": index,
@@ -275,6 +277,7 @@ def describe(
             f"Moreau-Jean step, theta = {scheme.theta:g}, h = {scheme.h:g} s; {law};"
             " Coulomb friction;"
             " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
+            f"{GYROSCOPIC if scene.gyroscopic else ''}"
             f" v in m/s and rad/s, r in N s, components {words_of_components},"
             " r_R in N m s, mu_r in m)"
         ),

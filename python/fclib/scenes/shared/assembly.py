@@ -122,6 +122,7 @@ class Bodies:
         # the turn that takes z to a plane's normal
         normal = self.planes[:, 3:]
         turn = np.column_stack((1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(planes)))
+        turn[normal[:, 2] == -1] = (0.0, 1.0, 0.0, 0.0)
         turn /= np.linalg.norm(turn, axis=1, keepdims=True)
         length, mass = self.units["length"], self.units["mass"]
         return BodyTable(

@@ -38,6 +38,7 @@ class Scene:
     activation: float = 0.0  # [m], of the velocity law, see `fclib.simulate.MoreauJean`
     begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
+    gyroscopic: bool = False  # their derivative is part of M, which is then not symmetric
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
     seed: int | None = None
     title: str = ""
@@ -64,6 +65,7 @@ class Scene:
             restitution=family.restitution,
             activation=getattr(family, "activation", 0.0),
             begin=getattr(family, "begin", 0.0),
+            gyroscopic=getattr(family, "gyroscopic", False),
             parameters=asdict(family),
             seed=seed,
             title=family.title,
@@ -246,7 +248,8 @@ class Assembly(Described, Protocol):
 class Family(Described, Protocol):
     """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
 
-    Where it has parameters `activation` [m] and `begin` [s], they are those of its scenes.
+    Where it has parameters `activation` [m], `begin` [s] and `gyroscopic`, they are those of its
+    scenes.
 
     Where the default scene takes long, `small` holds parameters of a quick one of the kind.
     """

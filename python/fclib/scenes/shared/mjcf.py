@@ -96,6 +96,12 @@ def document(
     )
 
 
+def margins(margin: float) -> list[str]:
+    """By the law of gaps, two geometries are in contact up to this gap [m]."""
+    # those of two geometries add up
+    return [f'<default><geom margin="{0.5 * margin!r}"/></default>'] if margin else []
+
+
 def indent(elements: Iterable[str]) -> str:
     return "\n".join("    " + element for element in elements)
 
@@ -124,6 +130,38 @@ def polyhedra(random: np.random.Generator, count: int) -> npt.NDArray[np.float64
     corners = octants * random.uniform(0.4, 1.0, size=(count, 8, 3))
     unit: npt.NDArray[np.float64] = corners / np.linalg.norm(corners, axis=2, keepdims=True)
     return unit
+
+
+def hexahedra(random: np.random.Generator, count: int) -> npt.NDArray[np.float64]:
+    """The corners (count x 8 x 3) of random convex hexahedra, the farthest one on the unit sphere.
+
+    Their six faces are flat quadrilaterals: two that meet touch in several points.
+    """
+    found = np.empty((count, 8, 3))
+    octants = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+    for k in range(count):
+        # planes n . x = d, opposite ones nearly parallel
+        normals = np.stack([-np.eye(3), np.eye(3)]) + 0.2 * random.uniform(-1, 1, size=(2, 3, 3))
+        offsets = random.uniform(0.6, 1.0, size=(2, 3))
+        for i, octant in enumerate(octants):
+            which = (octant, np.arange(3))
+            found[k, i] = np.linalg.solve(normals[which], offsets[which])
+        found[k] -= found[k].mean(axis=0)
+        found[k] /= np.linalg.norm(found[k], axis=1).max()
+    return found
+
+
+def on_a_face(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The corners of `hexahedra` (count x 8 x 3), turned so that a flat face looks down."""
+    turned = np.empty_like(corners)
+    for k, shape in enumerate(corners):
+        # the first face along z: corners 0, 2, 4, 6
+        a, b = shape[4] - shape[0], shape[2] - shape[0]
+        up = np.cross(a, b)
+        up *= np.sign(up[2]) / np.linalg.norm(up)
+        x = a / np.linalg.norm(a)
+        turned[k] = shape @ np.stack((x, np.cross(up, x), up)).T
+    return turned
 
 
 def polyhedron_mesh(name: str, corners: npt.NDArray[np.float64]) -> str:

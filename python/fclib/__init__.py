@@ -52,9 +52,10 @@ from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
 
 if typing.TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
-    from fclib.collections import Collection
+    from fclib.collections import Collection, Step
 
 
 def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Collection":
@@ -91,6 +92,28 @@ def load(name: str, form: str | None = None, folder: "str | Path | None" = None)
 
     problem: Problem = collections.load(name, form, folder)
     return problem
+
+
+def sequence(
+    name: str, folder: "str | Path | None" = None, form: str | None = None
+) -> "Iterator[Step]":
+    """The problems of a family in the order of their steps, each with a guess from the one before.
+
+    >>> for step in fclib.sequence("rt444/KaplasTower"):
+    ...     result = fclib.solve(step.problem, guess=step.guess())
+
+    Args:
+        name: a family, as ``fclib collection list`` has them.
+        folder: as ``collection`` has it.
+        form: "global" or "local"; by default the global one of problems that have both.
+
+    Raises:
+        KeyError: there is no such family.
+        ValueError: the name is of a set of several families.
+    """
+    from fclib import collections
+
+    return collections.sequence(name, folder, form)
 
 
 __all__ = [
@@ -134,6 +157,7 @@ __all__ = [
     "read_guesses",
     "read_siconos",
     "read_solution",
+    "sequence",
     "solve",
     "solve_batch",
     "solver",

@@ -278,3 +278,58 @@ def rotations(turn: Numbers) -> Numbers:
         (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
     )
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def carried(
+    before: Contacts, now: Contacts, r: npt.ArrayLike, d: int, *, planar: bool = False
+) -> Numbers:
+    """A guess of reactions (d nc): those that the same contacts had in another step.
+
+    They are turned by way of the world into the new frames, forces and moments alike. A contact
+    whose feature is new takes the nearest one that is left of its two shapes; one of two shapes
+    that did not touch gets none.
+
+    Args:
+        before: the contacts of the other step.
+        now: those of this one.
+        r: the reactions of the other step (d nc).
+        d: components of a contact.
+        planar: whether all moves in the plane x, z.
+
+    Raises:
+        ValueError: the reactions are not of the other step's size.
+    """
+    local = np.asarray(r, dtype=float)
+    if local.size != d * len(before):
+        raise ValueError(f"{local.size} reactions for {len(before)} contacts of {d} components")
+    local = local.reshape(-1, d)
+
+    source = np.full(len(now), -1)
+    known = {name: i for i, name in enumerate(before.identity)}
+    names = now.identity
+    for i, name in enumerate(names):
+        source[i] = known.pop(name, -1)
+    # of each pair those that are left
+    left: dict[tuple[int, ...], list[int]] = {}
+    for name, i in known.items():
+        left.setdefault(name[:-1], []).append(i)
+    for i in np.flatnonzero(source < 0).tolist():
+        rest = left.get(names[i][:-1])
+        if rest:
+            away = np.linalg.norm(before.point[rest] - now.point[i], axis=1)
+            source[i] = rest.pop(int(away.argmin()))
+
+    found = source >= 0
+    result = np.zeros((len(now), d))
+    force, axis = (2, 2) if planar else (3, 1)
+    old, new, given = before.frame[source[found]], now.frame[found], local[source[found]]
+    for part, axes in (
+        (slice(0, force), slice(0, force)),
+        (slice(force, d), slice(axis, axis + d - force)),
+    ):
+        world = np.einsum("cij,ci->cj", old[:, axes], given[:, part])
+        result[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
+    # a limit has no frame: its components go as they are
+    limit = found & (now.shape < 0).any(axis=1)
+    result[limit] = local[source[limit]]
+    return result.ravel()

@@ -67,7 +67,7 @@ PYTHON: dict[str, set[str]] = {
     "scenes": {"_core", "_geometry"},
     "simulate": {"_core", "_geometry", "_solve", "scenes"},
     "recorders": {"_core", "_solve"},
-    "collections": {"_core", "_digest", "_solve", "analysis", "scenes", "simulate"},
+    "collections": {"_core", "_digest", "_geometry", "_solve", "analysis", "scenes", "simulate"},
     "__init__": {"_batch", "_core", "_digest", "_geometry", "_registry", "_solve", "collections"},
     "bench": {
         "_core",

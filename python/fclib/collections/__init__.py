@@ -20,6 +20,9 @@ build.py      a family into files, gone on with after a kill. Needs plan.py, cat
 verify.py     files as the catalogue says, solutions judged anew
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
+guesses.py    what a solution says of the next step's problem
+rights.py     license and citation, in files and catalogues. Needs plan.py
+sequence.py   consecutive problems, with guesses. Needs guesses.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
 choose.py     the lists of chosen problems, by rules that anyone can repeat
 candidates.py states of all families, of which `standard` is chosen. Needs known.py, record.py
@@ -31,6 +34,7 @@ standing.py   which problems are easy, hard or open, by stored runs. Needs known
 from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
+from fclib.collections.guesses import guess_of
 from fclib.collections.known import (
     folders,
     fresh_plan,
@@ -44,6 +48,7 @@ from fclib.collections.library import Collection, load
 from fclib.collections.plan import Plan, Selection, Simulation, families
 from fclib.collections.published import VersionError, file_name
 from fclib.collections.record import record
+from fclib.collections.sequence import Step, sequence
 from fclib.collections.trajectory import Trajectory, TrajectoryError
 from fclib.collections.trajectory import read as read_trajectory
 from fclib.collections.verify import verify
@@ -54,6 +59,7 @@ __all__ = [
     "Plan",
     "Selection",
     "Simulation",
+    "Step",
     "Trajectory",
     "TrajectoryError",
     "VersionError",
@@ -64,6 +70,7 @@ __all__ = [
     "fresh_plan",
     "from_folder",
     "get",
+    "guess_of",
     "load",
     "origin_of",
     "plan_of",
@@ -71,6 +78,7 @@ __all__ = [
     "read_catalog",
     "read_trajectory",
     "record",
+    "sequence",
     "sets",
     "verify",
     "version",

@@ -33,7 +33,8 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog, trajectory
+from fclib.collections import catalog, rights, trajectory
+from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
 from fclib.collections.record import record
 
@@ -246,6 +247,7 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
     kept = Kept(plan)
     read_checkpoint(state_folder, kept)
 
+    before: Before | None = None
     last = time.monotonic()
     numbers = range(plan.total) if states is None else states.number.tolist()
     for number in numbers:
@@ -256,7 +258,10 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
             last = time.monotonic()
         kept.looked = number
         if kept.wants(number):
-            store(plan, kept, item_of(plan, states, number), out)
+            item = item_of(plan, states, number)
+            if before is None and number and plan.references:
+                before = stored_before(plan, kept, out)
+            before = store(plan, kept, item, before, out)
         kept.looked += 1
         report(plan.name, kept.looked, plan.total)
 
@@ -283,8 +288,38 @@ def reference(plan: Plan, problem: Any) -> _core.Result | None:
     return _solve.solve(problem, plan.solver, tol=plan.tol, **options)
 
 
-def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
-    """Write a problem's files, and remove those that it drives out."""
+@dataclass(frozen=True)
+class Before:
+    """The problem that was stored before, and its solution."""
+
+    step: int
+    problem: Any
+    solution: _core.Solution
+
+
+def stored_before(plan: Plan, kept: Kept, out: Path) -> Before | None:
+    """The same from its file, where a build goes on."""
+    row = kept.rows.get(max((n for n in kept.rows if n < kept.looked), default=-1))
+    if row is None:
+        return None
+    path = out / str(row["global_file"] or row["local_file"])
+    solution = _core.read_solution(path)
+    return None if solution is None else Before(row["step"], _core.read(path), solution)
+
+
+def guesses_of(plan: Plan, item: Item, before: Before | None) -> list[_core.Solution]:
+    """The impulses that the same contacts had in the step before, where that was stored.
+
+    Where the hard ones are selected, what is stored depends on what comes later: none.
+    """
+    if before is None or before.step + 1 != item.step or plan.select == "hard":
+        return []
+    guess = guess_of(before.problem, before.solution, item.problem)
+    return [] if guess is None else [guess]
+
+
+def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) -> Before | None:
+    """Write a problem's files, remove those that it drives out, and return it."""
     is_global = item.problem.kind.startswith("global")
     local = item.problem.condense() if is_global else item.problem
     sweeps = None
@@ -294,6 +329,7 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
         )
         sweeps = trial.iterations
     result = reference(plan, item.problem)
+    guesses = guesses_of(plan, item, before)
     row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
     if result is not None:
         row |= judged(item.problem, result) | {"tol": plan.tol}
@@ -308,11 +344,16 @@ def store(plan: Plan, kept: Kept, item: Item, out: Path) -> None:
         solution = result.solution if result is not None else None
         if solution is not None and form == "local":
             solution = _core.Solution(r=solution.r, u=solution.u, l=solution.l)
-        _core.write(out / path, problem, solution)
+        stamped = problem.replace(info=rights.stamped(problem.info, plan, kept.looked))
+        own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
+        _core.write(out / path, stamped, solution, own)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
         for file, _ in catalog.files_of({**dict.fromkeys(catalog.FILES), **gone}):
             (out / file).unlink(missing_ok=True)
+    if result is None:
+        return None
+    return Before(item.step, item.problem, result.solution)
 
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
@@ -343,6 +384,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
         "left_out": "; ".join(item.left_out) or None,
         "digest": _digest.digest(problem),
+        **rights.of(plan),
     }
 
 

@@ -54,6 +54,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("global_sha256", "string", "of that file"),
     ("local_file", "string", "path from the catalogue's folder"),
     ("local_sha256", "string", "of that file"),
+    ("license", "string", "of the data; null where nobody said"),
+    ("citation", "string", "how to name the data; null where nobody said"),
 )
 
 # of the files' paths and SHA-256

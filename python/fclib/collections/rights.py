@@ -1,0 +1,39 @@
+"""What a file and a catalogue say of who may use the data, and how to name them."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from fclib import _core
+from fclib.collections.plan import Plan, families
+
+LICENSE = "CC-BY-4.0"  # of the data; the software has another
+CITATION = (
+    "V. Acary, M. Bremond, T. Koziara, F. Perignon, FCLIB: a collection of discrete 3D Frictional"
+    " Contact problems, Inria RT-0444, 2014; set {set}, version {version}"
+)
+DOI = "to be assigned"
+
+
+def of(plan: Plan) -> dict[str, str | None]:
+    """License and citation of a plan's problems; nothing is said of a scene that is not ours."""
+    if plan.scene.name not in families():
+        return {"license": None, "citation": None}
+    citation = CITATION.format(set=plan.collection, version=plan.version)
+    return {"license": LICENSE, "citation": citation}
+
+
+def stamped(info: _core.ProblemInfo, plan: Plan, number: int) -> _core.ProblemInfo:
+    """The info with all of it in the JSON that ends its description, and the problem's name."""
+    *words, last = info.description.split("\n")
+    try:
+        origin: Any = json.loads(last)
+    except ValueError:
+        return info
+    own: dict[str, Any] = {name: value for name, value in of(plan).items() if value is not None}
+    if own:
+        own["doi"] = DOI
+    known = {"collection": plan.collection, "version": plan.version, "number": number}
+    text = "\n".join([*words, json.dumps(origin | known | own)])
+    return info.replace(description=text)

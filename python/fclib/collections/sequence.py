@@ -1,0 +1,84 @@
+"""Consecutive problems of a family, with the impulses of the step before as a guess.
+
+    for step in fclib.sequence("rt444/KaplasTower"):
+        result = fclib.solve(step.problem, guess=step.guess())          of the stored solutions
+        result = fclib.solve(step.problem, guess=step.guess(result))    of one's own
+
+Contacts are linked by what names them (`fclib.Contacts.identity`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fclib import _core
+from fclib.collections.guesses import guess_of
+from fclib.collections.library import Collection
+
+
+@dataclass(frozen=True)
+class Step:
+    """A problem of a sequence, and the one before it."""
+
+    id: str  # SET/FAMILY/NUMBER
+    step: int  # of the simulation
+    problem: Any
+    solution: _core.Solution | None  # the stored one
+    before: Step | None  # None where the step before is not there; it knows of no one before it
+
+    def guess(self, solution: _core.Solution | None = None) -> _core.Solution | None:
+        """A guess from a solution of the step before, by default the stored one.
+
+        None at the first problem, after a step without a problem, and where the contacts of one of
+        the two have no names.
+
+        Raises:
+            ValueError: the solution is not of the size of the step before.
+        """
+        if self.before is None:
+            return None
+        known = solution if solution is not None else self.before.solution
+        return None if known is None else guess_of(self.before.problem, known, self.problem)
+
+
+def sequence(
+    name: str, folder: str | Path | None = None, form: str | None = None
+) -> Iterator[Step]:
+    """The problems of a family in the order of their steps, as they are read.
+
+    Args:
+        name: a family, or SET/FAMILY; it is built where it is not there.
+        folder: as `collection` has it.
+        form: "global" or "local"; by default the global one of problems that have both.
+
+    Raises:
+        KeyError: there is no such family.
+        ValueError: the name is of a set of several families.
+    """
+    problems = Collection(name, folder)
+    if len(problems.folders) != 1:
+        raise ValueError(
+            f"a sequence is of one family, and {name} has several: {', '.join(problems.folders)}"
+        )
+    return _steps(problems, form)
+
+
+def _steps(problems: Collection, form: str | None) -> Iterator[Step]:
+    rows = problems.catalog.select(["id", "step"]).to_pylist()
+    before: Step | None = None
+    for row in sorted(rows, key=lambda row: int(row["step"])):
+        path = problems.path(row["id"], form)
+        follows = before is not None and before.step + 1 == row["step"]
+        step = Step(
+            row["id"],
+            row["step"],
+            _core.read(path),
+            _core.read_solution(path),
+            before if follows else None,
+        )
+        yield step
+        # without those before it, or all of them stay in memory
+        before = Step(step.id, step.step, step.problem, step.solution, None)

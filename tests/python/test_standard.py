@@ -175,13 +175,13 @@ def ratings(name: str = "tiny") -> dict[str, str]:
 
 def test_classes_follow_from_runs(results: Path) -> None:
     wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
-    rows = [run(wall, name, 1e-9 if name in "ab" else None) for name in "abcd"]
-    rows += [run(kaplas, name, 1e-9 if name == "a" else 1e-3) for name in "abc"]
+    rows = [run(wall, name, 1e-9 if name in "abc" else None) for name in "abcd"]
+    rows += [run(kaplas, name, 1e-9 if name in "ab" else 1e-3) for name in "abce"]
     rows += [run(discs, "a", 2e-8), run(discs, "b", 1e-4), run(discs, "c", None)]
     # who does not take it has no vote
     rows += [run(kaplas, "d", None, status="unsuitable")]
     # of two versions the newer one
-    rows += [run(wall, "d", 1e-9, date="2026-01-01", version="0")]
+    rows += [run(kaplas, "c", 1e-9, date="2026-01-01", version="0")]
     standing.write(rows)
     found = ratings()
     assert (found[wall], found[kaplas], found[discs]) == ("easy", "hard", "open")
@@ -191,7 +191,7 @@ def test_classes_follow_from_runs(results: Path) -> None:
     assert (row.best.solver, row.best.error, row.solved, row.voters) == ("a", 2e-8, 0, 3)
     basis = standing.standings("tiny")[1]
     assert basis is not None
-    assert (basis.limit, basis.solvers) == (1.0, ("a", "b", "c", "d"))
+    assert (basis.limit, basis.solvers) == (1.0, tuple("abcde"))
     # a longer run has no vote, and what it solves is no longer open
     standing.write([*standing.runs(), run(discs, "auto", 9e-9, limit=60.0)])
     assert ratings()[discs] == "hard"
@@ -315,3 +315,30 @@ def test_part_of_a_trajectory_is_some_of_its_problems(tmp_path: Path) -> None:
     assert (part.origin["collection"], part.origin["version"]) == ("some", "3")
     assert fclib.digest(part.problem(1).problem) == states.digest[states.index(150)]
     assert target.stat().st_size < path.stat().st_size
+
+
+# ---- lists of earlier versions
+
+
+@there
+def test_problems_of_an_older_list_are_named_with_their_version(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    old = known.folders(["hard"], "6")
+    now = {f"hard/{choice.family}/{choice.number:04d}" for choice in known.choices("hard")}
+    names = [f"{own}/{number:04d}" for own in old for number in published.digests(own, "6")]
+    gone = next(name for name in names if name.startswith("hard/PlanarBlocks") and name not in now)
+    with pytest.raises(collections.VersionError, match=r"version 6 had: .* hard --version 6"):
+        load(gone, folder=tmp_path)
+    folder, _, number = gone.rpartition("/")
+    plan = collections.plan_of(folder, version="6", references=False)
+    collections.build([plan], tmp_path, pictures=False)
+    rows = collections.read_catalog(tmp_path).to_pylist()
+    assert [row["number"] for row in rows] == sorted(published.digests(folder, "6"))
+    assert {known.origin_of(row) for row in rows} == {"published"}
+    assert int(number) in [row["number"] for row in rows]
+
+
+@there
+def test_hard_is_of_standard() -> None:
+    rated = {row.digest: row.rating for row in standing.standings("standard")[0]}
+    assert {rated[choice.digest] for choice in known.choices("hard")} <= {"hard", "open"}

@@ -23,6 +23,10 @@ app = typer.Typer(
 )
 
 List = Annotated[Path, typer.Option("--out", help="The list that is written, JSON.")]
+States = Annotated[
+    Path | None, typer.Option(help="Folder that the chosen states are written into.")
+]
+Version = Annotated[str, typer.Option(help="Of the states that are written.")]
 PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
 
 
@@ -36,6 +40,8 @@ def choose_hard(
         float, typer.Option(help="Of the solvers that must have failed.", min=0.0, max=1.0)
     ] = 0.5,
     per_family: PerFamily = 5,
+    states: States = None,
+    version: Version = "1",
 ) -> None:
     """What most solvers fail on, from campaigns over the global files of a collection."""
     runs = []
@@ -50,6 +56,12 @@ def choose_hard(
     limits = sorted({run["time_limit"] for run in runs if run["tol"] == tol})
     rule = {"tol": tol, "share": share, "per_family": per_family}
     choose.write_list(target, chosen, rule | {"solvers": solvers, "time_limits": limits})
+    if states is not None:
+        try:
+            sources = select.sources_of(folder, {choice.family for choice in chosen})
+            select.publish(sources, chosen, "hard", version, states)
+        except (OSError, ValueError, KeyError) as error:
+            fail(str(error))
     tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
 
 
@@ -60,10 +72,8 @@ def choose_standard(
     ],
     target: List,
     table: Annotated[Path, typer.Option(help="Features of all candidates, CSV.")],
-    states: Annotated[
-        Path | None, typer.Option(help="Folder that the chosen states are written into.")
-    ] = None,
-    version: Annotated[str, typer.Option(help="Of the states that are written.")] = "1",
+    states: States = None,
+    version: Version = "1",
     kept: Annotated[
         Path | None,
         typer.Option("--keep", help="A list that stays; problems of other families come to it."),

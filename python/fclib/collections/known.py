@@ -42,7 +42,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("7", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
-    "hard": ("6", "what most solvers fail on; chosen by the bench"),
+    "hard": ("7", "of standard, what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (

@@ -22,8 +22,8 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _digest
-from fclib.collections import catalog, features, trajectory
+from fclib import _digest, scenes
+from fclib.collections import catalog, features, known, trajectory
 from fclib.collections.candidates import Candidates
 from fclib.collections.known import Choice
 
@@ -236,6 +236,28 @@ def choices_of(
         parameters = dict(scene.parameters)
         chosen.append(Choice(scene.name, parameters, scene.seed or 0, number, step, row["digest"]))
     return chosen
+
+
+def sources_of(folder: Path, names: Collection[str]) -> dict[str, Candidates]:
+    """Where the problems of a built folder are from: of each family its stored states.
+
+    Raises:
+        CatalogError: the folder has no catalogue.
+        VersionError: the states of a family are not stored here.
+        OSError, TrajectoryError: they cannot be read.
+    """
+    found = {}
+    for row in catalog.read_catalog(folder).to_pylist():
+        name = row["family"]
+        if name not in names or name in found:
+            continue
+        own = f"{row['collection']}/{name}"
+        assembled = name in scenes.assemblies()
+        plan = known.plan_of(own, version=None if assembled else row["version"])
+        states = None if plan.trajectory is None else trajectory.read(plan.trajectory)
+        numbers = plan.numbers().tolist()
+        found[name] = Candidates(plan, tuple(numbers), states)
+    return found
 
 
 def publish(

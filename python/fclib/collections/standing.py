@@ -9,8 +9,8 @@ A problem is known by the digest of its data, of which 16 digits are stored, wha
 however many sets. Of the runs to TOLERANCE those at one limit of CPU time have a vote, the limit at
 which most runs were done, of the newest version of each solver:
 
-easy    at least half of the solvers that take such problems solved it
-hard    fewer did
+easy    more than half of the solvers that take such problems solved it
+hard    not so many
 open    no run and no solution that was taken in has an error within TOLERANCE
 
 Runs at a longer limit have no vote; what they solved is no longer open.
@@ -248,7 +248,7 @@ def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run])
     elif not any(run.within for run in mine):
         rating = "open"
     else:
-        rating = "easy" if 2 * solved >= len(voters) else "hard"
+        rating = "easy" if 2 * solved > len(voters) else "hard"
     path = solution_path(digest)
     return Standing(
         name, digest, rating, solved, len(voters), best, path if path.is_file() else None

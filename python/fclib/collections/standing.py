@@ -11,7 +11,8 @@ which most runs were done, of the newest version of each solver:
 
 easy    more than half of the solvers that take such problems solved it
 hard    not so many
-open    no run and no solution that was taken in has an error within TOLERANCE
+open    no run and no solution that was taken in has an error within TOLERANCE, and no run has
+        proved that there is no solution, which counts as solved
 
 Runs at a longer limit have no vote; what they solved is no longer open.
 """
@@ -36,6 +37,7 @@ from fclib.collections import catalog, known, published, trajectory
 
 TOLERANCE: Final = 1e-8
 DIGITS: Final = 16  # of a digest
+PROVEN: Final = "infeasible"  # the status of a run whose proof the bench has checked
 TAKEN: Final = "taken"  # the status of a solution that came from elsewhere
 BETTER: Final = 0.9  # times the best error known: what a new solution must reach
 FOLDER: Final = "results"
@@ -63,13 +65,13 @@ class Run:
 
     @property
     def solved(self) -> bool:
-        """Whether the error is within TOLERANCE, in time."""
-        return self.status in ("converged", TAKEN) and self.within
+        """Whether its solver had the answer, in time."""
+        return self.status in ("converged", PROVEN) and self.settled
 
     @property
-    def within(self) -> bool:
-        """Whether the error is within TOLERANCE."""
-        return self.error is not None and self.error <= TOLERANCE
+    def settled(self) -> bool:
+        """Whether its error is within TOLERANCE, or it has proved that there is no solution."""
+        return self.status == PROVEN or (self.error is not None and self.error <= TOLERANCE)
 
 
 @dataclass(frozen=True)
@@ -245,7 +247,7 @@ def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run])
     best = min(judged, key=lambda run: run.error or 0.0, default=None)
     if not voters:
         rating = ""
-    elif not any(run.within for run in mine):
+    elif not any(run.settled for run in mine):
         rating = "open"
     else:
         rating = "easy" if 2 * solved > len(voters) else "hard"

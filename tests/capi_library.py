@@ -85,7 +85,7 @@ def compile_program(source: Path, program: Path, *flags: str, folder: Path | Non
     elif sys.platform == "linux":  # a library that was unpacked there has its own beside it
         flags = (*flags, f"-Wl,-rpath-link,{folder}")
     libraries = [f"-L{folder}", "-lfclib", "-lm", "-lpthread"]
-    language, standard = ("C++", "-std=c++17") if source.suffix == ".cpp" else ("C", "-std=gnu11")
+    language, standard = ("C++", "-std=c++20") if source.suffix == ".cpp" else ("C", "-std=gnu11")
     command = [compiler(language), standard, "-g", *WARNINGS, str(source), "-o", str(program)]
     subprocess.run([*command, *flags, *libraries], check=True)
     return program

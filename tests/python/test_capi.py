@@ -121,6 +121,14 @@ def test_the_header_compiles_as_cxx(programs: Path) -> None:
     assert subprocess.run([program]).returncode == 0
 
 
+def test_what_the_cpp_header_promises(programs: Path, tmp_path: Path) -> None:
+    program = compile_program(CAPI / "facade.cpp", programs / "facade", "-pedantic")
+    done = subprocess.run([program, tmp_path], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    (tmp_path / "valgrind").mkdir()
+    valgrind(program, tmp_path / "valgrind")
+
+
 # ---- the examples
 
 
@@ -743,6 +751,19 @@ def test_it_is_installed_as_a_user_of_c_expects(tmp_path: Path) -> None:
     run(cmake, "--build", build)
     run(build / "write", tmp_path / "ball.hdf5")
     assert "converged" in run(build / "solve", tmp_path / "ball.hdf5")
+
+    # by CMake from C++
+    (client / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.16)\nproject(client CXX)\n"
+        "find_package(fclib 3.2 REQUIRED)\n"
+        f'add_executable(ball "{ROOT}/examples/cpp/ball.cpp")\n'
+        "target_compile_features(ball PRIVATE cxx_std_20)\n"
+        "target_link_libraries(ball fclib::fclib)\n"
+    )
+    build = client / "cpp"
+    run(cmake, "-S", client, "-B", build, f"-DCMAKE_PREFIX_PATH={prefix}")
+    run(cmake, "--build", build)
+    assert "converged" in run(build / "ball", tmp_path / "cpp.hdf5")
 
     # by CMake from Fortran, where the module was compiled; its source is there in any case
     assert (prefix / "include/fclib.f90").is_file()

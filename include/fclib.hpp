@@ -1,0 +1,410 @@
+// fclib.hpp: fclib.h with the manners of C++20. What is read frees itself, arrays are std::span,
+// and what fails throws fclib::Error.
+//
+//   const auto problem = fclib::read<fclib_local>("problem.hdf5");
+//   const fclib::Result result = fclib::solve(*problem, "auto", {.tolerance = 1e-10});
+//   for (const double component : result.solution.r) ...
+//
+// It needs nothing but fclib.h and the library, whose functions and structs may be used beside it.
+// The library prints a line on the standard error where a call fails, as libfclib 3.1 did;
+// fclib_set_error_handler(nullptr, nullptr) leaves that to the exception.
+#pragma once
+
+#if !defined(__cplusplus) || \
+    (__cplusplus < 202002L && (!defined(_MSVC_LANG) || _MSVC_LANG < 202002L))
+#error "fclib.hpp needs C++20; fclib.h can be used from any C++"
+#endif
+
+#include <fclib.h>
+
+#include <cstddef>
+#include <cstdlib>
+#include <limits>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+namespace fclib {
+// the library has a namespace of the same name inside: no symbol is to be that of a static one
+inline namespace facade {
+
+/// A call that failed: the library's message.
+class Error : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws the message of the call of this thread that has just failed.
+[[noreturn]] inline void fail() { throw Error(fclib_last_error()); }
+
+/// The result of a call, unless it is 0, or NULL.
+template <class Value>
+Value checked(Value value) {
+  if (!value) fail();
+  return value;
+}
+
+// ---- problems
+
+/// The functions of fclib.h for a struct.
+template <class C>
+struct Calls;
+
+#define FCLIB_CALLS(kind)                                     \
+  template <>                                                 \
+  struct Calls<fclib_##kind> {                                \
+    static constexpr std::string_view name = #kind;           \
+    static constexpr auto read = fclib_read_##kind;           \
+    static constexpr auto write = fclib_write_##kind;         \
+    static constexpr auto free_members = fclib_delete_##kind; \
+    static constexpr auto validate = fclib_validate_##kind;   \
+    static constexpr auto merit = fclib_merit_##kind;         \
+    static constexpr auto solve = fclib_solve_##kind;         \
+  };
+FCLIB_CALLS(global)
+FCLIB_CALLS(local)
+FCLIB_CALLS(global_rolling)
+FCLIB_CALLS(local_rolling)
+#undef FCLIB_CALLS
+
+/// fclib_global, fclib_local, fclib_global_rolling, fclib_local_rolling.
+template <class C>
+concept Problem = requires { Calls<std::remove_cv_t<C>>::name; };
+
+/// Frees what a read returns.
+struct Delete {
+  template <Problem C>
+  void operator()(C* problem) const {
+    Calls<C>::free_members(problem);
+    std::free(problem);
+  }
+};
+
+/// A problem that was read.
+template <Problem C>
+using Owned = std::unique_ptr<C, Delete>;
+
+/// The lengths that the arrays of a problem have.
+struct Sizes {
+  std::size_t n = 0;   ///< degrees of freedom, 0 of a local problem
+  std::size_t m = 0;   ///< components of the contacts
+  std::size_t p = 0;   ///< bilateral constraints
+  std::size_t nc = 0;  ///< contacts
+};
+
+template <Problem C>
+Sizes sizes(const C& problem) {
+  const auto of = [](const fclib_matrix* a, int fclib_matrix::* side) {
+    return a != nullptr && a->*side > 0 ? static_cast<std::size_t>(a->*side) : 0;
+  };
+  Sizes all;
+  if constexpr (requires { problem.W; }) {
+    all.m = of(problem.W, &fclib_matrix::m);
+    all.p = of(problem.V, &fclib_matrix::n);
+  } else {
+    all.n = of(problem.M, &fclib_matrix::m);
+    all.m = of(problem.H, &fclib_matrix::n);
+    all.p = of(problem.G, &fclib_matrix::n);
+  }
+  if (problem.spacedim > 0) all.nc = all.m / static_cast<std::size_t>(problem.spacedim);
+  return all;
+}
+
+/// The arrays of a problem, as spans of the lengths they have: fclib::mu(*problem).
+#define FCLIB_SPAN(member, size)                                                               \
+  template <Problem C>                                                                         \
+    requires requires(C problem) { problem.member; }                                           \
+  auto member(C& problem) {                                                                    \
+    using Number = std::conditional_t<std::is_const_v<C>, const double, double>;               \
+    return problem.member == nullptr ? std::span<Number>()                                     \
+                                     : std::span<Number>(problem.member, sizes(problem).size); \
+  }
+FCLIB_SPAN(mu, nc)
+FCLIB_SPAN(mu_r, nc)
+FCLIB_SPAN(q, m)
+FCLIB_SPAN(s, p)
+FCLIB_SPAN(f, n)
+FCLIB_SPAN(w, m)
+FCLIB_SPAN(b, p)
+#undef FCLIB_SPAN
+
+/// Throws where the data of a problem makes no sense.
+template <Problem C>
+void validate(const C& problem) {
+  checked(Calls<C>::validate(&problem));
+}
+
+// ---- matrices of the caller's numbers, which must outlive them; the library changes none
+
+namespace detail {
+
+inline int count(std::size_t size) {
+  if (size > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
+    throw Error("an array has more entries than an int counts");
+  }
+  return static_cast<int>(size);
+}
+
+template <class Number>
+Number* pointer(std::span<const Number> values) {
+  return const_cast<Number*>(values.data());
+}
+
+inline void require_size(std::string_view name, std::size_t size, std::size_t expected) {
+  if (size == expected) return;
+  throw Error(std::string(name) + " has " + std::to_string(size) + " entries, expected " +
+              std::to_string(expected));
+}
+
+inline fclib_matrix matrix(int m, int n, int nz, std::span<const int> p, std::span<const int> i,
+                           std::span<const double> x) {
+  if (m < 0 || n < 0) throw Error("a matrix has a negative number of rows or columns");
+  return {count(x.size()), m, n, pointer(p), pointer(i), pointer(x), nz, nullptr};
+}
+
+inline fclib_matrix compressed(int m, int n, int nz, std::span<const int> starts,
+                               std::span<const int> i, std::span<const double> x) {
+  fclib_matrix a = matrix(m, n, nz, starts, i, x);
+  require_size("starts", starts.size(), static_cast<std::size_t>(nz == -1 ? n : m) + 1);
+  require_size("the indices", i.size(), x.size());
+  return a;
+}
+
+}  // namespace detail
+
+/// Dense, the numbers by columns.
+inline fclib_matrix dense(int m, int n, std::span<const double> x) {
+  fclib_matrix a = detail::matrix(m, n, -3, {}, {}, x);
+  detail::require_size("a dense matrix", x.size(),
+                       static_cast<std::size_t>(m) * static_cast<std::size_t>(n));
+  return a;
+}
+
+/// Compressed columns: where each starts (n + 1), the rows.
+inline fclib_matrix columns(int m, int n, std::span<const int> starts, std::span<const int> rows,
+                            std::span<const double> x) {
+  return detail::compressed(m, n, -1, starts, rows, x);
+}
+
+/// Compressed rows: where each starts (m + 1), the columns.
+inline fclib_matrix rows(int m, int n, std::span<const int> starts, std::span<const int> columns,
+                         std::span<const double> x) {
+  return detail::compressed(m, n, -2, starts, columns, x);
+}
+
+/// Triplets; those at one place add up.
+inline fclib_matrix triplets(int m, int n, std::span<const int> rows, std::span<const int> columns,
+                             std::span<const double> x) {
+  fclib_matrix a = detail::matrix(m, n, detail::count(x.size()), columns, rows, x);
+  detail::require_size("the rows", rows.size(), x.size());
+  detail::require_size("the columns", columns.size(), x.size());
+  return a;
+}
+
+// ---- solutions
+
+/// A solution, or a guess, with its arrays. One that is empty is not given.
+struct Solution {
+  Solution() = default;
+  explicit Solution(const Sizes& size) : v(size.n), u(size.m), r(size.m), l(size.p) {}
+
+  /// The struct that the library takes, valid as long as the arrays are.
+  [[nodiscard]] fclib_solution view() const {
+    const auto array = [](const std::vector<double>& x) {
+      return x.empty() ? nullptr : const_cast<double*>(x.data());
+    };
+    return {array(v), array(u), array(r), array(l)};
+  }
+
+  std::vector<double> v, u, r, l;
+};
+
+namespace detail {
+
+/// The library reads as many numbers as the problem says.
+inline void require_sizes(const Solution& solution, const Sizes& size) {
+  const auto require = [](const char* name, const std::vector<double>& x, std::size_t expected) {
+    if (!x.empty()) require_size(name, x.size(), expected);
+  };
+  require("v", solution.v, size.n);
+  require("u", solution.u, size.m);
+  require("r", solution.r, size.m);
+  require("l", solution.l, size.p);
+}
+
+}  // namespace detail
+
+/// MERIT_2, what every tolerance bounds, or MERIT_1, that of libfclib 3.1.
+template <Problem C>
+double merit(const C& problem, const Solution& solution, fclib_merit kind = MERIT_2) {
+  detail::require_sizes(solution, sizes(problem));
+  fclib_solution view = solution.view();
+  const double value = Calls<C>::merit(const_cast<C*>(&problem), kind, &view);
+  if (value != value) fail();
+  return value;
+}
+
+// ---- files
+
+template <Problem C>
+Owned<C> read(const std::string& path) {
+  return Owned<C>(checked(Calls<C>::read(path.c_str())));
+}
+
+/// Adds the problem to a file; see fclib_set_write_mode() for one that is there already.
+template <Problem C>
+void write(const std::string& path, const C& problem) {
+  checked(Calls<C>::write(const_cast<C*>(&problem), path.c_str()));
+}
+
+/// "global", "local", ...: the problem that the solution of the file belongs to.
+inline std::string_view kind(const std::string& path) {
+  return checked(fclib_problem_kind(path.c_str()));
+}
+
+namespace detail {
+
+inline Sizes sizes_in(const std::string& path) {
+  const std::string_view name = kind(path);
+  if (name == Calls<fclib_global>::name) return sizes(*read<fclib_global>(path));
+  if (name == Calls<fclib_local>::name) return sizes(*read<fclib_local>(path));
+  if (name == Calls<fclib_global_rolling>::name) return sizes(*read<fclib_global_rolling>(path));
+  return sizes(*read<fclib_local_rolling>(path));
+}
+
+inline Solution copied(const fclib_solution& from, const Sizes& size) {
+  const auto array = [](const double* x, std::size_t count) {
+    return x == nullptr ? std::vector<double>() : std::vector<double>(x, x + count);
+  };
+  Solution solution;
+  solution.v = array(from.v, size.n);
+  solution.u = array(from.u, size.m);
+  solution.r = array(from.r, size.m);
+  solution.l = array(from.l, size.p);
+  return solution;
+}
+
+/// Solutions as fclib_read_guesses() returns them.
+struct Array {
+  fclib_solution* data = nullptr;
+  int count = 0;
+
+  Array(fclib_solution* from, int size) : data(from), count(size) {}
+  Array(const Array&) = delete;
+  Array& operator=(const Array&) = delete;
+  ~Array() { fclib_delete_solutions(data, count); }
+};
+
+}  // namespace detail
+
+/// The solution in a file; throws where there is none.
+inline Solution read_solution(const std::string& path) {
+  const Sizes size = detail::sizes_in(path);
+  const detail::Array found(checked(fclib_read_solution(path.c_str())), 1);
+  return detail::copied(*found.data, size);
+}
+
+/// Adds a solution of the problem that is in the file. What it has not is completed, as
+/// fclib_write_solution() says.
+inline void write_solution(const std::string& path, const Solution& solution) {
+  detail::require_sizes(solution, detail::sizes_in(path));
+  fclib_solution view = solution.view();
+  checked(fclib_write_solution(&view, path.c_str()));
+}
+
+/// The guesses in a file; throws where there are none.
+inline std::vector<Solution> read_guesses(const std::string& path) {
+  const Sizes size = detail::sizes_in(path);
+  int count = 0;
+  fclib_solution* const first = checked(fclib_read_guesses(path.c_str(), &count));
+  const detail::Array found(first, count);
+  std::vector<Solution> guesses;
+  for (const auto& guess : std::span(found.data, static_cast<std::size_t>(found.count))) {
+    guesses.push_back(detail::copied(guess, size));
+  }
+  return guesses;
+}
+
+/// Adds guesses for the problem that is in the file.
+inline void write_guesses(const std::string& path, std::span<const Solution> guesses) {
+  const Sizes size = detail::sizes_in(path);
+  std::vector<fclib_solution> views;
+  for (const Solution& guess : guesses) {
+    detail::require_sizes(guess, size);
+    views.push_back(guess.view());
+  }
+  checked(fclib_write_guesses(detail::count(views.size()), views.data(), path.c_str()));
+}
+
+// ---- solving
+
+/// What is asked of a solver: what stands here asks for the defaults.
+struct Options {
+  double tolerance = 0;             ///< on MERIT_2; 0 for 1e-8
+  int max_iterations = 0;           ///< 0 for the solver's own
+  double time_limit = 0;            ///< wall clock [s]; 0 for none
+  std::span<const double> guess{};  ///< reactions to start from (m), or none
+  std::string solver_options{};     ///< "name=value name=\"a text\""
+};
+
+/// How a solve ended, and the solution it left.
+struct Result {
+  fclib_status status = FCLIB_DIVERGED;
+  int iterations = 0;
+  double error = 0;              ///< MERIT_2 of the solution
+  double cpu_s = 0;              ///< CPU time of the solver alone [s]
+  double certificate_bound = 0;  ///< where the status is FCLIB_INFEASIBLE
+  Solution solution;
+  std::vector<double> certificate_y, certificate_z;  ///< ... and its proof
+
+  [[nodiscard]] bool converged() const { return status == FCLIB_CONVERGED; }
+  [[nodiscard]] std::string_view status_name() const { return fclib_status_name(status); }
+};
+
+/// Solves a problem. Throws for data that makes no sense, an unknown solver or option; how a solver
+/// ended that ran is the status.
+template <Problem C>
+Result solve(const C& problem, const std::string& solver = "auto", const Options& options = {}) {
+  const Sizes size = sizes(problem);
+  if (!options.guess.empty()) detail::require_size("the guess", options.guess.size(), size.m);
+  Result result;
+  result.solution = Solution(size);
+  std::vector<double> y(size.nc);
+  std::vector<double> z(size.p);
+  fclib_solve_options asked{};
+  asked.tolerance = options.tolerance;
+  asked.max_iterations = options.max_iterations;
+  asked.time_limit = options.time_limit;
+  asked.guess = options.guess.empty() ? nullptr : options.guess.data();
+  asked.options = options.solver_options.empty() ? nullptr : options.solver_options.c_str();
+  asked.certificate_y = y.data();
+  asked.certificate_z = z.data();
+  fclib_solution view = result.solution.view();
+  fclib_solve_result said{};
+  checked(Calls<C>::solve(&problem, solver.c_str(), &asked, &view, &said));
+  result.status = said.status;
+  result.iterations = said.iterations;
+  result.error = said.error;
+  result.cpu_s = said.cpu_s;
+  result.certificate_bound = said.certificate_bound;
+  if (said.status == FCLIB_INFEASIBLE) {
+    result.certificate_y = std::move(y);
+    result.certificate_z = std::move(z);
+  }
+  return result;
+}
+
+/// The names of all solvers.
+inline std::vector<std::string_view> solvers() {
+  std::vector<std::string_view> names;
+  for (int k = 0; const char* name = fclib_solver_name(k); ++k) names.emplace_back(name);
+  return names;
+}
+
+}  // namespace facade
+}  // namespace fclib

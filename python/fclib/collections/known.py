@@ -4,7 +4,7 @@ Every family has the set that it names; its problems are SET/FAMILY/NUMBER. Two 
 others:
 
 extended      all the families that came after RT-0444
-standard, hard, tiny    chosen problems, in folders of their own; lists in data/ have them
+standard, hard, tiny, rr9118    chosen problems, in folders of their own; lists in data/
 
 A version changes when a problem of the set does, or when one comes or goes. Problems of a version
 whose trajectory is stored do not change (`published.py`).
@@ -39,6 +39,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "impacts": ("1", "bodies that strike and bounce, restitution 0 to 1"),
     "existence": ("1", "without a solution, or with several, and known to be so"),
     "dynamics": ("1", "silo, rope, spinning bodies, friction that differs by contact"),
+    "rr9118": ("1", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("7", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),

@@ -10,6 +10,8 @@ their number of contacts.
 
 States in which a body is more than DEEPEST in another are left out.
 
+With the name ChuteLocalProblems it writes OUT/chute_local_problems.json from the stored states.
+
 Writes OUT/rr9118/FAMILY-1.trajectory and OUT/rr9118.json, the list of what was chosen, which go to
 `collection/` and to `python/fclib/collections/data/`. Half an hour of CPU.
 """
@@ -279,6 +281,44 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     ]
 
 
+def one_contacts(out: Path) -> None:
+    """Write the problems of one contact of the chute, the others' reactions being a solution's.
+
+    At equal distances, of the contacts that carry a reaction and whose W is conditioned as
+    published.
+    """
+    path = published.path_of(f"{SET}/Chute1000", VERSION)
+    assert path is not None
+    states = trajectory.read(path)
+    found = []
+    for place in range(len(states)):
+        problem: Any = states.problem(place).problem
+        result = fclib.solve(problem, solver="nsgs", tol=1e-6, max_iterations=500, merit="natural")
+        r = np.reshape(result.solution.r, (-1, 3))
+        u = np.reshape(np.asarray(result.solution.u), (-1, 3))
+        H = sp.csc_array(problem.H)
+        weighted = sp.csc_array(sp.linalg.inv(sp.csc_array(problem.M)) @ H)
+        for c in np.flatnonzero(r[:, 0] > 1e-3 * r[:, 0].max()):
+            part = slice(3 * c, 3 * c + 3)
+            W = (H[:, part].T @ weighted[:, part]).toarray()
+            if np.linalg.cond(W) <= 4.66:
+                q = u[c] - W @ r[c]
+                found.append((f"rr9118/Chute1000/{states.number[place]:04d}, contact {c}", W, q))
+    chosen = np.unique(np.linspace(0, len(found) - 1, 834).round().astype(int))
+    lines = ",\n".join(
+        json.dumps(
+            {
+                **{"spacedim": 3, "mu": 1.0, "mu_r": None, "origin": found[k][0]},
+                **{"W": found[k][1].tolist(), "q": found[k][2].tolist()},
+            }
+        )
+        for k in chosen
+    )
+    text = f'{{"problems": [\n{lines}\n]}}\n'
+    (out / "chute_local_problems.json").write_text(text, encoding="utf-8")
+    print(f"{len(chosen)} of {len(found)} contacts")
+
+
 def main() -> None:
     """Simulate, choose, write."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
@@ -286,6 +326,10 @@ def main() -> None:
     parser.add_argument("families", nargs="*", help="some of them; all by default")
     arguments = parser.parse_args()
     target = arguments.out / f"{SET}.json"
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    if arguments.families == ["ChuteLocalProblems"]:
+        one_contacts(arguments.out)
+        return
     for name in arguments.families or REGIMES:
         own = make(name, REGIMES[name], arguments.out)
         before = known.Choice.read(target) if target.is_file() else ()

@@ -48,7 +48,7 @@ KNOWN: dict[str, tuple[str, str]] = {
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
-    *("impacts", "existence", "dynamics"),
+    *("impacts", "existence", "dynamics", "rr9118"),
 )
 
 

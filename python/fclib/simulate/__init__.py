@@ -7,6 +7,7 @@
                           ^                                                                   │
                           └──────────────────── integrate(h, v) ──────────────────────────────┘
 
+arrays.py         what a step needs of sparse matrices, on their arrays
 moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
 mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks too much

@@ -62,7 +62,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -70,9 +70,19 @@ import scipy.sparse as sp
 
 from fclib import _core, _solve
 from fclib.scenes import Law
+from fclib.simulate.arrays import (
+    Sparse,
+    Vector,
+    added,
+    by_columns,
+    columns_of,
+    pointers,
+    take,
+    times,
+    transposed_times,
+)
 
-Vector: TypeAlias = npt.NDArray[np.float64]
-Sparse: TypeAlias = Any  # a SciPy sparse array
+__all__ = ["Sparse", "Vector"]
 
 
 @dataclass(frozen=True)
@@ -136,7 +146,7 @@ def components(planar: bool, *, rolling: bool) -> int:
 class DryFriction:
     """Dry friction in k joints and tendons: a force of at most its bound against the velocity."""
 
-    gradient: Sparse  # (n x k) of the joints, their velocities are gradient^T v
+    gradient: Sparse  # (n x k) of the joints, their velocities are gradient^T v, none is empty
     bound: Vector  # (k) F [N], [N m]
     mass: Vector  # (k) a of the auxiliary degrees of freedom, of the size of the joint's inertia
     pair: npt.NDArray[np.int64]  # (k x 2) < 0, as of a limit: which joint or tendon
@@ -223,25 +233,25 @@ class MoreauJean:
         contacts, H = system.contacts, system.H
         d = contacts.dimension
         if self.law == "velocity":
-            before = (H.T @ v)[0::d]
+            before = transposed_times(H, v)[0::d]
             active = closing(contacts.pair, contacts.gap + 0.5 * h * before, self.activation)
-            contacts, H = contacts[active], H[:, block_columns(active, d)]
+            contacts, H = contacts[active], take(H, block_columns(active, d))
             w_n = self.restitution * before[active]
         else:
             middle = contacts.gap
             if self.theta < 1:
-                middle = middle + (1 - self.theta) * h * (H.T @ v)[0::d]
+                middle = middle + (1 - self.theta) * h * transposed_times(H, v)[0::d]
             share = np.where(middle > 0, 1.0, self.stabilization)
             w_n = share * middle / h
 
         w = np.zeros(d * len(contacts))
         w[0::d] = w_n
         implicit = self.theta * h
-        M = system.M + implicit * system.C
-        f = M @ v + h * system.force
+        M = added(system.M, implicit, system.C)
+        f = times(M, v) + h * system.force
         if self.theta < 1:
-            f -= implicit * (h - implicit) * (system.K @ v)
-        M = sp.csc_array(M + implicit**2 * system.K)
+            f -= implicit * (h - implicit) * times(system.K, v)
+        M = added(M, implicit**2, system.K)
         b = self.stabilization / h * system.violation
         tree, G = system.tree, system.G
         if system.dry is not None:
@@ -250,13 +260,21 @@ class MoreauJean:
             )
 
         inside, rows = linked(tree, M, H, G)
+        whole = len(inside) == len(f) and len(rows) == len(b)
         # auxiliary degrees of freedom have contacts
-        apart = np.setdiff1d(np.arange(len(v)), inside)
+        apart = rows[:0] if whole else np.setdiff1d(np.arange(len(v)), inside)
+        if not whole:
+            place = np.full(len(f), -1, dtype=np.int32)
+            place[inside] = np.arange(len(inside), dtype=np.int32)
+            all_M, all_G = M, G
+            # nothing couples what is inside to what is not
+            M, G = take(M, inside, place), take(G, rows, place)
+            H = take(H, np.arange(H.shape[1]), place)
         fields: dict[str, Any] = {
-            "M": M[inside][:, inside],
-            "H": H[inside],
-            "G": G[inside][:, rows] if rows.size else None,
-            "f": f[inside],
+            "M": M,
+            "H": H,
+            "G": G if rows.size else None,
+            "f": f if whole else f[inside],
             "w": w,
             "mu": contacts.mu,
             "b": b[rows] if rows.size else None,
@@ -274,7 +292,7 @@ class MoreauJean:
             if apart.size:
                 others = np.setdiff1d(np.arange(len(b)), rows)
                 velocity[apart] = free_velocity(
-                    M[apart][:, apart], G[apart][:, others], f[apart], b[others]
+                    all_M[apart][:, apart], all_G[apart][:, others], f[apart], b[others]
                 )
             return velocity
 
@@ -313,19 +331,29 @@ def with_dry_friction(
     """The problem's data with an auxiliary degree of freedom and a contact for each friction."""
     k, d = len(dry.bound), contacts.dimension
     n = len(f)
-    gradient = sp.coo_array(dry.gradient)
+    gradient = dry.gradient
+    own = np.arange(k, dtype=np.int32)
     # N is the auxiliary velocity, T1 the joint's
-    rows = np.concatenate((gradient.row, n + np.arange(k)))
-    columns = np.concatenate((d * gradient.col + 1, d * np.arange(k)))
-    values = np.concatenate((gradient.data, np.ones(k)))
-    own = sp.csc_array((values, (rows, columns)), shape=(n + k, d * k))
-    H = sp.hstack((sp.vstack((H, sp.csc_array((k, H.shape[1])))), own), format="csc")
-    first = np.full(k, n)
-    np.minimum.at(first, gradient.col, gradient.row)
+    lengths = np.zeros((k, d), dtype=np.int32)
+    lengths[:, 0], lengths[:, 1] = 1, np.diff(gradient.indptr)
+    starts = pointers(np.append(np.diff(H.indptr), lengths))
+    rows = np.insert(gradient.indices, gradient.indptr[:-1], n + own)
+    values = np.insert(gradient.data, gradient.indptr[:-1], 1.0)
+    first = gradient.indices[gradient.indptr[:-1]]
     return (
-        sp.csc_array(sp.block_diag((M, sp.diags_array(dry.mass)))),
-        H,
-        sp.vstack((G, sp.csc_array((k, G.shape[1]))), format="csc"),
+        by_columns(
+            np.concatenate((M.data, dry.mass)),
+            np.concatenate((M.indices, n + own)),
+            np.concatenate((M.indptr, M.indptr[-1] + 1 + own)),
+            (n + k, n + k),
+        ),
+        by_columns(
+            np.concatenate((H.data, values)),
+            np.concatenate((H.indices, rows)),
+            starts,
+            (n + k, H.shape[1] + d * k),
+        ),
+        by_columns(G.data, G.indices, G.indptr, (n + k, G.shape[1])),
         np.concatenate((f, -h * dry.bound)),
         np.concatenate((w, np.zeros(d * k))),
         Contacts(
@@ -367,21 +395,22 @@ def linked(
     n, p, trees = H.shape[0], G.shape[1], tree.max(initial=-1) + 1
     if not H.shape[1]:
         return np.arange(n), np.arange(p)
-    # a graph of trees and bilateral rows; a contact links the trees that its columns have
-    links = [sp.coo_array(M), sp.coo_array(H), sp.coo_array(G)]
-    ends = [
-        tree[links[0].col],
-        trees + p + links[1].col,
-        trees + links[2].col,
-    ]
-    starts = [tree[link.row] for link in links]
-    size = trees + p + H.shape[1]
-    first, second = np.concatenate(starts), np.concatenate(ends)
-    graph = sp.coo_array((np.ones(first.size), (first, second)), shape=(size, size))
-    _, label = sp.csgraph.connected_components(graph, directed=False)
-    touched = np.zeros(label.max() + 1, dtype=bool)
-    touched[label[starts[1]]] = True
-    return np.flatnonzero(touched[label[tree]]), np.flatnonzero(touched[label[trees : trees + p]])
+    # contacts touch trees; inertia and bilateral rows pass it on
+    touched = np.zeros(trees, dtype=bool)
+    touched[tree[H.indices]] = True
+    first, second = tree[M.indices], tree[columns_of(M)]
+    between = np.flatnonzero(first != second)
+    first, second = first[between], second[between]
+    of_row, row = tree[G.indices], columns_of(G)
+    reached = np.zeros(p, dtype=bool)
+    while True:
+        before = touched.sum()
+        touched[first[touched[second]]] = True
+        touched[second[touched[first]]] = True
+        reached[row[touched[of_row]]] = True
+        touched[of_row[reached[row]]] = True
+        if touched.sum() == before:
+            return np.flatnonzero(touched[tree]), np.flatnonzero(reached)
 
 
 def free_velocity(M: Sparse, G: Sparse, f: Vector, b: Vector) -> Vector:

@@ -26,14 +26,19 @@ import scipy.sparse as sp
 
 from fclib.scenes import Scene
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.moreau_jean import (
-    Contacts,
-    DryFriction,
+from fclib.simulate.arrays import (
     Sparse,
-    System,
     Vector,
-    components,
+    added,
+    by_columns,
+    columns_of,
+    diagonal,
+    pointers,
+    summed,
+    take,
+    without_zeros,
 )
+from fclib.simulate.moreau_jean import Contacts, DryFriction, System, components
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,
@@ -76,6 +81,9 @@ class MujocoModel:
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
         self._pattern = mass_pattern(m)
+        # the same at all configurations, where no actuator feeds back
+        feeds = (m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE).any()
+        self._linear = None if feeds else linear_forces(m, self.data)
         self.rolling = has_condim(m, 6)
         # every contact detected gives rows
         m.geom_gap[:] = 0
@@ -158,7 +166,7 @@ class MujocoModel:
 
         rows = jacobian(m, d)
         if self._cell:
-            rows = sp.csr_array(rows + self._cell.rows(m, d))
+            rows = sp.csc_array(rows + self._cell.rows(m, d).T)
         H, contacts = contact_columns(self, rows)
         if self.scene.planar:
             geometries = np.where(contacts.pair[:, :1] < 0, 0, contacts.pair)
@@ -175,7 +183,7 @@ class MujocoModel:
             # at the end of the step, where its springs are taken too
             d.ctrl[:] = self._gait.controls(d.time + h)
         force = self._force()
-        C, K = linear_forces(m, d)
+        C, K = self._linear or linear_forces(m, d)
         if self.scene.gyroscopic:
             C = sp.csc_array(C + gyroscopic(m, d))
         return System(
@@ -308,18 +316,26 @@ def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
     plain = np.isin(m.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
     springs = np.zeros(m.nv)
     springs[m.jnt_dofadr[plain]] = m.jnt_stiffness[plain]
-    moment = sp.csr_array(
-        (d.actuator_moment, d.moment_colind, pointers(d.moment_rownnz)), shape=(m.nout, m.nv)
-    )
     # the actuator of each output
     owner = np.repeat(np.arange(len(m.actuator_outnum)), m.actuator_outnum)
     affine = m.actuator_biastype[owner] == mujoco.mjtBias.mjBIAS_AFFINE
 
-    def linear(diagonal: Vector, gain: Vector) -> Sparse:
-        feedback = sp.diags_array(np.where(affine, np.maximum(-gain, 0), 0.0))
-        matrix = sp.csc_array(sp.diags_array(diagonal.copy()) + moment.T @ feedback @ moment)
-        matrix.eliminate_zeros()
-        return matrix
+    n = m.nv
+
+    def linear(own: Vector, gain: Vector) -> Sparse:
+        feedback = np.where(affine, np.maximum(-gain, 0), 0.0)
+        acting = np.flatnonzero(feedback)
+        if not acting.size:
+            return diagonal(own)
+        # sums of the outer products of the rows of moments, actuator by actuator
+        places, values = [], []
+        for k in acting:
+            row = slice(d.moment_rowadr[k], d.moment_rowadr[k] + d.moment_rownnz[k])
+            columns, moment = d.moment_colind[row].astype(np.int64), d.actuator_moment[row]
+            places.append((columns[:, None] * n + columns).ravel())
+            values.append((moment[:, None] * (moment * feedback[k])).ravel())
+        products = summed(np.concatenate(values), np.concatenate(places), (n, n))
+        return added(diagonal(own), 1.0, products)
 
     # the bias of an actuator is p0 + p1 length + p2 velocity
     bias = m.actuator_biasprm[owner]
@@ -342,22 +358,21 @@ def advance_actuators(m: Any, d: Any, h: float) -> None:
 
 
 def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
-    """Of joints and tendons, by MuJoCo's constraint rows (nefc x n); None: there is none."""
+    """Of joints and tendons, by MuJoCo's rows as columns (n x nefc); None: there is none."""
     if not d.nf:
         return None
     types = mujoco.mjtConstraint
     of_joints = d.efc_type == int(types.mjCNSTR_FRICTION_DOF)
     which = np.flatnonzero(of_joints | (d.efc_type == int(types.mjCNSTR_FRICTION_TENDON)))
-    gradient = rows[which]
-    moved = np.flatnonzero(np.diff(gradient.indptr))
-    which, gradient = which[moved], gradient[moved]
+    which = which[np.diff(rows.indptr)[which] > 0]
+    gradient = take(rows, which)
     index = d.efc_id[which]
     joint = of_joints[which]
     inverse = np.zeros(len(which))
     inverse[joint] = m.dof_invweight0[index[joint]]
     inverse[~joint] = m.tendon_invweight0[index[~joint]]
     return DryFriction(
-        gradient=gradient.T,
+        gradient=gradient,
         bound=d.efc_frictionloss[which].copy(),
         mass=1 / np.where(inverse > 0, inverse, 1.0),
         pair=np.column_stack((-1 - d.efc_type[which].astype(np.int64), index)),
@@ -404,16 +419,16 @@ class MassPattern:
 
     entries: npt.NDArray[np.int64]  # (nnz) of MuJoCo's M, the upper triangle's among them
     rows: npt.NDArray[np.int32]  # (nnz) by columns
-    pointers: npt.NDArray[np.int64]  # (n + 1) of the columns
+    pointers: npt.NDArray[np.int32]  # (n + 1) of the columns
 
     def fill(self, values: Vector) -> Sparse:
         """M (n x n), by columns and without explicit zeros."""
         n = len(self.pointers) - 1
-        # copies, since zeros are squeezed out in place
-        entries = (values[self.entries], self.rows.copy(), self.pointers.copy())
-        M = sp.csc_array(entries, shape=(n, n))
-        M.eliminate_zeros()
-        return M
+        found = values[self.entries]
+        if found.all():
+            return by_columns(found, self.rows, self.pointers, (n, n))
+        columns = np.repeat(np.arange(n), np.diff(self.pointers))
+        return without_zeros(found, self.rows, columns, (n, n))
 
 
 def mass_pattern(m: Any) -> MassPattern:
@@ -431,16 +446,14 @@ def mass_pattern(m: Any) -> MassPattern:
 
 
 def jacobian(m: Any, d: Any) -> Sparse:
-    """All of MuJoCo's constraint rows (nefc x n), without its explicit zeros."""
-    entries = (d.efc_J.copy(), d.efc_J_colind.copy(), pointers(d.efc_J_rownnz))
-    rows = sp.csr_array(entries, shape=(d.nefc, m.nv))
-    rows.eliminate_zeros()
-    return rows
-
-
-def pointers(lengths: npt.NDArray[Any]) -> npt.NDArray[np.int64]:
-    """The row pointers (k + 1) of k rows stored one after the other."""
-    return np.concatenate(([0], np.cumsum(lengths, dtype=np.int64)))
+    """All of MuJoCo's constraint rows, as columns (n x nefc), without its explicit zeros."""
+    lengths = d.efc_J_rownnz
+    entries = int(lengths.sum())
+    row = np.repeat(np.arange(d.nefc), lengths)
+    found = without_zeros(d.efc_J[:entries], d.efc_J_colind[:entries], row, (m.nv, d.nefc))
+    if np.shares_memory(found.data, d.efc_J):
+        found.data, found.indices = found.data.copy(), found.indices.copy()
+    return found
 
 
 def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
@@ -448,12 +461,12 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
 
     The limits of joints and tendons come after the contacts.
     """
-    m, data = source.model, source.data
+    data = source.data
     contact = data.contact
     # a body of a mocap, or one whose joints do not move the point, has rows without entries
     entries = np.append(np.diff(rows.indptr), 0)
     first = contact.efc_address[:, None] + np.arange(3)
-    moves = entries[np.where(first < rows.shape[0], first, -1)].any(axis=1)
+    moves = entries[np.where(first < rows.shape[1], first, -1)].any(axis=1)
     rigid = (contact.geom >= 0).reshape(-1, 2).all(axis=1)
     which = np.flatnonzero((contact.efc_address >= 0) & rigid & moves)
     dim = contact.dim[which]
@@ -471,17 +484,15 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     )
     nc = len(which) + len(limits)
     d = components(planar=False, rolling=source.rolling)
-    # where a component has no row, this one of zeros
-    nothing = rows.shape[0]
-    source_row = np.full((nc, d), nothing)
+    # -1 where a component has no row
+    source_row = np.full((nc, d), -1)
     source_row[: len(which), :3] = contact.efc_address[which][:, None] + np.arange(3)
     if source.rolling:
         # N, T1, T2, spin, R1, R2
         rolls = np.flatnonzero(dim == 6)
         source_row[rolls, 3:] = contact.efc_address[which[rolls]][:, None] + (4, 5)
     source_row[len(which) :, 0] = limits
-    padded = sp.vstack([rows, sp.csr_array((1, m.nv))], format="csr")
-    H = padded[source_row.ravel()].T
+    H = take(rows, source_row.ravel())
 
     def with_limits(values: npt.NDArray[Any], of_limits: Any = 0.0) -> npt.NDArray[Any]:
         tail = np.zeros((len(limits), *values.shape[1:]), dtype=values.dtype)
@@ -508,8 +519,8 @@ def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
     Rows that vanish are left out: a loop in a plane has one out of it, which says 0 = 0.
     """
     if not d.ne:
-        return sp.csc_array((rows.shape[1], 0)), np.zeros(0)
-    gradients = rows[: d.ne]
-    sizes = np.sqrt(gradients.multiply(gradients).sum(axis=1))
+        return sp.csc_array((rows.shape[0], 0)), np.zeros(0)
+    gradients = take(rows, np.arange(d.ne))
+    sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
     kept = np.flatnonzero(sizes > ROUNDING * sizes.max(initial=0.0))
-    return gradients[kept].T, d.efc_pos[: d.ne][kept]
+    return take(gradients, kept), d.efc_pos[: d.ne][kept]

@@ -1,0 +1,115 @@
+"""The few operations on sparse matrices that a step needs, on their arrays.
+
+SciPy checks and copies at every operation: tens of microseconds each, more than the entries of a
+robot take. Sums are taken in the order in which SciPy takes them, entry after entry, so
+that problems are the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import copy
+import functools
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+Vector: TypeAlias = npt.NDArray[np.float64]
+Sparse: TypeAlias = Any  # a SciPy sparse array
+Index: TypeAlias = npt.NDArray[Any]
+
+
+def pointers(lengths: Index) -> npt.NDArray[np.int32]:
+    """The pointers (k + 1) of k rows or columns stored one after the other."""
+    found = np.zeros(len(lengths) + 1, dtype=np.int32)
+    np.cumsum(lengths, out=found[1:])
+    return found
+
+
+@functools.lru_cache(maxsize=256)
+def empty(shape: tuple[int, int]) -> Sparse:
+    """A matrix by columns without entries; not to be changed."""
+    return sp.csc_array(shape)
+
+
+def by_columns(data: Vector, rows: Index, starts: Index, shape: tuple[int, int]) -> Sparse:
+    """A matrix by columns of arrays that are known to fit, which are not copied."""
+    matrix = copy.copy(empty(shape))
+    matrix.data, matrix.indices, matrix.indptr = data, rows, starts
+    return matrix
+
+
+def columns_of(matrix: Sparse) -> npt.NDArray[np.intp]:
+    """The column (nnz) of each entry."""
+    return np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+
+
+def times(matrix: Sparse, x: Vector) -> Vector:
+    """A x."""
+    weights = matrix.data * x[columns_of(matrix)]
+    sums: Vector = np.asarray(
+        np.bincount(matrix.indices, weights, minlength=matrix.shape[0]), dtype=float
+    )
+    return sums
+
+
+def transposed_times(matrix: Sparse, x: Vector) -> Vector:
+    """A^T x."""
+    weights = matrix.data * x[matrix.indices]
+    sums: Vector = np.asarray(
+        np.bincount(columns_of(matrix), weights, minlength=matrix.shape[1]), dtype=float
+    )
+    return sums
+
+
+def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
+    """The columns of these numbers; -1 is one without entries. `rows`: the new number of each row.
+
+    Entries all lie in rows that have a number.
+    """
+    lengths = np.append(np.diff(matrix.indptr), 0)[columns]
+    starts = pointers(lengths)
+    first = np.append(matrix.indptr[:-1], 0)[columns]
+    entries = np.repeat(first - starts[:-1], lengths) + np.arange(starts[-1])
+    indices = matrix.indices[entries]
+    size = matrix.shape[0]
+    if rows is not None:
+        indices, size = rows[indices], int((rows >= 0).sum())
+    return by_columns(matrix.data[entries], indices, starts, (size, len(columns)))
+
+
+def without_zeros(data: Vector, rows: Index, columns: Index, shape: tuple[int, int]) -> Sparse:
+    """A matrix of entries that come column by column; zeros are dropped."""
+    kept = data != 0
+    if not kept.all():
+        data, rows, columns = data[kept], rows[kept], columns[kept]
+    starts = pointers(np.bincount(columns, minlength=shape[1]))
+    return by_columns(data, rows.astype(np.int32, copy=False), starts, shape)
+
+
+def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
+    """A + factor B, without zeros."""
+    if not other.nnz:
+        return matrix
+    n = matrix.shape[0]
+    places = np.concatenate(
+        (columns_of(matrix) * n + matrix.indices, columns_of(other) * n + other.indices)
+    )
+    values = np.concatenate((matrix.data, factor * other.data))
+    return summed(values, places, matrix.shape)
+
+
+def summed(values: Vector, places: Index, shape: tuple[int, int]) -> Sparse:
+    """A matrix of entries at places column * rows + row, those of one place added up in order."""
+    unique, inverse = np.unique(places, return_inverse=True)
+    sums: Vector = np.asarray(
+        np.bincount(inverse.ravel(), values, minlength=len(unique)), dtype=float
+    )
+    return without_zeros(sums, unique % shape[0], unique // shape[0], shape)
+
+
+def diagonal(values: Vector) -> Sparse:
+    """A diagonal matrix, without zeros."""
+    kept = np.flatnonzero(values)
+    return without_zeros(values[kept], kept, kept, (len(values), len(values)))

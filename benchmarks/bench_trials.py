@@ -83,7 +83,7 @@ def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bo
         trials.job(prepared, "nsn-ac"), problem=campaign().plan()[0].problem
     )
     for name, expected in trials.EXPECTED.items():
-        wall = trials.LIMIT if expected == "wall_limit" else 10 * trials.LIMIT
+        wall = trials.LIMIT if expected == "wall_limit" else 60 * trials.LIMIT
         before = least(supervisor, usual)
         record = supervisor.do(trials.job(prepared, f"bad-{name}", wall=wall))
         after = least(supervisor, usual)

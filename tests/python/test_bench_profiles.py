@@ -759,6 +759,22 @@ def test_names_that_matplotlib_would_read_otherwise(store: Path, tmp_path: Path)
         assert word in drawn
 
 
+def test_figures_that_are_unsteady_or_of_a_busy_machine_are_marked(store: Path) -> None:
+    fill(store, {"B": [2.9, 1.3, None, None]}, repeat=1)
+    with bench.Store(store) as opened:
+        opened.db.execute("UPDATE machines SET cores = 2")
+        opened.db.execute("UPDATE runs SET load = 1.5")
+        opened.db.execute("UPDATE runs SET load = 2.5 WHERE id = 9")  # of C
+    shown = CliRunner().invoke(app, ["profile", str(store)])
+    assert shown.exit_code == 0, shown.output
+    lines = [line for line in shown.output.splitlines() if line.startswith(("A ", "B ", "C "))]
+    means = {line[0]: line for line in lines[:3]}
+    assert " ~ " in means["B"]
+    assert " ^ " in means["C"]
+    assert not {"~", "^"} & set(means["A"])
+    assert "1 of 16 runs were begun while the load was above" in " ".join(shown.output.split())
+
+
 def test_machines_of_one_name_are_two(store: Path) -> None:
     fill(store, tol=1e-7)
     with bench.Store(store) as opened:

@@ -55,7 +55,7 @@ SHIFT = 1e-3  # [s]
 RESAMPLES = 2000
 BANDS = 400  # the same for the bands of curves
 SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is marked
-MARK = "~"  # of such a figure, and of one whose runs were done under load
+MARK, LOADED = "~", "^"  # of such a figure, and of one with runs under load
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 VIRTUAL_BEST = "virtual best"
 

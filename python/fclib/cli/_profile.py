@@ -100,7 +100,10 @@ def show(
         wide = row["spread"] is not None and row["spread"] > profiles.SPREAD
         unsteady = unsteady or wide
         of = f"{row['mean']:.3g}"
-        marked.append(row | {"mean": f"{of} {profiles.MARK}" if wide else of})
+        marks = (profiles.MARK if wide else "") + (
+            profiles.LOADED if busy.get(row["solver"]) else ""
+        )
+        marked.append(row | {"mean": f"{of} {marks}".rstrip()})
     if all(row["spread"] is None for row in marked):
         marked = [{name: row[name] for name in row if name != "spread"} for row in marked]
     if not any(row["unsuitable"] for row in marked):
@@ -126,8 +129,9 @@ def show(
             )
         if name == "summary" and busy:
             out.print(
-                f"{sum(busy.values())} of {len(rows)} runs were begun while the load was above the"
-                " number of cores: their times are longer than on a quiet machine",
+                f"{profiles.LOADED}: {sum(busy.values())} of {len(rows)} runs were begun while the"
+                " load was above the number of cores: their times may be longer than on a quiet"
+                " machine",
                 highlight=False,
             )
     best = tables["summary"][1]["solver"]

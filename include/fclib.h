@@ -228,6 +228,10 @@ int fclib_create_int_attributes_in_info(const char* path, const char* attr_name,
  *  "global_rolling" or "local_rolling". Not to be freed. NULL where the file holds none. */
 const char* fclib_problem_kind(const char* path);
 
+/** New. The lengths of that problem's arrays, each of which may be NULL: degrees of freedom (0 of a
+ *  local problem), components of the contacts, bilateral constraints, contacts. Returns 1, or 0. */
+int fclib_problem_sizes(const char* path, int* n, int* m, int* p, int* nc);
+
 /** New. What a write does where the file already holds such a thing. */
 enum fclib_write_mode {
   FCLIB_WRITE_ADD,    /**< it fails; as 3.1 does, and the default */
@@ -410,6 +414,129 @@ const char* fclib_solver_name(int k);
 
 /** New. "converged", "iteration_limit", ...: not to be freed. */
 const char* fclib_status_name(enum fclib_status status);
+
+/* ---- by name --------------------------------------------------------------------------------- */
+
+/** New. Settings by name, which may become more: a program has only a pointer. One may be used by
+ *  many calls, in several threads at once as long as none changes it.
+ *
+ *  a solve   "solver" ("auto"), "tolerance" (1e-8), "max_iterations" (0: the solver's own),
+ *            "time_limit" ([s], 0: none), "merit" ("both", or "natural": without the scaled map),
+ *            the options of the solver, the array "guess" (m reactions to start from), and a
+ *            function that is told of the progress
+ *  a write   "mode" ("add", "replace"), "compression" (-1 to 9): in the place of what
+ *            fclib_set_write_mode() and fclib_set_compression() have set for all
+ *
+ *  A name that the call does not know is an error of that call. */
+struct fclib_options;
+struct fclib_options* fclib_options_create(void);
+void fclib_options_delete(struct fclib_options* options); /* or NULL */
+
+/** New. Sets one thing, whose old value goes; text, number and array are copied. Any setting may be
+ *  given as a text. Return 1, or 0. */
+int fclib_options_set_text(struct fclib_options* options, const char* name, const char* value);
+int fclib_options_set_number(struct fclib_options* options, const char* name, double value);
+int fclib_options_set_array(struct fclib_options* options, const char* name, const double* values,
+                            int count);
+
+/** New. A function that is told how a solve goes: iterations, error (the solver's own), wall clock
+ *  [s], and the method that works ("" in a solver that has but one). The thread that solves calls
+ *  it. If it returns anything but 0, the solve ends as FCLIB_INTERRUPTED with what it has. */
+typedef int (*fclib_progress)(int iteration, double error, double time, const char* stage,
+                              void* context);
+
+/** New. Sets that function, or NULL, and the context it is called with. Returns 1, or 0. */
+int fclib_options_set_progress(struct fclib_options* options, fclib_progress progress,
+                               void* context);
+
+/** New. What a call says, by name; there may be more names. */
+struct fclib_report;
+void fclib_report_delete(struct fclib_report* report); /* or NULL */
+
+/** New. A number, a text, an array of a report. What is pointed to is the report's. NaN or NULL
+ *  where there is none of this name. An array may have no entries; its pointer is not NULL then. */
+double fclib_report_number(const struct fclib_report* report, const char* name);
+const char* fclib_report_text(const struct fclib_report* report, const char* name);
+const double* fclib_report_array(const struct fclib_report* report, const char* name, int* count);
+
+/** New. Solves a problem as the options (or NULL) say. The report has the numbers "error",
+ *  "iterations", "status" (of enum fclib_status), "cpu_s", "setup_s", "certificate_bound"; the
+ *  texts "status" and "solver"; the arrays "v", "u", "r", "l", "certificate_y", "certificate_z". To
+ *  be deleted. NULL for invalid data, an unknown solver or option. */
+struct fclib_report* fclib_solve_global_with(const struct fclib_global* problem,
+                                             const struct fclib_options* options);
+struct fclib_report* fclib_solve_local_with(const struct fclib_local* problem,
+                                            const struct fclib_options* options);
+struct fclib_report* fclib_solve_global_rolling_with(const struct fclib_global_rolling* problem,
+                                                     const struct fclib_options* options);
+struct fclib_report* fclib_solve_local_rolling_with(const struct fclib_local_rolling* problem,
+                                                    const struct fclib_options* options);
+
+/** New. The parts of MERIT_2, as numbers: "error" (all of it), "natural", "scaled_natural",
+ *  "dynamics", "bilateral", "kinematics"; "cone", "dual_cone" and "complementarity", the largest of
+ *  a contact; and how many contacts are "open", "stick" and "slide". To be deleted. NULL where the
+ *  problem or the solution is not valid. */
+struct fclib_report* fclib_judge_global(const struct fclib_global* problem,
+                                        const struct fclib_solution* solution);
+struct fclib_report* fclib_judge_local(const struct fclib_local* problem,
+                                       const struct fclib_solution* solution);
+struct fclib_report* fclib_judge_global_rolling(const struct fclib_global_rolling* problem,
+                                                const struct fclib_solution* solution);
+struct fclib_report* fclib_judge_local_rolling(const struct fclib_local_rolling* problem,
+                                               const struct fclib_solution* solution);
+
+/** New. Writes as fclib_write_global() and its like, fclib_write_solution() and
+ *  fclib_write_guesses() do, by options (or NULL) of this call. Return 1, or 0. */
+int fclib_write_global_with(const struct fclib_global* problem, const char* path,
+                            const struct fclib_options* options);
+int fclib_write_local_with(const struct fclib_local* problem, const char* path,
+                           const struct fclib_options* options);
+int fclib_write_global_rolling_with(const struct fclib_global_rolling* problem, const char* path,
+                                    const struct fclib_options* options);
+int fclib_write_local_rolling_with(const struct fclib_local_rolling* problem, const char* path,
+                                   const struct fclib_options* options);
+int fclib_write_solution_with(const struct fclib_solution* solution, const char* path,
+                              const struct fclib_options* options);
+int fclib_write_guesses_with(int number_of_guesses, const struct fclib_solution* guesses,
+                             const char* path, const struct fclib_options* options);
+
+/** New. "title", "family" or "citation" of a solver. Not to be freed. NULL on failure. */
+const char* fclib_solver_text(const char* solver, const char* what);
+
+/** New. Of option number k = 0, 1, ... of a solver: "name", "type" ("bool", "int", "float",
+ *  "choice", "text"), "default", "unit", "doc", "lowest", "highest" or "choices" (a list with
+ *  commas). The text is the library's, and stays until the next call of this function in this
+ *  thread. NULL past the last, and on failure. */
+const char* fclib_option_text(const char* solver, int k, const char* what);
+
+/* ---- converting ------------------------------------------------------------------------------ */
+
+/** New. The local problem of a global one, W = H^T M^-1 H, q = H^T M^-1 f + w, and V, R, s from G
+ *  and b; to be deleted and freed. NULL where the problem is not valid, or M is singular. */
+struct fclib_local* fclib_condense_global(const struct fclib_global* problem);
+struct fclib_local_rolling* fclib_condense_global_rolling(
+    const struct fclib_global_rolling* problem);
+
+/** New. Fills u and v, or whichever of them is not NULL, by what follows from r (and l, where
+ *  p > 0): what a solution of the condensed problem means for the global one. Returns 1, or 0. */
+int fclib_complete_global(const struct fclib_global* problem, struct fclib_solution* solution);
+int fclib_complete_local(const struct fclib_local* problem, struct fclib_solution* solution);
+int fclib_complete_global_rolling(const struct fclib_global_rolling* problem,
+                                  struct fclib_solution* solution);
+int fclib_complete_local_rolling(const struct fclib_local_rolling* problem,
+                                 struct fclib_solution* solution);
+
+/** New. Reads and writes the text (.dat) of Siconos, which has no bilateral constraints. A write
+ *  replaces the file. A read returns NULL, a write 0 on failure. */
+struct fclib_global* fclib_read_siconos_global(const char* path);
+int fclib_write_siconos_global(const struct fclib_global* problem, const char* path);
+struct fclib_local* fclib_read_siconos_local(const char* path);
+int fclib_write_siconos_local(const struct fclib_local* problem, const char* path);
+struct fclib_global_rolling* fclib_read_siconos_global_rolling(const char* path);
+int fclib_write_siconos_global_rolling(const struct fclib_global_rolling* problem,
+                                       const char* path);
+struct fclib_local_rolling* fclib_read_siconos_local_rolling(const char* path);
+int fclib_write_siconos_local_rolling(const struct fclib_local_rolling* problem, const char* path);
 
 /* ---- many small problems --------------------------------------------------------------------- */
 

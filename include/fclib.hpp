@@ -19,7 +19,10 @@
 
 #include <cstddef>
 #include <cstdlib>
+#include <exception>
+#include <functional>
 #include <limits>
+#include <map>
 #include <memory>
 #include <span>
 #include <stdexcept>
@@ -64,7 +67,7 @@ struct Calls;
     static constexpr auto free_members = fclib_delete_##kind; \
     static constexpr auto validate = fclib_validate_##kind;   \
     static constexpr auto merit = fclib_merit_##kind;         \
-    static constexpr auto solve = fclib_solve_##kind;         \
+    static constexpr auto solve = fclib_solve_##kind##_with;  \
   };
 FCLIB_CALLS(global)
 FCLIB_CALLS(local)
@@ -270,11 +273,13 @@ inline std::string_view kind(const std::string& path) {
 namespace detail {
 
 inline Sizes sizes_in(const std::string& path) {
-  const std::string_view name = kind(path);
-  if (name == Calls<fclib_global>::name) return sizes(*read<fclib_global>(path));
-  if (name == Calls<fclib_local>::name) return sizes(*read<fclib_local>(path));
-  if (name == Calls<fclib_global_rolling>::name) return sizes(*read<fclib_global_rolling>(path));
-  return sizes(*read<fclib_local_rolling>(path));
+  int n = 0;
+  int m = 0;
+  int p = 0;
+  int nc = 0;
+  checked(fclib_problem_sizes(path.c_str(), &n, &m, &p, &nc));
+  return {static_cast<std::size_t>(n), static_cast<std::size_t>(m), static_cast<std::size_t>(p),
+          static_cast<std::size_t>(nc)};
 }
 
 inline Solution copied(const fclib_solution& from, const Sizes& size) {
@@ -343,13 +348,22 @@ inline void write_guesses(const std::string& path, std::span<const Solution> gue
 
 // ---- solving
 
+/// What a solver tells while it works.
+struct Progress {
+  int iteration = 0;
+  double error = 0;        ///< the solver's own
+  double time = 0;         ///< wall clock [s]
+  std::string_view stage;  ///< the method that works, where a solver chains some
+};
+
 /// What is asked of a solver: what stands here asks for the defaults.
 struct Options {
-  double tolerance = 0;             ///< on MERIT_2; 0 for 1e-8
-  int max_iterations = 0;           ///< 0 for the solver's own
-  double time_limit = 0;            ///< wall clock [s]; 0 for none
-  std::span<const double> guess{};  ///< reactions to start from (m), or none
-  std::string solver_options{};     ///< "name=value name=\"a text\""
+  double tolerance = 0;                                 ///< on MERIT_2; 0 for 1e-8
+  int max_iterations = 0;                               ///< 0 for the solver's own
+  double time_limit = 0;                                ///< wall clock [s]; 0 for none
+  std::span<const double> guess{};                      ///< reactions to start from (m), or none
+  std::map<std::string, std::string> solver_options{};  ///< of this solver, by name
+  std::function<bool(const Progress&)> progress{};      ///< false stops it: FCLIB_INTERRUPTED
 };
 
 /// How a solve ended, and the solution it left.
@@ -366,36 +380,81 @@ struct Result {
   [[nodiscard]] std::string_view status_name() const { return fclib_status_name(status); }
 };
 
-/// Solves a problem. Throws for data that makes no sense, an unknown solver or option; how a solver
-/// ended that ran is the status.
+namespace detail {
+
+struct DeleteHandle {
+  void operator()(fclib_options* options) const { fclib_options_delete(options); }
+  void operator()(fclib_report* report) const { fclib_report_delete(report); }
+};
+template <class Struct>
+using Handle = std::unique_ptr<Struct, DeleteHandle>;
+
+/// A caller's function, and what it has thrown, which may not pass through C.
+struct Watch {
+  const std::function<bool(const Progress&)>& progress;
+  std::exception_ptr thrown = nullptr;
+
+  static int tell(int iteration, double error, double time, const char* stage, void* context) {
+    auto& watch = *static_cast<Watch*>(context);
+    try {
+      return watch.progress({iteration, error, time, stage}) ? 0 : 1;
+    } catch (...) {
+      watch.thrown = std::current_exception();
+      return 1;
+    }
+  }
+};
+
+inline std::vector<double> array(const fclib_report& report, const char* name) {
+  int count = 0;
+  const double* const first = checked(fclib_report_array(&report, name, &count));
+  return {first, first + count};
+}
+
+}  // namespace detail
+
+/// Solves a problem. Throws for data that makes no sense, an unknown solver or option, and what the
+/// function of the progress has thrown; how a solver ended that ran is the status.
 template <Problem C>
 Result solve(const C& problem, const std::string& solver = "auto", const Options& options = {}) {
-  const Sizes size = sizes(problem);
-  if (!options.guess.empty()) detail::require_size("the guess", options.guess.size(), size.m);
-  Result result;
-  result.solution = Solution(size);
-  std::vector<double> y(size.nc);
-  std::vector<double> z(size.p);
-  fclib_solve_options asked{};
-  asked.tolerance = options.tolerance;
-  asked.max_iterations = options.max_iterations;
-  asked.time_limit = options.time_limit;
-  asked.guess = options.guess.empty() ? nullptr : options.guess.data();
-  asked.options = options.solver_options.empty() ? nullptr : options.solver_options.c_str();
-  asked.certificate_y = y.data();
-  asked.certificate_z = z.data();
-  fclib_solution view = result.solution.view();
-  fclib_solve_result said{};
-  checked(Calls<C>::solve(&problem, solver.c_str(), &asked, &view, &said));
-  result.status = said.status;
-  result.iterations = said.iterations;
-  result.error = said.error;
-  result.cpu_s = said.cpu_s;
-  result.certificate_bound = said.certificate_bound;
-  if (said.status == FCLIB_INFEASIBLE) {
-    result.certificate_y = std::move(y);
-    result.certificate_z = std::move(z);
+  const detail::Handle<fclib_options> handle(checked(fclib_options_create()));
+  fclib_options* const asked = handle.get();
+  for (const auto& [name, value] : options.solver_options) {
+    checked(fclib_options_set_text(asked, name.c_str(), value.c_str()));
   }
+  checked(fclib_options_set_text(asked, "solver", solver.c_str()));
+  const auto set = [asked](const char* name, double value) {
+    if (value != 0) checked(fclib_options_set_number(asked, name, value));
+  };
+  set("tolerance", options.tolerance);
+  set("max_iterations", options.max_iterations);
+  set("time_limit", options.time_limit);
+  if (!options.guess.empty()) {
+    checked(fclib_options_set_array(asked, "guess", options.guess.data(),
+                                    detail::count(options.guess.size())));
+  }
+  detail::Watch watch{options.progress};
+  if (options.progress) {
+    checked(fclib_options_set_progress(asked, detail::Watch::tell, &watch));
+  }
+  const detail::Handle<fclib_report> report(Calls<C>::solve(&problem, asked));
+  if (watch.thrown) std::rethrow_exception(watch.thrown);
+  checked(report.get());
+
+  const auto number = [&](const char* name) { return fclib_report_number(report.get(), name); };
+  const auto array = [&](const char* name) { return detail::array(*report, name); };
+  Result result;
+  result.status = static_cast<fclib_status>(number("status"));
+  result.iterations = static_cast<int>(number("iterations"));
+  result.error = number("error");
+  result.cpu_s = number("cpu_s");
+  result.certificate_bound = number("certificate_bound");
+  result.solution.v = array("v");
+  result.solution.u = array("u");
+  result.solution.r = array("r");
+  result.solution.l = array("l");
+  result.certificate_y = array("certificate_y");
+  result.certificate_z = array("certificate_z");
   return result;
 }
 

@@ -1,10 +1,13 @@
 // The functions of fclib.h that read, write and free.
+#include <array>
 #include <atomic>
 #include <cstdlib>
 #include <memory>
+#include <string_view>
 
 #include "capi/errors.hpp"
 #include "capi/from_c.hpp"
+#include "capi/options.hpp"
 #include "capi/to_c.hpp"
 #include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
@@ -28,16 +31,30 @@ std::atomic<bool> replace{false};
 std::atomic<int> compression{first_compression()};
 std::atomic<bool> keep_dense{false};
 
-/// 3.1 checks no value and converts no matrix.
-WriteOptions write_options() {
-  return {.validate = false, .replace = replace, .compression = compression};
-}
+/// What the options of one write may say.
+struct Asked {
+  enum class Mode { add, replace };
+  Mode mode = replace ? Mode::replace : Mode::add;
+  int compression = c::compression;
+
+  static constexpr std::array<std::string_view, 2> modes{"add", "replace"};
+  static constexpr auto fields() {
+    using A = Asked;
+    return std::tuple{
+        OptionField<A, Mode>{.name = "mode", .member = &A::mode, .choices = modes},
+        OptionField<A, int>{.name = "compression",
+                            .member = &A::compression,
+                            .lowest = compress_cheaply,
+                            .highest = 9},
+    };
+  }
+};
 
 template <class C>
-int write_problem(const C* c, const char* path) {
+int write_problem(const C* c, const char* path, const fclib_options* asked) {
   return guarded(0, [&] {
     const auto problem = problem_as_given(given(c, "problem"));
-    WriteOptions options = write_options();
+    WriteOptions options = write_options(asked);
     options.append = true;
     write_file(&given(path, "path"), &problem, nullptr, {}, options);
     return 1;
@@ -86,7 +103,51 @@ void delete_members(C* c) {
   *c = C{};
 }
 
+int write_one_solution(const fclib_solution* solution, const char* path,
+                       const fclib_options* options) {
+  return guarded(0, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    write_solution(path, completed(given(solution, "solution"), outline, path),
+                   write_options(options));
+    return 1;
+  });
+}
+
+int write_all_guesses(int number_of_guesses, const fclib_solution* guesses, const char* path,
+                      const fclib_options* options) {
+  return guarded(0, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    const std::size_t count = size_of(number_of_guesses, "number_of_guesses");
+    if (count > 0) given(guesses, "guesses");
+    std::vector<Solution> all;
+    for (std::size_t k = 0; k < count; ++k) all.push_back(completed(guesses[k], outline, path));
+    write_guesses(path, all, write_options(options));
+    return 1;
+  });
+}
+
 }  // namespace
+
+// 3.1 checks no value and converts no matrix
+WriteOptions write_options(const fclib_options* options) {
+  Asked asked;
+  if (options != nullptr) {
+    for (const auto& [name, value] : options->values) {
+      if (name == "mode" || name == "compression") continue;
+      fail("options", "a write has no option '" + name + "'; it has: mode, compression");
+    }
+    if (!options->arrays.empty()) fail("options", "a write takes no array");
+    // what is not there is as the process has it
+    OptionValues values{
+        {"mode", std::string(Asked::modes.at(static_cast<std::size_t>(asked.mode)))},
+        {"compression", std::int64_t{asked.compression}}};
+    for (const auto& [name, value] : options->values) values[name] = value;
+    asked = parse_options<Asked>(values);
+  }
+  return {.validate = false,
+          .replace = asked.mode == Asked::Mode::replace,
+          .compression = asked.compression};
+}
 
 }  // namespace fclib::c
 
@@ -97,7 +158,11 @@ extern "C" {
 
 #define FCLIB_FUNCTIONS_OF(kind)                                                           \
   int fclib_write_##kind(fclib_##kind* problem, const char* path) {                        \
-    return write_problem(problem, path);                                                   \
+    return write_problem(problem, path, nullptr);                                          \
+  }                                                                                        \
+  int fclib_write_##kind##_with(const fclib_##kind* problem, const char* path,             \
+                                const fclib_options* options) {                            \
+    return write_problem(problem, path, options);                                          \
   }                                                                                        \
   fclib_##kind* fclib_read_##kind(const char* path) { return read_c<fclib_##kind>(path); } \
   void fclib_delete_##kind(fclib_##kind* problem) { delete_members(problem); }
@@ -107,25 +172,21 @@ FCLIB_FOR_EACH_KIND(FCLIB_FUNCTIONS_OF)
 #undef FCLIB_FUNCTIONS_OF
 
 int fclib_write_solution(fclib_solution* solution, const char* path) {
-  return guarded(0, [&] {
-    const Problem outline = read_outline(&given(path, "path"));
-    write_solution(path, completed(given(solution, "solution"), outline, path), write_options());
-    return 1;
-  });
+  return write_one_solution(solution, path, nullptr);
+}
+
+int fclib_write_solution_with(const fclib_solution* solution, const char* path,
+                              const fclib_options* options) {
+  return write_one_solution(solution, path, options);
 }
 
 int fclib_write_guesses(int number_of_guesses, fclib_solution* guesses, const char* path) {
-  return guarded(0, [&] {
-    const Problem outline = read_outline(&given(path, "path"));
-    const std::size_t count = size_of(number_of_guesses, "number_of_guesses");
-    if (count > 0) given(guesses, "guesses");
-    std::vector<Solution> all;
-    for (std::size_t k = 0; k < count; ++k) {
-      all.push_back(completed(guesses[k], outline, path));
-    }
-    write_guesses(path, all, write_options());
-    return 1;
-  });
+  return write_all_guesses(number_of_guesses, guesses, path, nullptr);
+}
+
+int fclib_write_guesses_with(int number_of_guesses, const fclib_solution* guesses, const char* path,
+                             const fclib_options* options) {
+  return write_all_guesses(number_of_guesses, guesses, path, options);
 }
 
 fclib_solution* fclib_read_solution(const char* path) {
@@ -167,7 +228,7 @@ void fclib_delete_solutions(fclib_solution* data, int count) {
 int fclib_create_int_attributes_in_info(const char* path, const char* attr_name, int attr_value) {
   return guarded(0, [&] {
     write_int_attribute(&given(path, "path"), &given(attr_name, "attr_name"), attr_value,
-                        write_options());
+                        write_options(nullptr));
     return 1;
   });
 }
@@ -177,6 +238,24 @@ const char* fclib_problem_kind(const char* path) {
     const Problem outline = read_outline(&given(path, "path"));
     // the kinds are literals
     return std::visit([]<class P>(const P&) { return P::kind.data(); }, outline);
+  });
+}
+
+int fclib_problem_sizes(const char* path, int* n, int* m, int* p, int* nc) {
+  return guarded(0, [&] {
+    const Problem outline = read_outline(&given(path, "path"));
+    std::visit(
+        [&](const auto& sizes) {
+          const auto tell = [&](int* place, Dim dim) {
+            if (place != nullptr) *place = sizes.size(dim);
+          };
+          tell(n, Dim::n);
+          tell(m, Dim::m);
+          tell(p, Dim::p);
+          tell(nc, Dim::nc);
+        },
+        outline);
+    return 1;
   });
 }
 

@@ -10,11 +10,30 @@ namespace fclib::c {
 
 namespace {
 
-double* copy_vector(const Vector& values) {
+template <class Numbers>
+auto malloc_array(const Numbers& values) {
+  using Number = std::remove_cvref_t<decltype(values[0])>;
   const auto size = static_cast<std::size_t>(values.size());
-  MallocArray<double> result(size);
-  if (size > 0) std::memcpy(result.data(), values.data(), size * sizeof(double));
-  return result.release();
+  MallocArray<Number> result(size);
+  if (size > 0) std::memcpy(result.data(), values.data(), size * sizeof(Number));
+  return result;
+}
+
+double* copy_vector(const Vector& values) { return malloc_array(values).release(); }
+
+RawMatrix raw_matrix(const Matrix& a) {
+  RawMatrix raw{.storage = a.storage,
+                .rows = a.rows,
+                .cols = a.cols,
+                .p = {},
+                .i = {},
+                .x = malloc_array(a.x),
+                .info = a.info};
+  if (a.storage != Storage::dense) {
+    raw.p = malloc_array(a.p);
+    raw.i = malloc_array(a.i);
+  }
+  return raw;
 }
 
 char* copy_text(const std::string& value) {
@@ -125,6 +144,28 @@ C* to_c(RawProblem& problem, bool keep_dense) {
   return c.release();
 }
 
+template <class C>
+C* to_c(const CoreOf<C>& problem) {
+  using P = CoreOf<C>;
+  RawProblem raw;
+  for_each_field<P>([&]<class Type>(const Field<P, Type>& field) {
+    const Type& value = problem.*field.member;
+    const bool optional = field.presence != Presence::required;
+    if constexpr (std::is_same_v<Type, Index>) {
+      raw.members.push_back({field.name, value});
+    } else if constexpr (std::is_same_v<Type, Matrix>) {
+      if (!optional || !value.empty()) raw.members.push_back({field.name, raw_matrix(value)});
+    } else if constexpr (std::is_same_v<Type, Vector>) {
+      if (!optional || value.size() > 0) raw.members.push_back({field.name, malloc_array(value)});
+    }
+  });
+  raw.info = problem.info;
+  if (raw.info.title.empty() && raw.info.description.empty() && raw.info.math_info.empty()) {
+    raw.info = {absent_group, absent_group, absent_group};
+  }
+  return to_c<C>(raw, false);
+}
+
 void to_c(const Solution& solution, const Problem& outline, const std::string& where,
           fclib_solution& c) {
   for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::* member) {
@@ -139,7 +180,9 @@ void to_c(const Solution& solution, const Problem& outline, const std::string& w
   });
 }
 
-#define FCLIB_TO_C(kind) template fclib_##kind* to_c(RawProblem&, bool);
+#define FCLIB_TO_C(kind)                          \
+  template fclib_##kind* to_c(RawProblem&, bool); \
+  template fclib_##kind* to_c<fclib_##kind>(const CoreOf<fclib_##kind>&);
 
 FCLIB_FOR_EACH_KIND(FCLIB_TO_C)
 

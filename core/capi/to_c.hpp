@@ -53,6 +53,10 @@ T* allocate(std::size_t count) {
 template <class C>
 C* to_c(RawProblem& problem, bool keep_dense);
 
+/// The same for a problem of the core's, dense matrices by columns.
+template <class C>
+C* to_c(const CoreOf<C>& problem);
+
 /// Fills the members of a solution from a file, whose sizes are those of its problem.
 void to_c(const Solution& solution, const Problem& outline, const std::string& where,
           fclib_solution& c);

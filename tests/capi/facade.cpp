@@ -100,9 +100,18 @@ void solving(C problem) {
   CHECK(fclib::merit(problem, result.solution) <= 1e-10);
   CHECK(result.error == fclib::merit(problem, result.solution));
   const std::array<double, 2> guess{};
-  THROWS("the guess has 2 entries", fclib::solve(problem, "auto", {.guess = guess}));
+  THROWS("has 2 entries, expected 3", fclib::solve(problem, "auto", {.guess = guess}));
   THROWS("no_such", fclib::solve(problem, "no_such"));
-  THROWS("no_such", fclib::solve(problem, "nsgs", {.solver_options = "no_such=1"}));
+  THROWS("no_such", fclib::solve(problem, "nsgs", {.solver_options = {{"no_such", "1"}}}));
+  int told = 0;
+  const auto cut = fclib::solve(problem, "nsgs", {.progress = [&](const fclib::Progress& progress) {
+                                  ++told;
+                                  return progress.error < 0;
+                                }});
+  CHECK(told == 1 && cut.status == FCLIB_INTERRUPTED && cut.solution.r.size() == 3);
+  THROWS("mine", fclib::solve(problem, "nsgs", {.progress = [](const fclib::Progress&) -> bool {
+                                throw fclib::Error("mine");
+                              }}));
   THROWS("r", fclib::merit(problem, fclib::Solution()));
   problem.mu = nullptr;
   THROWS("mu", fclib::solve(problem));

@@ -121,6 +121,20 @@ def test_the_header_compiles_as_cxx(programs: Path) -> None:
     assert subprocess.run([program]).returncode == 0
 
 
+@pytest.fixture(scope="session")
+def by_name(programs: Path) -> Path:
+    return compile_program(CAPI / "by_name.c", programs / "by_name")
+
+
+def test_what_goes_by_name(by_name: Path, tmp_path: Path) -> None:
+    done = subprocess.run([by_name, tmp_path], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    text = fclib.read_siconos(tmp_path / "ball.dat")
+    assert isinstance(text, fclib.LocalProblem)
+    (tmp_path / "valgrind").mkdir()
+    valgrind(by_name, tmp_path / "valgrind")
+
+
 def test_what_the_cpp_header_promises(programs: Path, tmp_path: Path) -> None:
     program = compile_program(CAPI / "facade.cpp", programs / "facade", "-pedantic")
     done = subprocess.run([program, tmp_path], capture_output=True, text=True, timeout=300)

@@ -61,7 +61,10 @@ def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: in
     for place in np.unique(np.linspace(0, len(small) - 1, min(sample, len(small))).round()):
         row = small[int(place)]
         # the spectrum of a large M, which is not asked for, would take minutes
-        local = row["local_file"] and row["nnz_M"] and row["nnz_M"] > 1_000_000
+        large = row["nnz_M"] and row["nnz_M"] > 1_000_000
+        local = row["local_file"] and large
+        if large and not local:
+            continue
         path = row["local_file"] if local else row["global_file"] or row["local_file"]
         problem = fclib.read(folder / path)
         record = analyze(problem).record
@@ -80,18 +83,21 @@ def off(published: str, values: Sequence[float], *, logarithm: bool) -> float:
     pairs = ((float(low), min(known)), (float(high or low), max(known)))
     if logarithm:
         pairs = tuple((np.log10(theirs), np.log10(ours)) for theirs, ours in pairs)  # type: ignore[assignment]
-    return max(abs(ours - theirs) / max(abs(theirs), 1e-9) for theirs, ours in pairs)
+    least = 1.0 if logarithm else 1e-9
+    return max(abs(ours - theirs) / max(abs(theirs), least) for theirs, ours in pairs)
 
 
 def within(row: dict[str, str], rows: Sequence[dict[str, Any]], figures: Sequence[Any]) -> str:
     """Of a published set and ours: yes, or what is off and by how much."""
     ours = {
-        "dof": [row["n"] for row in rows],
+        "dof": [row["n"] or None for row in rows],
         "contacts": [row["nc"] for row in rows],
         "density": [row["density"] for row in rows],
         "rank_ratio": [ratio for ratio, _ in figures],
         "conditioning": [conditioning for _, conditioning in figures],
     }
+    if figures:  # the rank is at most the number of degrees of freedom
+        ours["rank_ratio"].append(max(1.0, *(row["density"] or 1.0 for row in rows)))
     shares = {
         name: off(row[name], ours[name], logarithm=name == "conditioning") for name in COMPARED
     }

@@ -19,7 +19,7 @@ class NewtonsCradle:
     struck comes back at (n - 2)/n.
     """
 
-    title: ClassVar[str] = "Newton's cradle"
+    title: ClassVar[str] = "Newton cradle"
     description: ClassVar[str] = "Hanging balls in a row, struck by some of them; restitution 1."
     application: ClassVar[str] = "impacts"
     authors: ClassVar[str] = "the authors of FCLIB"

@@ -230,7 +230,8 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
     return rows, Basis(
         limit,
         tuple(sorted({run.solver for run in voting})),
-        tuple(sorted({run.version for run in voting})),
+        # without the hash of a solver's code
+        tuple(sorted({run.version.partition("-")[0] for run in voting})),
         (dates[0], dates[-1]),
     )
 

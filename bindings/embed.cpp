@@ -1,4 +1,4 @@
-// What simulators embed: batches of small problems.
+// What simulators embed: batches of small problems, and what is kept between solves.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -8,7 +8,10 @@
 
 #include "arrays.hpp"
 #include "embed/batch.hpp"
+#include "embed/workspace.hpp"
+#include "linalg/cpu_time.hpp"
 #include "module.hpp"
+#include "solve/driver.hpp"
 
 namespace fclib::bindings {
 
@@ -63,6 +66,49 @@ void bind_embed(nb::module_& m) {
       "spacedim"_a, "count"_a, "each"_a, "nc"_a.none(), "W"_a, "q"_a, "mu"_a, "guess"_a.none(),
       "r"_a, "u"_a, "status"_a, "error"_a, "iterations"_a, "tolerance"_a, "threads"_a,
       "time_limit"_a, "How many problems the solver auto has solved.");
+  using Names = std::optional<In<std::int64_t>>;
+  const auto span_of = [](const Names& names) {
+    return names ? std::span<const std::int64_t>(names->data(), names->size())
+                 : std::span<const std::int64_t>();
+  };
+  nb::class_<Workspace>(m, "Workspace", "The memory of fclib.Workspace.")
+      .def(nb::init<>())
+      .def(
+          "solve",
+          [span_of](Workspace& self, const LocalProblem& problem, const Names& contacts,
+                    double tolerance, double time_limit) {
+            const double start = cpu_time();
+            Result result;
+            const Unlocked unlocked;
+            const auto answer = self.solve(LocalView(problem), span_of(contacts),
+                                           {.tolerance = tolerance, .time_limit = time_limit});
+            const auto vector = [](std::span<const double> x) {
+              return Eigen::Map<const Vector>(x.data(), static_cast<Eigen::Index>(x.size()));
+            };
+            result.solution.r = vector(answer.r);
+            result.solution.u = vector(answer.u);
+            result.status = answer.status;
+            result.iterations = answer.iterations;
+            result.error = answer.error;
+            result.solver = answer.by_auto ? "auto" : "workspace";
+            result.cpu_s = cpu_time() - start;
+            return result;
+          },
+          "problem"_a, "contacts"_a.none(), "tolerance"_a, "time_limit"_a)
+      .def(
+          "guess",
+          [span_of](const Workspace& self, int spacedim, const Names& contacts,
+                    const Out<double>& r) {
+            self.guess(spacedim, span_of(contacts), {r.data(), r.size()});
+          },
+          "spacedim"_a, "contacts"_a.none(), "r"_a)
+      .def(
+          "keep",
+          [span_of](Workspace& self, int spacedim, const Names& contacts, const In<double>& r) {
+            self.keep(spacedim, span_of(contacts), {r.data(), r.size()});
+          },
+          "spacedim"_a, "contacts"_a.none(), "r"_a)
+      .def("forget", &Workspace::forget);
   m.def(
       "status_names",
       [] {

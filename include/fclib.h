@@ -570,6 +570,30 @@ struct fclib_batch {
  *  the problem: answers of the others are there all the same. */
 int fclib_solve_batch(const struct fclib_batch* batch);
 
+/* ---- one solve after another ----------------------------------------------------------------- */
+
+/** New. What a simulation keeps between its solves: memory, and the reactions of its contacts. For
+ *  one thread at a time. */
+struct fclib_workspace;
+
+/** New. NULL where there is not enough memory. Delete it with fclib_workspace_delete(). */
+struct fclib_workspace* fclib_workspace_new(void);
+
+/** New. Frees a workspace (or NULL). */
+void fclib_workspace_delete(struct fclib_workspace* workspace);
+
+/** New. Solves a local problem without bilateral constraints to a tolerance on MERIT_2 (0 for
+ *  1e-8). `contacts` (nc, or NULL) are names that contacts keep from one problem to the next: the
+ *  solve starts from the reactions that those had. Fills r (m), and u (m), status and error where
+ *  they are not NULL. No memory is allocated once the workspace has seen the largest problem, but
+ *  where the solver "auto" is needed. Returns 1 however it ended, and 0 for invalid data. */
+int fclib_workspace_solve(struct fclib_workspace* workspace, const struct fclib_local* problem,
+                          const size_t* contacts, double tolerance, double* r, double* u,
+                          enum fclib_status* status, double* error);
+
+/** New. Starts from zero again; the memory stays. */
+void fclib_workspace_forget(struct fclib_workspace* workspace);
+
 #ifdef __cplusplus
 }
 #endif

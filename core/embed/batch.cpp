@@ -235,13 +235,7 @@ class Runner {
     if (nc <= most_contacts) {
       begin();
       solver.take(nc, one.W, one.q, one.mu);
-      bool met = solver.solve(settings_.tolerance, one.r);
-      double error = judge<D>(one);
-      if (met && !(error <= settings_.tolerance)) {
-        // what double precision takes for the tolerance is a little above it
-        met = solver.solve(0.1 * settings_.tolerance, one.r);
-        error = judge<D>(one);
-      }
+      const double error = solver.solve(settings_.tolerance, one.r, [&] { return judge<D>(one); });
       if (error <= settings_.tolerance) {
         answer(Status::converged, error, solver.iterations());
         return;

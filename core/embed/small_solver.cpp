@@ -6,18 +6,24 @@
 #include <utility>
 
 #include "contact/alart_curnier.hpp"
+#include "embed/memory.hpp"
 
 namespace fclib {
 
 namespace {
 
 constexpr int most_sweeps = 500;
-constexpr int newton_attempts = 5;
-constexpr int newton_steps = 12;
+constexpr int newton_attempts = 8;
+constexpr int newton_steps = 12;  // of the first attempt, and more of each
+/// As far ahead the rate of sweeps is believed.
+constexpr double most_foreseen = 80;
 /// Sweeps before the first attempt of Newton's method: they find most of the statuses.
 constexpr int first_sweeps = 3;
-/// The proximal weight over the mean diagonal of W.
-constexpr double proximal = 1e-9;
+/// The proximal weight over the mean diagonal of W: the heavier, the shorter and the safer are the
+/// steps. Of many contacts the next statuses are not near.
+constexpr double light = 1e-9;
+constexpr double heavy = 1e-3;
+constexpr Index few_contacts = 12;
 /// Unknowns of the largest system that is factorised here, which is dense.
 constexpr Index most_unknowns = 900;
 
@@ -56,23 +62,17 @@ bool eliminate(double* rows, Index n) {
   return true;
 }
 
-/// At least so long, and never shorter: memory is kept.
-template <class T>
-void reserve(std::vector<T>& vector, std::size_t size) {
-  if (vector.size() < size) vector.resize(size);
-}
-
 }  // namespace
 
 template <int D>
 void SmallSolver<D>::resize(Index nc) {
   nc_ = nc;
   const auto count = static_cast<std::size_t>(nc);
-  reserve(diagonal_, count);
-  reserve(row_, count + 1);
-  reserve(rho_, count);
-  reserve(place_, count);
-  for (auto* vector : {&best_, &last_, &z_}) reserve(*vector, D * count);
+  grow(diagonal_, count);
+  grow(row_, count + 1);
+  grow(rho_, count);
+  grow(place_, count);
+  for (auto* vector : {&best_, &last_, &z_}) grow(*vector, D * count);
 }
 
 template <int D>
@@ -81,8 +81,8 @@ void SmallSolver<D>::take(Index nc, const double* W, const double* q, const doub
   q_ = q;
   mu_ = mu;
   const auto count = static_cast<std::size_t>(nc);
-  reserve(blocks_, count * count);
-  reserve(column_, count * count);
+  grow(blocks_, count * count);
+  grow(column_, count * count);
   std::size_t at = 0;
   const auto m = static_cast<std::ptrdiff_t>(D) * nc;
   for (Index a = 0; a < nc; ++a) {
@@ -108,27 +108,28 @@ void SmallSolver<D>::take(Index nc, const double* W, const double* q, const doub
 }
 
 template <int D>
-void SmallSolver<D>::take(const Matrix& W, const double* q, const double* mu) {
+const char* SmallSolver<D>::take(const MatrixView& W, const double* q, const double* mu) {
   const Index nc = W.rows / D;
   resize(nc);
   q_ = q;
   mu_ = mu;
   const auto count = static_cast<std::size_t>(nc);
   // the entries of each contact's rows
-  reserve(entry_row_, count + 2);
+  grow(entry_row_, count + 2);
   std::fill(entry_row_.begin(), entry_row_.end(), 0);
-  for_each_entry(W, [&](Index row, Index, double value) {
+  const char* wrong = W.visit([&](Index row, Index, double value) {
     if (value != 0) ++entry_row_[static_cast<std::size_t>(row / D) + 2];
   });
+  if (wrong != nullptr) return wrong;
   for (std::size_t a = 2; a < count + 2; ++a) entry_row_[a] += entry_row_[a - 1];
-  reserve(entries_, entry_row_[count + 1]);
-  for_each_entry(W, [&](Index row, Index col, double value) {
+  grow(entries_, entry_row_[count + 1]);
+  W.visit([&](Index row, Index col, double value) {
     if (value != 0) {
       entries_[entry_row_[static_cast<std::size_t>(row / D) + 1]++] = {col, value, row % D};
     }
   });
   // blocks of them
-  reserve(block_of_, count);
+  grow(block_of_, count);
   std::fill(block_of_.begin(), block_of_.end(), -1);
   std::size_t at = 0;
   for (Index a = 0; a < nc; ++a) {
@@ -146,8 +147,8 @@ void SmallSolver<D>::take(const Matrix& W, const double* q, const double* mu) {
       std::ptrdiff_t& place = block_of_[static_cast<std::size_t>(b)];
       if (place < first) {
         place = static_cast<std::ptrdiff_t>(at);
-        reserve(blocks_, at + 1);
-        reserve(column_, at + 1);
+        grow(blocks_, at + 1);
+        grow(column_, at + 1);
         blocks_[at].setZero();
         column_[at++] = b;
       }
@@ -156,11 +157,13 @@ void SmallSolver<D>::take(const Matrix& W, const double* q, const double* mu) {
   }
   row_[count] = at;
   prepare();
+  return nullptr;
 }
 
 /// The contacts alone, and what errors are relative to.
 template <int D>
 void SmallSolver<D>::prepare() {
+  iterations_ = 0;
   contacts_.clear();
   double squares = 0;
   double scaled = 0;
@@ -250,7 +253,7 @@ double SmallSolver<D>::newton_cost() const {
 
 /// One step of Newton's method from r. False where its system is singular.
 template <int D>
-bool SmallSolver<D>::newton_step(double* r) {
+bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
   Index count = 0;
   // open contacts are left out
   for (Index a = 0; a < nc_; ++a) {
@@ -264,11 +267,11 @@ bool SmallSolver<D>::newton_step(double* r) {
   }
   const Index n = D * count;
   const auto width = static_cast<std::size_t>(n) + 1;
-  reserve(system_, static_cast<std::size_t>(n) * width);
+  grow(system_, static_cast<std::size_t>(n) * width);
   std::fill_n(system_.begin(), static_cast<std::size_t>(n) * width, 0.0);
   double trace = 0;
   for (Index a = 0; a < nc_; ++a) trace += 1 / rho_[static_cast<std::size_t>(a)];
-  const double weight = proximal * trace / nc_;
+  const double weight = weight_of_mean * trace / nc_;
   for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
     const Index at = place_[self];
@@ -309,16 +312,22 @@ bool SmallSolver<D>::newton_step(double* r) {
 
 /// Some steps from r, while they better it. Whether the tolerance is met, in r.
 template <int D>
-bool SmallSolver<D>::newton(double tolerance, double* r, double& best) {
+bool SmallSolver<D>::newton(int attempt, double tolerance, double* r, double& best) {
+  double weight = nc_ <= few_contacts && attempt == 0 ? light : heavy * std::pow(10, attempt / 2);
   int worse = 0;
-  for (int k = 0; k < newton_steps && worse < 3; ++k) {
-    if (!newton_step(r)) break;
+  for (int k = 0; k < (1 + attempt) * newton_steps && worse < 3 + 2 * attempt; ++k) {
+    if (!newton_step(weight, r)) break;
     sweep(r);
     if (!solvable_) return false;
     const double now = error(r);
     if (now <= tolerance) return true;
     if (!std::isfinite(now)) break;
-    worse = keep(now, r, best) ? 0 : worse + 1;
+    if (now < 0.3 * best) weight = std::max(0.1 * weight, light);
+    if (keep(now, r, best)) {
+      worse = 0;
+    } else {
+      ++worse;
+    }
   }
   std::copy_n(best_.begin(), D * nc_, r);
   return false;
@@ -326,13 +335,13 @@ bool SmallSolver<D>::newton(double tolerance, double* r, double& best) {
 
 template <int D>
 bool SmallSolver<D>::solve(double tolerance, double* r) {
-  iterations_ = 0;
   solvable_ = true;
   double best = std::numeric_limits<double>::infinity();
   double last = 0;
   int attempts = 0;
   int next_attempt = first_sweeps;
-  const double worth = 4 * newton_cost() / sweep_cost();  // sweeps
+  // sweeps; of many of them the rate tells little
+  const double worth = std::min(4 * newton_cost() / sweep_cost(), most_foreseen);
   for (int k = 1; k <= most_sweeps; ++k) {
     const double change = sweep(r);
     if (!solvable_ || !std::isfinite(change)) return false;
@@ -352,11 +361,9 @@ bool SmallSolver<D>::solve(double tolerance, double* r) {
       continue;
     }
     keep(error(r), r, best);
-    ++attempts;
-    std::copy_n(r, D * nc_, last_.begin());
-    if (newton(tolerance, r, best)) return true;
+    if (newton(attempts++, tolerance, r, best)) return true;
     if (!solvable_) return false;
-    next_attempt = k + (first_sweeps << attempts);
+    next_attempt = k + first_sweeps * attempts * attempts;
     last = 0;
   }
   std::copy_n(best_.begin(), D * nc_, r);

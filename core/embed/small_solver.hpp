@@ -9,12 +9,13 @@
 // It knows when it has failed, and says so: its callers then take the solver `auto`.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "contact/coulomb.hpp"
 #include "contact/exact_contact.hpp"
-#include "linalg/matrix.hpp"
+#include "embed/matrix_view.hpp"
 
 namespace fclib {
 
@@ -27,14 +28,37 @@ class SmallSolver {
   /// W (m x m, by rows), q (m) and mu (nc). q and mu must live while r is sought.
   void take(Index nc, const double* W, const double* q, const double* mu);
 
-  /// The same of W in any storage.
-  void take(const Matrix& W, const double* q, const double* mu);
+  /// The same of W in any storage. What is wrong with it, null where nothing is.
+  const char* take(const MatrixView& W, const double* q, const double* mu);
 
   /// Improves r (m), a guess on entry, until the error of its natural maps in double precision is
   /// at most the tolerance. Whether it is; where it is not r is the best iterate.
   bool solve(double tolerance, double* r);
 
-  /// Sweeps and Newton steps of the last solve.
+  /// The same until `judge()` of r says that its error, the merit's, is at most the tolerance; from
+  /// r = 0 where the guess leads nowhere. The error.
+  template <class Judge>
+  double solve(double tolerance, double* r, const Judge& judge) {
+    bool guessed = false;
+    for (Index k = 0; k < D * nc_ && !guessed; ++k) guessed = r[k] != 0;
+    double aim = tolerance;
+    // what double precision takes for the tolerance may be a little above it
+    for (int attempt = 0;; ++attempt) {
+      const bool met = solve(aim, r);
+      const double error = judge();
+      if (error <= tolerance || attempt == 2) return error;
+      if (met) {
+        aim *= 0.1;
+      } else if (guessed) {
+        std::fill_n(r, D * nc_, 0.0);
+        guessed = false;
+      } else {
+        return error;
+      }
+    }
+  }
+
+  /// Sweeps and Newton steps since the problem was taken.
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
 
  private:
@@ -44,8 +68,8 @@ class SmallSolver {
   [[nodiscard]] Vec velocity(Index a, const double* r) const;
   double sweep(double* r);
   [[nodiscard]] double error(const double* r) const;
-  bool newton(double tolerance, double* r, double& best);
-  bool newton_step(double* r);
+  bool newton(int attempt, double tolerance, double* r, double& best);
+  bool newton_step(double weight_of_mean, double* r);
   bool keep(double error, const double* r, double& best);
   [[nodiscard]] double sweep_cost() const;
   [[nodiscard]] double newton_cost() const;

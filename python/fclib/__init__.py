@@ -50,6 +50,7 @@ from fclib._digest import digest
 from fclib._geometry import Bodies, Contacts
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
 from fclib._solve import Problem, solve
+from fclib._workspace import Workspace
 
 if typing.TYPE_CHECKING:
     from collections.abc import Iterator
@@ -141,6 +142,7 @@ __all__ = [
     "SolverError",
     "SolverInfo",
     "UnsuitableError",
+    "Workspace",
     "__version__",
     "collection",
     "component_order",

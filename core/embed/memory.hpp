@@ -1,0 +1,15 @@
+// Memory that is kept.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace fclib {
+
+/// At least so long, and never shorter.
+template <class T>
+void grow(std::vector<T>& vector, std::size_t size) {
+  if (vector.size() < size) vector.resize(size);
+}
+
+}  // namespace fclib

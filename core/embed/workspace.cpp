@@ -1,0 +1,191 @@
+#include "embed/workspace.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "embed/memory.hpp"
+#include "merit/natural_sums.hpp"
+#include "solve/driver.hpp"
+
+namespace fclib {
+
+namespace {
+
+/// Beyond, `auto` with its sparse factors is the better choice.
+constexpr std::size_t most_contacts = 400;
+
+[[noreturn]] void refuse(const char* where, const std::string& what) {
+  throw Error(ErrorKind::problem, what, where);
+}
+
+void require_sizes(const LocalView& problem, std::size_t names) {
+  if (problem.spacedim != 2 && problem.spacedim != 3) {
+    refuse("spacedim", "is " + std::to_string(problem.spacedim) + ", expected 2 or 3");
+  }
+  const std::size_t m = static_cast<std::size_t>(problem.spacedim) * problem.mu.size();
+  if (problem.q.size() != m) {
+    refuse("q", "has " + std::to_string(problem.q.size()) +
+                    " entries, expected m = " + std::to_string(m));
+  }
+  if (static_cast<std::size_t>(problem.W.rows) != m || problem.W.rows != problem.W.cols) {
+    refuse("W", "is " + std::to_string(problem.W.rows) + " x " + std::to_string(problem.W.cols) +
+                    ", expected m = " + std::to_string(m));
+  }
+  if (names > 0 && names != problem.mu.size()) {
+    refuse("contacts", "has " + std::to_string(names) +
+                           " names, expected nc = " + std::to_string(problem.mu.size()));
+  }
+  for (std::size_t k = 0; k < m; ++k) {
+    if (!std::isfinite(problem.q[k])) refuse("q", "has an entry that is not finite");
+  }
+  for (std::size_t a = 0; a < problem.mu.size(); ++a) {
+    if (problem.mu[a] >= 0 && std::isfinite(problem.mu[a])) continue;
+    refuse("mu", "contact " + std::to_string(a) + " has " + std::to_string(problem.mu[a]) +
+                     ", expected a finite number that is not negative");
+  }
+}
+
+LocalProblem copied(const LocalView& view) {
+  LocalProblem problem;
+  problem.spacedim = view.spacedim;
+  problem.q = Eigen::Map<const Vector>(view.q.data(), static_cast<Eigen::Index>(view.q.size()));
+  problem.mu = Eigen::Map<const Vector>(view.mu.data(), static_cast<Eigen::Index>(view.mu.size()));
+  problem.W.storage = Storage::triplet;
+  problem.W.rows = view.W.rows;
+  problem.W.cols = view.W.cols;
+  view.W.visit([&](Index row, Index col, double value) {
+    problem.W.i.push_back(row);
+    problem.W.p.push_back(col);
+    problem.W.x.push_back(value);
+  });
+  return problem;
+}
+
+}  // namespace
+
+void Workspace::guess(int spacedim, std::span<const std::int64_t> contacts,
+                      std::span<double> r) const {
+  std::fill(r.begin(), r.end(), 0.0);
+  const auto d = static_cast<std::size_t>(spacedim);
+  if (known_ == 0 || spacedim != spacedim_) return;
+  if (contacts.empty()) {
+    if (!named_ && r.size() == d * known_) std::copy_n(last_.begin(), r.size(), r.begin());
+    return;
+  }
+  if (!named_) return;
+  const auto end = names_.begin() + static_cast<std::ptrdiff_t>(known_);
+  for (std::size_t a = 0; a < contacts.size(); ++a) {
+    const auto at =
+        std::lower_bound(names_.begin(), end, contacts[a],
+                         [](const auto& known, std::int64_t name) { return known.first < name; });
+    if (at == end || at->first != contacts[a]) continue;
+    std::copy_n(last_.begin() + static_cast<std::ptrdiff_t>(d * at->second), d,
+                r.begin() + static_cast<std::ptrdiff_t>(d * a));
+  }
+}
+
+void Workspace::keep(int spacedim, std::span<const std::int64_t> contacts,
+                     std::span<const double> r) {
+  spacedim_ = spacedim;
+  known_ = r.size() / static_cast<std::size_t>(spacedim);
+  named_ = !contacts.empty();
+  grow(last_, r.size());
+  std::copy(r.begin(), r.end(), last_.begin());
+  if (!named_) return;
+  grow(names_, known_);
+  for (std::size_t a = 0; a < known_; ++a) names_[a] = {contacts[a], a};
+  std::sort(names_.begin(), names_.begin() + static_cast<std::ptrdiff_t>(known_));
+}
+
+/// u = W r + q, and the merit of r, both in extended precision.
+template <int D>
+double Workspace::judge(const LocalView& problem) {
+  using Real = long double;
+  using Vec = ContactVector<D, Real>;
+  const std::size_t nc = problem.mu.size();
+  std::fill_n(real_.begin(), D * nc, Real(0));
+  std::fill_n(trace_.begin(), nc, Real(0));
+  problem.W.visit([&](Index row, Index col, double value) {
+    real_[static_cast<std::size_t>(row)] += Real(value) * Real(r_[static_cast<std::size_t>(col)]);
+    if (row == col) trace_[static_cast<std::size_t>(row / D)] += Real(value) / D;
+  });
+  NaturalSums<Coulomb<D, Real>> sums;
+  for (std::size_t a = 0; a < nc; ++a) {
+    Vec u;
+    Vec q;
+    Vec r;
+    for (int k = 0; k < D; ++k) {
+      const std::size_t at = D * a + static_cast<std::size_t>(k);
+      q[k] = problem.q[at];
+      r[k] = r_[at];
+      u[k] = real_[at] + q[k];
+      u_[at] = static_cast<double>(u[k]);
+    }
+    const Real rho = trace_[a] > 0 ? 1 / trace_[a] : Real(1);
+    sums.add(Coulomb<D, Real>(problem.mu[a]), u, r, q.squaredNorm(), Real(0), rho);
+  }
+  const double natural = sums.natural();
+  const double scaled = sums.scaled_natural();
+  return scaled <= natural ? natural : scaled;
+}
+
+template <int D>
+Workspace::Answer Workspace::solve_in(SmallSolver<D>& solver, const LocalView& problem,
+                                      const Settings& settings) {
+  const std::size_t nc = problem.mu.size();
+  Answer answer;
+  bool separating = true;
+  for (std::size_t a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
+  if (const char* wrong = solver.take(problem.W, problem.q.data(), problem.mu.data())) {
+    refuse("W", wrong);
+  }
+  if (separating) {
+    std::fill_n(r_.begin(), D * nc, 0.0);
+    answer.error = judge<D>(problem);
+    answer.status = Status::converged;
+    return answer;
+  }
+  if (nc <= most_contacts) {
+    answer.error = solver.solve(settings.tolerance, r_.data(), [&] { return judge<D>(problem); });
+    answer.iterations = solver.iterations();
+    if (answer.error <= settings.tolerance) {
+      answer.status = Status::converged;
+      return answer;
+    }
+  }
+  static const Solver& whole_way = find_solver("auto");
+  fclib::Settings asked;
+  asked.tolerance = settings.tolerance;
+  asked.time_limit = settings.time_limit;
+  Solution start;
+  start.r = Eigen::Map<const Vector>(r_.data(), static_cast<Eigen::Index>(D * nc));
+  if (!start.r.allFinite()) start.r.resize(0);
+  const Result result = fclib::solve(copied(problem), whole_way, asked, {}, start);
+  answer.by_auto = true;
+  answer.status = result.status;
+  answer.error = result.error;
+  answer.iterations += result.iterations;
+  std::copy(result.solution.r.begin(), result.solution.r.end(), r_.begin());
+  std::copy(result.solution.u.begin(), result.solution.u.end(), u_.begin());
+  return answer;
+}
+
+Workspace::Answer Workspace::solve(const LocalView& problem, std::span<const std::int64_t> contacts,
+                                   const Settings& settings) {
+  require_sizes(problem, contacts.size());
+  const std::size_t m = problem.q.size();
+  grow(r_, m);
+  grow(u_, m);
+  grow(real_, m);
+  grow(trace_, problem.mu.size());
+  guess(problem.spacedim, contacts, {r_.data(), m});
+  Answer answer = problem.spacedim == 2 ? solve_in(plane_, problem, settings)
+                                        : solve_in(space_, problem, settings);
+  answer.r = {r_.data(), m};
+  answer.u = {u_.data(), m};
+  keep(problem.spacedim, contacts, answer.r);
+  return answer;
+}
+
+}  // namespace fclib

@@ -1,0 +1,87 @@
+// What a simulation keeps from one solve to the next: memory, and the reactions of its contacts.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "embed/matrix_view.hpp"
+#include "embed/small_solver.hpp"
+#include "problems/local.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib {
+
+/// A local problem in the caller's arrays: u = W r + q and Coulomb's law.
+struct LocalView {
+  int spacedim = 3;  ///< 2 or 3
+  MatrixView W;      ///< (m x m)
+  std::span<const double> q;
+  std::span<const double> mu;
+
+  LocalView() = default;
+  explicit LocalView(const LocalProblem& problem)
+      : spacedim(problem.spacedim),
+        W(problem.W),
+        q(problem.q.data(), static_cast<std::size_t>(problem.q.size())),
+        mu(problem.mu.data(), static_cast<std::size_t>(problem.mu.size())) {}
+};
+
+/// One solve after another, in one thread. Nothing is allocated once it has seen the largest
+/// problem, but where the solver auto is needed.
+class Workspace {
+ public:
+  struct Settings {
+    double tolerance = 1e-8;                                      ///< on Merit::error
+    double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock of one solve [s]
+  };
+
+  /// Of the workspace until its next solve.
+  struct Answer {
+    Status status = Status::diverged;
+    std::int64_t iterations = 0;
+    double error = 0;           ///< Merit::error
+    bool by_auto = false;       ///< whether the solver auto was needed
+    std::span<const double> r;  ///< (m)
+    std::span<const double> u;  ///< (m)
+  };
+
+  /// `contacts` (nc, or empty) are names that contacts keep from one problem to the next: the
+  /// reactions that those had are where this solve starts. Without names, a problem of as many
+  /// contacts starts from the last one's reactions.
+  ///
+  /// Throws Error (problem) where the data is not valid.
+  Answer solve(const LocalView& problem, std::span<const std::int64_t> contacts,
+               const Settings& settings);
+
+  /// The reactions of the last solve for these contacts, zero where there is none, in `r` (spacedim
+  /// nc).
+  void guess(int spacedim, std::span<const std::int64_t> contacts, std::span<double> r) const;
+
+  /// Keeps reactions that something else has found.
+  void keep(int spacedim, std::span<const std::int64_t> contacts, std::span<const double> r);
+
+  /// Starts from zero again; the memory stays.
+  void forget() { known_ = 0; }
+
+ private:
+  template <int D>
+  Answer solve_in(SmallSolver<D>& solver, const LocalView& problem, const Settings& settings);
+  template <int D>
+  double judge(const LocalView& problem);
+
+  SmallSolver<2> plane_;
+  SmallSolver<3> space_;
+  std::vector<double> r_, u_;
+  std::vector<long double> real_, trace_;
+  // of the last solve
+  int spacedim_ = 0;
+  std::size_t known_ = 0;                                    // contacts
+  std::vector<std::pair<std::int64_t, std::size_t>> names_;  // sorted, with their places
+  std::vector<double> last_;
+  bool named_ = false;
+};
+
+}  // namespace fclib

@@ -1,0 +1,77 @@
+"""One solve after another, as a simulation has them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib import _core
+from fclib._solve import Problem, solve
+
+
+class Workspace:
+    """What a simulation keeps between its solves: memory, and the reactions of its contacts.
+
+    Local problems of Coulomb's law go a way that allocates nothing once it has seen the largest
+    of them; all others are solved by ``fclib.solve``, from the same guesses. For one thread.
+
+    >>> workspace = fclib.Workspace(tol=1e-8)
+    >>> result = workspace.solve(problem, contacts=names)
+
+    Args:
+        tol: bound on Merit.error.
+        time_limit: [s] of wall-clock time for each solve.
+    """
+
+    def __init__(self, tol: float = 1e-8, *, time_limit: float | None = None) -> None:
+        if not tol >= 0:
+            raise _core.OptionError(f"tol: {tol} is not a positive number")
+        if time_limit is not None and not time_limit > 0:
+            raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+        self.tol = tol
+        self.time_limit = time_limit
+        self._core = _core.Workspace()
+
+    def solve(self, problem: Problem, contacts: npt.ArrayLike | None = None) -> _core.Result:
+        """Solve a problem from what its contacts had before.
+
+        Args:
+            problem: of any formulation.
+            contacts: (nc,) whole numbers, names that contacts keep from one problem to the next.
+                Without them a problem of as many contacts starts from the last one's reactions.
+
+        Returns:
+            As ``fclib.solve`` does; ``Result.solver`` is "workspace" where nothing else was needed.
+
+        Raises:
+            ProblemError: the data of the problem is not valid, or there are not nc names.
+        """
+        names = None if contacts is None else _names(contacts, problem.nc)
+        limit = math.inf if self.time_limit is None else self.time_limit
+        if type(problem) is _core.LocalProblem and problem.p == 0:
+            return self._core.solve(problem, names, self.tol, limit)
+        r = np.zeros(problem.m)
+        self._core.guess(problem.spacedim, names, r)
+        guess = _core.Solution(r=r) if r.any() else None
+        result = solve(problem, tol=self.tol, time_limit=self.time_limit, guess=guess)
+        self._core.keep(problem.spacedim, names, result.solution.r)
+        return result
+
+    def forget(self) -> None:
+        """Start from zero again; the memory stays."""
+        self._core.forget()
+
+    def __repr__(self) -> str:
+        return f"<Workspace: tol = {self.tol:g}>"
+
+
+def _names(contacts: npt.ArrayLike, nc: int) -> Any:
+    names = np.asarray(contacts)
+    if names.shape != (nc,) or (names.dtype.kind not in "iu" and nc > 0):
+        raise _core.ProblemError(
+            f"contacts: expected nc = {nc} whole numbers, not {names.dtype} {names.shape}"
+        )
+    return np.ascontiguousarray(names, dtype=np.int64)

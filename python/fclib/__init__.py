@@ -46,6 +46,7 @@ from fclib._core import (
     write_solution,
 )
 from fclib._core import version as __version__
+from fclib._derivatives import Gradient, Tangent, jvp, vjp
 from fclib._digest import digest
 from fclib._geometry import Bodies, Contacts
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
@@ -125,6 +126,7 @@ __all__ = [
     "FileError",
     "GlobalProblem",
     "GlobalRollingProblem",
+    "Gradient",
     "Islands",
     "LocalProblem",
     "LocalRollingProblem",
@@ -141,6 +143,7 @@ __all__ = [
     "Solution",
     "SolverError",
     "SolverInfo",
+    "Tangent",
     "UnsuitableError",
     "Workspace",
     "__version__",
@@ -150,6 +153,7 @@ __all__ = [
     "contents",
     "digest",
     "find_solver",
+    "jvp",
     "load",
     "merge",
     "merit",
@@ -164,6 +168,7 @@ __all__ = [
     "solve_batch",
     "solver",
     "solvers",
+    "vjp",
     "write",
     "write_attributes",
     "write_guesses",

@@ -63,6 +63,7 @@ PYTHON: dict[str, set[str]] = {
     "_solve": {"_core", "_registry"},
     "_batch": {"_core"},
     "_workspace": {"_core", "_solve"},
+    "_derivatives": {"_core"},
     "external": {"_core", "_registry"},
     "analysis": {"_core", "_digest", "_registry", "_solve"},
     "scenes": {"_core", "_geometry"},
@@ -72,6 +73,7 @@ PYTHON: dict[str, set[str]] = {
     "__init__": {
         "_batch",
         "_core",
+        "_derivatives",
         "_digest",
         "_geometry",
         "_registry",

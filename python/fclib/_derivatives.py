@@ -1,0 +1,369 @@
+"""Derivatives of a solution, by the implicit function theorem on the statuses of its contacts.
+
+With the equations of the problem, Coulomb's law at each contact is, near a solution,
+
+    open    dr = 0
+    stick   du = 0
+    slide   du_N = 0,   dr_T = -mu t dr_N - r_N t dmu - mu r_N (I - t t^T) / ||u_T|| du_T
+
+with t = u_T / ||u_T||. The status is read off z = r - rho u, which Alart & Curnier's map projects:
+where z lies on a border between two statuses (grazing, at the limit of friction) the solution has
+no derivative; one of the two is taken, an element of the generalised Jacobian of the map, and the
+contact is flagged. Where redundant contacts leave r undetermined, the least change of r is given.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from fclib import _core
+
+Array: TypeAlias = npt.NDArray[np.float64]
+Smooth: TypeAlias = _core.LocalProblem | _core.GlobalProblem
+
+# relative to the largest z: nearer to a border than this is on it
+BORDER = 1e-6
+# singular values below this, relative to the largest, are zero
+RANK = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent:
+    """What ``fclib.jvp`` returns: how the solution changes.
+
+    Attributes:
+        r, u: (m,) reactions and velocities of the contacts.
+        v: (n,) of a global problem, else None.
+        l: (p,) where there are bilateral constraints, else None.
+        degenerate: (nc,) contacts on a border between two statuses.
+        unique: whether the changes are determined; else those of r and l are the least ones.
+    """
+
+    r: Array
+    u: Array
+    v: Array | None
+    l: Array | None  # noqa: E741
+    degenerate: npt.NDArray[np.bool_]
+    unique: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Gradient:
+    """What ``fclib.vjp`` returns: the derivative by each datum, of its shape.
+
+    Those of another formulation are None. The entries of a matrix are taken as independent of each
+    other; of a sparse matrix those that are stored have a derivative.
+
+    Attributes:
+        mu: (nc,)
+        q, W, s: of a local problem.
+        f, w, M, H, b: of a global one.
+        degenerate: (nc,) contacts on a border between two statuses.
+        unique: whether it is determined; else it belongs to the least change of r and l.
+    """
+
+    mu: Array
+    q: Array | None
+    W: Any
+    s: Array | None
+    f: Array | None
+    w: Array | None
+    M: Any
+    H: Any
+    b: Array | None
+    degenerate: npt.NDArray[np.bool_]
+    unique: bool
+
+
+def jvp(
+    problem: Smooth,
+    solution: _core.Solution | _core.Result | npt.ArrayLike,
+    *,
+    mu: npt.ArrayLike | None = None,
+    q: npt.ArrayLike | None = None,
+    W: Any = None,
+    s: npt.ArrayLike | None = None,
+    f: npt.ArrayLike | None = None,
+    w: npt.ArrayLike | None = None,
+    M: Any = None,
+    H: Any = None,
+    b: npt.ArrayLike | None = None,
+) -> Tangent:
+    """How a solution changes when the data do: forward mode.
+
+    Args:
+        problem: without rolling.
+        solution: of it; a Solution, a Result, or the reactions alone where there are no bilateral
+            constraints.
+        mu: change of mu.
+        q: change of q.
+        W: change of W.
+        s: change of s.
+        f: change of f.
+        w: change of w.
+        M: change of M.
+        H: change of H.
+        b: change of b.
+
+    Raises:
+        ProblemError: a datum that the problem does not have, or a wrong shape.
+        UnsuitableError: the problem has rolling friction.
+    """
+    point = _Point(problem, solution)
+    given = {"mu": mu, "q": q, "W": W, "s": s, "f": f, "w": w, "M": M, "H": H, "b": b}
+    change = {
+        name: _of_shape(name, value, getattr(problem, name, None))
+        for name, value in given.items()
+        if value is not None
+    }
+    return point.tangent(change)
+
+
+def vjp(
+    problem: Smooth,
+    solution: _core.Solution | _core.Result | npt.ArrayLike,
+    *,
+    r: npt.ArrayLike | None = None,
+    u: npt.ArrayLike | None = None,
+    v: npt.ArrayLike | None = None,
+    l: npt.ArrayLike | None = None,  # noqa: E741
+) -> Gradient:
+    """The derivatives of r . r* + u . u* + v . v* + l . l* by all data: adjoint mode.
+
+    r*, u*, v* and l* are the solution, r, u, v and l weights.
+
+    Args:
+        problem: without rolling.
+        solution: as for ``jvp``.
+        r: weights, say the derivatives of a loss by r; zero where left out.
+        u: the same of u.
+        v: the same of v, of a global problem.
+        l: the same of l, where there are bilateral constraints.
+
+    Raises:
+        ProblemError: weights of a wrong shape, or of what the problem does not have.
+        UnsuitableError: the problem has rolling friction.
+    """
+    return _Point(problem, solution).gradient({"r": r, "u": u, "v": v, "l": l})
+
+
+def _dense(matrix: Any) -> Array:
+    return np.asarray(matrix.toarray() if hasattr(matrix, "toarray") else matrix, dtype=np.float64)
+
+
+def _of_shape(name: str, value: Any, like: Any) -> Array | None:
+    if like is None:
+        raise _core.ProblemError(f"{name}: this problem has no such datum")
+    array = _dense(value)
+    if array.shape != like.shape:
+        raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected {like.shape}")
+    return array
+
+
+def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
+    """Left right^T, where a matrix has entries."""
+    if not hasattr(matrix, "tocoo"):
+        return np.outer(left, right)
+    import scipy.sparse as sp
+
+    at = matrix.tocoo()
+    values = left[at.row] * right[at.col]
+    return sp.csr_array((values, (at.row, at.col)), shape=matrix.shape)
+
+
+class _Point:
+    """A solution of a problem, and the linear system that its derivatives solve.
+
+    The unknowns are r, l of a local problem and v, r, l of a global one.
+    """
+
+    def __init__(self, problem: Smooth, solution: Any) -> None:
+        if not isinstance(problem, (_core.LocalProblem, _core.GlobalProblem)):
+            raise _core.UnsuitableError(
+                f"{type(problem).__name__}: derivatives are there for problems without rolling"
+            )
+        if isinstance(solution, _core.Result):
+            solution = solution.solution
+        elif not isinstance(solution, _core.Solution):
+            solution = _core.Solution(r=solution)
+        self.problem = problem
+        self.d, self.nc, self.m, self.p = problem.spacedim, problem.nc, problem.m, problem.p
+        self.r = solution.r
+        if self.r.shape != (self.m,):
+            raise _core.ProblemError(f"r: has the shape {self.r.shape}, expected ({self.m},)")
+        if self.p and solution.l is None:
+            raise _core.ProblemError("l: is missing, and the problem has bilateral constraints")
+        self.l = solution.l if self.p else np.zeros(0)
+        self.v: Array | None = None
+        self.moving = np.zeros(0)
+        m, p = self.m, self.p
+        if isinstance(problem, _core.LocalProblem):
+            W = _dense(problem.W)
+            V = _dense(problem.V) if p else np.zeros((m, 0))
+            R = _dense(problem.R) if p else np.zeros((0, 0))
+            self.to_u = np.hstack([W, V])
+            self.u = self.to_u @ np.concatenate([self.r, self.l]) + problem.q
+            self._law(np.diag(W))
+            law = self.by_u @ self.to_u
+            law[:, :m] += self.by_r
+            self.system = np.vstack([law, np.hstack([V.T, R])])
+            self.rows = {"law": slice(0, m), "joints": slice(m, m + p)}
+            self.parts = {"r": slice(0, m), "l": slice(m, m + p)}
+        else:
+            n = problem.n
+            M, H = _dense(problem.M), _dense(problem.H)
+            G = _dense(problem.G) if p else np.zeros((n, 0))
+            self.v = solution.v
+            if self.v is None:
+                self.v = np.linalg.solve(M, H @ self.r + G @ self.l + problem.f)
+            self.moving = self.v
+            self.u = H.T @ self.v + problem.w
+            self._law(np.einsum("ij,ij->j", H, H / np.diag(M)[:, None]))
+            self.to_u = np.hstack([H.T, np.zeros((m, m + p))])
+            law = self.by_u @ self.to_u
+            law[:, n : n + m] += self.by_r
+            joints = np.hstack([G.T, np.zeros((p, m + p))])
+            self.system = np.vstack([np.hstack([M, -H, -G]), law, joints])
+            self.rows = {
+                "dynamics": slice(0, n),
+                "law": slice(n, n + m),
+                "joints": slice(n + m, n + m + p),
+            }
+            self.parts = {
+                "v": slice(0, n),
+                "r": slice(n, n + m),
+                "l": slice(n + m, n + m + p),
+            }
+
+    def _law(self, diagonal: Array) -> None:
+        """by_u du + by_r dr = by_mu dmu, contact by contact."""
+        d, nc = self.d, self.nc
+        rho = 1 / np.maximum(diagonal.reshape(nc, d).mean(axis=1), np.finfo(float).tiny)
+        mu = self.problem.mu
+        u, r = self.u.reshape(nc, d), self.r.reshape(nc, d)
+        z = r - rho[:, None] * u
+        sliding = np.linalg.norm(z[:, 1:], axis=1)
+        border = BORDER * np.linalg.norm(z, axis=1).max(initial=0.0)
+        opened = z[:, 0] <= 0
+        slides = ~opened & ((sliding > mu * z[:, 0]) | (mu == 0))
+        self.degenerate = np.abs(z[:, 0]) <= border
+        self.degenerate |= ~opened & (np.abs(sliding - mu * z[:, 0]) <= border)
+        self.by_u = np.zeros((self.m, self.m))
+        self.by_r = np.zeros((self.m, self.m))
+        self.by_mu = np.zeros((nc, d))
+        eye = np.eye(d - 1)
+        for a in range(nc):
+            at = slice(d * a, d * a + d)
+            if opened[a]:
+                self.by_r[at, at] = np.eye(d)
+                continue
+            if not slides[a]:
+                self.by_u[at, at] = rho[a] * np.eye(d)
+                continue
+            normal, tangent = d * a, slice(d * a + 1, d * a + d)
+            speed = np.linalg.norm(u[a, 1:])
+            # on the border to stick the reaction says where it would slide
+            t = u[a, 1:] / speed if speed > 0 else -z[a, 1:] / (sliding[a] or 1.0)
+            self.by_u[normal, normal] = rho[a]
+            self.by_r[tangent, tangent] = eye
+            self.by_r[tangent, normal] = mu[a] * t
+            turn = mu[a] * r[a, 0] * (eye - np.outer(t, t))
+            self.by_u[tangent, tangent] = turn / speed if speed > 0 else 0 * turn
+            self.by_mu[a, 1:] = -r[a, 0] * t
+
+    def _solve(self, transposed: bool, right: Array) -> tuple[Array, bool]:
+        """By singular values; rows and columns brought to the same size before."""
+        system = self.system.T if transposed else self.system
+        if system.size == 0:
+            return np.zeros(len(right)), True
+        columns = np.linalg.norm(self.system, axis=0)
+        columns[columns == 0] = 1
+        rows = np.linalg.norm(self.system / columns, axis=1)
+        rows[rows == 0] = 1
+        left_scale, right_scale = (columns, rows) if transposed else (rows, columns)
+        scaled = system / left_scale[:, None] / right_scale
+        found, _, rank, _ = np.linalg.lstsq(scaled, right / left_scale, rcond=RANK)
+        return found / right_scale, bool(rank == len(right))
+
+    def _velocity(self, change: dict[str, Array | None]) -> Array:
+        """The change of u at the same unknowns."""
+        result = np.zeros(self.m)
+        for name in ("q", "w"):
+            if (value := change.get(name)) is not None:
+                result += value
+        if (W := change.get("W")) is not None:
+            result += W @ self.r
+        if (H := change.get("H")) is not None:
+            result += H.T @ self.moving
+        return result
+
+    def tangent(self, change: dict[str, Array | None]) -> Tangent:
+        velocity = self._velocity(change)
+        right = np.zeros(len(self.system))
+        law = -self.by_u @ velocity
+        if (mu := change.get("mu")) is not None:
+            law += (self.by_mu * mu[:, None]).reshape(-1)
+        right[self.rows["law"]] = law
+        for name in ("s", "b"):
+            if (value := change.get(name)) is not None:
+                right[self.rows["joints"]] -= value
+        if "dynamics" in self.rows:
+            impulse = np.zeros(self.rows["dynamics"].stop)
+            if (f := change.get("f")) is not None:
+                impulse += f
+            if (M := change.get("M")) is not None:
+                impulse -= M @ self.moving
+            if (H := change.get("H")) is not None:
+                impulse += H @ self.r
+            right[self.rows["dynamics"]] = impulse
+        found, unique = self._solve(False, right)
+        return Tangent(
+            r=found[self.parts["r"]],
+            u=self.to_u @ found + velocity,
+            v=found[self.parts["v"]] if "v" in self.parts else None,
+            l=found[self.parts["l"]] if self.p else None,
+            degenerate=self.degenerate,
+            unique=unique,
+        )
+
+    def gradient(self, weights: dict[str, npt.ArrayLike | None]) -> Gradient:
+        right = np.zeros(len(self.system))
+        by_u = np.zeros(self.m)
+        for name, values in weights.items():
+            if values is None:
+                continue
+            array = np.asarray(values, dtype=np.float64)
+            part = self.parts.get(name)
+            size = self.m if name == "u" else (0 if part is None else part.stop - part.start)
+            if array.shape != (size,):
+                raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected ({size},)")
+            if name == "u":
+                by_u = array
+            else:
+                right[part] += array
+        right += self.to_u.T @ by_u
+        found, unique = self._solve(True, right)
+        law = found[self.rows["law"]]
+        by_q = by_u - self.by_u.T @ law
+        by_mu = np.einsum("ad,ad->a", self.by_mu, law.reshape(self.nc, self.d))
+        joints = -found[self.rows["joints"]] if self.p else None
+        problem = self.problem
+        nothing: dict[str, Any] = dict.fromkeys(("q", "W", "s", "f", "w", "M", "H", "b"))
+        if isinstance(problem, _core.LocalProblem):
+            mine = {"q": by_q, "W": _on_pattern(problem.W, by_q, self.r), "s": joints}
+        else:
+            assert self.v is not None
+            by_f = found[self.rows["dynamics"]]
+            by_H = _on_pattern(problem.H, by_f, self.r) + _on_pattern(problem.H, self.v, by_q)
+            mine = {
+                "f": by_f,
+                "w": by_q,
+                "M": _on_pattern(problem.M, -by_f, self.v),
+                "H": by_H,
+                "b": joints,
+            }
+        return Gradient(mu=by_mu, **(nothing | mine), degenerate=self.degenerate, unique=unique)

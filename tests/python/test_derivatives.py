@@ -1,0 +1,144 @@
+"""Derivatives of solutions, against differences of solutions."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fclib
+from helpers import planted_global, planted_local
+
+STEP = 1e-6
+
+
+def changes(problem: Any, seed: int) -> dict[str, Any]:
+    """A change of every datum; of W and M one that keeps the symmetry and the pattern."""
+    rng = np.random.default_rng(seed)
+    found: dict[str, Any] = {"mu": rng.uniform(size=problem.nc)}
+    for name in ("q", "s", "f", "w", "b"):
+        if getattr(problem, name, None) is not None:
+            found[name] = rng.normal(size=getattr(problem, name).shape)
+    for name in ("W", "M", "H"):
+        if (matrix := getattr(problem, name, None)) is None:
+            continue
+        dense = matrix.toarray()
+        change = 0.1 * rng.normal(size=dense.shape)
+        if name != "H":
+            change = change + change.T
+        found[name] = np.where(dense != 0, change, 0)
+    return found
+
+
+def moved(problem: Any, change: dict[str, Any], step: float) -> Any:
+    def plus(name: str, value: Any) -> Any:
+        old = getattr(problem, name)
+        old = old.toarray() if hasattr(old, "toarray") else old
+        return old + step * value
+
+    return problem.replace(**{name: plus(name, value) for name, value in change.items()})
+
+
+def problems() -> list[Any]:
+    return [
+        pytest.param(kind, d, p, id=f"{kind.__name__[8:]}-{d}D-{'mixed' if p else 'plain'}")
+        for kind in (planted_local, planted_global)
+        for d in (2, 3)
+        for p in (0, 3)
+    ]
+
+
+def solved(problem: Any, guess: Any) -> Any:
+    result = fclib.solve(problem, tol=1e-14, guess=guess)
+    assert result.error < 1e-11
+    return result.solution
+
+
+@pytest.mark.parametrize(("kind", "d", "p"), problems())
+def test_forward_is_the_difference_of_solutions(kind: Any, d: int, p: int) -> None:
+    planted = kind(seed=5, d=d, nc=6, p=p)
+    problem = planted.problem
+    solution = solved(problem, planted.solution)
+    for seed, names in enumerate((None, "mu", "q", "W", "f", "w", "M", "H", "s", "b")):
+        change = changes(problem, seed)
+        if names is not None:
+            change = {name: value for name, value in change.items() if name == names}
+        if not change:
+            continue
+        tangent = fclib.jvp(problem, solution, **change)
+        assert tangent.unique
+        assert not tangent.degenerate.any()
+        one = solved(moved(problem, change, STEP), solution)
+        other = solved(moved(problem, change, -STEP), solution)
+        for name in ("r", "u", "v", "l"):
+            expected = getattr(one, name)
+            if expected is None:
+                assert getattr(tangent, name) is None
+                continue
+            difference = (expected - getattr(other, name)) / (2 * STEP)
+            scale = 1e-5 * (1 + np.abs(difference).max())
+            assert np.abs(getattr(tangent, name) - difference).max() < scale, (names, name)
+
+
+@pytest.mark.parametrize(("kind", "d", "p"), problems())
+def test_adjoint_is_the_transpose_of_forward(kind: Any, d: int, p: int) -> None:
+    planted = kind(seed=7, d=d, nc=6, p=p)
+    problem, solution = planted.problem, planted.solution
+    change = changes(problem, 3)
+    tangent = fclib.jvp(problem, solution, **change)
+    rng = np.random.default_rng(0)
+    weights = {
+        name: rng.normal(size=getattr(tangent, name).shape)
+        for name in ("r", "u", "v", "l")
+        if getattr(tangent, name) is not None
+    }
+    gradient = fclib.vjp(problem, solution, **weights)
+
+    def inner(a: Any, b: Any) -> float:
+        a = a.toarray() if hasattr(a, "toarray") else a
+        return float(np.sum(a * b))
+
+    forward = sum(inner(getattr(tangent, name), value) for name, value in weights.items())
+    adjoint = sum(inner(getattr(gradient, name), value) for name, value in change.items())
+    assert adjoint == pytest.approx(forward, rel=1e-9)
+
+
+def test_borders_are_flagged_with_the_derivative_of_one_side() -> None:
+    # at rest on the limit of friction: pushed on it slides, pushed back it sticks
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0.5, 0], mu=[0.5])
+    tangent = fclib.jvp(problem, [1, -0.5, 0], q=[0, 1, 0])
+    assert tangent.degenerate.tolist() == [True]
+    slides, sticks = np.allclose(tangent.r, 0), np.allclose(tangent.r, [0, -1, 0])
+    assert slides or sticks
+    # a contact that grazes
+    grazing = fclib.LocalProblem(W=np.eye(3), q=[0, 0.5, 0], mu=[0.5])
+    assert fclib.jvp(grazing, np.zeros(3), q=[1, 0, 0]).degenerate.all()
+
+
+def test_redundant_contacts_leave_u_determined() -> None:
+    rng = np.random.default_rng(0)
+    h = rng.normal(size=(3, 9))
+    q = h.T @ [-1.0, 0.2, 0.1]
+    q[::3] = -np.abs(q[::3])
+    problem = fclib.LocalProblem(W=h.T @ h, q=q, mu=[0.9] * 3)
+    result = fclib.solve(problem, tol=1e-12)
+    change = h.T @ rng.normal(size=3)
+    tangent = fclib.jvp(problem, result, q=change)
+    other = fclib.solve(problem.replace(q=q + 1e-6 * change), tol=1e-12)
+    assert other.solution.u is not None
+    assert result.solution.u is not None
+    difference = (other.solution.u - result.solution.u) / 1e-6
+    assert np.abs(tangent.u - difference).max() < 1e-3
+
+
+def test_wrong_input_is_refused_by_its_name() -> None:
+    planted: Any = planted_local(seed=0, nc=3)
+    problem, solution = planted.problem, planted.solution
+    with pytest.raises(fclib.ProblemError, match="f: this problem has no such datum"):
+        fclib.jvp(problem, solution, f=np.zeros(3))
+    with pytest.raises(fclib.ProblemError, match="q: has the shape"):
+        fclib.jvp(problem, solution, q=np.zeros(3))
+    with pytest.raises(fclib.ProblemError, match="v: has the shape"):
+        fclib.vjp(problem, solution, v=np.zeros(3))
+    rolling: Any = planted_local(seed=0, d=5, nc=3, rolling=True)
+    with pytest.raises(fclib.UnsuitableError, match="without rolling"):
+        fclib.vjp(rolling.problem, rolling.solution, r=np.zeros(15))

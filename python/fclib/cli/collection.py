@@ -483,6 +483,64 @@ def take(
 
 
 @app.command()
+def add(
+    source: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with FCLIB files.")],
+    name: Annotated[
+        str | None, typer.Option(help="Of the set; by default the folder's.", show_default=False)
+    ] = None,
+    folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
+        "collection"
+    ),
+    references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
+    tol: Annotated[float, typer.Option(help="Of these, relative.", min=0.0)] = 1e-8,
+    time_limit: Annotated[float, typer.Option(help="[s] of each.", min=0.001)] = 20.0,
+    license_: Annotated[
+        str | None, typer.Option("--license", help="Of the data, for the catalogue.")
+    ] = None,
+    citation: Annotated[
+        str | None, typer.Option(help="How to name the data, for the catalogue.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Take files that are already there into a collection, as a set of it.
+
+    They are copied, never written; their folders are the families. A solution in a file stays where
+    it is good to --tol, or better than the one found. What holds no valid problem is named and left
+    out, with exit status 1.
+    """
+    rules = collections.Rules(
+        references=references,
+        tol=tol,
+        time_limit=time_limit,
+        license=license_,
+        citation=citation,
+    )
+    mine = collections.plain(name or source.resolve().name)
+    try:
+        with many_bars() as bars:
+            refused = collections.add(source, folder, mine, rules, bars)
+        table = collections.read_catalog(folder).to_pylist()
+    except ValueError as error:
+        usage_error(error)
+    except (collections.CatalogError, ImportError, OSError) as error:
+        fail(str(error))
+    report = Report(as_json)
+    rows = [row for row in table if row["collection"] == mine]
+    for row in ranges_of(rows):
+        report.add(row)
+    for refusal in refused:
+        report.error(refusal.path, fclib.Error(refusal.reason))
+    if not as_json and rows:
+        out.print(make_table(report.records))
+        unsolved = [row for row in rows if row["status"] not in (None, "converged")]
+        if unsolved:
+            names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
+            out.print(f"{len(unsolved)} were not solved to {tol:g}: {names}", highlight=False)
+        out.print(f"FCLIB_COLLECTION={folder} makes set:{mine} known to fclib bench, and to load")
+    raise typer.Exit(int(report.failed))
+
+
+@app.command()
 def publish(
     folder: Folder,
     site: Annotated[Path, typer.Option("--out", help="Folder that a web server serves.")],

@@ -18,6 +18,7 @@ record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
 build.py      a family into files, gone on with after a kill. Needs plan.py, catalog.py, figures.py
 verify.py     files as the catalogue says, solutions judged anew
+add.py        files that are already there, as a set. Needs build.py, figures.py, known.py
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
 guesses.py    what a solution says of the next step's problem
@@ -31,6 +32,7 @@ select.py     the set `standard` from a table of features. Needs candidates.py, 
 standing.py   which problems are easy, hard or open, by stored runs. Needs known.py
 """
 
+from fclib.collections.add import Refusal, Rules, add, plain
 from fclib.collections.archives import get, publish
 from fclib.collections.build import build
 from fclib.collections.catalog import CatalogError, read_catalog
@@ -57,12 +59,15 @@ __all__ = [
     "CatalogError",
     "Collection",
     "Plan",
+    "Refusal",
+    "Rules",
     "Selection",
     "Simulation",
     "Step",
     "Trajectory",
     "TrajectoryError",
     "VersionError",
+    "add",
     "build",
     "families",
     "file_name",
@@ -73,6 +78,7 @@ __all__ = [
     "guess_of",
     "load",
     "origin_of",
+    "plain",
     "plan_of",
     "publish",
     "read_catalog",

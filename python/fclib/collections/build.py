@@ -358,8 +358,6 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
     """The row of a problem: all but its solution and its files."""
-    problem = item.problem
-    mu = np.asarray(problem.mu)
     return {
         "id": f"{plan.name}/{number:04d}",
         "collection": plan.collection,
@@ -369,22 +367,30 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "step": item.step,
         "time": item.time,
         "seed": plan.scene.seed,
+        **facts_of(item.problem),
+        "bodies": item.bodies,
+        **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
+        "left_out": "; ".join(item.left_out) or None,
+        **rights.of(plan),
+    }
+
+
+def facts_of(problem: Any) -> dict[str, Any]:
+    """What a row says of a problem's data, wherever it is from."""
+    mu = np.asarray(problem.mu)
+    return {
         "title": problem.info.title,
         "formulation": problem.formulation,
         "spacedim": problem.spacedim,
         "n": problem.n,
         "p": problem.p,
         "nc": problem.nc,
-        "bodies": item.bodies,
         "density": problem.spacedim * problem.nc / problem.n if problem.n else None,
-        "mu_min": float(mu.min()),
-        "mu_max": float(mu.max()),
+        "mu_min": float(mu.min()) if mu.size else None,
+        "mu_max": float(mu.max()) if mu.size else None,
         "nnz_M": nnz(problem.M) if problem.n else None,
         "nnz_H": nnz(problem.H) if problem.n else None,
-        **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
-        "left_out": "; ".join(item.left_out) or None,
         "digest": _digest.digest(problem),
-        **rights.of(plan),
     }
 
 

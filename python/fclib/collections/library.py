@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, overload
@@ -47,6 +48,17 @@ def ensure(name: str, folder: Path) -> None:
         build([known.plan_of(name)], folder, pictures=False)
 
 
+def folders_in(folder: Path, name: str) -> list[str]:
+    """The folders SET/FAMILY that a collection has of a set, or a family in one, of one's own."""
+    if name.split("/")[0] in known.sets() or not re.fullmatch(r"[\w.-]+(/[\w.-]+)?", name):
+        return []
+    pattern = name if "/" in name else f"{name}/*"
+    return [
+        part.parent.relative_to(folder).as_posix()
+        for part in sorted(folder.glob(f"{pattern}/{catalog.FILE}"))
+    ]
+
+
 def version_in(part: Path) -> str | None:
     """The version of a family's part of a catalogue; None where it has none or no problem."""
     found: list[str | None] = catalog.read_catalog(part)["version"].to_pylist()
@@ -64,7 +76,8 @@ class Collection(Sequence[Any]):
     def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
         """KeyError, with the known names, where there is no such set or family."""
         self.name = name
-        self.folders = known.folders([name])
+        own = folders_in(Path(folder) if folder is not None else default_folder(), name)
+        self.folders = own or known.folders([name])
         shipped = all(own.split("/")[0] in known.SHIPPED for own in self.folders)
         if shipped:
             self.folder = known.DATA

@@ -1,0 +1,236 @@
+"""Files that are already there, as a set of a collection.
+
+    OUT/NAME/FAMILY/0000-local.hdf5   a copy, with a reference solution
+                    catalog.parquet   of the family; column `source` has the file's path
+                    distribution.*    histograms of its problems
+
+The family is the folder that a file lies in. The files themselves are read and never written. A
+row is known by path and SHA-256 of its file: what was taken in is left as it is, a file that has
+changed is another problem, and a run that was killed goes on.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fclib import _core, _solve
+from fclib.collections import catalog, known
+from fclib.collections.build import CHECKPOINT, facts_of, judged, nnz
+from fclib.collections.figures import draw_distribution
+
+SUFFIXES = (".hdf5", ".h5")
+VERSION = "own"
+OF_FILE = "the file"  # instead of a solver, where the file's own solution is the better one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules:
+    """How files are taken in."""
+
+    references: bool = True  # whether solutions are looked for
+    tol: float = 1e-8  # of these
+    time_limit: float = 20.0  # [s] of each
+    license: str | None = None  # of the data
+    citation: str | None = None  # how to name them
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A file that is left out, and why."""
+
+    path: Path
+    reason: str
+
+
+def add(
+    source: str | Path,
+    out: str | Path,
+    name: str | None = None,
+    rules: Rules | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> list[Refusal]:
+    """Take the FCLIB files below a folder into a collection, as a set of it.
+
+    Args:
+        source: the folder.
+        out: of the collection; made where it is not there.
+        name: of the set; by default that of the folder.
+        rules: see there.
+        progress: called with the family, the files done and their number.
+
+    Returns:
+        The files that hold no valid problem; they are left out.
+
+    Raises:
+        NotADirectoryError: the source is no folder.
+        ValueError: a published set has the name, or a family that was built.
+        FileNotFoundError: there is no HDF5 file in the source.
+        OSError: the collection cannot be written.
+    """
+    catalog.arrow()
+    source, out = Path(source).resolve(), Path(out).resolve()
+    if not source.is_dir():
+        raise NotADirectoryError(f"{source}: is no folder")
+    collection = plain(name or source.name)
+    if collection in known.sets() or collection in known.KNOWN:
+        raise ValueError(f"{collection}: is the name of a published set; choose another (--name)")
+    families: dict[str, list[Path]] = {}
+    for path in sorted(source.rglob("*")):
+        # a collection may lie inside
+        if path.suffix in SUFFIXES and path.is_file() and out not in path.parents:
+            inner = path.parent.relative_to(source).parts
+            families.setdefault(plain("-".join(inner) or source.name), []).append(path)
+    if not families:
+        raise FileNotFoundError(f"{source}: holds no file *{' and no *'.join(SUFFIXES)}")
+    report = progress or (lambda family, done, total: None)
+    refused: list[Refusal] = []
+    for family, paths in families.items():
+        part = Part(source, out, collection, family, rules or Rules())
+        for done, refusal in enumerate(part.take(paths), 1):
+            refused += [refusal] if refusal is not None else []
+            report(f"{collection}/{family}", done, len(paths))
+    catalog.gather(out)
+    return refused
+
+
+def plain(name: str) -> str:
+    """A name for a folder, without what URLs and shells do not take."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip(".") or "files"
+
+
+class Part:
+    """A family that is being taken in."""
+
+    def __init__(self, source: Path, out: Path, collection: str, family: str, rules: Rules) -> None:
+        """Takes the rows that are there already."""
+        self.source, self.out, self.rules = source, out, rules
+        self.collection, self.family = collection, family
+        self.catalogue = out / collection / family / catalog.FILE
+        self.rows: dict[tuple[str, str], dict[str, Any]] = {}  # by path and SHA-256 of the source
+        if self.catalogue.is_file():
+            table = catalog.read_catalog(self.catalogue)
+            if "source" not in table.column_names:
+                raise ValueError(
+                    f"{self.catalogue.parent}: was built from a scene; choose another name (--name)"
+                )
+            for row in table.to_pylist():
+                self.rows[row["source"], row["source_sha256"]] = row
+
+    def take(self, paths: Sequence[Path]) -> Iterator[Refusal | None]:
+        """Take files in; of each, None or why it is left out."""
+        last = time.monotonic()
+        try:
+            for path in paths:
+                try:
+                    self._take(path)
+                    refusal = None
+                except (_core.Error, OSError) as error:
+                    # what cannot be written to the collection is no fault of the file
+                    if isinstance(error, OSError) and Path(error.filename or path) != path:
+                        raise
+                    words = str(error)
+                    named = words.startswith(str(path))
+                    refusal = Refusal(path, words if named else f"{path}: {words}")
+                yield refusal
+                if time.monotonic() - last > CHECKPOINT:
+                    self._write()
+                    last = time.monotonic()
+        finally:
+            self._write()
+        rows = list(self.rows.values())
+        if rows:
+            draw_distribution(rows, self.catalogue.parent, self.family)
+
+    def _write(self) -> None:
+        if not self.rows:
+            return
+        catalog.write_catalog(self.catalogue, self.rows.values())
+
+    def _take(self, path: Path) -> None:
+        key = path.relative_to(self.source).as_posix(), catalog.sha256(path)
+        row = self.rows.get(key)
+        if row is not None and all(
+            (self.out / file).is_file() and catalog.sha256(self.out / file) == digest
+            for file, digest in catalog.files_of(row)
+        ):
+            return
+        taken = [own["number"] for own in self.rows.values()]
+        number = row["number"] if row is not None else max(taken, default=-1) + 1
+        self.rows[key] = self._store(path, number) | dict(
+            zip(("source", "source_sha256"), key, strict=True)
+        )
+
+    def _store(self, path: Path, number: int) -> dict[str, Any]:
+        """Write the copy of a file, and return its row."""
+        kinds = [kind for kind in _core.contents(path) if kind not in ("solution", "guesses")]
+        if not kinds:
+            raise _core.FileError(f"{path}: holds no problem of FCLIB")
+        # what a solution in the file belongs to
+        kind = "global" if "global" in kinds else kinds[0]
+        problem: Any = _core.read(path, kind)
+        own = _core.read_solution(path)
+        judgement, solution = self._reference(problem, own)
+        form = "global" if problem.kind.startswith("global") else "local"
+        file = self.catalogue.parent / f"{number:04d}-{form}.hdf5"
+
+        def copy(beside: Path) -> None:
+            if len(kinds) > 1:
+                _core.write(beside, problem, solution, _core.read_guesses(path))
+                return
+            shutil.copyfile(path, beside)
+            if solution is not None and solution is not own:
+                _core.write_solution(beside, solution)
+
+        file.parent.mkdir(parents=True, exist_ok=True)
+        catalog.replace_file(file, copy)
+        stored = {
+            f"{form}_file": file.relative_to(self.out).as_posix(),
+            f"{form}_sha256": catalog.sha256(file),
+        }
+        return {
+            "id": f"{self.collection}/{self.family}/{number:04d}",
+            "collection": self.collection,
+            "version": VERSION,
+            "family": self.family,
+            "number": number,
+            **facts_of(problem),
+            "nnz_W": nnz(problem.W) if form == "local" else None,
+            **judgement,
+            **dict.fromkeys(catalog.FILES),
+            **stored,
+            "license": self.rules.license,
+            "citation": self.rules.citation,
+        }
+
+    def _reference(
+        self, problem: Any, own: _core.Solution | None
+    ) -> tuple[dict[str, Any], _core.Solution | None]:
+        """What a row says of the solution, and that: the file's own, or a better one."""
+        rules = self.rules
+        of_file: dict[str, Any] = {}
+        if own is not None:
+            merit = _core.merit(problem, own)
+            error = merit.error_by("natural")
+            of_file = {"open": merit.open, "stick": merit.stick, "slide": merit.slide}
+            of_file |= {"solver": OF_FILE, "error": error, "tol": rules.tol}
+            of_file["status"] = "converged" if error <= rules.tol else "inaccurate"
+            if error <= rules.tol:
+                return of_file, own
+        if not rules.references:
+            return of_file, own
+        try:
+            result = _solve.solve(
+                problem, "auto", tol=rules.tol, time_limit=rules.time_limit, merit="natural"
+            )
+        except _core.Error:  # a singular M: the problem is there all the same
+            return of_file, own
+        found = judged(problem, result) | {"tol": rules.tol}
+        if of_file and not found["error"] < of_file["error"]:
+            return of_file, own
+        return found, result.solution

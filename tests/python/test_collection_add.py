@@ -1,0 +1,111 @@
+"""Files that are already there, taken into a collection as a set like any other."""
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import fclib
+from fclib.cli import app
+
+pytest.importorskip("pyarrow")
+
+from fclib import collections
+from fclib.collections import catalog
+from fclib.collections.known import DATA
+
+# what they give is of one kind here
+read: Any = fclib.read
+read_solution: Any = fclib.read_solution
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    """Two families of one problem each, one without its solution, and what is no problem."""
+    folder = tmp_path / "from afar"
+    names = sorted((DATA / "tiny").glob("*/*-local.hdf5"))[:2]
+    for path in names:
+        target = folder / path.parent.name / f"{path.parent.name}.hdf5"
+        target.parent.mkdir(parents=True)
+        shutil.copyfile(path, target)
+    bare = folder / names[0].parent.name / "bare.h5"
+    fclib.write(bare, read(names[0]).replace(mu=0.5 * read(names[0]).mu))
+    (folder / "torn.hdf5").write_bytes(names[0].read_bytes()[:1000])
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {str(path): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before, out = contents(source), tmp_path / "collection"
+    result = CliRunner().invoke(app, ["collection", "add", str(source), "--out", str(out)])
+    assert result.exit_code == 1
+    assert "torn.hdf5" in result.stderr
+    assert contents(source) == before
+    rows = collections.read_catalog(out).to_pylist()
+    assert len(rows) == 3
+    assert {row["collection"] for row in rows} == {"from_afar"}
+    assert {row["source"] for row in rows} == {
+        path.relative_to(source).as_posix() for path in source.glob("*/*")
+    }
+    for row in rows:
+        problem = read(source / row["source"])
+        loaded: Any = fclib.load(row["id"], folder=out)
+        np.testing.assert_array_equal(loaded.q, problem.q)
+        assert row["digest"] == fclib.digest(problem)
+        own = read_solution(source / row["source"])
+        kept = read_solution(out / row["local_file"])
+        assert own is None or np.array_equal(own.r, kept.r)
+        assert fclib.merit(problem, kept).error_by("natural") == row["error"] <= 1e-8
+    assert [row["solver"] for row in rows].count("the file") == 2
+    assert all(verdict.ok for verdict in collections.verify(out))
+    monkeypatch.setenv("FCLIB_COLLECTION", str(out))
+    assert len(fclib.collection("from_afar")) == 3
+    with pytest.raises(KeyError, match="no set"):
+        fclib.collection("from_nowhere")
+
+
+def test_it_goes_on_and_keeps_what_it_has(source: Path, tmp_path: Path) -> None:
+    out, rules = tmp_path / "collection", collections.Rules(references=False)
+    assert [refusal.path.name for refusal in collections.add(source, out, "mine", rules)] == [
+        "torn.hdf5"
+    ]
+    first = contents(out)
+    collections.add(source, out, "mine", rules)
+    assert contents(out) == first
+    # a copy that is gone comes back; a file that changed is another problem, the old one stays
+    row = collections.read_catalog(out).to_pylist()[0]
+    (out / row["local_file"]).unlink()
+    collections.add(source, out, "mine", rules)
+    assert contents(out) == first
+    changed = read(source / row["source"])
+    fclib.write(source / row["source"], changed.replace(q=2 * changed.q), mode="replace")
+    collections.add(source, out, "mine", rules)
+    rows = collections.read_catalog(out).to_pylist()
+    assert [own["source"] for own in rows].count(row["source"]) == 2
+    assert rows[0] == row
+    assert catalog.sha256(out / row["local_file"]) == row["local_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "words"),
+    [
+        ("from afar", "rt444", "published set"),
+        ("missing", "mine", "no folder"),
+        ("empty", "mine", "holds no file"),
+    ],
+)
+def test_what_cannot_be_added_is_one_line(
+    source: Path, tmp_path: Path, where: str, name: str, words: str
+) -> None:
+    (tmp_path / "empty").mkdir()
+    result = CliRunner().invoke(
+        app, ["collection", "add", str(tmp_path / where), "--name", name, "--out", str(source)]
+    )
+    assert result.exit_code in (1, 2)
+    assert words in " ".join(result.stderr.replace("│", " ").split())

@@ -138,9 +138,10 @@ from fclib import scenes
 module.CHECKPOINT = 0.0  # at each step
 store = module.store
 
-def slow(plan, kept, step, out):
-    store(plan, kept, step, out)
+def slow(plan, kept, *rest):
+    before = store(plan, kept, *rest)
     print(kept.looked, flush=True)
+    return before
 
 module.store = slow
 scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
@@ -230,8 +231,10 @@ def test_another_plan_in_the_same_folder_is_refused(built: Path) -> None:
 def test_count_keeps_problems_at_equal_distances(built: Path, tmp_path: Path) -> None:
     table = collections.build([plan(count=4)], tmp_path, pictures=False)
     assert table["number"].to_pylist() == [0, 4, 7, 11]
-    whole = {row["id"]: row for row in collections.read_catalog(built).to_pylist()}
-    assert all(row == whole[row["id"]] for row in table.to_pylist())
+    # a file's guess is from the step before, where that is kept too
+    columns = [name for name in table.column_names if not name.endswith("_sha256")]
+    whole = collections.read_catalog(built).select(columns).take([0, 4, 7, 11])
+    assert table.select(columns).to_pylist() == whole.to_pylist()
 
 
 def test_hard_keeps_what_costs_nsgs_most(built: Path, tmp_path: Path) -> None:
@@ -502,7 +505,9 @@ def test_family_is_built_from_its_default_scene(name: str, tmp_path: Path) -> No
     plan = dataclasses.replace(plan, scene=collections.plan.source(name, small))
     table = collections.build([plan], tmp_path, pictures=False)
     assert table["number"].to_pylist() == [0, 1, 2]
-    assert table["status"].to_pylist() == ["converged"] * 3
+    # one that is proved to have no solution is told so
+    expected = ["infeasible", "converged"] * 2 if name == "Squeezed" else ["converged"] * 3
+    assert table["status"].to_pylist() == expected[:3]
     assert all(verdict.ok for verdict in collections.verify(tmp_path))
 
 

@@ -160,8 +160,20 @@ class Island {
     if (when.below > 0 && !(error_ < when.below)) return false;
     if (when.guessed && !guessed_) return false;
     if ((when.law == Law::coulomb || coulomb_alone(rule.method)) && !coulomb) return false;
+    if (when.jointed > 0 && !(jointed() > when.jointed)) return false;
     return when.bodies == Bodies::any ||
            (when.bodies == Bodies::fewer) == CoupledSystem::bodies_are_fewer(problem_);
+  }
+
+  /// The largest share of a contact's mobility that bilateral constraints take: rho has what it
+  /// was.
+  [[nodiscard]] double jointed() const {
+    double most = 0;
+    for (Eigen::Index a = 0; a < problem_.rho.size(); ++a) {
+      const double left = problem_.W.template diagonal_block<D>(static_cast<Index>(a)).trace() / D;
+      most = std::max(most, 1 - left * problem_.rho[a]);
+    }
+    return most;
   }
 
   void enter(const StageRule& rule) {

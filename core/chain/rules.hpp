@@ -47,6 +47,7 @@ struct When {
   std::int64_t at_most = 0;
   double below = 0;
   bool guessed = false;
+  double jointed = 0;
   Bodies bodies = Bodies::any;
   Law law = Law::any;
 
@@ -75,6 +76,13 @@ struct When {
                                .lowest = 0},
         OptionField<O, bool>{
             .name = "guessed", .member = &O::guessed, .doc = "only where there is a guess"},
+        OptionField<O, double>{.name = "jointed",
+                               .member = &O::jointed,
+                               .unit = "1",
+                               .doc = "only where bilateral constraints take more than this share "
+                                      "of the mobility of a contact; 0: anywhere",
+                               .lowest = 0,
+                               .highest = 1},
         OptionField<O, Bodies>{.name = "bodies",
                                .member = &O::bodies,
                                .doc = "whether the bodies must have at most half as many "

@@ -125,7 +125,9 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
     step.w_update();
     step.velocity(u);
     de_saxce_shift<Cone>(u, problem.friction, shift);
-    if (k >= check || best.due(k - told)) {
+    if (k < check) {
+      if (best.due(k - told) && best.glance(k - told, step.z())) return best.outcome(r);
+    } else {
       problem.velocity(step.z(), u);
       if (best.report(k - told, step.z(), u)) return best.outcome(r);
       told = k;

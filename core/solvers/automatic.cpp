@@ -16,6 +16,8 @@ constexpr const char* table = R"(
 # name                          : method              where and from what              rules
 gauss-seidel                    : gauss_seidel        on=whole at_most=2               limit=5 worth=0
 gauss-seidel                    : gauss_seidel        on=whole at_least=3              limit=20 worth=0
+# between walls that joints hold, sweeps let reactions grow without bound
+proximal newton                 : polish              jointed=0.1 from=nothing         limit=12
 # bodies at rest that stick everywhere, from the guess where there is one
 conjugate gradients             : conjugate_gradients at_least=20                      limit=400
 # a good guess: the statuses are nearly known; on few bodies the proximal point is cheaper

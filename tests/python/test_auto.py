@@ -367,6 +367,11 @@ def test_a_chain_of_ones_own() -> None:
     result = fclib.solve(problem, chain=own)
     assert result.status == "stalled"
     assert stage_names(result) == ["mine"]
+    # one for joints is entered where there are some alone
+    free, joined = planted_local(4, nc=12).problem, planted_local(5, nc=12, p=5).problem
+    for problem_, names in ((free, ["b"]), (joined, ["a"])):
+        chain = "a : proximal_point jointed=0.01 from=nothing limit=500; b : proximal_point"
+        assert stage_names(fclib.solve(problem_, chain=chain))[:1] == names
     # an interior point has no rolling cone
     rolling = planted_rolling(5, 17, 10)[0]
     result = fclib.solve(rolling, chain="a : interior_point ; b : proximal_point limit=500")

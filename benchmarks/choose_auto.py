@@ -1,0 +1,448 @@
+"""Which stages and thresholds of `auto` pay: each change of its table, on problems of two halves.
+
+    .venv/bin/python benchmarks/choose_auto.py FILE... [--problems 12] [--seconds 10]
+        [--only NAME...] [--results auto-stages]
+    .venv/bin/python benchmarks/choose_auto.py FILE... --against OTHER_PYTHON [--limits 1 10 60]
+
+A problem belongs to the choosing half or to the judging one by its family (for a file, its folder):
+what is chosen is chosen on CHOOSING; recorded problems, other families and new seeds of generated
+ones only judge. At most --problems of a family are taken, evenly spread.
+
+A change is the table without one of its stages, or with another rule (CHANGES). It is run on the
+problems that came to the stage, each beside the table as it is, in one process; the others take the
+same path. A row says how many problems came to the stage and how many it solved; how many the chain
+solves without the change and with it; and the sum of CPU times with the change over that without
+it, with the 95 % interval of 2,000 bootstrap samples of the problems. The limit is one of CPU time;
+a failure counts as twice the limit. A stage pays where problems are lost without it, or where its
+interval is above 1.
+
+--against makes one table on the judging half: this fclib beside another one's (the Python that
+imports it), solved at 1e-4, 1e-8 and 1e-12 within each limit, sum and shifted mean of CPU times,
+the ten worst ratios, and what was lost.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import _results
+import numpy as np
+
+import fclib
+from fclib import scenes
+
+CHOOSING = {"BoxesStack", "Capsules", "Bridge", "Chute", "LowWall", "Packing", "Wall"}
+TOLERANCE = 1e-8
+CHARGE = 2.0  # limits, for a failure
+SHIFT = 1e-3  # [s] of the geometric mean
+SAMPLES = 2000
+
+WORKER = """
+import json, sys, time
+import fclib
+for line in sys.stdin:
+    job = json.loads(line)
+    options = {"chain": job["chain"]} if job.get("chain") else {}
+    problem = fclib.read(job["file"])
+    end = time.process_time() + job["limit"]
+    try:
+        result = fclib.solve(problem, "auto", job["tol"], time_limit=20 * job["limit"],
+                             callback=lambda *_: time.process_time() < end, **options)
+        stages = [[s.name, s.calls, s.solved, s.time] for s in result.stages]
+        answer = [result.status, result.cpu_s, stages]
+    except fclib.Error as error:
+        answer = [type(error).__name__, None, []]
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A solve by `auto`."""
+
+    status: str
+    cpu_s: float
+    stages: dict[str, tuple[int, int, float]]  # calls, solved, time [s]
+
+    @property
+    def solved(self) -> bool:
+        """Whether it has an answer: a solution, or the proof that there is none."""
+        return self.status in ("converged", "infeasible")
+
+
+class Worker:
+    """A process that solves files with the fclib of its Python."""
+
+    def __init__(self, python: str = sys.executable) -> None:
+        self._python = python
+        self._process = subprocess.Popen(
+            [python, "-c", WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+
+    def run(self, file: Path, limit: float, tol: float = TOLERANCE, chain: str = "") -> Run:
+        """One solve."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        job = {"file": str(file), "limit": limit, "tol": tol, "chain": chain}
+        self._process.stdin.write(json.dumps(job) + "\n")
+        self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        if not line:
+            raise SystemExit(f"{self._python}: has ended with {self._process.wait()}")
+        status, cpu_s, stages = json.loads(line)
+        return Run(status, cpu_s or 0.0, {name: (c, s, t) for name, c, s, t in stages})
+
+
+# ---- the table and its changes
+
+
+def table() -> list[str]:
+    """The stages of `auto`, a line each."""
+    (text,) = (o.default for o in fclib.find_solver("auto").options if o.name == "chain")
+    lines = [line.split("#")[0].strip() for line in str(text).splitlines()]
+    return [line for line in lines if line]
+
+
+def name_of(line: str) -> str:
+    """What results call the stage."""
+    return line.partition(":")[0].strip()
+
+
+def ruled(line: str, **rules: object) -> str:
+    """The stage with other values of its rules."""
+    words = [word for word in line.split() if word.partition("=")[0] not in rules]
+    return " ".join([*words, *(f"{key}={value}" for key, value in rules.items())])
+
+
+def with_rules(number: int, **rules: object) -> Callable[[list[str]], list[str]]:
+    """The change of the rules of a stage."""
+    return lambda lines: [
+        ruled(line, **rules) if k == number else line for k, line in enumerate(lines)
+    ]
+
+
+def place(lines: Sequence[str], name: str, which: int = 0) -> int:
+    """Of the stage of this name."""
+    return [k for k, line in enumerate(lines) if name_of(line) == name][which]
+
+
+def without(number: int) -> Callable[[list[str]], list[str]]:
+    """The change that leaves a stage out."""
+    return lambda lines: [*lines[:number], *lines[number + 1 :]]
+
+
+def inserted(after: str, line: str) -> Callable[[list[str]], list[str]]:
+    """The change that puts a stage after another."""
+
+    def change(lines: list[str]) -> list[str]:
+        at = place(lines, after) + 1
+        return [*lines[:at], line, *lines[at:]]
+
+    return change
+
+
+def before_islands(line: str) -> Callable[[list[str]], list[str]]:
+    """The change that puts a stage before all others of islands."""
+    return lambda lines: [
+        *(own for own in lines if "on=whole" in own),
+        line,
+        *(own for own in lines if "on=whole" not in own),
+    ]
+
+
+@dataclass(frozen=True)
+class Change:
+    """A change of the table, and the stage that a problem must come to for it to matter."""
+
+    name: str
+    stage: str
+    apply: Callable[[list[str]], list[str]]
+
+
+def changes(lines: list[str]) -> list[Change]:
+    """Each stage left out, and other values of what has been looked at."""
+    result = []
+    names = [name_of(line) for line in lines]
+    for k, name in enumerate(names):
+        word = name if names.count(name) == 1 else f"{name} {1 + names[:k].count(name)}"
+        if lines[k].split(":")[1].split()[0] == "gauss_seidel" and "on=whole" in lines[k]:
+            continue  # where every problem starts
+        result.append(Change(f"without {word}", name, without(k)))
+    for gate in ("jointed=0.1", "at_most=10", "at_most=100", "at_least=0"):
+        line = f"proximal newton : polish from=nothing {gate} limit=12"
+        change = before_islands(line)
+        result.append(Change(f"first proximal newton from nothing, {gate}", "gauss-seidel", change))
+    first = "interior point"
+    at = place(lines, first)
+    for gate in ("1e-3", "1e-4", "1e-5"):
+        line = f"proximal point : proximal_point from=best below={gate} limit=350"
+        result.append(
+            Change(f"proximal point after the first, below {gate}", first, inserted(first, line))
+        )
+    tried: dict[str, tuple[float, ...]] = {"far": (1, 16), "tau": (0.003, 0.3), "limit": (30, 120)}
+    for key, values in tried.items():
+        result += [
+            Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
+            for value in values
+        ]
+    sweeps = place(lines, "gauss-seidel", 1)
+    for value in (10, 40):
+        result.append(
+            Change(f"sweeps on the whole: {value}", "gauss-seidel", with_rules(sweeps, limit=value))
+        )
+    island = place(lines, "gauss-seidel", 2)
+    for value in (25, 50, 200):
+        result.append(
+            Change(f"sweeps on islands: {value}", "gauss-seidel", with_rules(island, limit=value))
+        )
+    polish = place(lines, "proximal newton", 1)
+    for below in ("1e-6", "1e-4", "1e-3"):
+        result.append(
+            Change(f"proximal newton: below={below}", first, with_rules(polish, below=below))
+        )
+    middle = place(lines, "proximal point")
+    for value in (100, 350):
+        result.append(
+            Change(
+                f"proximal point: limit={value}", "proximal point", with_rules(middle, limit=value)
+            )
+        )
+    return result
+
+
+# ---- the problems
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A file, with its family and half."""
+
+    file: Path
+    family: str
+    half: str
+
+
+def generated(folder: Path) -> Iterable[Problem]:
+    """Packings and walls: some seeds to choose on, others to judge on."""
+    for family in ("Packing", "Wall"):
+        for half, seeds in (("choose", range(4)), ("judge", range(100, 104))):
+            for contacts in (80, 300):
+                for push in (0.0, 1.0):
+                    for seed in seeds:
+                        made: Any = scenes.assemblies()[family]()
+                        file = folder / f"{family}-{contacts}-{push:g}-{seed}.hdf5"
+                        fclib.write(file, made.of_size(contacts, push, seed))
+                        yield Problem(file, family, half)
+
+
+def evenly(problems: list[Problem], count: int) -> list[Problem]:
+    """So many of them."""
+    places = np.unique(np.linspace(0, len(problems) - 1, min(count, len(problems))).round())
+    return [problems[int(k)] for k in places]
+
+
+def gathered(files: Sequence[Path], folder: Path, count: int) -> list[Problem]:
+    """At most `count` of each family and half."""
+    groups: dict[tuple[str, str], list[Problem]] = defaultdict(list)
+    for file in sorted(files):
+        family = file.resolve().parent.name
+        groups[family, "choose" if family in CHOOSING else "judge"].append(
+            Problem(file.resolve(), family, "choose" if family in CHOOSING else "judge")
+        )
+    for problem in generated(folder):
+        groups[problem.family, problem.half].append(problem)
+    return [problem for group in groups.values() for problem in evenly(group, count)]
+
+
+# ---- the measure
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a change does on a half."""
+
+    change: str
+    half: str
+    entered: int  # problems that came to the stage
+    solved_there: int  # ... and were solved by it
+    solved: int  # by the table
+    solved_changed: int
+    lost: int  # solved by the table alone
+    won: int
+    ratio: float  # sums of CPU times, the change over the table
+    low: float  # ends of the 95 % interval
+    high: float
+
+    def shown(self) -> dict[str, object]:
+        """As pages have it."""
+        return {
+            "change": self.change,
+            "half": self.half,
+            "came to the stage": self.entered,
+            "solved there": self.solved_there,
+            "solved": self.solved,
+            "solved with the change": self.solved_changed,
+            "lost": self.lost,
+            "won": self.won,
+            "CPU ratio": self.ratio,
+            "from": self.low,
+            "to": self.high,
+        }
+
+
+def cost(run: Run, limit: float) -> float:
+    """CPU time [s], a failure charged."""
+    return run.cpu_s if run.solved else CHARGE * limit
+
+
+def interval(base: Sequence[float], changed: Sequence[float]) -> tuple[float, float]:
+    """Of the ratio of the sums, over samples of the problems."""
+    pick = np.random.default_rng(0).integers(0, len(base), (SAMPLES, len(base)))
+    ratios = np.array(changed)[pick].sum(axis=1) / np.array(base)[pick].sum(axis=1)
+    low, high = np.percentile(ratios, [2.5, 97.5])
+    return float(low), float(high)
+
+
+def measured(
+    change: Change,
+    half: str,
+    found: dict[Problem, Run],
+    lines: list[str],
+    limit: float,
+    worker: Worker,
+) -> Row | None:
+    """The change on the problems of the half that came to its stage."""
+    problems = [p for p, run in found.items() if p.half == half and change.stage in run.stages]
+    if not problems:
+        return None
+    chain = "\n".join(change.apply(lines))
+    base, changed = [], []
+    for problem in problems:
+        # side by side: the machine is shared
+        base.append(worker.run(problem.file, limit, chain="\n".join(lines)))
+        changed.append(worker.run(problem.file, limit, chain=chain))
+    costs = [[cost(run, limit) for run in runs] for runs in (base, changed)]
+    low, high = interval(*costs)
+    return Row(
+        change=change.name,
+        half=half,
+        entered=len(problems),
+        solved_there=sum(run.stages.get(change.stage, (0, 0, 0))[1] > 0 for run in base),
+        solved=sum(run.solved for run in base),
+        solved_changed=sum(run.solved for run in changed),
+        lost=sum(a.solved and not b.solved for a, b in zip(base, changed, strict=True)),
+        won=sum(b.solved and not a.solved for a, b in zip(base, changed, strict=True)),
+        ratio=round(sum(costs[1]) / sum(costs[0]), 3),
+        low=round(low, 3),
+        high=round(high, 3),
+    )
+
+
+def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
+    """All changes on both halves."""
+    lines = table()
+    worker = Worker()
+    found = {p: worker.run(p.file, arguments.seconds) for p in problems}
+    for half in ("choose", "judge"):
+        own = [run for p, run in found.items() if p.half == half]
+        print(f"{half}: {len(own)} problems, {sum(run.solved for run in own)} solved")
+    print(f"{'change':46} {'half':7} entered there  solved   lost  won  CPU ratio")
+    rows = []
+    for change in changes(lines):
+        if arguments.only and not any(word in change.name for word in arguments.only):
+            continue
+        for half in ("choose", "judge"):
+            row = measured(change, half, found, lines, arguments.seconds, worker)
+            if row is None:
+                continue
+            rows.append(row)
+            print(
+                f"{row.change:46} {row.half:7} {row.entered:7} {row.solved_there:5} "
+                f"{row.solved:3} > {row.solved_changed:3} {row.lost:5} {row.won:4}  "
+                f"{row.ratio:.3f} [{row.low:.3f}, {row.high:.3f}]",
+                flush=True,
+            )
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            [row.shown() for row in rows],
+            title="What the stages of auto are worth",
+            note=f"Limit {arguments.seconds:g} s of CPU, tolerance {TOLERANCE:g}; at most "
+            f"{arguments.problems} problems of a family.",
+        )
+
+
+def shifted_mean(values: Sequence[float]) -> float:
+    """The shifted geometric mean [s]."""
+    return float(np.exp(np.mean(np.log(np.array(values) + SHIFT))) - SHIFT)
+
+
+def compare(problems: list[Problem], arguments: argparse.Namespace) -> None:
+    """Both versions on the judging half."""
+    judging = [problem for problem in problems if problem.half == "judge"]
+    workers = {"this": Worker(), "other": Worker(arguments.against)}
+    longest = max(arguments.limits)
+    print(f"{len(judging)} problems of the judging half")
+    heads = " ".join(f"{f'{limit:g} s':>7}" for limit in arguments.limits)
+    print(f"{'tolerance':10} {'whose':6} {heads} {'sum s':>9} {'mean ms':>9}")
+    for tol in (1e-4, 1e-8, 1e-12):
+        runs: dict[str, list[Run]] = {"this": [], "other": []}
+        for problem in judging:
+            for whose, worker in workers.items():
+                runs[whose].append(worker.run(problem.file, longest, tol))
+        for whose, own in runs.items():
+            counts = " ".join(
+                f"{sum(run.solved and run.cpu_s <= limit for run in own):7}"
+                for limit in arguments.limits
+            )
+            times = [min(run.cpu_s, longest) if run.solved else longest for run in own]
+            print(
+                f"{tol:<10.0e} {whose:6} {counts} {sum(times):9.2f} "
+                f"{1e3 * shifted_mean(times):9.3f}",
+                flush=True,
+            )
+        pairs = list(zip(judging, runs["this"], runs["other"], strict=True))
+        for problem, a, b in pairs:
+            if a.solved != b.solved:
+                word = "won" if a.solved else "LOST"
+                print(f"    {word}: {problem.family}/{problem.file.stem}: {a.status}, {b.status}")
+        worst = sorted(
+            (
+                ((a.cpu_s + SHIFT) / (b.cpu_s + SHIFT), problem, a.cpu_s, b.cpu_s)
+                for problem, a, b in pairs
+                if a.solved and b.solved
+            ),
+            key=lambda entry: -entry[0],
+        )[:10]
+        for ratio, problem, mine, theirs in worst if tol == TOLERANCE else []:
+            name = f"{problem.family}/{problem.file.stem}"
+            print(f"    {ratio:6.2f}  {1e3 * mine:9.2f} ms  {1e3 * theirs:9.2f} ms  {name}")
+
+
+def main() -> None:
+    """Choose, or compare."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("files", nargs="*", type=Path)
+    parser.add_argument("--problems", type=int, default=12, help="of a family at most")
+    parser.add_argument("--seconds", type=float, default=10, help="limit of a solve")
+    parser.add_argument("--only", nargs="+", help="changes whose names have one of these in them")
+    _results.add_option(parser)
+    parser.add_argument("--against", help="the Python of another fclib")
+    parser.add_argument("--limits", type=float, nargs="+", default=[1, 10, 60], help="[s]")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        problems = gathered(arguments.files, Path(folder), arguments.problems)
+        (compare if arguments.against else choose)(problems, arguments)
+
+
+if __name__ == "__main__":
+    main()

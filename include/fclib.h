@@ -217,7 +217,8 @@ struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new
 struct fclib_solution* fclib_read_solution(const char* path);
 
 /** Reads the guesses, and stores how many there are. Returns their array, to be freed with
- *  fclib_delete_solutions(guesses, number); NULL on failure, and where there are none. */
+ *  fclib_delete_solutions(guesses, number); NULL on failure, and without an error where there are
+ *  none. */
 struct fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses);
 
 /** Gives the info of the local problem in the file (of another one where there is no local one) an

@@ -322,11 +322,12 @@ inline void write_solution(const std::string& path, const Solution& solution) {
   checked(fclib_write_solution(&view, path.c_str()));
 }
 
-/// The guesses in a file; throws where there are none.
+/// The guesses in a file, if there are any.
 inline std::vector<Solution> read_guesses(const std::string& path) {
   const Sizes size = detail::sizes_in(path);
   int count = 0;
-  fclib_solution* const first = checked(fclib_read_guesses(path.c_str(), &count));
+  fclib_solution* const first = fclib_read_guesses(path.c_str(), &count);
+  if (first == nullptr && *fclib_last_error() != '\0') fail();
   const detail::Array found(first, count);
   std::vector<Solution> guesses;
   for (const auto& guess : std::span(found.data, static_cast<std::size_t>(found.count))) {

@@ -204,7 +204,7 @@ fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses) {
   return guarded<fclib_solution*>(nullptr, [&] {
     int& number = given(number_of_guesses, "number_of_guesses");
     auto guesses = read_guesses(&given(path, "path"));
-    if (guesses.empty()) throw Error(ErrorKind::file, "holds no guesses", "/", path);
+    if (guesses.empty()) return static_cast<fclib_solution*>(nullptr);  // silently, as 3.1
     const Problem outline = read_outline(path);
     const int count = static_cast<int>(guesses.size());
     const auto release = [&](fclib_solution* array) { fclib_delete_solutions(array, count); };

@@ -107,7 +107,8 @@ static void errors(void) {
   CHECK(!fclib_read_global(path_of("a")));
   SAYS("holds no global problem; it holds: local");
   CHECK(!fclib_read_solution(path_of("a")));
-  CHECK(!fclib_read_guesses(path_of("a"), &count));
+  CHECK(!fclib_read_guesses(path_of("a"), &count) && count == 0);
+  CHECK(!*fclib_last_error()); /* that there are none is no error */
 
   /* nothing to delete */
   fclib_delete_local(NULL);

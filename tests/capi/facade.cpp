@@ -72,6 +72,9 @@ void files(const std::string& folder) {
   THROWS("no such file", fclib::read<fclib_global>(folder + "/missing"));
   THROWS("holds no solution", fclib::read_solution(path));
 
+  CHECK(fclib::read_guesses(path).empty());
+  THROWS("no such file", fclib::read_guesses(folder + "/missing"));
+
   auto problem = fclib::read<fclib_global>(path);
   const fclib::Sizes size = fclib::sizes(*problem);
   CHECK(size.n == 3 && size.m == 3 && size.p == 0 && size.nc == 1);

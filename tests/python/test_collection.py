@@ -642,6 +642,37 @@ def test_simulate_finds_the_packages_of_a_urdf(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
 
 
+def test_archive_has_the_model_with_its_includes(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "ball.xml").write_text(
+        '<mujoco><worldbody><body pos="0 0 0.099"><freejoint/><geom size="0.1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    (tmp_path / "wedge.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    model = tmp_path / "model.xml"
+    text = (
+        '<mujoco><include file="parts/ball.xml"/>{}<worldbody><geom type="plane" size="1 1 1"/>'
+        "</worldbody></mujoco>"
+    )
+    model.write_text(text.format('<asset><mesh name="wedge" file="wedge.obj"/></asset>'))
+    scene = scenes.Scene.from_file(model)
+    assert scene.parameters["files"] == {
+        name: catalog.sha256(tmp_path / name) for name in ("parts/ball.xml", "wedge.obj")
+    }
+    # with no mesh to fetch the states alone make the problems again
+    model.write_text(text.format(""))
+    run = invoke("simulate", model, "--steps", 3, "--no-pictures", "--out", tmp_path / "out")
+    assert run.exit_code == 0, run.output
+    (tmp_path / "parts" / "ball.xml").unlink()
+    states = collections.read_trajectory(tmp_path / "out/scenes/model/states.trajectory")
+    assert states.scene.path is None
+    row = collections.read_catalog(tmp_path / "out").to_pylist()[0]
+    assert fclib.digest(states.problem(0).problem) == row["digest"]
+    assert "parts/ball.xml" in read(tmp_path / "out" / row["global_file"]).info.description
+
+
 def test_list_and_show() -> None:
     listed = invoke("collection", "list")
     assert listed.exit_code == 0

@@ -327,7 +327,10 @@ def unpacked(data: bytes, *, shape: list[int], bytes: int, exponent: int) -> Vec
 
 def record(scene: Scene) -> dict[str, Any]:
     """A scene in JSON's types: all of it but the place of its file on this machine."""
-    return asdict(replace(scene, parameters=dict(scene.parameters), path=None))
+    known = asdict(replace(scene, parameters=dict(scene.parameters), path=None))
+    if not scene.includes:
+        del known["includes"]
+    return known
 
 
 def scene_of(known: Mapping[str, Any]) -> Scene:

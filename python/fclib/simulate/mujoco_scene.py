@@ -55,7 +55,8 @@ def compile_scene(scene: Scene) -> Any:
         if scene.path is not None:
             spec = mujoco.MjSpec.from_file(str(scene.path))
         else:
-            spec = mujoco.MjSpec.from_string(scene.xml)
+            included = {name: text.encode() for name, text in scene.includes.items()}
+            spec = mujoco.MjSpec.from_string(scene.xml, include=included or None)
         if scene.period is not None:
             add_ghosts(spec)
         if spec.memory < 0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import json
 import os
 import re
@@ -54,6 +55,7 @@ class Scene:
     # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
     period: tuple[float, float] | None = None
     path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
+    includes: Mapping[str, str] = field(default_factory=dict)  # texts of MJCF files in it, by path
 
     @classmethod
     def of(cls, family: Any, seed: int, xml: str = "", **more: Any) -> Scene:
@@ -91,7 +93,7 @@ class Scene:
     ) -> Scene:
         """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
 
-        Its parameters hold the file's name and its SHA-256, not the files that it includes.
+        Its parameters hold the SHA-256 of the file and of all that it refers to.
 
         Args:
             path: of the file.
@@ -106,11 +108,13 @@ class Scene:
         Raises:
             OSError: it cannot be read.
             ValueError: a package is not known.
+            ImportError: it refers to files, and MuJoCo is missing.
         """
         path = Path(path)
         xml = path.read_text(encoding="utf-8")
         digest = hashlib.sha256(xml.encode()).hexdigest()
         resolved = resolve_packages(path.name, xml, packages or {})
+        files, includes = references_of(path, resolved)
         return cls(
             name=path.stem,
             xml=resolved,
@@ -119,13 +123,41 @@ class Scene:
             law=law,
             planar=planar,
             keyframe=keyframe,
-            parameters={"file": path.name, "sha256": digest},
+            parameters={"file": path.name, "sha256": digest, **({"files": files} if files else {})},
             title=path.stem,
             description=f"Problems of the scene {path.name}.",
             ignore=tuple(ignore),
             # the text tells all where packages were resolved
             path=path if resolved == xml else None,
+            includes=includes,
         )
+
+
+def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]:
+    """SHA-256 of the files that a model refers to, and the texts of the MJCF among them.
+
+    Both by their paths from the model's folder. What is not there is left to the compiler to name.
+    """
+    if "file=" not in xml and "filename=" not in xml:
+        return {}, {}
+    folder = path.resolve().parent
+    if "<mujoco" in xml and "<robot" not in xml:
+        module: Any = importlib.import_module("mujoco")
+        try:
+            names = module.mju_getXMLDependencies(str(path.resolve()))
+        except (ValueError, module.FatalError):  # bad MJCF, which the compiler says better
+            return {}, {}
+    else:
+        names = re.findall(r"""filename=["']([^"']+)""", xml)
+    hashes, texts = {}, {}
+    for found in sorted({(folder / name).resolve() for name in names} - {path.resolve()}):
+        if not found.is_file():
+            continue
+        content, name = found.read_bytes(), os.path.relpath(found, folder)
+        hashes[name] = hashlib.sha256(content).hexdigest()
+        if found.suffix == ".xml":
+            texts[name] = content.decode()
+    return hashes, texts
 
 
 def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) -> str:

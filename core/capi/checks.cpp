@@ -31,7 +31,7 @@ int validate_solution(const C* c, const fclib_solution* solution) {
 }
 
 template <class C>
-double merit_of(const C* c, fclib_merit kind, const fclib_solution* solution) {
+double merit_of(const C* c, int kind, const fclib_solution* solution) {
   return guarded(std::numeric_limits<double>::quiet_NaN(), [&] {
     const auto problem = valid_problem(given(c, "problem"));
     const Solution candidate = solution_of(given(solution, "solution"), problem, Parts::some);
@@ -41,7 +41,7 @@ double merit_of(const C* c, fclib_merit kind, const fclib_solution* solution) {
       case MERIT_2:
         return merit(problem, candidate).error;
     }
-    fail("merit", std::to_string(static_cast<int>(kind)) + " is no merit");
+    fail("merit", std::to_string(kind) + " is no merit");
   });
 }
 
@@ -77,7 +77,7 @@ extern "C" {
     return validate_solution(problem, solution);                                                   \
   }                                                                                                \
   double fclib_merit_##kind(fclib_##kind* problem, fclib_merit merit, fclib_solution* solution) {  \
-    return merit_of(problem, merit, solution);                                                     \
+    return merit_of(problem, number_of(merit), solution);                                          \
   }                                                                                                \
   double fclib_certificate_##kind(const fclib_##kind* problem, const double* y, const double* z) { \
     return bound_of_certificate(problem, y, z);                                                    \

@@ -1,6 +1,7 @@
 // Errors on their way to C: nothing is thrown across, the message is kept.
 #pragma once
 
+#include <cstring>
 #include <exception>
 #include <new>
 #include <string>
@@ -36,6 +37,16 @@ template <class T>
 T& given(T* pointer, const char* name) {
   if (pointer == nullptr) fail(name, "is NULL");
   return *pointer;
+}
+
+/// A constant of the caller, who may hand over any number: one that is none is no value of the enum
+/// in C++, and may not be read as one.
+template <class Enum>
+int number_of(const Enum& constant) {
+  static_assert(sizeof(Enum) == sizeof(int));
+  int number;
+  std::memcpy(&number, &constant, sizeof number);
+  return number;
 }
 
 }  // namespace fclib::c

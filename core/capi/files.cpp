@@ -261,10 +261,11 @@ int fclib_problem_sizes(const char* path, int* n, int* m, int* p, int* nc) {
 
 int fclib_set_write_mode(fclib_write_mode mode) {
   return guarded(0, [&] {
-    if (mode != FCLIB_WRITE_ADD && mode != FCLIB_WRITE_REPLACE) {
-      fail("write mode", std::to_string(static_cast<int>(mode)) + " is none");
+    const int number = number_of(mode);
+    if (number != FCLIB_WRITE_ADD && number != FCLIB_WRITE_REPLACE) {
+      fail("write mode", std::to_string(number) + " is none");
     }
-    replace = mode == FCLIB_WRITE_REPLACE;
+    replace = number == FCLIB_WRITE_REPLACE;
     return 1;
   });
 }

@@ -120,10 +120,11 @@ const char* fclib_solver_name(int k) {
 }
 
 const char* fclib_status_name(fclib_status status) {
+  const int number = number_of(status);
   for (const Status candidate :
        {Status::converged, Status::iteration_limit, Status::time_limit, Status::diverged,
         Status::inaccurate, Status::interrupted, Status::stalled, Status::infeasible}) {
-    if (status_in_c(candidate) == status) return name_of(candidate).data();  // a literal
+    if (status_in_c(candidate) == number) return name_of(candidate).data();  // a literal
   }
   return "unknown";
 }

@@ -226,13 +226,13 @@ TEST_F(Writing, CompressionIsALevel) {
   const LocalProblem large = local_problem(1, 40);
   std::vector<std::uintmax_t> sizes;
   for (const int level : {0, 1, 9}) {
-    write(large, {.compression = level});
+    write(large, {.dense = true, .compression = level});
     EXPECT_EQ(std::get<LocalProblem>(read_problem(path())).W, large.W);
     sizes.push_back(fs::file_size(path()));
   }
   EXPECT_LT(sizes[1], sizes[0]);
   EXPECT_LE(sizes[2], sizes[1]);
-  for (const int level : {-1, 10}) {
+  for (const int level : {-2, 10}) {
     const WriteOptions options{.replace = true, .compression = level};
     const std::string said = "is " + std::to_string(level) + ", but must be 0 to 9";
     expect_in(said, refusal([&] { write(large, options); }));
@@ -245,7 +245,7 @@ TEST_F(Writing, CompressionIsALevel) {
 TEST_F(Writing, WhatIsKnownOfAMatrixIsKept) {
   LocalProblem problem = local_problem(1);
   problem.W.info = {.comment = "diagonal", .conditioning = 1, .determinant = 1, .rank = 6};
-  write(problem, {});
+  write(problem, {.dense = true});
   EXPECT_EQ(std::get<LocalProblem>(read_problem(path())).W, problem.W);
 }
 

@@ -542,11 +542,11 @@ json.dump(results, open(sys.argv[1], "w"))
 def siconos() -> str:
     """A Python that has Siconos."""
     for python in filter(None, (shutil.which("python3", path="/usr/bin"), sys.executable)):
-        command = [python, "-c", "import siconos.numerics"]
+        command = [python, "-c", "import scipy.sparse, siconos.numerics"]
         with contextlib.suppress(OSError):
             if subprocess.run(command, capture_output=True).returncode == 0:
                 return python
-    pytest.skip("Siconos is not installed")
+    pytest.skip("Siconos, or the SciPy that it takes matrices of, is not installed")
 
 
 def ask(siconos: str, folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -612,7 +612,7 @@ def test_modes_and_levels_that_are_none(written: Path) -> None:
         fclib.write(path, planted.problem, mode="append")  # type: ignore[call-overload]
     with pytest.raises(fclib.OptionError, match="no mode 'overwrite'; there are: replace, add"):
         fclib.write_guesses(path, [], mode="overwrite")  # type: ignore[arg-type]
-    for level in (-1, 10):
+    for level in (-2, 10):
         said = f"level: is {level}, but must be 0 to 9"
         with pytest.raises(fclib.OptionError, match=said):
             fclib.write(path, planted.problem, compression=level)

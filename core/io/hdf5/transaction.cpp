@@ -121,7 +121,9 @@ class MemoryFile {
 
 void require_level(int compression) {
   if (compression < compress_cheaply || compression > 9) {
-    throw Error(ErrorKind::option, "is " + std::to_string(compression) + ", but must be 0 to 9",
+    throw Error(ErrorKind::option,
+                "is " + std::to_string(compression) +
+                    ", but must be 0 to 9, or -1 (only what packs at once)",
                 "the compression level");
   }
 }

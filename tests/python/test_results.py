@@ -35,7 +35,7 @@ PAGES = sorted((ROOT / "docs").glob("*.md"))
 
 # code, links, names of a program or standard with its version, tolerances, dimensions, years
 NO_FIGURE = re.compile(
-    r"""```.*?```|<!--.*?-->|`[^`]*`|\]\([^)]*\)|^\[Table:.*?$|\{\{[^{}]*\}\}|^(?:\ {4}.*\n)+
+    r"""```.*?```|<!--.*?-->|`[^`]*`|\]\([^)]*\)|^\[Table:[^\n]*$|\{\{[^{}]*\}\}|^(?:\ {4}[^\n]*\n)+
     |^\d+\.\ |\b1e-\d+\b|\b[23]D\b|\bRT-\d+\b|\b(?:19|20)\d\d\b
     |\b(?:libfclib|Siconos|Debian|Python|MuJoCo|GCC|HDF5|Drake|Pinocchio|Newton|C\+\+|Clarabel)\s\d[\d.]*
     """,
@@ -44,7 +44,7 @@ NO_FIGURE = re.compile(
 
 
 def is_of_results(text: str) -> bool:
-    """Whether a page quotes a stored table."""
+    """Whether a part of a page quotes a stored table."""
     return bool(results.TABLE.search(text) or results.ENTRY.search(text))
 
 
@@ -58,13 +58,19 @@ def typed_figures(text: str) -> list[str]:
     return [f"{k}: {line}" for k, line in enumerate(left.splitlines(), 1) if re.search(r"\d", line)]
 
 
-def test_no_figure_is_typed_on_a_page_of_results() -> None:
-    found = {
-        page.name: typed_figures(text)
+def sections(text: str) -> list[str]:
+    """The parts of a page, each from its heading on; headings stand in no block of code."""
+    return re.split(r"^(?=#{1,6} )", text, flags=re.MULTILINE)
+
+
+def test_no_figure_is_typed_beside_a_stored_table() -> None:
+    wrong = [
+        f"{page.name}, {part.splitlines()[0]}: line {line}"
         for page in PAGES
-        if is_of_results(text := page.read_text(encoding="utf-8"))
-    }
-    wrong = [f"{name}:{line}" for name, lines in found.items() for line in lines]
+        for part in sections(page.read_text(encoding="utf-8"))
+        if is_of_results(part)
+        for line in typed_figures(part)
+    ]
     assert not wrong, "figures belong into docs/results:\n" + "\n".join(wrong)
 
 
@@ -75,6 +81,12 @@ def test_no_figure_is_typed_on_a_page_of_results() -> None:
 def test_a_figure_that_is_typed_is_found(text: str) -> None:
     (found,) = typed_figures("A page.\n\n" + text)
     assert found.startswith("3: ")
+
+
+def test_a_figure_after_code_is_found() -> None:
+    page = "## One\n\n[Table: T](results/a.csv)\n\n    code 7\n\ntakes 8 s\n\n## Two\n\ntakes 9 s\n"
+    found = [typed_figures(part) for part in sections(page) if is_of_results(part)]
+    assert found == [["7: takes 8 s"]]
 
 
 @pytest.mark.parametrize(

@@ -444,7 +444,7 @@ def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     assert took < ASLEEP / 2
     if name == "works_elsewhere":
         assert record.cpu_s is not None
-        assert record.cpu_s > 0.15
+        assert record.cpu_s > 0.12  # of 0.15; processes are counted in ticks of 10 ms
     if record.ran:
         # nothing is left of it: no process, no thread, no file
         assert not left_over(supervisor)

@@ -435,7 +435,7 @@ def refusals(program: Path, files: dict[Path, str], *tool: str) -> list[tuple[st
     """For each file, in which of the kinds it is read, the step that refuses it and the message."""
     asked = "".join(f"{kind} {path}\n" for path, kind in files.items())
     run = subprocess.run([*tool, program], input=asked, capture_output=True, text=True, timeout=300)
-    assert (run.returncode, run.stderr) == (0, ""), "it ended, or printed"
+    assert (run.returncode, run.stderr) == (0, ""), run.stdout[-300:] + run.stderr[-600:]
     found = [line.partition("\t") for line in run.stdout.splitlines()]
     assert len(found) == len(files)
     return [(step, message) for step, _, message in found]

@@ -1,7 +1,8 @@
-// auto: the default. A chain of methods, each cheap to leave, from the fastest that may do to the
-// slowest that nearly always does. The table below is all of it: a stage a line, in their order,
-// first those for the whole problem, then those for each island of contacts (linked through W) that
-// is left. chain/rules.hpp says what each word of it means, chain/chain.cpp walks through it.
+// auto: the default. A chain of methods, each cheap to leave. The first ones are fast and solve
+// most problems, the last ones are slow and solve nearly all. The table below is all of it: a stage
+// a line, in their order, first those for the whole problem, then those for each island of contacts
+// (linked through W) that is left. chain/rules.hpp says what each word of it means, chain/chain.cpp
+// walks through it.
 //
 // Before the chain, r = 0 where nothing approaches. After it, the chain again from r = 0, where it
 // did not solve the problem from a guess.

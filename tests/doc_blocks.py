@@ -27,6 +27,7 @@ class Block:
     code: str
     reason: str = ""  # why it is not run, or not all of it
     words: tuple[str, ...] = ()  # of the lines that the reason is for; none: of all
+    file: str = ""  # the name under which a reader saves it: ```python NAME
 
     def __str__(self) -> str:
         return f"{self.page}:{self.line}"
@@ -51,9 +52,15 @@ class Block:
 
 
 def pages() -> list[Path]:
-    """The pages whose blocks are tested."""
+    """The pages whose blocks are tested one by one."""
     tops = ["README.md", "ARCHITECTURE.md"]
-    return [*(ROOT / name for name in tops), *sorted((ROOT / "docs").glob("*.md"))]
+    docs = sorted((ROOT / "docs").glob("*.md"))
+    return [*(ROOT / name for name in tops), *(page for page in docs if page not in tutorials())]
+
+
+def tutorials() -> list[Path]:
+    """The pages that are followed from the first line to the last, in an empty folder."""
+    return sorted((ROOT / "docs").glob("tutorial-*.md"))
 
 
 def blocks_of(page: Path) -> Iterator[Block]:
@@ -68,9 +75,10 @@ def blocks_of(page: Path) -> Iterator[Block]:
             words = tuple(name.strip() for name in names if name.strip())
         elif token.type in ("fence", "code_block"):
             assert token.map is not None
-            language = token.info.strip() or guess(token.content)
+            language, _, file = token.info.strip().partition(" ")
+            language = language or guess(token.content)
             name = page.relative_to(ROOT).as_posix()
-            yield Block(name, token.map[0] + 1, language, token.content, reason, words)
+            yield Block(name, token.map[0] + 1, language, token.content, reason, words, file)
             reason, words = "", ()
 
 

@@ -33,7 +33,13 @@ AS_THEY_ARE = {
 }
 # the menu; FOLDER/* stands for the generated pages of a folder
 MENU = {
-    "Start": ["first-steps", "examples/index"],
+    "Start": [
+        "tutorial-problem",
+        "tutorial-solver",
+        "tutorial-robot",
+        "tutorial-embed",
+        "examples/index",
+    ],
     "The problem": ["mathematics", "format", "analysis", "glossary"],
     "The collection": ["collection", "families/index", "families-of-your-own", "recorders"],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],

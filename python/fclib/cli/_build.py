@@ -105,8 +105,8 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         origins = Counter(collections.origin_of(row) for row in own)
         errors = [row["error"] for row in own if row["error"] is not None]
 
-        def span(key: str, own: list[dict[str, Any]] = own) -> str:
-            values = [row[key] for row in own if row[key] is not None]
+        def span(*keys: str, own: list[dict[str, Any]] = own) -> str:
+            values = [row[key] for row in own for key in keys if row[key] is not None]
             return f"{min(values):.4g} to {max(values):.4g}" if values else ""
 
         found.append(
@@ -123,7 +123,7 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 "dof": span("n"),
                 "contacts": span("nc"),
                 "density": span("density"),
-                "mu": span("mu_max"),
+                "mu": span("mu_min", "mu_max"),
                 "largest error": max(errors) if errors else "",
             }
         )

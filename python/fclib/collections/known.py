@@ -124,6 +124,10 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
             found[name] = None
         elif name in families():
             found[f"{families()[name].collection}/{name}"] = None
+        elif name.partition("/")[0] in known:
+            own = name.partition("/")[0]
+            has = ", ".join(folder.partition("/")[2] for folder in known[own])
+            raise KeyError(f"the set {own} has no family {name.partition('/')[2]!r}; it has {has}")
         else:
             raise KeyError(
                 f"no set and no family is called {name!r}; sets: {', '.join(known)};"

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from capi_library import compiler, library_folder
 from doc_blocks import blocks_of, tutorials
 

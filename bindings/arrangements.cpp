@@ -1,4 +1,5 @@
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <string>
@@ -43,6 +44,20 @@ void bind_islands(nb::module_& m) {
   numbers("contact", &Islands::contact, "(nc,) the island of each contact");
   numbers("dof", &Islands::dof, "(n,) the island of each degree of freedom");
   numbers("bilateral", &Islands::bilateral, "(p,) the island of each bilateral constraint");
+  cls.def(
+      "__getstate__",
+      [](const Islands& self) {
+        return std::tuple(self.count, self.spacedim, self.contact, self.dof, self.bilateral);
+      },
+      nb::sig("def __getstate__(self) -> tuple[object, ...]"));
+  cls.def(
+      "__setstate__",
+      [](Islands& self, const std::tuple<Index, Index, std::vector<Index>, std::vector<Index>,
+                                         std::vector<Index>>& state) {
+        const auto& [count, spacedim, contact, dof, bilateral] = state;
+        new (&self) Islands{count, spacedim, contact, dof, bilateral};
+      },
+      nb::sig("def __setstate__(self, state: tuple[object, ...], /) -> None"));
   cls.def("__repr__",
           [](const Islands& self) { return "<Islands: " + std::to_string(self.count) + ">"; });
 

@@ -1,5 +1,5 @@
 // Python classes from the fields() of a C++ struct: constructor, properties, copies
-// with changes and pickling.
+// with changes, pickling, comparison.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -10,6 +10,7 @@
 #include "arrays.hpp"
 #include "error.hpp"
 #include "field.hpp"
+#include "problem.hpp"
 #include "problem_info.hpp"
 #include "tables.hpp"
 
@@ -133,6 +134,41 @@ void set_matrix_info(Struct& self, nb::handle value) {
   }
 }
 
+/// Throws Error (problem) at what is wrong with the coefficients of friction that were given.
+///
+/// Their number is that of contacts: a wrong one would be blamed on the matrices later.
+template <class P>
+void check_friction(const P& problem, const nb::dict& values) {
+  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
+    if constexpr (std::is_same_v<Member, Vector>) {
+      const std::string name(field.name);
+      if (field.rows != Dim::nc || !values.contains(name.c_str())) return;
+      const Vector& given = problem.*field.member;
+      Index components = 0;
+      std::string source;
+      if constexpr (requires { problem.W; }) {
+        components = problem.W.rows;
+        source = "rows of W";
+      } else {
+        components = problem.H.cols;
+        source = "columns of H";
+      }
+      // another spacedim, or a matrix of another size, is not the fault of mu
+      const bool counted = problem.spacedim > 0 && components % problem.spacedim == 0;
+      const Index expected = counted ? components / problem.spacedim : -1;
+      if (counted && static_cast<Index>(given.size()) != expected) {
+        throw Error(ErrorKind::problem,
+                    "has " + std::to_string(given.size()) +
+                        " entries, expected nc = " + std::to_string(expected) +
+                        ", one for each contact: " + source + " " + std::to_string(components) +
+                        ", spacedim " + std::to_string(problem.spacedim),
+                    name);
+      }
+      detail::validate_vector(given, static_cast<Index>(given.size()), field, name);
+    }
+  });
+}
+
 enum class Fill { all, changes };
 
 /// Fills a struct from keyword arguments: all that it needs, or what is to change.
@@ -177,6 +213,7 @@ void fill(Struct& self, const nb::dict& values, Fill what = Fill::all) {
       (*changed).*member = table_from(values[name.c_str()], table);
       self.geometry = std::move(changed);
     });
+    check_friction(self, values);
   }
   if (used < values.size()) {
     for (const auto& [key, value] : values) {
@@ -267,6 +304,11 @@ void def_construction(nb::class_<Struct>& cls) {
         return copy;
       },
       nb::sig(signature_of<Struct>("replace", name, Fill::changes).c_str()), doc.c_str());
+}
+
+/// Pickling, and with it copies, by the values of all fields.
+template <class Struct>
+void def_pickling(nb::class_<Struct>& cls) {
   cls.def(
       "__getstate__", [](nb::handle self) { return to_dict<Struct>(self); },
       nb::sig("def __getstate__(self) -> dict[str, object]"));
@@ -277,6 +319,68 @@ void def_construction(nb::class_<Struct>& cls) {
         fill(self, values);
       },
       nb::sig("def __setstate__(self, values: dict[str, object], /) -> None"));
+}
+
+inline bool equal(const Vector& a, const Vector& b) {
+  return a.size() == b.size() && (a.array() == b.array()).all();
+}
+
+/// Whether all members are equal. Matrices are so where they are stored alike.
+template <class Struct>
+bool equal(const Struct& a, const Struct& b) {
+  bool same = true;
+  for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+    const Member& one = a.*field.member;
+    const Member& other = b.*field.member;
+    if constexpr (std::is_same_v<Member, Vector>) {
+      same = same && equal(one, other);
+    } else {
+      same = same && one == other;
+    }
+  });
+  if constexpr (requires { a.geometry; }) {
+    static const Geometry nothing;
+    const Geometry& one = a.geometry ? *a.geometry : nothing;
+    const Geometry& other = b.geometry ? *b.geometry : nothing;
+    same = same && a.info == b.info && one.contacts == other.contacts && one.bodies == other.bodies;
+  }
+  return same;
+}
+
+/// Equality, and a hash of what is quickly read: numbers and vectors.
+template <class Struct>
+void def_equality(nb::class_<Struct>& cls) {
+  cls.def(
+      "__eq__",
+      [](const Struct& self, nb::handle other) {
+        return nb::isinstance<Struct>(other) && equal(self, nb::cast<const Struct&>(other));
+      },
+      nb::sig("def __eq__(self, other: object, /) -> bool"));
+  cls.def("__hash__", [](const Struct& self) {
+    std::size_t hash = 0;
+    const auto add = [&](double value) {
+      hash = 31 * hash + std::hash<double>{}(value + 0.0);  // -0 equals 0
+    };
+    for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+      const Member& member = self.*field.member;
+      if constexpr (std::is_same_v<Member, Vector>) {
+        add(static_cast<double>(member.size()));
+        for (const double value : member) add(value);
+      } else if constexpr (std::is_arithmetic_v<Member>) {
+        add(static_cast<double>(member));
+      }
+    });
+    return static_cast<Py_ssize_t>(hash);
+  });
+}
+
+/// What notebooks show: fclib._display knows how.
+template <class Class>
+void def_html(Class& cls) {
+  cls.def(
+      "_repr_html_",
+      [](nb::handle self) { return nb::module_::import_("fclib._display").attr("html")(self); },
+      nb::sig("def _repr_html_(self) -> str"));
 }
 
 /// Structs of plain values: equal where their members are, and printed as they are made.

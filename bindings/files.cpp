@@ -29,9 +29,19 @@ std::string signature(const std::string& name, const std::string& rest, const st
   return "def " + name + "(" + path_type + rest + ") -> " + result;
 }
 
-const std::string guesses_type = "guesses: collections.abc.Sequence[Solution]";
+const std::string guesses_type =
+    "guesses: collections.abc.Sequence[" + solution_type + "] | numpy.typing.NDArray[typing.Any]";
 const std::string compression_type =
     "compression: int = " + std::to_string(WriteOptions{}.compression);
+
+std::vector<Solution> solutions_from(const nb::object& given) {
+  std::vector<Solution> result;
+  for (const nb::handle one : given) {
+    result.push_back(
+        solution_from(one, ("guesses[" + std::to_string(result.size()) + "]").c_str()));
+  }
+  return result;
+}
 
 /// The options of a mode's name.
 WriteOptions options_of(const std::string& mode, std::initializer_list<std::string_view> modes,
@@ -99,16 +109,18 @@ void bind_hdf5(nb::module_& m) {
       "FileError.");
   m.def(
       "write_solution",
-      [](const fs::path& path, const Solution& solution, int compression) {
+      [](const fs::path& path, const nb::object& given, int compression) {
+        const Solution solution = solution_from(given, "solution");
+        const Unlocked unlocked;
         const Problem problem = read_owner(path.string());
         const Solution whole =
             std::visit([&](const auto& p) { return fclib::complete(p, solution); }, problem);
         write_solution(path.string(), whole, {.replace = true, .compression = compression});
       },
       "path"_a, "solution"_a, nb::kw_only(), "compression"_a = WriteOptions{}.compression,
-      nb::sig(signature("write_solution", ", solution: Solution, *, " + compression_type, "None")
+      nb::sig(signature("write_solution",
+                        ", solution: " + solution_type + ", *, " + compression_type, "None")
                   .c_str()),
-      nb::call_guard<Unlocked>(),
       "Puts a solution into a file that has its problem, in place of the one it had, atomically. "
       "It is that of the global problem where the file holds several.\n\n"
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
@@ -142,8 +154,9 @@ void bind_hdf5(nb::module_& m) {
       "Raises FileError where there is no solution in the file.");
   m.def(
       "write_guesses",
-      [](const fs::path& path, const std::vector<Solution>& guesses, const std::string& mode,
-         int compression) {
+      [](const fs::path& path, const nb::object& given, const std::string& mode, int compression) {
+        const std::vector<Solution> guesses = solutions_from(given);
+        const Unlocked unlocked;
         WriteOptions options = options_of(mode, {"replace", "add"}, compression);
         options.append = mode == "add";
         const Problem problem = read_owner(path.string());
@@ -160,7 +173,6 @@ void bind_hdf5(nb::module_& m) {
                             compression_type,
                         "None")
                   .c_str()),
-      nb::call_guard<Unlocked>(),
       "Puts guesses into a file that has their problem, atomically: in place of those it had "
       "(\"replace\"), or after them (\"add\").\n\n"
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
@@ -168,33 +180,34 @@ void bind_hdf5(nb::module_& m) {
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
         "write",
-        [](const fs::path& path, const P& problem, const Solution* solution,
-           const std::vector<Solution>& guesses, const std::string& mode, int compression,
-           bool dense) {
+        [](const fs::path& path, const P& problem, const nb::object& given,
+           const nb::object& given_guesses, const std::string& mode, int compression, bool dense) {
+          const bool solved = !given.is_none();
+          const Solution solution = solved ? solution_from(given, "solution") : Solution{};
+          const std::vector<Solution> guesses = solutions_from(given_guesses);
+          const Unlocked unlocked;
           WriteOptions options = options_of(mode, {"overwrite", "add", "replace"}, compression);
           options.dense = dense;
-          if (solution == nullptr && guesses.empty()) {
+          if (!solved && guesses.empty()) {
             write_file(path.string(), &problem, nullptr, {}, options);
             return;
           }
           validate(problem);
-          const bool solved = solution != nullptr;
-          const Solution whole = solved ? fclib::complete(problem, *solution) : Solution{};
+          const Solution whole = solved ? fclib::complete(problem, solution) : Solution{};
           write_file(path.string(), &problem, solved ? &whole : nullptr, complete(problem, guesses),
                      options);
         },
-        "path"_a, "problem"_a, "solution"_a.none() = nb::none(),
-        "guesses"_a = std::vector<Solution>{}, nb::kw_only(), "mode"_a = "overwrite",
-        "compression"_a = WriteOptions{}.compression, "dense"_a = false,
+        "path"_a, "problem"_a, "solution"_a.none() = nb::none(), "guesses"_a = nb::tuple(),
+        nb::kw_only(), "mode"_a = "overwrite", "compression"_a = WriteOptions{}.compression,
+        "dense"_a = false,
         nb::sig(signature("write",
-                          ", problem: " + class_name(P::kind) +
-                              ", solution: Solution | None = None, " + guesses_type +
+                          ", problem: " + class_name(P::kind) + ", solution: " + solution_type +
+                              " | None = None, " + guesses_type +
                               " = (), *, mode: typing.Literal['overwrite', 'add', 'replace'] = "
                               "'overwrite', " +
                               compression_type + ", dense: bool = False",
                           "None")
                     .c_str()),
-        nb::call_guard<Unlocked>(),
         "Writes an FCLIB file, atomically. What the solution and the guesses lack of v and u is "
         "completed: readers of libfclib 3.1 need it.\n\n"
         "A file that is there is replaced whole (\"overwrite\"); or it keeps what it holds, and "

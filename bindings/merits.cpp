@@ -1,5 +1,6 @@
 #include <nanobind/stl/string.h>
 
+#include <cstdio>
 #include <string>
 
 #include "fields.hpp"
@@ -14,6 +15,17 @@ using namespace nb::literals;
 void bind_merits(nb::module_& m) {
   nb::class_<Merit> merit_class(m, "Merit", "How good a solution is, judged from the data alone.");
   def_fields(merit_class);
+  def_pickling(merit_class);
+  def_equality(merit_class);
+  def_html(merit_class);
+  merit_class.def("__repr__", [](const Merit& self) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "<Merit: error %.1e, natural %.1e, scaled %.1e; %d open, %d stick, %d slide>",
+                  self.error, self.natural, self.scaled_natural, static_cast<int>(self.open),
+                  static_cast<int>(self.stick), static_cast<int>(self.slide));
+    return std::string(text);
+  });
   merit_class.def(
       "error_by",
       [](const Merit& merit, const std::string& kind) {
@@ -26,14 +38,24 @@ void bind_merits(nb::module_& m) {
       "error, where merit is 'both'; where it is 'natural' the same without scaled_natural.\n\n"
       "Raises OptionError for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
+    const auto signature = [](const std::string& name, const std::string& result) {
+      return "def " + name + "(problem: " + class_name(P::kind) + ", solution: " + solution_type +
+             ") -> " + result;
+    };
     m.def(
-        "merit_1", [](const P& p, const Solution& s) { return merit_1(p, s); }, "problem"_a,
-        "solution"_a, nb::call_guard<Unlocked>(),
+        "merit_1",
+        [](const P& p, const nb::object& given) {
+          const Solution s = solution_from(given, "solution");
+          const Unlocked unlocked;
+          return merit_1(p, s);
+        },
+        "problem"_a, "solution"_a, nb::sig(signature("merit_1", "float").c_str()),
         "What libfclib calls MERIT_1, for comparisons with it.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "contact_merits",
-        [](const P& p, const Solution& s) {
+        [](const P& p, const nb::object& given) {
+          const Solution s = solution_from(given, "solution");
           const ContactMerits merits = [&] {
             const Unlocked unlocked;
             return contact_merits(p, s);
@@ -67,9 +89,7 @@ void bind_merits(nb::module_& m) {
           return result;
         },
         "problem"_a, "solution"_a,
-        nb::sig(("def contact_merits(problem: " + class_name(P::kind) +
-                 ", solution: Solution) -> dict[str, typing.Any]")
-                    .c_str()),
+        nb::sig(signature("contact_merits", "dict[str, typing.Any]").c_str()),
         "The merit contact by contact: status (open, stick, slide), u (m,) recomputed, natural "
         "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,); and "
         "mismatches: of each of v, u and l that is stored the component that is worst, a dict of "
@@ -77,9 +97,15 @@ void bind_merits(nb::module_& m) {
         "difference beyond rounding over the velocity of its component.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
-        "merit", [](const P& p, const Solution& s) { return merit(p, s); }, "problem"_a,
-        "solution"_a, nb::call_guard<Unlocked>(),
-        "The merit of a solution. A missing v is computed, a missing u is not judged.\n\n"
+        "merit",
+        [](const P& p, const nb::object& given) {
+          const Solution s = solution_from(given, "solution");
+          const Unlocked unlocked;
+          return merit(p, s);
+        },
+        "problem"_a, "solution"_a, nb::sig(signature("merit", "Merit").c_str()),
+        "The merit of a solution, which may be a Result, or the reactions alone. A missing v is "
+        "computed, a missing u is not judged.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
   });
 }

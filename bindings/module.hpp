@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include "solution.hpp"
+
 namespace fclib::bindings {
 
 namespace nb = nanobind;
@@ -15,6 +17,10 @@ using Unlocked = nb::gil_scoped_release;
 std::string class_name(std::string_view kind);
 /// "GlobalProblem | LocalProblem"
 std::string problem_union();
+
+/// What is taken where a solution or a guess is: a Solution, a Result, or the reactions alone.
+Solution solution_from(nb::handle object, const char* what);
+const std::string solution_type = "Solution | Result | numpy.typing.ArrayLike";
 
 // in this order: signatures name the classes that are bound before
 

@@ -38,7 +38,10 @@ void bind_problem(nb::module_& m) {
   const std::string name = class_name(P::kind);
   nb::class_<P> cls(m, name.c_str(), P::doc);
   def_construction(cls);
+  def_pickling(cls);
   def_fields(cls);
+  def_equality(cls);
+  def_html(cls);
   cls.def_prop_ro("info", [](const P& p) { return p.info; }, "title, description, math_info");
   cls.def_prop_ro(
       "matrix_info",
@@ -87,16 +90,31 @@ void bind_problem(nb::module_& m) {
 void bind_problems(nb::module_& m) {
   nb::class_<ProblemInfo> info(m, "ProblemInfo", "What a file says about its problem in words.");
   def_construction(info);
+  def_pickling(info);
   def_fields(info);
   def_value(info);
   nb::class_<MatrixInfo> matrix_info(
       m, "MatrixInfo", "What is known of a matrix and cannot be read off its entries.");
   def_construction(matrix_info);
+  def_pickling(matrix_info);
   def_fields(matrix_info);
   def_value(matrix_info);
   nb::class_<Solution> solution(m, "Solution", "A solution, or a guess, of any formulation.");
   def_construction(solution);
+  def_pickling(solution);
   def_fields(solution);
+  def_equality(solution);
+  def_html(solution);
+  solution.def("__repr__", [](const Solution& self) {
+    std::string text;
+    for_each_field<Solution>([&](const auto& field) {
+      const Vector& values = self.*field.member;
+      if (values.size() == 0 && field.name != "r") return;
+      text += (text.empty() ? "" : ", ") + std::string(field.name) + " (" +
+              std::to_string(values.size()) + ",)";
+    });
+    return "<Solution: " + text + ">";
+  });
   for_each_formulation([&]<class P>(std::type_identity<P>) { bind_problem<P>(m); });
 }
 

@@ -10,8 +10,10 @@
 
 #include <algorithm>
 #include <string>
+#include <tuple>
 
 #include "arrays.hpp"
+#include "fields.hpp"
 #include "fingerprints.hpp"
 #include "module.hpp"
 #include "solve/driver.hpp"
@@ -70,7 +72,7 @@ void bind_solve(nb::module_& m) {
   m.def(
       "solve",
       [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
-         double time_limit, const OptionValues& options, const Solution* guess,
+         double time_limit, const OptionValues& options, const nb::object& guess,
          const nb::object& callback, bool history, bool natural, const nb::object& clock) {
         Settings settings{.tolerance = tolerance,
                           .merit = natural ? MeritKind::natural : MeritKind::both,
@@ -80,8 +82,9 @@ void bind_solve(nb::module_& m) {
                           .poll = poll_signals,
                           .clock = make_clock(clock),
                           .history = history};
+        const Solution start = guess.is_none() ? Solution{} : solution_from(guess, "guess");
         const Unlocked unlocked;
-        return solve(problem, solver, settings, options, guess != nullptr ? *guess : Solution{});
+        return solve(problem, solver, settings, options, start);
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
       "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
@@ -104,10 +107,172 @@ nb::object history_of(const Result& result) {
   return nb::module_::import_("numpy").attr("array")(points, "dtype"_a = type);
 }
 
+/// Of a class that no user makes: pickling, and with it copies, by what `get` gives and `set`
+/// takes.
+template <class Class, class Get, class Set>
+void def_state(nb::class_<Class>& cls, Get get, Set set) {
+  cls.def("__getstate__", get, nb::sig("def __getstate__(self) -> dict[str, object]"));
+  cls.def(
+      "__setstate__",
+      [set](Class& self, const nb::dict& values) {
+        new (&self) Class();
+        set(self, values);
+      },
+      nb::sig("def __setstate__(self, values: dict[str, object], /) -> None"));
+}
+
+template <class Member>
+void take(Member& member, const nb::dict& values, const char* name) {
+  member = nb::cast<Member>(values[name]);
+}
+
+nb::dict state_of(const OptionInfo& option) {
+  nb::dict values;
+  values["name"] = option.name;
+  values["type"] = option.type;
+  values["default"] = option.default_value;
+  values["unit"] = option.unit;
+  values["doc"] = option.doc;
+  values["choices"] = option.choices;
+  values["lowest"] = option.lowest;
+  values["highest"] = option.highest;
+  return values;
+}
+
+void set_state(OptionInfo& option, const nb::dict& values) {
+  take(option.name, values, "name");
+  take(option.type, values, "type");
+  take(option.default_value, values, "default");
+  take(option.unit, values, "unit");
+  take(option.doc, values, "doc");
+  take(option.choices, values, "choices");
+  take(option.lowest, values, "lowest");
+  take(option.highest, values, "highest");
+}
+
+nb::dict state_of(const Stage& stage) {
+  nb::dict values;
+  values["name"] = stage.kind.name;
+  values["families"] = stage.kind.families;
+  values["calls"] = stage.calls;
+  values["solved"] = stage.solved;
+  values["iterations"] = stage.iterations;
+  values["factorisations"] = stage.factorisations;
+  values["time"] = stage.time;
+  return values;
+}
+
+void set_state(Stage& stage, const nb::dict& values) {
+  take(stage.kind.name, values, "name");
+  take(stage.kind.families, values, "families");
+  take(stage.calls, values, "calls");
+  take(stage.solved, values, "solved");
+  take(stage.iterations, values, "iterations");
+  take(stage.factorisations, values, "factorisations");
+  take(stage.time, values, "time");
+}
+
+bool same(const Stage& a, const Stage& b) {
+  return std::tie(a.kind.name, a.kind.families, a.calls, a.solved, a.iterations,
+                  a.factorisations) ==
+         std::tie(b.kind.name, b.kind.families, b.calls, b.solved, b.iterations, b.factorisations);
+}
+
+using Point = std::tuple<std::int64_t, double, double, std::string>;
+
+nb::dict state_of(const Result& result) {
+  nb::dict values;
+  values["solution"] = result.solution;
+  values["status"] = static_cast<int>(result.status);
+  values["iterations"] = result.iterations;
+  values["error"] = result.error;
+  values["cpu_s"] = result.cpu_s;
+  values["setup_s"] = result.setup_s;
+  values["solver"] = result.solver;
+  const NoSolution& proof = result.certificate;
+  values["certificate"] = std::tuple(proof.y, proof.z, proof.gain, proof.distance, proof.bound);
+  values["stages"] = result.stages;
+  std::optional<std::vector<Point>> history;
+  if (result.history) {
+    history.emplace();
+    for (const HistoryPoint& point : *result.history) {
+      history->emplace_back(point.iteration, point.error, point.time, point.stage);
+    }
+  }
+  values["history"] = history;
+  return values;
+}
+
+void set_state(Result& result, const nb::dict& values) {
+  take(result.solution, values, "solution");
+  int status = 0;
+  take(status, values, "status");
+  if (status < 0 || status > static_cast<int>(Status::infeasible)) {
+    throw nb::value_error("a result of this status is not of this version");
+  }
+  result.status = static_cast<Status>(status);
+  take(result.iterations, values, "iterations");
+  take(result.error, values, "error");
+  take(result.cpu_s, values, "cpu_s");
+  take(result.setup_s, values, "setup_s");
+  take(result.solver, values, "solver");
+  std::tuple<Vector, Vector, double, double, double> proof;
+  take(proof, values, "certificate");
+  auto& [y, z, gain, distance, bound] = proof;
+  result.certificate = {y, z, gain, distance, bound};
+  take(result.stages, values, "stages");
+  std::optional<std::vector<Point>> history;
+  take(history, values, "history");
+  if (!history) return;
+  result.history.emplace();
+  for (const auto& [iteration, error, time, stage] : *history) {
+    result.history->push_back({iteration, error, time, stage});
+  }
+}
+
+/// But for the times, which no second run repeats.
+bool same(const Result& a, const Result& b) {
+  const auto same_point = [](const HistoryPoint& one, const HistoryPoint& other) {
+    return std::tie(one.iteration, one.error, one.stage) ==
+           std::tie(other.iteration, other.error, other.stage);
+  };
+  if (a.history.has_value() != b.history.has_value()) return false;
+  return std::tie(a.status, a.iterations, a.error, a.solver, a.certificate.bound) ==
+             std::tie(b.status, b.iterations, b.error, b.solver, b.certificate.bound) &&
+         equal(a.solution, b.solution) && equal(a.certificate.y, b.certificate.y) &&
+         equal(a.certificate.z, b.certificate.z) &&
+         std::ranges::equal(a.stages, b.stages,
+                            [](const Stage& x, const Stage& y) { return same(x, y); }) &&
+         (!a.history || std::ranges::equal(*a.history, *b.history, same_point));
+}
+
+/// Equality by `same`, and a hash of the name that says which it is.
+template <class Class, class Same, class Name>
+void def_same(nb::class_<Class>& cls, Same same, Name name) {
+  cls.def(
+      "__eq__",
+      [same](const Class& self, nb::handle other) {
+        return nb::isinstance<Class>(other) && same(self, nb::cast<const Class&>(other));
+      },
+      nb::sig("def __eq__(self, other: object, /) -> bool"));
+  cls.def("__hash__", [name](const Class& self) {
+    return static_cast<Py_ssize_t>(std::hash<std::string>{}(name(self)));
+  });
+}
+
 }  // namespace
 
+Solution solution_from(nb::handle object, const char* what) {
+  if (nb::isinstance<Solution>(object)) return nb::cast<const Solution&>(object);
+  if (nb::isinstance<Result>(object)) return nb::cast<const Result&>(object).solution;
+  Solution solution;
+  solution.r = vector_from(object, what);
+  return solution;
+}
+
 void bind_solvers(nb::module_& m) {
-  nb::class_<OptionInfo>(m, "OptionInfo", "An option of a solver.")
+  nb::class_<OptionInfo> option(m, "OptionInfo", "An option of a solver.");
+  option
       .def(
           "__init__",
           [](OptionInfo* self, const std::string& name, const std::string& type,
@@ -125,6 +290,20 @@ void bind_solvers(nb::module_& m) {
       .def_ro("choices", &OptionInfo::choices, "the values of a choice")
       .def_ro("lowest", &OptionInfo::lowest)
       .def_ro("highest", &OptionInfo::highest);
+  def_state(
+      option, [](const OptionInfo& self) { return state_of(self); },
+      [](OptionInfo& self, const nb::dict& values) { set_state(self, values); });
+  def_same(
+      option,
+      [](const OptionInfo& a, const OptionInfo& b) {
+        return nb::cast<bool>(nb::object(state_of(a)).equal(state_of(b)));
+      },
+      [](const OptionInfo& self) { return self.name; });
+  option.def("__repr__", [](const OptionInfo& self) {
+    const nb::object value = nb::cast(self.default_value);
+    return "<OptionInfo " + self.name + ": " + self.type + " = " +
+           nb::cast<std::string>(nb::repr(value)) + ">";
+  });
   nb::class_<Solver>(m, "SolverInfo", "A solver of the registry.")
       .def_ro("name", &Solver::name)
       .def_ro("family", &Solver::family)
@@ -140,7 +319,17 @@ void bind_solvers(nb::module_& m) {
           "check_options",
           [](const Solver& s, const OptionValues& options) { s.check_options(options); },
           "options"_a,
-          "Raises OptionError at the first option that is unknown or has a wrong value.");
+          "Raises OptionError at the first option that is unknown or has a wrong value.")
+      // by its name: a solver is code
+      .def(
+          "__reduce__",
+          [](const Solver& s) {
+            return nb::make_tuple(nb::module_::import_("fclib._registry").attr("find_solver"),
+                                  nb::make_tuple(s.name));
+          },
+          nb::sig("def __reduce__(self) -> tuple[object, ...]"))
+      .def("__repr__",
+           [](const Solver& s) { return "<SolverInfo " + s.name + ": " + s.title + ">"; });
   m.def(
       "solvers",
       [] {
@@ -159,8 +348,14 @@ void bind_solvers(nb::module_& m) {
       "The solver of this name in the core. Raises OptionError where there is none.");
   bind_python_solvers(m);
 
-  nb::class_<Stage>(m, "Stage", "A part of a solve, by a method of its own.")
-      .def_prop_ro("name", [](const Stage& s) { return s.kind.name; })
+  nb::class_<Stage> stage(m, "Stage", "A part of a solve, by a method of its own.");
+  def_state(
+      stage, [](const Stage& self) { return state_of(self); },
+      [](Stage& self, const nb::dict& values) { set_state(self, values); });
+  def_same(
+      stage, [](const Stage& a, const Stage& b) { return same(a, b); },
+      [](const Stage& self) { return self.kind.name; });
+  stage.def_prop_ro("name", [](const Stage& s) { return s.kind.name; })
       .def_prop_ro(
           "families", [](const Stage& s) { return s.kind.families; },
           "of solvers whose methods it uses, separated by ', '")
@@ -173,8 +368,17 @@ void bind_solvers(nb::module_& m) {
         return "<Stage " + s.kind.name + ": solved " + std::to_string(s.solved) + " of " +
                std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
       });
-  nb::class_<Result>(m, "Result", "What fclib.solve returns.")
-      .def_ro("solution", &Result::solution)
+  nb::class_<Result> result(m, "Result",
+                            "What fclib.solve returns. Results are equal where all but their times "
+                            "are.");
+  def_state(
+      result, [](const Result& self) { return state_of(self); },
+      [](Result& self, const nb::dict& values) { set_state(self, values); });
+  def_same(
+      result, [](const Result& a, const Result& b) { return same(a, b); },
+      [](const Result& self) { return self.solver + std::to_string(self.iterations); });
+  def_html(result);
+  result.def_ro("solution", &Result::solution)
       .def_prop_ro(
           "status", [](const Result& r) { return std::string(name_of(r.status)); },
           "converged, iteration_limit, time_limit, diverged, inaccurate, stalled, interrupted or\n"
@@ -230,6 +434,18 @@ void bind_solvers(nb::module_& m) {
                       static_cast<long long>(r.iterations), r.error, r.cpu_s);
         return std::string(text);
       });
+  m.def(
+      "solution_from",
+      [](const nb::object& given, const std::string& what) {
+        return solution_from(given, what.c_str());
+      },
+      "given"_a, "what"_a = "solution",
+      nb::sig(
+          ("def solution_from(given: " + solution_type + ", what: str = 'solution') -> Solution")
+              .c_str()),
+      "What is taken where a solution or a guess is: a Solution, that of a Result, or "
+      "reactions.\n\n"
+      "Raises ProblemError, by the name of what it is, for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) { bind_solve<P>(m); });
 }
 

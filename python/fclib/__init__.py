@@ -92,8 +92,7 @@ def load(name: str, form: str | None = None, folder: "str | Path | None" = None)
     """
     from fclib import collections
 
-    problem: Problem = collections.load(name, form, folder)
-    return problem
+    return collections.load(name, form, folder)
 
 
 def sequence(

@@ -186,10 +186,7 @@ class _Point:
             raise _core.UnsuitableError(
                 f"{type(problem).__name__}: derivatives are there for problems without rolling"
             )
-        if isinstance(solution, _core.Result):
-            solution = solution.solution
-        elif not isinstance(solution, _core.Solution):
-            solution = _core.Solution(r=solution)
+        solution = _core.solution_from(solution)
         self.problem = problem
         self.d, self.nc, self.m, self.p = problem.spacedim, problem.nc, problem.m, problem.p
         self.r = solution.r

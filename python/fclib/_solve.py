@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Literal, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from fclib import _core
 from fclib._registry import find_solver
@@ -19,6 +20,8 @@ Problem: TypeAlias = (
     | _core.GlobalRollingProblem
 )
 
+# what is taken where a solution or a guess is
+Given: TypeAlias = _core.Solution | _core.Result | npt.ArrayLike
 MeritKind: TypeAlias = Literal["both", "natural"]
 Value: TypeAlias = bool | int | float | str | Path | list[str]
 
@@ -30,7 +33,7 @@ def solve(
     *,
     max_iterations: int | None = None,
     time_limit: float | None = None,
-    guess: _core.Solution | None = None,
+    guess: Given | None = None,
     callback: Callable[[int, float, float, str], bool | None] | None = None,
     history: bool = False,
     merit: MeritKind = "both",
@@ -44,7 +47,7 @@ def solve(
         tol: bound on ``Merit.error``.
         max_iterations: limit of the solver's iterations, its own default where None.
         time_limit: [s] limit of wall-clock time.
-        guess: a starting point; of it ``r`` is used.
+        guess: a starting point: reactions (m,), or a Solution or Result, of which ``r`` is used.
         callback: called as ``callback(iteration, error, seconds, stage)`` where the solver
             evaluates its error; returning False stops it. ``stage`` is empty but for solvers that
             chain others, as ``auto`` does.

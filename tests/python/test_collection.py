@@ -720,3 +720,37 @@ def test_unwritable_folder_is_one_line(tmp_path: Path) -> None:
     *said, error = done.stderr.splitlines()
     assert "below" in error
     assert all("is stored of" in line for line in said)
+
+
+def test_a_collection_is_filtered_by_its_catalogue() -> None:
+    problems = fclib.collection("tiny")
+    rows = problems.catalog.to_pylist()
+    small = problems.filter(nc=(5, 20), family=["Wall", "FourBar", "RollingDiscs"])
+    expected = [
+        row["id"]
+        for row in rows
+        if 5 <= row["nc"] <= 20 and row["family"] in ("Wall", "FourBar", "RollingDiscs")
+    ]
+    assert small.ids == expected
+    assert 0 < len(small) < len(problems)
+    assert [one.nc for one in small] == [row["nc"] for row in small.catalog.to_pylist()]
+    assert fclib.digest(small[0]) == fclib.digest(problems[small.ids[0]])
+    sliding = small.filter(lambda row: row["slide"] > 0, mu_max=lambda mu: mu < 1)
+    assert set(sliding.ids) <= set(small.ids)
+    assert "nc=(5, 20)" in repr(small)
+    assert len(problems.filter(nc=(None, 0))) == 0
+    with pytest.raises(KeyError, match="no column 'size'"):
+        problems.filter(size=3)
+    with pytest.raises(ValueError, match="bounds are two"):
+        problems.filter(nc=(1, 2, 3))
+    with pytest.raises(IndexError):
+        small[len(small)]
+
+
+def test_a_catalogue_is_a_data_frame(monkeypatch: pytest.MonkeyPatch) -> None:
+    problems = fclib.collection("tiny")
+    pytest.importorskip("pandas")
+    assert list(problems.to_pandas()["id"]) == problems.ids
+    monkeypatch.setitem(sys.modules, "polars", None)
+    with pytest.raises(ImportError, match="pip install polars"):
+        problems.to_polars()

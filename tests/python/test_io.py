@@ -671,7 +671,7 @@ def written(tmp_path: Path) -> Path:
 
 
 def invalid_problem() -> fclib.LocalProblem:
-    return fclib.LocalProblem(W=np.eye(3), q=np.zeros(3), mu=[-1.0])
+    return fclib.LocalProblem(W=np.eye(3), q=[np.nan, 0, 0], mu=[1.0])
 
 
 def test_a_rewritten_file_is_the_new_one_alone(written: Path) -> None:
@@ -684,7 +684,7 @@ def test_a_rewritten_file_is_the_new_one_alone(written: Path) -> None:
 
 def test_an_invalid_problem_leaves_the_old_file(written: Path) -> None:
     before = (written / "p.hdf5").read_bytes()
-    with pytest.raises(fclib.ProblemError, match=r"p\.hdf5.*mu\[0\]"):
+    with pytest.raises(fclib.ProblemError, match=r"p\.hdf5.*q\[0\]"):
         fclib.write(written / "p.hdf5", invalid_problem())
     with pytest.raises(fclib.ProblemError, match="/solution/r"):
         fclib.write_solution(written / "p.hdf5", fclib.Solution(r=np.zeros(3)))

@@ -194,8 +194,7 @@ def test_an_invalid_problem_has_no_merit() -> None:
     r = np.zeros(3)
     for problem in (
         fclib.LocalProblem(W=np.eye(3), q=[np.nan, 0, 0], mu=[1.0]),
-        fclib.LocalProblem(W=np.eye(3), q=np.zeros(3), mu=[-1.0]),
-        fclib.LocalProblem(W=np.eye(6), q=np.zeros(3), mu=[1.0]),
+        fclib.LocalProblem(W=np.eye(6), q=np.zeros(3), mu=[1.0, 1.0]),
         fclib.LocalProblem(W=np.eye(3), q=np.zeros(3), mu=[1.0], spacedim=5),
     ):
         with pytest.raises(fclib.ProblemError):

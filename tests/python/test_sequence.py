@@ -45,6 +45,8 @@ def test_guesses_are_the_impulses_of_the_same_contacts(built: Path) -> None:
         assert guess is not None
         np.testing.assert_array_equal(guess.r, stored[0].r)
         assert before.solution is not None
+        assert before.problem.contacts is not None
+        assert step.problem.contacts is not None
         known = dict(
             zip(before.problem.contacts.identity, before.solution.r.reshape(-1, 3), strict=True)
         )

@@ -1,7 +1,7 @@
 """The collection: families of problems, built from scenes, with a catalogue.
 
     fclib.collection("rt444")[100]      a problem, from the user's folder; built if it is not there
-    fclib.load("tiny/BoxesStack/0030")  one that comes with the package
+    fclib.load("tiny/RollingDiscs/0040")  one that comes with the package
     collections.record(...)             scenes ──> trajectories: simulates, solves each step
     collections.build(...)              trajectories ──> problems, solutions, files ──> catalogue
     collections.verify(...)             files again as the catalogue says, solutions judged anew

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _geometry
+from fclib._solve import Given
 
 
-def guess_of(before: Any, solution: _core.Solution, problem: Any) -> _core.Solution | None:
+def guess_of(before: Any, solution: Given, problem: Any) -> _core.Solution | None:
     """What a solution of a problem says of another one's, contact by contact.
 
     A contact that is new has no reaction, and multipliers stay where there are as many. None where
@@ -20,6 +21,7 @@ def guess_of(before: Any, solution: _core.Solution, problem: Any) -> _core.Solut
     """
     if before.contacts is None or problem.contacts is None or before.spacedim != problem.spacedim:
         return None
+    solution = _core.solution_from(solution)
     planar = problem.bodies is not None and problem.bodies.is_planar
     r = _geometry.carried(
         before.contacts, problem.contacts, solution.r, problem.spacedim, planar=planar

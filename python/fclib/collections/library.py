@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import copy
+import importlib
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import Any, overload
 
 from fclib import _core
+from fclib._solve import Problem
 from fclib.collections import archives, catalog, known, published
 from fclib.collections.build import build
 
@@ -50,7 +54,7 @@ def ensure(name: str, folder: Path) -> None:
 
 def folders_in(folder: Path, name: str) -> list[str]:
     """The folders SET/FAMILY that a collection has of a set, or a family in one, of one's own."""
-    if name.split("/")[0] in known.sets() or not re.fullmatch(r"[\w.-]+(/[\w.-]+)?", name):
+    if not re.fullmatch(r"[\w.-]+(/[\w.-]+)?", name):
         return []
     pattern = name if "/" in name else f"{name}/*"
     return [
@@ -65,18 +69,22 @@ def version_in(part: Path) -> str | None:
     return found[0] if found else None
 
 
-class Collection(Sequence[Any]):
+class Collection(Sequence[Problem]):
     """The problems of a set or a family, in the order of their names; read when asked for.
 
     >>> problems = fclib.collection("rt444")
     >>> problems[0], problems["rt444/KaplasTower/0100"]
-    >>> problems.catalog.to_pandas()
+    >>> for problem in problems.filter(family="Chain", nc=(10, 20)):
+    ...     print(fclib.solve(problem))
+    >>> problems.to_pandas()
     """
 
     def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
         """KeyError, with the known names, where there is no such set or family."""
         self.name = name
-        own = folders_in(Path(folder) if folder is not None else default_folder(), name)
+        # a set that comes with the package needs nothing that knows of folders
+        ours = name.split("/")[0] in known.sets()
+        own = [] if ours else folders_in(Path(folder) if folder else default_folder(), name)
         self.folders = own or known.folders([name])
         shipped = all(own.split("/")[0] in known.SHIPPED for own in self.folders)
         if shipped:
@@ -84,9 +92,12 @@ class Collection(Sequence[Any]):
         else:
             self.folder = Path(folder) if folder is not None else default_folder()
         self._catalog: Any = None
+        self._places: dict[str, int] | None = None
+        self._filters: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        return f"Collection({self.name!r}, {str(self.folder)!r})"
+        text = f"Collection({self.name!r}, {str(self.folder)!r})"
+        return text + "".join(f".filter({one})" for one in self._filters)
 
     @property
     def catalog(self) -> Any:
@@ -107,49 +118,128 @@ class Collection(Sequence[Any]):
             )
         return self._catalog
 
+    def filter(
+        self, rows: Callable[[Mapping[str, Any]], bool] | None = None, /, **columns: Any
+    ) -> Collection:
+        """The problems of certain rows of the catalogue, all that is asked being true.
+
+        >>> problems.filter(family="Chain", nc=(10, 20), mu_max=lambda mu: mu < 0.5)
+        >>> problems.filter(lambda row: row["slide"] > row["stick"])
+
+        Args:
+            rows: is given each row, as a dict by column.
+            columns: of each column a value; bounds (lowest, highest), None where there is none; a
+                list or a set of values; or a function that is true of the values wanted. A row
+                without the value is left out, unless None is asked for.
+
+        Raises:
+            KeyError: the catalogue has no such column.
+        """
+        table = self.catalog
+        if unknown := sorted(columns.keys() - set(table.column_names)):
+            raise KeyError(
+                f"the catalogue of {self.name} has no column {unknown[0]!r}; there are: "
+                + ", ".join(table.column_names)
+            )
+        kept = [True] * table.num_rows
+        for name, wanted in columns.items():
+            for k, value in enumerate(table[name].to_pylist()):
+                kept[k] = kept[k] and is_wanted(value, wanted)
+        if rows is not None:
+            for k, row in enumerate(table.to_pylist()):
+                kept[k] = kept[k] and bool(rows(row))
+        found = copy.copy(self)
+        found._catalog = table.filter(catalog.arrow().array(kept, "bool"))
+        found._places = None
+        said = [] if rows is None else [getattr(rows, "__name__", "...")]
+        said += [f"{name}={wanted!r}" for name, wanted in columns.items()]
+        found._filters = (*self._filters, ", ".join(said))
+        return found
+
+    def to_pandas(self) -> Any:
+        """The catalogue as pandas.DataFrame. ImportError where pandas is not installed."""
+        installed("pandas")
+        return self.catalog.to_pandas()
+
+    def to_polars(self) -> Any:
+        """The catalogue as polars.DataFrame. ImportError where polars is not installed."""
+        return installed("polars").from_arrow(self.catalog)
+
     @property
     def ids(self) -> list[str]:
         """The names of the problems."""
-        names: list[str] = self.catalog["id"].to_pylist()
-        return names
+        return list(self._place_of())
+
+    def _place_of(self) -> dict[str, int]:
+        if self._places is None:
+            self._places = {name: k for k, name in enumerate(self.catalog["id"].to_pylist())}
+        return self._places
 
     def path(self, which: int | str, form: str | None = None) -> Path:
         """The file of a problem, by its place or its name. IndexError, KeyError.
 
         The form is "global" or "local"; by default the global one of a problem that has both.
         """
-        ids = self.ids
         if isinstance(which, str):
-            if which not in ids:
-                raise KeyError(f"{self.name} has no problem {which!r}; the first is {ids[0]!r}")
-            which = ids.index(which)
+            places = self._place_of()
+            if which not in places:
+                first = f"; the first is {next(iter(places))!r}" if places else ": it is empty"
+                raise KeyError(f"{self.name} has no problem {which!r}{first}")
+            which = places[which]
+        if not -len(self) <= which < len(self):
+            raise IndexError(f"{self!r} has {len(self)} problems, and none of number {which}")
         for name in (form,) if form else FORMS:
             file: str | None = self.catalog[f"{name}_file"][which].as_py()
             if file is not None:
                 return self.folder / file
-        raise KeyError(f"the {form} form of {ids[which]} was not built, or it has none")
+        raise KeyError(f"the {form} form of {self.ids[which]} was not built, or it has none")
 
     def solution(self, which: int | str, form: str | None = None) -> _core.Solution | None:
         """The stored solution of a problem."""
         return _core.read_solution(self.path(which, form))
 
     def __len__(self) -> int:
-        return len(self.ids)
+        return len(self._place_of())
 
     @overload
-    def __getitem__(self, which: int | str) -> Any: ...
+    def __getitem__(self, which: int | str) -> Problem: ...
 
     @overload
-    def __getitem__(self, which: slice) -> list[Any]: ...
+    def __getitem__(self, which: slice) -> list[Problem]: ...
 
-    def __getitem__(self, which: int | str | slice) -> Any:
+    def __getitem__(self, which: int | str | slice) -> Problem | list[Problem]:
         """The global form, or the only one, of a problem, by its place or its name."""
         if isinstance(which, slice):
             return [self[i] for i in range(*which.indices(len(self)))]
         return _core.read(self.path(which))
 
 
-def load(name: str, form: str | None = None, folder: str | Path | None = None) -> Any:
+def is_wanted(value: Any, wanted: Any) -> bool:
+    """Whether a value is what Collection.filter was asked for."""
+    if callable(wanted):
+        return value is not None and bool(wanted(value))
+    if isinstance(wanted, tuple):
+        if len(wanted) != 2:
+            raise ValueError(f"bounds are two, (lowest, highest), and a list has values: {wanted}")
+        low, high = wanted
+        inside = value is not None and (low is None or value >= low)
+        return inside and (high is None or value <= high)
+    if isinstance(wanted, (list, AbstractSet)):
+        return value in wanted
+    return bool(value == wanted)
+
+
+def installed(package: str) -> Any:
+    """A package that is no requirement. ImportError, with what to install."""
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise ImportError(
+            f"{package} is not there ({error}); install it with: pip install {package}"
+        ) from error
+
+
+def load(name: str, form: str | None = None, folder: str | Path | None = None) -> Problem:
     """One problem by its name, as ``"rt444/KaplasTower/0100"``.
 
     Args:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from fclib import _core
+from fclib._solve import Given, Problem
 from fclib.collections.guesses import guess_of
 from fclib.collections.library import Collection
 
@@ -25,12 +25,14 @@ class Step:
 
     id: str  # SET/FAMILY/NUMBER
     step: int  # of the simulation
-    problem: Any
+    problem: Problem
     solution: _core.Solution | None  # the stored one
     before: Step | None  # None where the step before is not there; it knows of no one before it
 
-    def guess(self, solution: _core.Solution | None = None) -> _core.Solution | None:
-        """A guess from a solution of the step before, by default the stored one.
+    def guess(self, solution: Given | None = None) -> _core.Solution | None:
+        """A guess from a solution (or a result, or reactions) of the step before.
+
+        By default from the stored one.
 
         None at the first problem, after a step without a problem, and where the contacts of one of
         the two have no names.

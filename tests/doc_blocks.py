@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ from markdown_it import MarkdownIt
 ROOT = Path(__file__).parent.parent
 # `<!-- not run: why -->` before a block, or `<!-- not run (word, word): why -->` for some lines
 MARK = re.compile(r"<!--\s*not run(?: \(([^)]*)\))?:\s*(.*?)\s*-->", re.DOTALL)
+# `<!-- needs: a module, another -->`: run where these are installed
+NEEDS = re.compile(r"<!--\s*needs:\s*([\w, ]+?)\s*-->")
 PROGRAMS = ("fclib", ".venv/bin/python", "make", "cmake", "pip", "dask", "python", "cc", "ninja")
 # languages that hold nothing to run
 WORDS = ("text", "math", "bibtex")
@@ -73,6 +76,9 @@ def blocks_of(page: Path) -> Iterator[Block]:
             reason = " ".join(found[2].split()) if found else ""
             names = (found[1] or "").split(",") if found else []
             words = tuple(name.strip() for name in names if name.strip())
+            if needs := NEEDS.search(token.content):
+                absent = [one for one in needs[1].split(", ") if not importlib.util.find_spec(one)]
+                reason = f"not installed here: {', '.join(absent)}" if absent else ""
         elif token.type in ("fence", "code_block"):
             assert token.map is not None
             language, _, file = token.info.strip().partition(" ")

@@ -38,6 +38,8 @@ PURPOSE: Final = {
     "report": "the site, figures for a paper",
     "solvers": "solvers to compare with",
     "recorders": "simulators whose steps are recorded",
+    "torch": "solving as a layer of PyTorch",
+    "jax": "solving as a layer of JAX",
 }
 # a package whose module bears another name
 MODULE: Final = {

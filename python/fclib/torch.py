@@ -1,0 +1,98 @@
+"""Contact problems in PyTorch: r and u as tensors that know their gradients.
+
+>>> import fclib.torch
+>>> r, u = fclib.torch.solve(W, q, mu)
+>>> (u**2).sum().backward()
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch.autograd.function import once_differentiable
+
+from fclib import _layer
+
+
+class _Solve(torch.autograd.Function):  # type: ignore[misc]
+    """Of tensors whose leading sizes are equal."""
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        W: torch.Tensor,
+        q: torch.Tensor,
+        mu: torch.Tensor,
+        spacedim: int,
+        tol: float,
+        threads: int,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        r, u = _layer.forward(_array(W), _array(q), _array(mu), spacedim, tol, threads)
+        ctx.spacedim = spacedim
+        ctx.reactions = r
+        ctx.save_for_backward(W, q, mu)
+        return torch.from_numpy(r).to(q), torch.from_numpy(u).to(q)
+
+    @staticmethod
+    @once_differentiable  # type: ignore[untyped-decorator, unused-ignore]
+    def backward(ctx: Any, by_r: torch.Tensor, by_u: torch.Tensor) -> tuple[Any, ...]:
+        W, q, mu = ctx.saved_tensors
+        found = _layer.backward(
+            _array(W),
+            _array(q),
+            _array(mu),
+            ctx.reactions,
+            ctx.spacedim,
+            _array(by_r),
+            _array(by_u),
+        )
+        by_W, by_q, by_mu = (torch.from_numpy(one).to(q) for one in found)
+        return by_W, by_q, by_mu, None, None, None
+
+
+def solve(
+    W: torch.Tensor,
+    q: torch.Tensor,
+    mu: torch.Tensor,
+    *,
+    spacedim: int = 3,
+    tol: float = 1e-10,
+    threads: int = 1,
+) -> tuple[torch.Tensor, torch.Tensor]:
+    """Reactions and velocities of local problems, u = W r + q with Coulomb's law.
+
+    The gradient is that of ``fclib.vjp``: by one element of the generalised Jacobian where a
+    contact grazes or rests on the limit of friction, by the least change of r where redundant
+    contacts leave r undetermined. There is no second derivative. All is computed in double
+    precision on the CPU, and comes back as q is.
+
+    Args:
+        W: (..., m, m), m = spacedim * nc. Leading sizes are broadcast with those of q and mu.
+        q: (..., m)
+        mu: (..., nc)
+        spacedim: 3, or 2 for planar problems.
+        tol: bound on ``Merit.error``; gradients need one far below 1e-6.
+        threads: that share a batch, 0 for all.
+
+    Returns:
+        r and u, (..., m).
+
+    Raises:
+        ProblemError: shapes that do not agree, entries that are not finite, a negative mu.
+        SolverError: a problem was not solved to the tolerance, or has no solution.
+    """
+    batch = _layer.check_shapes(tuple(W.shape), tuple(q.shape), tuple(mu.shape), spacedim)
+    m = q.shape[-1]
+    return _Solve.apply(  # type: ignore[no-any-return, no-untyped-call, unused-ignore]
+        W.expand(*batch, m, m),
+        q.expand(*batch, m),
+        mu.expand(*batch, m // spacedim),
+        spacedim,
+        tol,
+        threads,
+    )
+
+
+def _array(tensor: torch.Tensor) -> Any:
+    return tensor.detach().to("cpu", torch.float64).contiguous().numpy()

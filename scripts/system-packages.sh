@@ -23,8 +23,11 @@ need libhdf5-dev sh -c 'pkg-config --exists hdf5 || ls /usr/include/hdf5.h /usr/
 need libeigen3-dev sh -c 'pkg-config --exists eigen3 || ls /usr/include/eigen3/Eigen/Core'
 need libgtest-dev sh -c 'pkg-config --exists gtest || ls /usr/include/gtest/gtest.h'
 
+# orders large factorisations, which go without where it is not
+ls /usr/include/metis.h /usr/local/include/metis.h 2>/dev/null | grep -q . || optional=" libmetis-dev"
+
 # draws the picture of the demo, which goes without where it is not; ldconfig is not on every PATH
-if ! { PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional=" libosmesa6"; fi
+if ! { PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional="$optional libosmesa6"; fi
 # shows the report's pages to the tests
 if [ "${1-}" = test ] && ! { command -v chromium || command -v chromium-browser; } >/dev/null 2>&1; then
   optional="$optional chromium"

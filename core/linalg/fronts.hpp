@@ -1,7 +1,9 @@
 // The symbolic part of a multifrontal factorisation of a matrix whose pattern is symmetric (Duff &
 // Reid, "The multifrontal solution of indefinite sparse symmetric linear systems", 1983): an
-// approximate minimum degree ordering of the blocks, and supernodes with relaxed amalgamation.
-// Nothing numeric.
+// ordering of the blocks, and supernodes with relaxed amalgamation. Nothing numeric.
+//
+// The ordering is by approximate minimum degree or, where that leaves many operations and the build
+// has METIS, by nested dissection (Karypis & Kumar 1998) where this takes fewer.
 #pragma once
 
 #include <cstdint>
@@ -39,18 +41,25 @@ struct Front {
   std::vector<Index> to_parent;  // scalar offset in the parent's front of each update block
 };
 
+enum class Ordering { best, minimum_degree, nested_dissection };
+
+/// Whether the build has METIS.
+bool has_nested_dissection();
+
 struct Fronts {
   Fronts() = default;
-  /// The pattern is not kept. A small system is one front.
-  explicit Fronts(const BlockPattern& pattern);
+  /// The pattern is not kept. A small system is one front. Nested dissection is minimum degree
+  /// where the build has none.
+  explicit Fronts(const BlockPattern& pattern, Ordering ordering = Ordering::best);
 
   int d = 1;
-  Index size = 0;               ///< of the matrix, scalar
-  Index largest = 0;            ///< front, scalar
-  double flops = 0;             ///< multiplications of an LU factorisation
-  double memory = 0;            ///< numbers that it keeps
-  std::vector<Index> position;  ///< of each node in the new numbering
-  std::vector<Front> fronts;    ///< children before parents
+  Index size = 0;                                ///< of the matrix, scalar
+  Index largest = 0;                             ///< front, scalar
+  double flops = 0;                              ///< multiplications of an LU factorisation
+  double memory = 0;                             ///< numbers that it keeps
+  std::vector<Index> position;                   ///< of each node in the new numbering
+  std::vector<Front> fronts;                     ///< children before parents
+  Ordering ordering = Ordering::minimum_degree;  ///< that was taken
 };
 
 /// The symbolic factorisation of this pattern: the one made before, where this thread had the same

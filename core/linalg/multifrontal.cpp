@@ -18,7 +18,10 @@ constexpr Index few = 768;
 }  // namespace
 
 Multifrontal::Multifrontal(const BlockPattern& pattern, int threads)
-    : symbolic_(analysed(pattern)), factors_(symbolic_->fronts.size()) {
+    : Multifrontal(analysed(pattern), threads) {}
+
+Multifrontal::Multifrontal(std::shared_ptr<const Fronts> symbolic, int threads)
+    : symbolic_(std::move(symbolic)), factors_(symbolic_->fronts.size()) {
   for (std::size_t f = 0; f < factors_.size(); ++f) {
     factors_[f].exchanged.resize(static_cast<std::size_t>(symbolic_->fronts[f].pivots));
   }

@@ -25,6 +25,7 @@ class Multifrontal {
   /// The symbolic factorisation alone, or that of a system with the same pattern that this thread
   /// had shortly before.
   explicit Multifrontal(const BlockPattern& pattern, int threads = 1);
+  explicit Multifrontal(std::shared_ptr<const Fronts> symbolic, int threads = 1);
 
   /// Multiplications of one factorisation, and numbers that it keeps.
   [[nodiscard]] double flops() const { return symbolic_->flops; }

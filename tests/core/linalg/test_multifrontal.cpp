@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "random_data.hpp"
 
 namespace fclib {
@@ -212,6 +214,66 @@ TEST(Fronts, are_planned_once_for_a_pattern) {
   const auto first = analysed(pattern);
   EXPECT_NE(analysed(other), first);
   EXPECT_EQ(analysed(pattern), first);
+}
+
+/// Blocks on a grid in space, each linked with its neighbours.
+BlockPattern grid(Index side, int d) {
+  BlockPattern pattern;
+  pattern.d = d;
+  pattern.first.push_back(0);
+  for (Index node = 0; node < side * side * side; ++node) {
+    const std::array<Index, 3> place{node % side, node / side % side, node / (side * side)};
+    std::vector<Index> rows{node};
+    Index step = 1;
+    for (const Index at : place) {
+      if (at > 0) rows.push_back(node - step);
+      if (at + 1 < side) rows.push_back(node + step);
+      step *= side;
+    }
+    std::sort(rows.begin(), rows.end());
+    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  return pattern;
+}
+
+TEST(Fronts, large_systems_have_the_ordering_of_fewer_operations) {
+  const BlockPattern pattern = grid(12, 3);
+  const Fronts degree(pattern, Ordering::minimum_degree);
+  const Fronts dissected(pattern, Ordering::nested_dissection);
+  const Fronts best(pattern);
+  EXPECT_EQ(best.flops, std::min(degree.flops, dissected.flops));
+  EXPECT_EQ(degree.ordering, Ordering::minimum_degree);
+  for (const Fronts* fronts : {&degree, &dissected}) {
+    std::vector<Index> places = fronts->position;
+    std::sort(places.begin(), places.end());
+    for (Index k = 0; k < pattern.nodes(); ++k) ASSERT_EQ(places[k], k);
+  }
+  // one ordering, however often it is asked for
+  EXPECT_EQ(Fronts(pattern, Ordering::nested_dissection).position, dissected.position);
+  if (!has_nested_dissection()) {
+    EXPECT_EQ(dissected.ordering, Ordering::minimum_degree);
+    return;
+  }
+  EXPECT_EQ(dissected.ordering, Ordering::nested_dissection);
+  EXPECT_LT(dissected.flops, degree.flops);
+
+  testing::RandomData random(14);
+  const std::vector<double> values = random_values(random, pattern, 20.0);
+  Multifrontal lu(pattern);
+  EXPECT_EQ(lu.flops(), dissected.flops);
+  ASSERT_TRUE(lu.factorise(values));
+  const Vector b = Vector::LinSpaced(lu.size(), -1, 1);
+  Vector x = b;
+  lu.solve(x);
+  Vector residual = b;
+  for (Index col = 0; col < pattern.nodes(); ++col) {
+    for (auto k = pattern.first[col]; k < pattern.first[col + 1]; ++k) {
+      residual.segment<3>(3 * pattern.row[static_cast<std::size_t>(k)]) -=
+          Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * k) * x.segment<3>(3 * col);
+    }
+  }
+  EXPECT_LT(residual.norm(), 1e-12 * b.norm());
 }
 
 }  // namespace

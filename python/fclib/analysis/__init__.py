@@ -7,8 +7,9 @@
 Existence is decided by conic programs, for which Clarabel is needed: ``pip install
 "fclib[analysis]"``.
 
-_analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _existence.py
+_analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _self_stress.py
 _existence.py   whether there is a solution. Needs _enumerate.py, _conic.py and _certificate.py
+_self_stress.py whether reactions can grow without moving anything. Needs _existence.py
 _enumerate.py   all solutions of a small problem. Needs _rational.py and _spatial.py
 _spatial.py     all solutions of one spatial contact, by the roots of polynomials
 _rational.py    linear systems and linear programs in exact arithmetic
@@ -43,13 +44,17 @@ from fclib.analysis._existence import (
     Slater,
 )
 from fclib.analysis._reference import Confirmation, Reference, reference
+from fclib.analysis._self_stress import OPEN, PRESTRESSED, SOLVABLE, SelfStress
 from fclib.analysis._spectrum import Spectrum
 
 __all__ = [
     "EXISTS_AT_HAND",
     "EXISTS_ENUMERATED",
     "EXISTS_SLATER",
+    "OPEN",
+    "PRESTRESSED",
     "PROVEN_NOT",
+    "SOLVABLE",
     "UNDECIDED",
     "VERDICTS",
     "Analysis",
@@ -61,6 +66,7 @@ __all__ = [
     "Enumeration",
     "Existence",
     "Reference",
+    "SelfStress",
     "Slater",
     "SolutionSet",
     "Spectrum",

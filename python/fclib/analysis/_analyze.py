@@ -15,6 +15,7 @@ from fclib.analysis._certificate import Certificate
 from fclib.analysis._data import DENSE, EPS, SYMMETRIC, Data, Reduced, asymmetry, columns
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import Existence, Slater, existence, slater
+from fclib.analysis._self_stress import SelfStress, least_singular, lower_bound, self_stress
 from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
 DEFINITE = ("positive definite", "positive semidefinite", "indefinite")
@@ -103,7 +104,7 @@ class Analysis:
         hyperstaticity: m - rank W, the dimension of the reactions that move nothing; None where
             the rank is not known.
         hyperstaticity_ratio: m / rank W.
-        units, slater, existence, uniqueness: see there.
+        units, slater, existence, uniqueness, self_stress: see there.
         enumeration: what the states of all contacts say; None where theorems say it all.
         isolated_solutions: how many there are; None where that is not known.
     """
@@ -124,6 +125,7 @@ class Analysis:
     slater: Slater
     existence: Existence
     uniqueness: Uniqueness
+    self_stress: SelfStress
     enumeration: Enumeration | None = field(default=None, repr=False)
 
     @property
@@ -193,6 +195,9 @@ class Analysis:
             "existence": self.existence.verdict,
             "existence_reason": self.existence.reason,
             "solution_error": self.existence.error,
+            "self_stress": self.self_stress.verdict,
+            "self_stress_reason": self.self_stress.reason,
+            "reaction_bound": self.self_stress.bound,
             "uniqueness": self.uniqueness.verdict,
             "uniqueness_reason": self.uniqueness.reason,
             "contraction": self.uniqueness.contraction,
@@ -218,6 +223,7 @@ class Analysis:
             sign += "." if self.asymmetry["W"] <= SYMMETRIC else " and not symmetric."
         text = [
             f"Existence: {self.existence.verdict}: {self.existence.reason}.",
+            f"Self-stress: {self.self_stress.verdict}: {self.self_stress.reason}.",
             f"Velocity: {self.uniqueness.verdict}: {self.uniqueness.reason}.",
             sign,
         ]
@@ -287,7 +293,9 @@ def analyze(
         elif sign.word == DEFINITE[1]:
             sign = replace(sign, word=UNKNOWN)
     full = rank == problem.m and sign.word == DEFINITE[0]
-    condition = slater(data, sign.word in DEFINITE[:2], full, time_limit)
+    # W = H^T M^-1 H, whatever its size
+    semidefinite = sign.word in DEFINITE[:2] or (sign.word == UNKNOWN and _definite_by_bodies(data))
+    condition = slater(data, semidefinite, full, time_limit)
     unique = _uniqueness(data, sign, full, dense)
     states = None
     # one solution, by theorems; else the states of the contacts say how many
@@ -313,8 +321,17 @@ def analyze(
         slater=condition,
         existence=verdict,
         uniqueness=unique,
+        self_stress=self_stress(data, condition, time_limit),
         enumeration=states,
     )
+
+
+def _definite_by_bodies(data: Data) -> bool:
+    """Whether M is positive definite and no joint follows from others, so that W' is what it is."""
+    M, G = data.matrices.get("M"), data.matrices.get("G")
+    if M is None or (M != M.T).nnz or not lower_bound(M) > 0:
+        return False
+    return G is None or least_singular(G.T) > 0
 
 
 def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:

@@ -52,6 +52,8 @@ class Slater:
         velocity: (m,) that velocity, [m/s].
         method: how it was found.
         threshold: what the margin must exceed.
+        witness: what that velocity comes from, where that was sought: v of a global problem, else x
+            of u = S x + q.
     """
 
     holds: bool | None
@@ -59,6 +61,7 @@ class Slater:
     velocity: Array | None = field(repr=False, compare=False)
     method: str
     threshold: float = MARGIN
+    witness: Array | None = field(default=None, repr=False, compare=False)
 
 
 def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
@@ -169,7 +172,7 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
     if p == 0 and data.dual_margin(data.local.q).min() > MARGIN * data.speed:
         margin = min(1.0, float(data.dual_margin(data.local.q).min() / data.speed))
         return Slater(True, margin, data.local.q, "the velocity without reactions")
-    A, c, B, e = _reachable(data)
+    A, c, B, e = reachable(data)
     # the velocity that leaves every contact at the same speed, where it can be reached
     if p == 0:
         x = lsmr(A, inside - c, atol=1e-14, btol=1e-14, maxiter=500)[0]
@@ -198,7 +201,7 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
     return Slater(False if solved and reached <= MARGIN else None, reached, None, "conic program")
 
 
-def _reachable(data: Data) -> tuple[sp.csr_array, Array, sp.csr_array, Array]:
+def reachable(data: Data) -> tuple[sp.csr_array, Array, sp.csr_array, Array]:
     """A, c, B, e: velocities are A x + c for all x with B x = e."""
     problem, local = data.problem, data.local
     bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
@@ -246,7 +249,7 @@ def _witness(
     margin = float((data.dual_margin(u) - rounding).min() - slack) / data.speed
     if not margin > MARGIN:
         return None
-    return Slater(True, min(1.0, margin), u, method)
+    return Slater(True, min(1.0, margin), u, method, witness=x)
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ COLUMNS = (
     "definiteness",
     "slater",
     "existence",
+    "self_stress",
     "uniqueness",
     "seconds",
 )

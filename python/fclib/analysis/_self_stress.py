@@ -1,0 +1,376 @@
+"""Whether reactions can grow without moving anything, with a proof that the data carries.
+
+solvable    a velocity strictly inside K* is reached, and W is positive semidefinite. Then there is
+            a solution, and all of them are bounded. Let u0 = H^T v0 + w be that velocity and vf the
+            one without reactions. Each solution has r . W r + q . r <= 0, since u^ . r = 0 and
+            mu ||u_T|| r_N >= 0, and q . r = u0 . r - (v0 - vf) . H r. With u0 . r >= c ||r|| on K,
+
+                c ||r|| <= ||v0 - vf||_M ||r||_W - ||r||_W^2 <= ||v0 - vf||_M^2 / 4
+
+            For a local problem v0 - vf is the x of u0 = S x + q, S the symmetric part of W. Where
+            S has eigenvalues down to -delta, W being rounded,
+
+                (c - delta ||x||) rho - delta rho^2 > (x . S x + delta ||x||^2) / 4
+
+            for some rho is what is needed: on the ball of that radius, where the law has a solution
+            as a variational inequality (Hartman & Stampacchia 1966), none touches the boundary.
+prestressed r_bar in K, not zero, with W r_bar = 0 (H r_bar + G l = 0 of a global problem).
+open        neither is proven.
+
+Sums are those of rational numbers, so that nothing is rounded. That a matrix has no eigenvalue
+below a bound is shown by a Cholesky factorisation of it with that bound and its own rounding taken
+off (Rump 2006, "Verification of positive definiteness"). r_bar is near what a conic program gives:
+small ones by elimination in rational numbers, others because H has full row rank on the contacts
+that carry them, so that some r_bar is no farther than what is left of H r over the least singular
+value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from math import inf, isfinite, nextafter, sqrt
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import qr
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import lsmr, spsolve
+
+from fclib import _core
+from fclib.analysis._conic import Program
+from fclib.analysis._data import DENSE, EPS, Array, Data
+from fclib.analysis._existence import Slater, reachable
+from fclib.analysis._rational import Elimination
+
+SOLVABLE = "solvable"
+PRESTRESSED = "prestressed"
+OPEN = "open"
+FEW = 40  # unknowns that are eliminated in rational numbers: their digits grow with each
+
+Exact = list[dict[int, Fraction]]  # rows
+
+
+@dataclass(frozen=True)
+class SelfStress:
+    """Whether reactions can grow without moving anything.
+
+    Attributes:
+        verdict: "solvable", "prestressed" or "open".
+        reason: in words.
+        vector: what proves it: (n,) the velocity v0 of a global problem, (m,) the x of a local one,
+            or (m,) the reactions r_bar, as doubles near them.
+        margin: solvable: the least u_N - mu ||u_T|| (- mu_r ||u_R||) of u0, over ||q||;
+            prestressed: the share of ||r_bar|| by which its contacts are inside K.
+        bound: of ||r|| for all solutions, where it is solvable; else inf.
+    """
+
+    verdict: str
+    reason: str
+    vector: Array | None = field(default=None, repr=False, compare=False)
+    margin: float = float("nan")
+    bound: float = inf
+
+
+def self_stress(data: Data, condition: Slater, time_limit: float = 60.0) -> SelfStress:
+    """The verdict.
+
+    Raises:
+        ImportError: Clarabel is needed, and not installed.
+    """
+    if data.problem.nc == 0:
+        return SelfStress(SOLVABLE, "there is no contact", np.zeros(0), 1.0, 0.0)
+    reason = "no velocity strictly inside K* was found"
+    if condition.holds:
+        found, reason = _solvable(data, condition)
+        if found is not None:
+            return found
+    stressed, why = _prestressed(data, time_limit)
+    return stressed or SelfStress(OPEN, f"{reason}; {why}")
+
+
+# ---- solvable
+
+
+def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
+    problem = data.problem
+    A, c, B, e = reachable(data)
+    x, velocity = condition.witness, condition.velocity
+    if x is None:
+        assert velocity is not None
+        whole = sp.vstack([A, B])
+        x = lsmr(whole, np.concatenate([velocity - c, e]), atol=1e-15, btol=1e-15, conlim=0)[0]
+    off, delta, size = 0.0, 0.0, 0.0
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        M = data.matrices["M"]
+        if (M != M.T).nnz or not lower_bound(M) > 0:
+            return None, "M is not shown to be symmetric positive definite"
+        if e.size:
+            off = _off_joints(B, e, x)
+            if not isfinite(off):
+                return None, "G is not shown to have full rank"
+        away = x - _free(data)
+        energy = float(away @ (M @ away)) * (1 + 1e-6)
+        rows = _rows(A)
+    elif e.size:
+        return None, "a local problem with bilateral constraints is not decided"
+    else:
+        delta = max(0.0, -lower_bound(A))
+        size = float(np.linalg.norm(x)) * (1 + 1e-12)
+        energy = max(0.0, float(x @ (A @ x))) * (1 + 1e-6) + 2 * delta * size**2
+        rows = _rows(data.W, data.W.T)
+    margins, forces = _inside(data, rows, x, c, off)
+    if not margins.min() > 0:
+        return None, f"in exact arithmetic contact {int(margins.argmin())} is not inside K*"
+    least = float(forces.min()) - delta * size
+    if not (least > 0 and least * least > delta * energy):
+        return None, f"W is not shown to have no eigenvalue below {-delta:.1e}, which is not enough"
+    root = sqrt(max(0.0, least * least - delta * energy))
+    margin = min(1.0, float(margins.min()) / data.speed)
+    reason = f"a velocity inside K* by {margin:.1e} of ||q||, in exact arithmetic"
+    return SelfStress(SOLVABLE, reason, x, margin, energy / (2 * (least + root))), ""
+
+
+def _free(data: Data) -> Array:
+    """The velocity of a global problem without reactions of contacts."""
+    problem = data.problem
+    assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
+    M, G = data.matrices["M"], data.matrices.get("G")
+    if G is None or problem.b is None:
+        return np.asarray(spsolve(M, problem.f))
+    saddle = sp.block_array([[M, -G], [G.T, None]], format="csc")
+    return np.asarray(spsolve(saddle, np.concatenate([problem.f, -problem.b])))[: problem.n]
+
+
+def _off_joints(B: sp.csr_array, e: Array, x: Array) -> float:
+    """From above, how far from x a velocity is that the joints allow."""
+    exact = [Fraction(float(one)) for one in x]
+    rest = [_dot(row, exact) - Fraction(float(one)) for row, one in zip(_rows(B), e, strict=True)]
+    square = sum((one * one for one in rest), Fraction())
+    least = least_singular(B)
+    return float(root_above(square)) * (1 + 1e-15) / least if least > 0 else inf
+
+
+def least_singular(B: Any) -> float:
+    """A number that no singular value of a matrix with more columns than rows is below."""
+    B = sp.csr_array(B)
+    product = sp.csr_array(B @ B.T)
+    # what a sum of so many terms may have lost
+    lost = (int(np.diff(B.indptr).max(initial=0)) + 2) * EPS * (abs(B) @ abs(B).T)
+    off = float(lost.sum(axis=1).max()) if lost.nnz else 0.0
+    product = sp.csr_array((product + product.T) / 2)
+    return sqrt(max(0.0, lower_bound(product) - 2 * off)) * (1 - 1e-14)
+
+
+def _rows(a: Any, other: Any = None) -> Exact:
+    """The rows in rational numbers; of half the sum with another matrix."""
+    rows: Exact = [{} for _ in range(a.shape[0])]
+    for matrix in (a,) if other is None else (a, other):
+        entries = sp.coo_array(matrix)
+        half = Fraction(1) if other is None else Fraction(1, 2)
+        for row, col, value in zip(
+            entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True
+        ):
+            own = rows[row]
+            own[col] = own.get(col, Fraction()) + half * Fraction(value)
+    return rows
+
+
+def _dot(row: dict[int, Fraction], x: list[Fraction]) -> Fraction:
+    return sum((value * x[col] for col, value in row.items()), Fraction())
+
+
+def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> tuple[Array, Array]:
+    """Of each contact, from below: u_N - mu ||u_T|| (- ...), and u . r over ||r|| on K.
+
+    `off` is how far the x that is meant may be from this one.
+    """
+    d, nc = data.d, data.problem.nc
+    exact = [Fraction(float(one)) for one in x]
+    margins, forces = np.zeros(nc), np.zeros(nc)
+    for a in range(nc):
+        u = [_dot(rows[d * a + k], exact) + Fraction(float(constant[d * a + k])) for k in range(d)]
+        steep, left = 1.0, u[0]
+        if off:
+            left -= Fraction(off) * _size(rows[d * a])
+        for mu, part in data.friction:
+            friction = root_above(sum((t * t for t in u[part]), Fraction()))
+            if off:
+                friction += Fraction(off) * sum(
+                    (_size(row) for row in rows[d * a : d * a + d][part]), Fraction()
+                )
+            left -= Fraction(float(mu[a])) * friction
+            steep += float(mu[a]) ** 2
+        margin = _below(left)
+        margins[a] = margin
+        forces[a] = margin / (sqrt(steep) * (1 + 1e-15))
+    return margins, forces
+
+
+def _size(row: dict[int, Fraction]) -> Fraction:
+    return root_above(sum((one * one for one in row.values()), Fraction()))
+
+
+def _below(x: Fraction) -> float:
+    return nextafter(float(x), -inf)
+
+
+def root_above(x: Fraction) -> Fraction:
+    """A rational number not less than the root, by 1e-15 of it."""
+    if x <= 0:
+        return Fraction()
+    shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
+    scale = Fraction(2) ** shift
+    guess = Fraction(sqrt(float(x * scale * scale)) * (1 + 1e-15)) / scale
+    while guess * guess < x:
+        guess *= 1 + Fraction(1, 10**15)
+    return guess
+
+
+def lower_bound(a: Any) -> float:
+    """A number that no eigenvalue of a symmetric matrix is below; -inf where none was found.
+
+    By blocks that nothing links, each up to DENSE.
+    """
+    a = sp.csr_array(a)
+    if a.nnz == 0:
+        return 0.0
+    labels = connected_components(a, directed=False)[1]
+    order = np.argsort(labels, kind="stable")
+    least = inf
+    for block in np.split(order, np.cumsum(np.bincount(labels))[:-1]):
+        if block.size > DENSE:
+            return -inf
+        least = min(least, _lower_bound(a[block][:, block].toarray()))
+    return least
+
+
+def _lower_bound(a: Array) -> float:
+    """Of a dense block: Cholesky's factorisation of a - shift succeeds."""
+    n = len(a)
+    diagonal = np.diag(a)
+    if n == 1:
+        return float(diagonal[0])
+    guess = float(np.linalg.eigvalsh(a)[0])
+    gamma = (n + 2) * EPS  # of n + 1 terms
+    size = n * EPS * float(abs(a).max())
+    for target in (guess / 2, 2 * guess, 0.0, *(-size * 4.0**k for k in range(8))):
+        if target > guess:
+            continue
+        own = gamma * float(np.abs(diagonal - target).sum()) * (1 + 1e-6) + 1e-300
+        shifted = a - (target + 2 * own) * np.eye(n)
+        try:
+            np.linalg.cholesky(shifted)
+        except np.linalg.LinAlgError:
+            continue
+        return target
+    return -inf
+
+
+# ---- prestressed
+
+
+def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]:
+    """Reactions that move nothing, with as many contacts inside their cones as can be."""
+    B = _moved(data)
+    nc, d, own = data.problem.nc, data.d, data.problem.m
+    extra = B.shape[1] - own
+    # r and what joints do, then t of each contact: r_a - t_a e_N in K, 0 <= t_a <= 1
+    size = B.shape[1] + nc
+    program = Program(size)
+    scale = float(abs(B).max()) or 1.0
+    program.equal(sp.hstack([B / scale, sp.csr_array((B.shape[0], nc))]), np.zeros(B.shape[0]))
+    t = sp.csr_array((np.ones(nc), (np.arange(nc), B.shape[1] + np.arange(nc))), (nc, size))
+    program.nonnegative(t, np.zeros(nc))
+    program.nonnegative(-t, np.ones(nc))
+    unknown = sp.eye_array(size, format="csr")
+    normal = unknown[d * np.arange(nc)] - t
+    program.nonnegative(normal, np.zeros(nc))
+    for mu, part in data.friction:
+        components = list(range(d))[part]
+        length = 1 + len(components)
+        stacked = sp.vstack(
+            [sp.diags_array(mu) @ normal, *(unknown[d * np.arange(nc) + k] for k in components)],
+            format="csr",
+        )
+        order = np.arange(length * nc).reshape(length, -1).T.ravel()
+        program.second_order(stacked[order], np.zeros(order.size), length)
+    goal = np.zeros(size)
+    goal[B.shape[1] :] = -1
+    answer = program.solve(goal, time_limit=time_limit)
+    y = np.array(answer.x)
+    if not np.isfinite(y).all():
+        return None, "no reactions that move nothing were found"
+    kept = np.flatnonzero(y[B.shape[1] :] > 0.5)
+    if kept.size == 0:
+        return None, "no reactions that move nothing were found"
+    # frictionless contacts have their normal reaction alone
+    columns = [d * a for a in kept.tolist()]
+    for mu, part in data.friction:
+        columns += [d * a + k for a in kept.tolist() if mu[a] > 0 for k in range(d)[part]]
+    columns = [*sorted(columns), *range(own, own + extra)]
+    x = _in_kernel(B[:, columns], y[columns])
+    if x is None:
+        return None, f"reactions of {kept.size} contacts move nothing up to rounding, no proof"
+    values, off = x
+    place = dict(zip(columns, values, strict=True))
+    margins = []
+    for a in kept.tolist():
+        r = [place.get(d * a + k, Fraction()) for k in range(d)]
+        for mu, part in data.friction:
+            friction = root_above(sum((one * one for one in r[part]), Fraction()))
+            margins.append(Fraction(float(mu[a])) * r[0] - friction)
+            if mu[a] > 0:
+                margins[-1] -= Fraction(off) * (1 + Fraction(float(mu[a])))
+        margins.append(r[0] - Fraction(off))
+    least = min(margins)
+    if least < 0 or not any(place[d * a] > Fraction(off) for a in kept.tolist()):
+        return None, f"reactions of {kept.size} contacts move nothing up to rounding, no proof"
+    r_bar = np.zeros(own)
+    for k, value in place.items():
+        if k < own:
+            r_bar[k] = float(value)
+    how = "in exact arithmetic" if off == 0 else f"some within {off:.1e} of these doubles"
+    reason = f"reactions of {kept.size} contacts move nothing, {how}"
+    return SelfStress(
+        PRESTRESSED, reason, r_bar, max(0.0, _below(least)) / float(np.linalg.norm(r_bar))
+    ), ""
+
+
+def _moved(data: Data) -> sp.csr_array:
+    """B of B (r, l) = 0: what reactions, and those of joints, move."""
+    if isinstance(data.problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        parts = [data.matrices["H"]] + ([data.matrices["G"]] if "G" in data.matrices else [])
+        return sp.csr_array(sp.hstack(parts))
+    if "V" not in data.matrices:
+        return sp.csr_array(data.W)
+    V, R = data.matrices["V"], data.matrices["R"]
+    return sp.csr_array(sp.vstack([sp.hstack([data.W, V]), sp.hstack([V.T, R])]))
+
+
+def _in_kernel(B: sp.csr_array, y: Array) -> tuple[list[Fraction], float] | None:
+    """A vector near y and how far from it one is whose image is exactly zero; None: not shown."""
+    B = sp.csr_array(B)
+    B = B[np.flatnonzero(np.diff(B.indptr))]
+    for _ in range(2):
+        y = y - lsmr(B, B @ y, atol=1e-15, btol=1e-15, conlim=0, maxiter=20 * sum(B.shape))[0]
+    if B.shape[0] <= B.shape[1] and B.shape[0] <= DENSE and (least := least_singular(B)) > 0:
+        exact = [Fraction(float(one)) for one in y]
+        square = sum((_dot(row, exact) ** 2 for row in _rows(B)), Fraction())
+        return exact, float(root_above(square)) / least * (1 + 1e-14)
+    if B.shape[1] > 2 * DENSE or B.shape[0] > DENSE:
+        return None
+    _, upper, order = qr(B.toarray(), mode="economic", pivoting=True)
+    values = abs(np.diag(upper))
+    rank = int((values > 1e-10 * values.max(initial=0)).sum())
+    if rank > FEW:
+        return None
+    equations = _rows(B)
+    elimination = Elimination(equations)
+    elimination.take_out(order[:rank].tolist())
+    if any(equations):
+        return None  # what is left says that the rank is higher, by rounding
+    start = {int(k): Fraction(float(y[k])) for k in order[rank:]}
+    full = elimination.complete(start)
+    return [full.get(k, Fraction()) for k in range(B.shape[1])], 0.0

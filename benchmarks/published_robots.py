@@ -1,7 +1,7 @@
 """The default solver on the robots that installed Python packages ship as MJCF files.
 
     .venv/bin/python benchmarks/published_robots.py OUT [--package metaworld dm_control ...]
-        [--model NAME ...] [--steps 100] [--tol 1e-8] [--limit 10] [--every 1]
+        [--model NAME ...] [--steps 100] [--tol 1e-8] [--limit 10] [--every 1] [--results NAME]
 
 Each model is simulated by FCLIB (Moreau-Jean, the velocity law) from where its file puts it, with
 random controls from a fixed seed, new in each step. Each problem with contacts or joints at their
@@ -26,6 +26,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import _results
 import numpy as np
 import scipy.sparse.linalg as spl
 
@@ -176,6 +177,7 @@ def main() -> None:
     parser.add_argument("--tol", type=float, default=1e-8)
     parser.add_argument("--limit", type=float, default=10.0, help="[s] for each solve")
     parser.add_argument("--others", nargs="*", default=[], help="solvers that try what is left")
+    _results.add_option(parser)
     arguments = parser.parse_args()
     arguments.out.mkdir(parents=True, exist_ok=True)
 
@@ -183,17 +185,21 @@ def main() -> None:
         f"{'problems':>9}{'solved':>8}{'proven':>8}{'stalled':>8}{'others':>8}{'max s':>8}  model"
     )
     sums: dict[str, Tally] = {}
+    files: Counter[str] = Counter()
     models: Counter[str] = Counter()
     refused: Counter[str] = Counter()
+    broken: Counter[str] = Counter()
     for robot in robots(arguments.package):
         if arguments.model and not any(part in robot.name for part in arguments.model):
             continue
         tally = solve_all(robot, arguments.out, arguments)
         total = sums.setdefault(robot.package, Tally())
+        files[robot.package] += 1
         if not tally.statuses:
             refused[robot.package] += bool(tally.trouble)
         else:
             models[robot.package] += 1
+            broken[robot.package] += bool(tally.trouble)
             total.statuses += tally.statuses
             total.slowest = max(total.slowest, tally.slowest)
         show(tally, f"{robot.package} {robot.name}")
@@ -208,6 +214,29 @@ def main() -> None:
         everything.statuses += total.statuses
         everything.slowest = max(everything.slowest, total.slowest)
     show(everything, f"all: {sum(models.values())} models with problems")
+    if arguments.results:
+        rows = [
+            {
+                "package": package,
+                "version": metadata.version(package),
+                "files": files[package],
+                "no model, or refused": refused[package],
+                "models with problems": models[package],
+                "ended before the last step": broken[package],
+                "problems": sum(total.statuses.values()),
+                "solved": total.statuses["converged"],
+                "proven to have no solution": total.statuses["infeasible"],
+                "slowest [s]": total.slowest,
+            }
+            for package, total in sums.items()
+        ]
+        _results.store(
+            arguments.results,
+            rows,
+            title="Robots that Python packages ship",
+            note=f"{arguments.steps} steps of each file, to {_results.power(arguments.tol)}, at"
+            f" most {arguments.limit:g} s a problem; the slowest by the wall clock.",
+        )
 
 
 def show(tally: Tally, name: str) -> None:

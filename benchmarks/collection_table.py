@@ -1,6 +1,7 @@
-"""The families of a built collection beside the published sets, as a Markdown table.
+"""The families of a built collection beside the published sets, as a table.
 
     .venv/bin/python benchmarks/collection_table.py FOLDER... [--sample 8] [--limit 3000]
+        [--results NAME]
 
 Sizes and density, contact components for a degree of freedom, are those of the catalogues. The rank
 ratio (contact components over the rank of W) and the conditioning of W (its largest singular value
@@ -26,6 +27,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import _results
 import numpy as np
 
 import fclib
@@ -107,8 +109,8 @@ def within(row: dict[str, str], rows: Sequence[dict[str, Any]], figures: Sequenc
 
 def line(
     name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any], verdict: str = ""
-) -> str:
-    """The line of a family of ours."""
+) -> dict[str, str]:
+    """The row of a family of ours."""
     cells = [
         name,
         span(row[key] for row in rows for key in ("mu_min", "mu_max")),
@@ -120,7 +122,7 @@ def line(
         span(conditioning for _, conditioning in figures),
         verdict,
     ]
-    return "| " + " | ".join(cells) + " |"
+    return dict(zip(HEAD, cells, strict=True))
 
 
 def main() -> None:
@@ -129,6 +131,7 @@ def main() -> None:
     parser.add_argument("folders", type=Path, nargs="+")
     parser.add_argument("--sample", type=int, default=8)
     parser.add_argument("--limit", type=int, default=3000)
+    _results.add_option(parser)
     arguments = parser.parse_args()
     families: dict[str, list[dict[str, Any]]] = defaultdict(list)
     where: dict[str, Path] = {}
@@ -137,11 +140,16 @@ def main() -> None:
             name = f"{row['collection']}/{row['family']}"
             if where.setdefault(name, folder) == folder:
                 families[name].append(row)
+    table: list[dict[str, str]] = []
 
-    def ours(name: str, published: dict[str, str] | None = None) -> str:
+    def show(row: dict[str, str]) -> None:
+        table.append(row)
+        print("| " + " | ".join(row.values()) + " |", flush=True)
+
+    def ours(name: str, published: dict[str, str] | None = None) -> None:
         rows = families.pop(name)
         figures = spectra(where[name], rows, arguments.sample, arguments.limit)
-        return line(name, rows, figures, within(published, rows, figures) if published else "")
+        show(line(name, rows, figures, within(published, rows, figures) if published else ""))
 
     print("| " + " | ".join(HEAD) + " |")
     print("|" + "---|" * len(HEAD), flush=True)
@@ -149,11 +157,19 @@ def main() -> None:
         for row in csv.DictReader(file):
             beside = row.pop("ours")
             cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
-            print("| " + " | ".join(cells) + " |", flush=True)
+            show(dict(zip(HEAD, cells, strict=True)))
             if beside in families:
-                print(ours(beside, row), flush=True)
+                ours(beside, row)
     for name in sorted(families):
-        print(ours(name), flush=True)
+        ours(name)
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            table,
+            title="Published sets (in italics) and ours",
+            note=f"Rank ratio and conditioning are of {arguments.sample} problems of a family, of"
+            f" at most {arguments.limit} contact components.",
+        )
 
 
 if __name__ == "__main__":

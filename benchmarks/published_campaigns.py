@@ -34,6 +34,7 @@ def main() -> None:
     parser.add_argument("name", help="a campaign of campaigns/")
     parser.add_argument("--budget", default="10min")
     parser.add_argument("--time-limit", help="[s] of CPU a run, instead of the campaign's own")
+    parser.add_argument("--wall-limit", help="[s] of the clock a run, on a machine that is shared")
     parser.add_argument("--sample", help="so many problems of each group")
     parser.add_argument("--repeats", help="instead of the campaign's own")
     parser.add_argument("--jobs", default="1")
@@ -44,7 +45,7 @@ def main() -> None:
         STORES.mkdir(parents=True, exist_ok=True)
         command = [str(Path(sys.executable).with_name("fclib")), "bench", arguments.name]
         command += ["--store", str(store), "--budget", arguments.budget, "-j", arguments.jobs]
-        for option in ("time_limit", "sample", "repeats"):
+        for option in ("time_limit", "wall_limit", "sample", "repeats"):
             if (value := getattr(arguments, option)) is not None:
                 command += [f"--{option.replace('_', '-')}", value]
         subprocess.run(command, check=True)

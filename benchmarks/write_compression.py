@@ -1,6 +1,7 @@
 """What compression costs a client that writes each step: CPU time over that of writing plain.
 
-    .venv/bin/python benchmarks/write_compression.py [FILE...] [--entries 3200000] [--repeats 5]
+    .venv/bin/python benchmarks/write_compression.py [FILE...] [--entries 3200000 100000]
+        [--repeats 5] [--results NAME]
 
 Local problems with a W of random numbers, of numbers that come again and of equal blocks, and the
 local problems in the files, are written by the C library at each level: the least CPU time of the
@@ -17,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import _results
 import numpy as np
 import scipy.sparse as sp
 
@@ -51,19 +53,23 @@ def made(entries: int) -> dict[str, fclib.LocalProblem]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("files", nargs="*", type=Path)
-    parser.add_argument("--entries", type=int, default=3_200_000)
+    parser.add_argument("--entries", type=int, nargs="+", default=[3_200_000])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--library", type=Path, default=ROOT / "build/libfclib.so.0")
+    _results.add_option(parser)
     given = parser.parse_args()
     library = ctypes.CDLL(str(given.library))
     library.fclib_read_local.restype = ctypes.c_void_p
     library.fclib_write_local.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+    rows: list[dict[str, str]] = []
     print(f"{'':24}  entries" + "".join(f"  {name:>13}" for name in LEVELS))
     with tempfile.TemporaryDirectory() as folder:
         source, target = Path(folder) / "source.hdf5", Path(folder) / "target.hdf5"
-        problems: dict[str, fclib.LocalProblem | Path] = dict(made(given.entries))
-        problems |= {path.name: path for path in given.files}
-        for name, problem in problems.items():
+        problems: list[tuple[str, fclib.LocalProblem | Path]] = [
+            own for entries in given.entries for own in made(entries).items()
+        ]
+        problems += [(path.name, path) for path in given.files]
+        for name, problem in problems:
             if isinstance(problem, Path):
                 path = problem
             else:
@@ -90,11 +96,19 @@ def main() -> None:
                 if isinstance(matrix.W, np.ndarray)
                 else (matrix.W.nnz)
             )
-            line = "".join(
-                f"  {times[level] / times['plain']:5.1f} ({sizes[level] / sizes['plain']:5.1%})"
+            cells = {
+                level: f"{times[level] / times['plain']:.1f} ({sizes[level] / sizes['plain']:.1%})"
                 for level in LEVELS
-            )
-            print(f"{name:24}  {count:7}{line}")
+            }
+            rows.append({"W": name, "entries": f"{count:,}", **cells})
+            print(f"{name:24}  {count:7}" + "".join(f"  {cell:>13}" for cell in cells.values()))
+    if given.results:
+        _results.store(
+            given.results,
+            rows,
+            title="CPU time over that of writing plain, and the bytes over those",
+            note=f"The least of {given.repeats} repeats.",
+        )
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """What the tests of the report are about: a small collection and a store of made-up runs."""
 
+import base64
+import gzip
 import hashlib
 import json
 import random
@@ -105,6 +107,9 @@ def made_facts(count: int) -> list[ProblemFacts]:
 def read_data(site: Path, name: str) -> Any:
     """What a data file of a site holds."""
     text = (site / "data" / f"{name}.js").read_text()
+    packed = f'Fclib.putPacked("{name}","'
+    if text.startswith(packed):
+        return json.loads(gzip.decompress(base64.b64decode(text[len(packed) : text.rindex('"')])))
     start = f'Fclib.put("{name}",'
     assert text.startswith(start)
     return json.loads(text[len(start) : text.rindex(");")])

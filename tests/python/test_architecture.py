@@ -96,7 +96,7 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
         "collections",
     },
-    "report": {"_core", "_registry", "bench", "collections"},
+    "report": {"_core", "_geometry", "_registry", "bench", "collections"},
     "demo": {"__init__", "scenes", "simulate", "bench"},
     "doctor": {"_core", "__init__", "external"},
     "cli": {

@@ -18,12 +18,15 @@ from scipy.spatial import ConvexHull
 from typer.testing import CliRunner
 
 import fclib
+from fclib._geometry import rotations
 from fclib.bench import Store, profiles
 from fclib.cli import app
+from fclib.collections import known
 from fclib.report import Campaigns, ReportError, build_site, view_of, write_view
 from fclib.report.libraries import as_script
 from fclib.report.network import network_of
 from fclib.report.recipes import recipes
+from fclib.report.solids import MESH, record_of, solids_of
 from fclib.report.view import hulls_of
 from helpers_report import (
     LABELS,
@@ -41,6 +44,11 @@ pytest.importorskip("itables")
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution
+
+
+def bare(problem: Any) -> Any:
+    """A problem as somebody else's file has it: nothing says where it is."""
+    return problem.replace(bodies=None, contacts=None)
 
 
 @pytest.fixture(scope="module")
@@ -308,7 +316,7 @@ def test_recipes_in_python_run(collection: Path, monkeypatch: pytest.MonkeyPatch
 def test_positions_are_recovered(collection: Path) -> None:
     """Cubes of side 2, one upon another: their centres are 2 apart, and 1 above the ground."""
     file = sorted(collection.rglob("*-global.hdf5"))[-1]
-    problem = read(file)
+    problem = bare(read(file))
     network = network_of(problem)
     assert network.placed
     assert len(network.bodies) == 3
@@ -324,8 +332,8 @@ def test_positions_are_those_of_the_simulation() -> None:
 
     scene = scenes.get("Capsules")(capsules=40, width=16.0).scene(seed=0)
     step = next(s for s in simulate.simulate(scene, 600) if s.problem.nc > 20)
-    network = network_of(step.problem)
-    assert network.placed
+    network = network_of(bare(step.problem))
+    assert network.source == "H"
     bodies = np.asarray(step.dofs)[::6] // 6
     true = step.model.position.reshape(-1, 7)[bodies, :3]
     pairs = network.pairs[(network.pairs >= 0).all(axis=1)]
@@ -339,8 +347,8 @@ def test_positions_are_those_of_the_simulation() -> None:
 
 def test_contacts_across_a_periodic_boundary_are_near_both_bodies() -> None:
     step = periodic_step()
-    network = network_of(step.problem)
-    assert network.placed
+    network = network_of(bare(step.problem))
+    assert network.source == "H"
     assert network.shifts is not None
     assert network.cell is not None
     np.testing.assert_allclose(np.diff(network.cell, axis=0), [[13.0, 13.0]])
@@ -364,17 +372,71 @@ def test_contacts_across_a_periodic_boundary_are_near_both_bodies() -> None:
     corners = np.concatenate([network.bodies, network.points, network.points - network.shifts])
     faces = np.array(hulls_of(network))
     assert faces.max() >= len(network.bodies) + len(network.points)
-    record = view_of(step.problem)["network"]
+    record = view_of(bare(step.problem))["network"]
     corners = np.array(record["bodies"] + record["points"] + record["images"])
     assert np.ptp(corners[faces], axis=1).max() < 7.0
     # where the file says nothing of a period, the points do not close
-    bare = step.problem.replace(info=fclib.ProblemInfo())
-    assert network_of(bare).shifts is None
+    silent = bare(step.problem).replace(info=fclib.ProblemInfo())
+    assert network_of(silent).shifts is None
+
+
+def stored_families() -> list[str]:
+    """Families of which states are stored, as the set `standard` has them."""
+    return [own.partition("/")[2] for own in known.sets()["standard"] if plan_of(own)]
+
+
+def plan_of(own: str) -> Any:
+    plan = known.plan_of(own)
+    return plan if plan.trajectory is not None else None
+
+
+@pytest.mark.parametrize("family", stored_families())
+def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
+    """Of each family, to 1e-6 of its smallest body, by MuJoCo's own places of its geometries."""
+    from fclib.collections import trajectory
+
+    plan = plan_of(f"standard/{family}")
+    assert plan is not None
+    states = trajectory.read(plan.trajectory)
+    part = states.problem(0)
+    bodies = part.problem.bodies
+    assert bodies is not None
+    drawn = solids_of(bodies, part.problem.contacts)
+    record = record_of(drawn)
+    bound = 1e-6 * drawn.size
+    network = network_of(part.problem)
+    assert network.source == "file"
+    model = states.model
+    if not hasattr(model, "model"):
+        # elastic: each vertex is a node, where it is now
+        nodes = model.places()
+        for shape in np.flatnonzero(bodies.shape_kind == MESH).tolist():
+            away = np.abs(drawn.world(shape)[:, None] - nodes[None]).max(axis=2).min(axis=1)
+            assert away.max() < bound
+        return
+    kinds = {0: 0, 2: 1, 3: 2, 4: 3, 5: 4, 6: 5, 7: 6, 1: 6}  # of MuJoCo's geometries
+    import mujoco
+
+    data = mujoco.MjData(model.model)
+    data.qpos[:] = states.position[0, : model.model.nq]
+    mujoco.mj_kinematics(model.model, data)
+    places, turns = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
+    found = 0
+    for shape in range(len(drawn.kind)):
+        away = np.abs(places - record["place"][shape]).max(axis=1)
+        near = np.flatnonzero(away < bound).tolist()
+        kind = int(bodies.shape_kind[shape])
+        near = [g for g in near if kinds[int(model.model.geom_type[g])] == kind]
+        assert near, f"shape {shape} is nowhere in the simulation"
+        R = rotations(np.array([record["turn"][shape]]))[0]
+        assert min(np.abs(turns[g] - R).max() for g in near) < 1e-6
+        found += 1
+    assert found == len(drawn.kind)
 
 
 def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
     """The rotation of a body turns its part of H and its inertia, and moves nothing."""
-    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    problem = bare(read(sorted(collection.rglob("*-global.hdf5"))[-1]))
     before = network_of(problem)
     H = problem.H.toarray()
     M = problem.M.toarray()
@@ -396,7 +458,7 @@ def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
 def test_bodies_without_contact_and_rounding_move_nothing(collection: Path) -> None:
     import scipy.sparse as sp
 
-    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    problem = bare(read(sorted(collection.rglob("*-global.hdf5"))[-1]))
     before = network_of(problem)
     # a body that touches nothing comes first, and rounding ties it to all contacts
     n, m = problem.n, problem.m
@@ -411,14 +473,13 @@ def test_bodies_without_contact_and_rounding_move_nothing(collection: Path) -> N
 
 
 def test_hulls_are_those_of_each_body(collection: Path) -> None:
-    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    problem = bare(read(sorted(collection.rglob("*-global.hdf5"))[-1]))
     network = network_of(problem)
     for body in range(len(network.bodies)):
         own = np.flatnonzero((network.pairs == body).any(axis=1))
         alone = dataclasses.replace(
             network,
             bodies=network.bodies[[body]],
-            radii=network.radii[[body]],
             points=network.points[own],
             pairs=np.tile([0, -1], (own.size, 1)),
         )
@@ -435,7 +496,7 @@ def test_hulls_are_those_of_each_body(collection: Path) -> None:
 
 
 def test_a_matrix_that_is_not_of_rigid_bodies_gives_a_graph(collection: Path) -> None:
-    problem = read(sorted(collection.rglob("*-global.hdf5"))[-1])
+    problem = bare(read(sorted(collection.rglob("*-global.hdf5"))[-1]))
     network = network_of(problem.replace(H=problem.H * 2.0))
     assert not network.placed
     assert "graph" in network.note

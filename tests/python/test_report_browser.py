@@ -202,7 +202,7 @@ def test_the_catalogue_filters_sorts_and_keeps_its_state(go: Opener, site: Path)
     total = read_data(site, "catalogue")["size"]
     said = page.get_by_role("status")
     assert said.inner_text() == f"{total} of {total} problems"
-    page.get_by_label("filter").fill("nc>4 family=BoxesStack")
+    page.get_by_label("filter").fill("contacts > 4 family = BoxesStack")
     page.wait_for_function("document.querySelector('[role=status]').textContent.startsWith('10 ')")
     head(page, "contacts").click()
     page.locator("th[aria-sort=ascending]").wait_for()
@@ -217,6 +217,14 @@ def test_the_catalogue_filters_sorts_and_keeps_its_state(go: Opener, site: Path)
     again.get_by_label("filter").fill("colour=red")
     again.wait_for_function(
         "document.querySelector('[role=status]').textContent.includes('no column colour')"
+    )
+    # what was listed before stays, and nothing is listed where that is all there is
+    assert len(column(again, 0)) == 10
+    empty = go("#/catalogue?q=colour%3Dred")
+    assert "Nothing is listed" in empty.get_by_role("status").inner_text()
+    again.get_by_label("filter").fill("")
+    again.wait_for_function(
+        f"document.querySelector('[role=status]').textContent.startsWith('{total} ')"
     )
     with again.expect_download() as saved:
         again.get_by_role("button", name="CSV").click()
@@ -359,7 +367,8 @@ def test_the_network_turns_zooms_and_answers(go: Opener) -> None:
     picture = image.imread(saved.value.path(), format="png")
     # of many shades, and not an empty one
     assert len(np.unique(picture.reshape(-1, picture.shape[-1]), axis=0)) > 100
-    page.locator(".scene").get_by_role("checkbox", name="bodies").uncheck()
+    for name in ("bodies", "fixed"):
+        page.locator(".scene").get_by_role("checkbox", name=name).uncheck()
     page.wait_for_function(
         "plot => !plot.data.some(trace => trace.type === 'mesh3d')", arg=scene.element_handle()
     )
@@ -440,7 +449,7 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
         page = go("")
         draw(page, ".scene .plot")
         assert file.name in page.inner_text("main")
-        assert ("To scale" in page.inner_text("main")) == (form == "global")
+        assert "as the file has them" in page.inner_text("main")
         page.click("#theme")
         page.locator(".scene summary").click()
         page.locator(".scene table tbody tr").first.wait_for()
@@ -562,3 +571,100 @@ def test_what_was_analysed_is_shown(browser: Any, tmp_path: Path) -> None:
     for context in go.contexts:
         context.close()
     assert not go.wrong
+
+
+FILTERS = {
+    # rows: nc 50, 120, 200; family Arch, LowWall, Chain; error 1e-9, none, 1e-4
+    "nc > 100": [1, 2],
+    "contacts>100": [1, 2],
+    "contacts ≥ 120 and nc<=150": [1],
+    "family != Arch": [1, 2],
+    "family=lowwall or family = Chain": [1, 2],
+    "masonry": [0, 1],
+    "masonry not (contacts < 100)": [1],
+    "best solver = nsgs": [0],
+    "best_solver=nsgs": [0],
+    '"low wall"': [1],
+    "error < 1e-6": [0],
+    'error = ""': [1],
+    "solved by < 50%": [1],
+    "": [0, 1, 2],
+    "nothing": [],
+    "colour = red": "no column colour",
+    "nc >": "needs a value",
+    "nc > many": "many is no number",
+    "> 5": "without a column",
+    "(nc > 5": "not closed",
+    "nc > 5 or": "missing at the end",
+    "nc > 5)": ") is not understood",
+    "and": "and stands where",
+}
+
+
+def test_the_filter_understands_or_says_what_it_does_not(go: Opener) -> None:
+    page = go("#/about")
+    found = page.evaluate(
+        """(texts) => {
+          const data = { nc: [50, 120, 200], family: ["Arch", "LowWall", "Chain"],
+            best_solver: ["nsgs", "auto", "auto"], error: [1e-9, null, 1e-4],
+            solved_by: [0.5, 0.2, 1] };
+          const labels = { nc: "contacts", family: "family", best_solver: "best solver",
+            error: "error", solved_by: "solved by" };
+          const columns = Object.entries(labels).map(([key, label]) => ({ key, label }));
+          const read = Object.fromEntries(
+            Object.entries(data).map(([key, v]) => [key, (k) => v[k]]));
+          const words = (k) => ["arch masonry", "a low wall of masonry", "chain"][k];
+          return texts.map((text) => {
+            try {
+              const { test } = Fclib.parseFilter(text, { columns, read, words });
+              return [0, 1, 2].filter(test);
+            } catch (error) { return error.message; }
+          });
+        }""",
+        list(FILTERS),
+    )
+    for (text, expected), result in zip(FILTERS.items(), found, strict=True):
+        if isinstance(expected, str):
+            assert isinstance(result, str), text
+            assert expected in result, text
+        else:
+            assert result == expected, text
+
+
+BUTTONS = {
+    "plane": {"Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes"},
+    "space": {"Orbital rotation", "Pan", "Reset camera to default"},
+}
+
+
+def test_charts_have_these_buttons_and_no_others(go: Opener) -> None:
+    titles = "plot => [...plot.querySelectorAll('.modebar-btn')].map(b => b.dataset.title)"
+    page = go("#/profiles")
+    assert set(draw(page).evaluate(titles)) == BUTTONS["plane"]
+    page = go("#/problem/small/BoxesStack/0011")
+    assert set(draw(page, ".scene .plot").evaluate(titles)) == BUTTONS["space"]
+    # a finger has none in its way
+    page = go("#/profiles", viewport=PHONE, has_touch=True, is_mobile=True)
+    assert draw(page).evaluate(titles) == []
+
+
+def test_the_browser_draws_what_the_files_say(go: Opener) -> None:
+    """Corners of shapes of all kinds, as Python has them."""
+    from fclib.collections import known, trajectory
+    from fclib.report.solids import record_of, solids_of
+
+    page = go("#/about")
+    kinds = set()
+    for family in ("Chute", "Carrier", "Humanoid"):
+        path = known.plan_of(f"standard/{family}").trajectory
+        assert path is not None
+        problem: Any = trajectory.read(path).problem(0).problem
+        solids = solids_of(problem.bodies, problem.contacts)
+        kinds |= set(problem.bodies.shape_kind.tolist())
+        drawn = page.evaluate(
+            "solids => solids.kind.map((_, k) => Fclib.corners(solids, k))", record_of(solids)
+        )
+        for shape, corners in enumerate(drawn):
+            apart = np.abs(np.array(corners) - solids.world(shape)).max()
+            assert apart < 1e-6 * max(solids.size, solids.reach(shape)), (family, shape)
+    assert {0, 1, 2, 3, 5, 6} <= kinds

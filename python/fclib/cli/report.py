@@ -48,8 +48,18 @@ def command(
         MeritKind | None, typer.Option(help="Only the runs whose tolerance bounds this.")
     ] = None,
     views: Annotated[
-        int, typer.Option(help="Problems that get a 3D view, those with runs first.", min=0)
-    ] = 60,
+        int | None,
+        typer.Option(help="Problems with a picture to turn, those with runs first; all.", min=0),
+    ] = None,
+    with_files: Annotated[
+        bool, typer.Option("--with-files", help="The problems too, with solutions and pictures.")
+    ] = False,
+    files_at: Annotated[
+        str, typer.Option(help="Address where the collection's folder is served, for links to it.")
+    ] = "",
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes that draw; one a core.", min=1)
+    ] = None,
     title: Annotated[str, typer.Option(help="Of the site.")] = "",
 ) -> None:
     """Make a site to browse from stores and a catalogue.
@@ -77,7 +87,15 @@ def command(
                 return
             show = stack.enter_context(bars())
             counts = report.build_site(
-                campaigns, folder, catalogue, views=views, title=title, progress=show
+                campaigns,
+                folder,
+                catalogue,
+                views=views,
+                title=title,
+                with_files=with_files,
+                files_at=files_at,
+                jobs=jobs,
+                progress=show,
             )
     except (fclib.Error, CatalogError) as error:
         fail(str(error))

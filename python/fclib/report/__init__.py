@@ -1,7 +1,7 @@
 """The report: a site to browse, a view of one problem, figures for a paper.
 
     stores, catalogue -> runs, problems -> site
-    problem file -> network -> view
+    problem file -> network, solids -> view, picture
 
 All numbers come from the stores of `fclib.bench` and from the catalogue of `fclib.collections`.
 Files of problems are read for their pictures alone: the pattern and the network of contacts.
@@ -9,14 +9,19 @@ Files of problems are read for their pictures alone: the pattern and the network
 site.py        the pages of the site: problems, families, solvers, runs
 runs.py        the runs of stores, as the site needs them, summed by `bench.profiles`
 view.py        what the page of one problem shows, and that page by itself
-network.py     the contact network of a problem, in space: positions from H, or a graph
+network.py     bodies and contacts: places from the file, from H where that is sound, or a graph
+solids.py      shapes of bodies in their places, as the file has them
+picture.py     a small picture of them
+drawn.py       what the site draws of each problem
+taking.py      what one can take of a problem from the site
 recipes.py     lines to copy: how to get and solve a problem
 paper.py       figures and tables for a paper
 libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError
 assets/        the pages themselves: HTML, CSS, JavaScript
 
-site.py needs all others but paper.py; view.py needs network.py; paper.py needs runs.py.
+site.py needs all others but paper.py; drawn.py needs view.py and picture.py, these two solids.py,
+and view.py network.py; paper.py needs runs.py.
 """
 
 from fclib.report.error import ReportError

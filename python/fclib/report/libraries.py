@@ -1,6 +1,6 @@
 """The libraries that the pages draw with, taken from the Python packages that ship them.
 
-    plotly   plotly.min.js: charts, patterns, the network of contacts in space
+    plotly   plotly.min.js: charts, patterns, bodies and contacts in space
     itables  DataTables with jQuery: tables
 
 Nothing of theirs lies in this repository: their files are copied into a site as it is written, each
@@ -65,7 +65,7 @@ def plotly() -> Library:
         version=_version(distribution, r"plotly\.js v([\d.]+)", script),
         licence="MIT, parts BSD-3-Clause",
         package=f"plotly {distribution.version}",
-        purpose="charts, patterns, contact networks",
+        purpose="charts, patterns, bodies and contacts",
         files={"plotly.js": script},
         notices=_notices(distribution, script),
     )

@@ -1,7 +1,7 @@
 """The network of contacts of a problem: bodies, contact points, normals, where they are in space.
 
-FCLIB files hold no positions. Where bodies are free and rigid, H holds more than it seems to: its
-block of a contact and a body is
+A file that has the groups /bodies and /contacts says it. Of another, H holds more than it seems to,
+where bodies are free and rigid: its block of a contact and a body is
 
     H_v = T            (3 x 3), the contact's frame, columns N, T1, T2, in space
     H_w = Q^T [l]x T   (3 x 3), l from the body's centre to the contact point, Q the body's rotation
@@ -12,7 +12,11 @@ the last sign is the one for which Q is a rotation (or, with one contact, the on
 lies on the side it is pushed to, as a convex body does). Two bodies in contact share its point,
 x_a + l_a = x_b + l_b, which gives the positions of all bodies that hang together, by least squares.
 Groups without a contact between them are set down beside each other, at their heights over
-the ground, and the network is said to be `placed`. Otherwise it is laid out as a graph.
+the ground.
+
+That is sound where M has six rows for each body that is touched, one mass and no more beside its
+inertia, and one rotation Q fits all of its contacts: a node of a mesh, or a body with joints, has
+no such rows. Of what is not sound there is a graph, and nobody is told where a body is.
 
 In a periodic cell x_a + l_a = x_b + l_b + s, with s of whole periods, which the file tells. Where
 contacts make a tree, s may be 0; at the others the positions leave gaps that round to their s.
@@ -30,11 +34,14 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import scipy.sparse.linalg
 
+from fclib._geometry import Bodies, Contacts
+
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 FRAME = 1e-6  # what the columns of a frame may lack of orthonormality
 MISFIT = 0.05  # what contact points may be apart, of the size of the levers, to be believed
+RIGID = 1e-6  # what the moments of a rigid body may differ from those of levers, relative
 EDGES = 20_000  # of a graph that pull while it is laid out
 ROUNDING = 1e-12  # what an entry of H may be, of the largest, and stand for nought
 GROUND = 1e-2  # weight of a plane ground against that of shared points
@@ -44,16 +51,21 @@ GROUND = 1e-2  # weight of a plane ground against that of shared points
 class Network:
     """Bodies that have a contact, and contacts, in space; the ground is body -1."""
 
-    placed: bool  # by the geometry in H; else laid out as a graph
+    source: str  # of positions: "file", "H", or "graph" where nobody knows them
     bodies: Array  # (bodies, 3) [m] where placed
     points: Array  # (contacts, 3)
     pairs: Indices  # (contacts, 2) bodies of each contact
     frames: Array | None  # (contacts, 3, 3) columns N, T1, T2, pushing the first body
-    radii: Array  # (bodies) of balls, 0 for another shape
     note: str = ""
+    limits: Indices | None = None  # contacts without a place: limits of joints, dry friction
     # (contacts, 3) from the place at the second body to that at the first; 0 but across a boundary
     shifts: Array | None = None
     cell: Array | None = None  # (2, 2) lowest and highest x, y of a periodic cell
+
+    @property
+    def placed(self) -> bool:
+        """Whether positions are known."""
+        return self.source != "graph"
 
 
 @dataclass
@@ -66,6 +78,8 @@ class _Body:
 
 def network_of(problem: Any) -> Network:
     """The network of a problem in any formulation; nc is at least 1."""
+    if problem.bodies is not None and problem.contacts is not None:
+        return given(problem.bodies, problem.contacts)
     if getattr(problem, "H", None) is None:
         return _of_local(problem)
     H = sp.csc_array(problem.H, copy=True)
@@ -87,11 +101,36 @@ def network_of(problem: Any) -> Network:
     kept = touched[touched >= 0]
     pairs = numbers.reshape(pairs.shape) - (touched.size - kept.size)
     bodies = [bodies[number] for number in kept]
-    if d >= 3:
+    if d >= 3 and all(body.free for body in bodies):
         found = _place(problem.nc, d, H, bodies, pairs, _period_of(problem))
         if found is not None:
             return found
     return _lay_out(len(bodies), pairs, "as a graph: H is not that of free rigid bodies in space")
+
+
+def given(bodies: Bodies, contacts: Contacts) -> Network:
+    """What a file says: the force of a contact pushes the second of its two bodies."""
+    pairs = np.asarray(contacts.body[:, ::-1], dtype=np.int64)
+    limits = np.flatnonzero((contacts.shape < 0).any(axis=1))
+    found = Network(
+        "file",
+        np.asarray(bodies.place),
+        np.asarray(contacts.point),
+        pairs,
+        np.swapaxes(contacts.frame, 1, 2),
+        limits=limits,
+    )
+    if len(bodies.period):
+        period = np.array([*bodies.period, np.inf])
+        # the nearest images of both bodies are meant
+        ends = [_whole(contacts.point - bodies.place[pairs[:, side]], period) for side in (0, 1)]
+        shifts = ends[1] - ends[0]
+        shifts[limits] = 0.0
+        found.shifts = shifts
+        # a contact is drawn where the first of its bodies is
+        found.points = found.points - ends[0]
+        found.shifts = shifts
+    return found
 
 
 def _period_of(problem: Any) -> Array | None:
@@ -121,32 +160,36 @@ def _bodies_of(problem: Any, H: Any) -> list[_Body]:
     cut = np.flatnonzero(ends == np.arange(problem.n))
     size = problem.spacedim
     rows = sp.csr_array(H)
-    masses = np.asarray(sp.csr_array(problem.M).diagonal())
+    M = sp.csr_array(problem.M)
     bodies = []
     start = 0
     while start < problem.n:
         end = int(cut[np.searchsorted(cut, start)]) + 1
         six = start + 6
         free = False
-        if size >= 3 and six <= problem.n and (end >= six or six - 1 in cut):
-            free = _is_free(rows, masses, size, start)
+        # the rows of a free body's place and rotation; M may couple them in blocks of its own
+        if size >= 3 and end <= six <= problem.n and six - 1 in cut:
+            own = M[start:six, start:six].toarray()
+            free = _is_free(rows, own, size, start)
             if free:
-                end = max(end, six)
+                end = six
         bodies.append(_Body(start, end - start, free))
         start = end
     return bodies
 
 
-def _is_free(H: Any, masses: Array, d: int, first: int) -> bool:
-    """Whether six degrees of freedom are the velocity of a body's point and its rotation.
+def _is_free(H: Any, M: Array, d: int, first: int) -> bool:
+    """Whether six degrees of freedom are the velocity of a rigid body's centre and its rotation.
 
-    Of a body without contact the equal masses of its first three decide.
+    Their mass must be one number and nothing beside, and the first three rows of H frames.
     """
+    mass = M[0, 0]
+    if np.abs(M[:3] - np.eye(3, 6) * mass).max() > FRAME * mass:
+        return False
     block = H[first : first + 6]
     contacts = np.unique(block.indices // d)
     if not contacts.size:
-        own = masses[first : first + 3]
-        return bool(np.ptp(own) <= FRAME * own.max())
+        return True
     # (3, contacts, 3): the columns of the frames, if they are such
     T = block[:3].toarray().reshape(3, -1, d)[:, contacts, :3]
     return bool(np.abs(np.einsum("ikp,ikq->kpq", T, T) - np.eye(3)).max() < FRAME)
@@ -172,6 +215,8 @@ def _place(
             T[contact] = block[:3]
             moments[contact] = block[3:] @ block[:3].T
         body.levers = _levers(moments, T)
+        if not _is_rigid(moments, body.levers):
+            return None
         for contact in own.tolist():
             if not known[contact] or pairs[contact, 0] == number:
                 frames[contact] = T[contact]
@@ -209,19 +254,12 @@ def _place(
         points += moves[label[pairs[:, 0]]]
         if cell is not None:
             cell += moves[label[inside.argmax()], :2]
-    radii = np.zeros(len(bodies))
-    for number, body in enumerate(bodies):
-        own = np.flatnonzero((pairs == number).any(axis=1))
-        if not body.free:
-            centres[number] = points[own].mean(axis=0)
-        elif body.size == 6:
-            radii[number] = _ball(body, own, frames)
     note = "positions recovered from H"
     if cell is not None:
         note += "; a contact across the boundary of the periodic cell is drawn on both sides"
     if groups > 1:
         note += f"; its {groups} groups that do not touch stand beside each other as it fits"
-    found = Network(True, centres, points, pairs, frames, radii, note)
+    found = Network("H", centres, points, pairs, frames, note)
     if cell is not None:
         found.shifts, found.cell = shifts, cell
     return found
@@ -284,6 +322,19 @@ def _levers(moments: dict[Any, Array], frames: dict[Any, Array]) -> dict[int, Ar
     else:
         wrong = sum(float(levers[c] @ frames[c][:, 0]) for c in order) > 0
     return {c: -lever if wrong else lever for c, lever in levers.items()}
+
+
+def _is_rigid(moments: dict[Any, Array], levers: dict[int, Array]) -> bool:
+    """Whether one rotation Q gives A = Q^T [l]x of all contacts, and not all levers are nought."""
+    own = [(moments[c], _cross(levers[c])) for c in levers]
+    size = max(float(np.abs(A).max()) for A, _ in own)
+    if size == 0.0:
+        return False
+    # the nearest rotation, by Kabsch
+    u, _, vt = np.linalg.svd(sum(A @ lever.T for A, lever in own))
+    turn = np.diag([1.0, 1.0, float(np.linalg.det(u @ vt))])
+    Q = u @ turn @ vt
+    return all(float(np.abs(A - Q @ lever).max()) < RIGID * size for A, lever in own)
 
 
 def _cross(x: Array) -> Array:
@@ -372,16 +423,6 @@ def _set_down(label: Indices, pairs: Indices, centres: Array, points: Array) -> 
     return moves
 
 
-def _ball(body: _Body, own: Indices, frames: Array) -> float:
-    """The radius of a body whose levers are normals of one length; 0 for another."""
-    levers = np.array([body.levers[c] for c in own])
-    sizes = np.linalg.norm(levers, axis=1)
-    along = np.abs(np.einsum("kj,kj->k", levers, frames[own][:, :, 0]))
-    # a contact in a gap lies beyond the surface
-    same = np.ptp(sizes) < 0.1 * sizes.max() and bool((along > 0.999 * sizes).all())
-    return float(sizes.min()) if same else 0.0
-
-
 # ---- graphs
 
 
@@ -396,7 +437,7 @@ def _of_local(problem: Any) -> Network:
     points = _spread(problem.nc, edges)
     pairs = np.full((problem.nc, 2), -1)
     note = "as a graph: points that W couples are near; a local problem does not know its bodies"
-    return Network(False, np.zeros((0, 3)), points, pairs, None, np.zeros(0), note)
+    return Network("graph", np.zeros((0, 3)), points, pairs, None, note)
 
 
 def _lay_out(count: int, pairs: Indices, note: str) -> Network:
@@ -406,7 +447,7 @@ def _lay_out(count: int, pairs: Indices, note: str) -> Network:
         [np.column_stack([side, contacts])[side >= 0] for side in (pairs[:, 0], pairs[:, 1])]
     )
     nodes = _spread(count + len(pairs), edges)
-    return Network(False, nodes[:count], nodes[count:], pairs, None, np.zeros(count), note)
+    return Network("graph", nodes[:count], nodes[count:], pairs, None, note)
 
 
 def _spread(count: int, edges: Indices, rounds: int = 60) -> Array:

@@ -3,10 +3,12 @@
     index.html  assets/           the pages and the libraries, the same for every site
     data/site.js                  what the first page shows, the solvers, the families
     data/catalogue.js             a column each of what is known of the problems
+    data/files/1.js               digests, files and how to name them, of rows 100 to 199
     data/t0.js  data/t0-cpu_s.js  statuses, and costs by a metric, at the first tolerance
     data/problems/12.js           the runs of the problem in row 12 of the catalogue
-    data/views/12.js              its patterns, and its network of contacts
+    data/views/  thumbs/          pictures; drawn.py
     pictures/SET/FAMILY/          of the catalogue
+    files/                        the problems themselves, where that is asked for
 
 A data file calls `Fclib.put(name, value)`: a script loads from a folder of files, JSON does not.
 """
@@ -26,18 +28,18 @@ from typing import Any
 from fclib import _core, _registry
 from fclib.bench.job import MERITS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
-from fclib.collections import families, read_catalog
+from fclib.collections import families, read_catalog, sets, standing
+from fclib.report import drawn, taking
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
 from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns
-from fclib.report.view import ASSETS, as_json, rounded, view_of
+from fclib.report.view import ASSETS, rounded
 
 MARK = "data/site.js"  # by which a folder is known to be a site
-VIEWS = 60  # problems whose network is drawn, where nothing else is said
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
-    *("index.html", "style.css", "core.js", "table.js", "plot.js"),
+    *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
     *("scene.js", "profiles.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
@@ -45,7 +47,15 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("id", "problem", "its name"),
     ("collection", "set", "the set of families"),
     ("family", "family", "the scene that it is from"),
-    ("formulation", "form", "in the abbreviations of RT-0444"),
+    ("kind", "kind", "the set that its family is of first: masonry, granular, mixed, ..."),
+    ("application", "application", "what such problems are from"),
+    ("formulation", "form", "in the abbreviations of RT-0444: G global, M mixed, R rolling"),
+    (
+        "class",
+        "class",
+        "easy: solved by more than half of the solvers that take it; hard: by fewer; open: by none",
+    ),
+    ("solved_by", "solved by", "share of the solvers that take it and solve it, for its class"),
     ("spacedim", "d", "components of a contact"),
     ("nc", "contacts", "number of contacts"),
     ("n", "dof", "degrees of freedom of the bodies that contacts move"),
@@ -92,11 +102,12 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("best_tol", "best at", "that tolerance"),
     ("runs", "runs", "in the stores"),
     ("solved", "solved", "runs whose recomputed error met the tolerance"),
-    ("view", "3D", "whether the site has its contact network"),
+    ("view", "view", "whether its page has a picture to turn"),
+    ("thumb", "picture", "whether there is a small picture of it"),
 )
 # of a catalogue, and of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
-HIDDEN |= {"nnz_H", "solver", "tol"}
+HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
 
 
 def _no_progress(what: str, done: int, total: int) -> None:
@@ -108,8 +119,11 @@ def build_site(
     out: Path,
     catalogue: Path | None = None,
     *,
-    views: int = VIEWS,
+    views: int | None = None,
     title: str = "",
+    with_files: bool = False,
+    files_at: str = "",
+    jobs: int | None = 1,
     progress: Callable[[str, int, int], None] = _no_progress,
 ) -> dict[str, int]:
     """Write the site, whole, in the place of an older one.
@@ -118,8 +132,12 @@ def build_site(
         campaigns: the runs; None for a catalogue alone.
         out: the folder of the site.
         catalogue: a collection's folder.
-        views: so many problems get their picture, those with runs first, spread over families.
+        views: so many problems get a picture to turn, those with runs first, spread over families;
+            None: all. A small picture has each.
         title: of the site.
+        with_files: copy the problems into the site, with their reference solutions and pictures.
+        files_at: an address where the folder of the collection is served, for links to it.
+        jobs: processes that draw; None: one a core.
         progress: is told what is done, how far, of how many.
 
     Returns:
@@ -138,7 +156,8 @@ def build_site(
     out.parent.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
-        counts = _Writer(part, campaigns, problems, views, title, progress).write()
+        taken = taking.Taking(part, problems.folder, with_files, files_at)
+        counts = _Writer(part, campaigns, problems, views, title, progress, taken, jobs).write()
         part.chmod(0o755)
         if out.exists():
             old = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
@@ -171,6 +190,34 @@ class Problems:
                 self.files.append(self.folder / (row["global_file"] or row["local_file"]))
         if campaigns is not None:
             self._add_runs(campaigns)
+        known = families()
+        for row in self.rows:
+            family = known.get(row["family"])
+            row["kind"] = family.collection if family else row.get("collection")
+            row["application"] = family.application if family else None
+            if not row["formulation"].startswith("G"):
+                # a local problem does not know its bodies
+                row |= {"n": None, "density": None}
+        self.standings = self._rate()
+
+    def _rate(self) -> dict[str, Any]:
+        """The class of each problem that stored runs say, and what that rests on, by set."""
+        found: dict[str, Any] = {}
+        rated: dict[str, standing.Standing] = {}
+        named = {str(row.get("collection")) for row in self.rows} | {standing.FIRST}
+        for name in sorted(named & set(sets())):
+            try:
+                rows, basis = standing.standings(name)
+            except (standing.StandingError, OSError):
+                continue  # the package of stored runs is not here
+            if basis is not None:
+                found[name] = (rows, basis)
+                rated |= {row.digest: row for row in rows if row.rating}
+        for row in self.rows:
+            own = rated.get(row.get("digest") or "")
+            if own is not None:
+                row |= {"class": own.rating, "solved_by": own.solved / own.voters}
+        return found
 
     def _add_runs(self, campaigns: Campaigns) -> None:
         digests = {row["digest"]: k for k, row in enumerate(self.rows)}
@@ -209,7 +256,7 @@ class Problems:
             values = [row.get(name) for row in self.rows]
             if any(value not in (None, "", False) for value in values):
                 found.append({"key": name, "label": label, "doc": doc, **_packed(values)})
-        for name in ("title", "step", "time", "seed", "tol", "solver", "global_file", "local_file"):
+        for name in ("title", "number", "tol", "solver", "global_file", "local_file"):
             values = [row.get(name) for row in self.rows]
             if any(value is not None for value in values):
                 found.append({"key": name, "hidden": True, **_packed(values)})
@@ -237,10 +284,14 @@ class _Writer:
         folder: Path,
         campaigns: Campaigns | None,
         problems: Problems,
-        views: int,
+        views: int | None,
         title: str,
         progress: Callable[[str, int, int], None],
+        taken: taking.Taking,
+        jobs: int | None,
     ) -> None:
+        self.taking = taken
+        self.jobs = jobs
         self.folder = folder
         self.campaigns = campaigns
         self.problems = problems
@@ -250,11 +301,7 @@ class _Writer:
         self.bytes = 0
 
     def put(self, name: str, value: Any) -> None:
-        path = self.folder / "data" / f"{name}.js"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        text = f"Fclib.put({as_json(name)},{as_json(value)});\n"
-        path.write_text(text, encoding="utf-8")
-        self.bytes += len(text)
+        self.bytes += drawn.put(self.folder, name, value)
 
     def write(self) -> dict[str, int]:
         (self.folder / "assets").mkdir()
@@ -277,17 +324,22 @@ class _Writer:
             site |= self._runs(self.campaigns)
         else:
             site["solvers"] = [_solver(info.name, info.name, {}) for info in _registry.solvers()]
-        drawn = self._views()
-        site["families"] = self._families()
-        site["views"] = drawn
+        views, steps = self._views()
+        site["families"] = self._families(steps)
+        site["views"] = views
+        site["standings"] = _standings(self.problems.standings)
         site["problems"] = len(self.problems.rows)
         site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
+        site["files"] = self.taking.kind
+        for first in range(0, len(self.problems.rows), taking.CHUNK):
+            rows = self.problems.rows[first : first + taking.CHUNK]
+            self.put(f"files/{first // taking.CHUNK}", [self.taking.record(row) for row in rows])
         self.put("catalogue", {"size": len(self.problems.rows), "columns": self.problems.columns()})
         self.put("site", site)
         return {
             "problems": len(self.problems.rows),
             "runs": len(self.campaigns.rows) if self.campaigns is not None else 0,
-            "views": drawn,
+            "views": views,
             "bytes": self.bytes,
         }
 
@@ -314,6 +366,7 @@ class _Writer:
             # tolerances fall: what a smaller one tells takes the place
             best |= self._best(bench, campaigns.solvers)
         self.progress("tolerances", total, total)
+        self._rate(campaigns)
         for place, (solver, seconds, tol) in best.items():
             self.problems.rows[place] |= {"best_solver": solver, "best_s": seconds, "best_tol": tol}
         by_place: dict[int, list[dict[str, Any]]] = defaultdict(list)
@@ -357,33 +410,55 @@ class _Writer:
                     found[place] = (solvers[k], value, bench.tol)
         return found
 
-    def _views(self) -> int:
+    def _rate(self, campaigns: Campaigns) -> None:
+        """The class, by these runs at the smallest tolerance, of what stored runs do not tell."""
+        solved: dict[int, list[bool]] = defaultdict(list)
+        last: dict[tuple[int, str], bool] = {}
+        for row in campaigns.at(campaigns.tolerances[-1]):
+            if row["status"] != "unsuitable":
+                last[self.problems.places[row["hash"]], row["solver"]] = bool(row["solved"])
+        for (place, _), done in last.items():
+            solved[place].append(done)
+        for place, own in solved.items():
+            row = self.problems.rows[place]
+            if not row.get("class"):
+                share = sum(own) / len(own)
+                row["class"] = "open" if share == 0 else "easy" if share > 0.5 else "hard"
+                row["solved_by"] = share
+
+    def _views(self) -> tuple[int, dict[tuple[str, str], list[int]]]:
+        """Draw all problems; how many have a view, and the steps of each family."""
         rows, files = self.problems.rows, self.problems.files
         there = [k for k, file in enumerate(files) if file is not None and file.is_file()]
-        chosen = _spread(there, rows, self.views)
-        drawn = 0
-        for done, place in enumerate(chosen):
-            self.progress("networks", done, len(chosen))
-            file = files[place]
+        chosen = set(there if self.views is None else _spread(there, rows, self.views))
+        tasks = []
+        for k in there:
+            file = files[k]
             assert file is not None
-            try:
-                problem: Any = _core.read(file)
-                solution = _core.read_solution(file) if "solution" in _core.contents(file) else None
-                self.put(f"views/{place}", view_of(problem, solution))
-            except _core.Error:
-                continue  # a file that went away or was damaged has no picture; its runs stay
-            rows[place]["view"] = True
-            drawn += 1
-        self.progress("networks", len(chosen), len(chosen))
-        return drawn
-
-    def _families(self) -> list[dict[str, Any]]:
-        known = families()
-        groups: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
-        for row in self.problems.rows:
-            groups[row.get("collection") or "", row["family"]].append(row)
+            tasks.append(drawn.Task(k, file, k in chosen, self.taking.picture(rows[k])))
         found = []
-        for (collection, name), rows in sorted(groups.items()):
+        for done, one in enumerate(drawn.draw_all(self.folder, tasks, self.jobs)):
+            self.progress("pictures", done + 1, len(tasks))
+            self.bytes += one.bytes
+            rows[one.place] |= {"view": one.view, "thumb": one.thumb}
+            found.append(one)
+        steps, size = drawn.sequences(self.folder, found, rows)
+        self.bytes += size
+        return sum(one.view for one in found), steps
+
+    def _families(self, steps: Mapping[tuple[str, str], list[int]]) -> list[dict[str, Any]]:
+        known = families()
+        groups: dict[tuple[str, str], list[int]] = defaultdict(list)
+        for k, row in enumerate(self.problems.rows):
+            groups[row.get("collection") or "", row["family"]].append(k)
+        # runs of a problem that the catalogue has not are beside its family there
+        for _, name in [key for key in groups if not key[0]]:
+            others = [key for key in groups if key[0] and key[1] == name]
+            if others:
+                groups[others[0]] += groups.pop(("", name))
+        found = []
+        for (collection, name), places in sorted(groups.items()):
+            rows = [self.problems.rows[k] for k in places]
             record: dict[str, Any] = {"name": name, "set": collection, "problems": len(rows)}
             record["ranges"] = {
                 key: [min(values), max(values)]
@@ -392,8 +467,16 @@ class _Writer:
             }
             record["ranges"] = rounded(record["ranges"])
             record["formulations"] = sorted({row["formulation"] for row in rows})
+            record["kind"] = rows[0]["kind"] or ""
+            record["version"] = rows[0].get("version")
+            record["citation"] = rows[0].get("citation")
+            if (collection, name) in steps:
+                record["steps"] = steps[collection, name]
             if name in known:
                 record |= _family(known[name])
+            shown = [k for k in places if self.problems.rows[k].get("thumb")]
+            if shown:
+                record["thumb"] = f"thumbs/{shown[len(shown) // 2]}.webp"
             source = self.problems.folder / collection / name if self.problems.folder else None
             for picture in PICTURES:
                 if source and (source / picture).is_file():
@@ -402,7 +485,33 @@ class _Writer:
                     shutil.copyfile(source / picture, target / picture)
                     record[picture.partition(".")[0]] = f"pictures/{collection}/{name}/{picture}"
             found.append(record)
-        return found
+        # pictures first
+        return sorted(found, key=lambda one: "scene" not in one and "thumb" not in one)
+
+
+def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What the page of classes shows, by set."""
+    found = []
+    for name, (rows, basis) in known.items():
+        counts: dict[str, dict[str, int]] = {}
+        for row in rows:
+            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(standing.CLASSES, 0))
+            if row.rating:
+                own[row.rating] += 1
+        best = [(row.id, row.best) for row in rows if row.rating == "open"]
+        found.append(
+            {
+                "set": name,
+                "basis": str(basis),
+                "families": [{"family": family, **own} for family, own in counts.items()],
+                "open": [
+                    {"problem": id_, "error": run.error, "by": run.solver, "date": run.date}
+                    for id_, run in best
+                    if run is not None
+                ],
+            }
+        )
+    return found
 
 
 def _spread(there: Sequence[int], rows: Sequence[Mapping[str, Any]], count: int) -> list[int]:

@@ -16,10 +16,12 @@ from scipy.spatial import ConvexHull, QhullError
 from fclib import _core
 from fclib.report.libraries import libraries
 from fclib.report.network import Network, network_of
+from fclib.report.solids import record_of, solids_of
 
 ASSETS = Path(__file__).with_name("assets")
 DIGITS = 5  # of positions and reactions in a picture
 CELLS = 128  # of a pattern, along its longer side
+CONDENSED = 2000  # contacts up to which W is made of a global problem, for its pattern
 SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
 SCRIPTS = ("table.js", "plot.js", "scene.js", "profiles.js", "view.js")
 STATUS = ("open", "stick", "slide")
@@ -70,24 +72,32 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
     }
     if not problem.nc:
         return record | {"patterns": patterns_of(problem, None)}
-    W = problem.condense().W if hasattr(problem, "H") else problem.W
+    W = None
+    if not hasattr(problem, "H"):
+        W = problem.W
+    elif problem.nc <= CONDENSED:
+        W = problem.condense().W
     record["patterns"] = patterns_of(problem, W)
-    record |= spectrum_of(W)
+    if W is not None:
+        record |= spectrum_of(W)
     network = network_of(problem)
-    size = float(np.abs(network.points - network.points.mean(axis=0)).max()) or 1.0
     record["network"] = {
-        "placed": network.placed,
+        "source": network.source,
         "note": network.note,
-        "size": rounded(size),
-        "bodies": rounded(network.bodies),
-        "points": rounded(network.points),
+        "bodies": rounded(network.bodies) if network.source != "file" else [],
+        "points": rounded(network.points, 7 if network.source == "file" else DIGITS),
         "pairs": network.pairs.tolist(),
-        "radii": rounded(network.radii),
-        "faces": hulls_of(network),
     }
-    if network.shifts is not None and network.cell is not None:
-        crossing = np.flatnonzero(network.shifts.any(axis=1))
+    if network.source == "file":
+        record["solids"] = record_of(solids_of(problem.bodies, problem.contacts))
+    elif network.source == "H":
+        record["network"]["faces"] = hulls_of(network)
+    if network.limits is not None and network.limits.size:
+        record["network"]["limits"] = network.limits.tolist()
+    if network.cell is not None:
         record["network"]["cell"] = rounded(network.cell)
+    if network.shifts is not None:
+        crossing = np.flatnonzero(network.shifts.any(axis=1))
         record["network"]["crossing"] = crossing.tolist()
         record["network"]["images"] = rounded((network.points - network.shifts)[crossing])
     if network.frames is not None:
@@ -98,7 +108,7 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
 
 
 def hulls_of(network: Network) -> list[list[int]]:
-    """Triangles of the hulls of each body's centre and contact points, but for balls.
+    """Triangles of the hulls of each body's centre and contact points.
 
     Returns:
         (triangles, 3) numbers of corners: first the bodies' centres, then the contact points, then
@@ -113,7 +123,7 @@ def hulls_of(network: Network) -> list[list[int]]:
         ends[crossing, 1] = len(corners) + np.arange(crossing.size)
         corners = np.concatenate([corners, (network.points - network.shifts)[crossing]])
     found: list[list[int]] = []
-    for body in np.flatnonzero(network.radii == 0) if network.placed else ():
+    for body in range(count) if network.source == "H" else ():
         chosen = np.concatenate([[body], ends[network.pairs == body]])
         if chosen.size == 3:
             found.append(chosen.tolist())

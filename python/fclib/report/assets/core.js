@@ -8,6 +8,11 @@ Fclib.NotHere = class extends Error {};
 
 // ---- data: a file calls put(), load() gives a promise of what it put
 Fclib.put = (name, value) => { Fclib.values[name] = value; };
+// large data come compressed
+Fclib.putPacked = (name, text) => {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  Fclib.values[name] = new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
+};
 Fclib.script = (src) => {
   Fclib.waiting[src] ||= new Promise((resolve, reject) => {
     const script = document.createElement("script");
@@ -20,7 +25,7 @@ Fclib.script = (src) => {
 };
 Fclib.load = async (name) => {
   if (!(name in Fclib.values)) await Fclib.script(`data/${name}.js`);
-  return Fclib.values[name];
+  return Fclib.values[name] = await Fclib.values[name];
 };
 // the library that draws is large: pages without pictures do not wait for it
 Fclib.plotly = async () => {
@@ -48,6 +53,21 @@ Fclib.set = (element, attributes) => {
 Fclib.facts = (pairs) => Fclib.h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [Fclib.h("dt", {}, name), Fclib.h("dd", {}, v)]));
 // `names` of code in a text
 Fclib.prose = (text) => text.split("`").map((part, k) => k % 2 ? Fclib.h("code", {}, part) : part);
+
+Fclib.copyable = (text, label) => {
+  const button = Fclib.h("button", { type: "button", "aria-label": label ? `Copy ${label}` : "Copy", onclick: async () => {
+    try { await navigator.clipboard.writeText(text); button.textContent = "copied"; } catch { getSelection().selectAllChildren(code); button.textContent = "selected"; }
+    setTimeout(() => { button.textContent = "copy"; }, 1500);
+  } }, "copy");
+  const code = Fclib.h("code", {}, text);
+  return Fclib.h("div", { class: "copy" }, Fclib.h("pre", { tabindex: 0, role: "region", "aria-label": label || "To copy" }, code), button);
+};
+// a text as a file to keep
+Fclib.save = (name, text) => {
+  const link = Fclib.h("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+};
 
 // ---- addresses: a page, what it is of, its state
 Fclib.to = (page, rest = [], params = {}) => {

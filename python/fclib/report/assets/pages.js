@@ -40,14 +40,7 @@
       onstate: ({ sort: by, at, q }) => keep({ sort: by && `${by.key}${by.down ? ":down" : ""}`, page: at ? at + 1 : "", look: q }),
     };
   };
-  const copyable = (text) => {
-    const button = h("button", { type: "button", onclick: async () => {
-      try { await navigator.clipboard.writeText(text); button.textContent = "copied"; } catch { getSelection().selectAllChildren(code); button.textContent = "selected"; }
-      setTimeout(() => { button.textContent = "copy"; }, 1500);
-    } }, "copy");
-    const code = h("code", {}, text);
-    return h("div", { class: "copy" }, h("pre", { tabindex: 0 }, code), button);
-  };
+  const { copyable } = Fclib;
   const shown = (v) => typeof v === "boolean" ? v ? "yes" : "no" : number(v);
   const status = (name) => h("span", { class: name === "converged" ? "good" : "bad" }, name);
 
@@ -104,10 +97,10 @@
   };
 
   const familyCards = (list) => h("div", { class: "cards" }, list.map((f) => h("article", { class: "panel" },
-    f.scene && h("img", { src: f.scene, alt: f.description || f.name, loading: "lazy" }),
+    f.scene || f.thumb ? h("a", { href: familyHref(f.set, f.name), tabindex: -1, "aria-hidden": true }, h("img", { src: f.scene || f.thumb, alt: "", loading: "lazy" })) : null,
     h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
     h("p", { class: "small" }, f.description || ""),
-    h("p", { class: "small soft" }, `${f.problems} problems, ${f.ranges.nc ? range(f.ranges.nc) : "?"} contacts, ${f.formulations.join(", ")}`))));
+    h("p", { class: "small soft" }, `${f.problems} problem${f.problems === 1 ? "" : "s"}, ${f.ranges.nc ? range(f.ranges.nc) : "?"} contacts, ${f.formulations.join(", ")}`))));
 
   Fclib.pages.families = async (page) => {
     const { families: all, problems } = site(), sets = [...new Set(all.map((f) => f.set))];
@@ -186,10 +179,16 @@
           ...there.map(([code, name, meaning]) => ({ key: code, label: name, title: meaning, type: "number", value: (r) => r.counts[code] || 0 }))],
       }));
     };
+    /* auto and the one that does best beside it: by problems solved, then by the mean */
+    const rivals = (t, all) => {
+      const table = (((s.headlines[t] || { tables: {} }).tables)[""] || []).filter((r) => r.solver !== "virtual best").sort((x, y) => y.solved - x.solved || x.mean - y.mean).map((r) => r.solver);
+      const order = [...table, ...all.filter((name) => !table.includes(name))], first = order.includes("auto") ? "auto" : order[0];
+      return [first, order.find((name) => name !== first) ?? first];
+    };
     const drawPair = (bench, costs, keepProblem) => {
       const names = labels.map((name) => [name, name]);
-      const two = [...chosen];
-      const a = Math.max(0, labels.indexOf(state.a ?? labels[two[0] ?? 0])), b = Math.max(0, labels.indexOf(state.b ?? labels[two[1] ?? 1] ?? labels[0]));
+      const [first_, second_] = rivals(state.tol, labels);
+      const a = Math.max(0, labels.indexOf(state.a ?? first_)), b = Math.max(0, labels.indexOf(state.b ?? second_));
       const families = [...new Set(bench.problems.map((k) => cat.read.family(k)))].sort();
       const points = [];
       let first = 0, second = 0, low = Infinity, high = 0;
@@ -212,60 +211,93 @@
   };
 
   // ---- catalogue
-  const OPERATORS = /^([\p{L}\w]+)(<=|>=|=|<|>)(.+)$/u;
-  /* "nc>100 mu_max<0.5 family=Chain stack": all must hold; a word without an operator is looked for in name and title */
-  const parseFilter = (text, read) => {
-    const tests = [], wrong = [];
-    for (const word of text.split(/\s+/).filter(Boolean)) {
-      const found = OPERATORS.exec(word);
-      if (!found) { const part = word.toLowerCase(); tests.push((k) => `${read.id(k)} ${read.title ? read.title(k) || "" : ""}`.toLowerCase().includes(part)); continue; }
-      const [, key, operator, wanted] = found, column = read[key];
-      if (!column) { wrong.push(`no column ${key}`); continue; }
-      if (operator === "=") tests.push((k) => String(column(k)).toLowerCase() === wanted.toLowerCase() || (wanted !== "" && column(k) === Number(wanted)));
-      else {
-        const bound = Number(wanted);
-        if (Number.isNaN(bound)) { wrong.push(`${wanted} is no number`); continue; }
-        const compare = { "<": (v) => v < bound, ">": (v) => v > bound, "<=": (v) => v <= bound, ">=": (v) => v >= bound }[operator];
-        tests.push((k) => column(k) !== null && column(k) !== undefined && compare(column(k)));
-      }
-    }
-    return { test: (k) => tests.every((one) => one(k)), wrong };
+  // a row may have several tags of a kind
+  const many = (v) => v === null || v === undefined || v === "" ? [] : String(v).split(", ");
+  const TAGS = [["kind", "kind"], ["class", "class"], ["formulation", "form"], ["application", "application"], ["status", "reference"], ["collection", "set"]];
+  const SLIDERS = ["nc", "n", "p", "density", "mu_max", "solved_by", "conditioning_W", "best_s"];
+  /* two handles over the values of a column, by their ranks, so that each step tells some problems apart */
+  const slider = (column, values, state, change) => {
+    const steps = [...new Set(values)].sort((a, b) => a - b);
+    if (steps.length < 2) return null;
+    const last = steps.length - 1, said = h("span", {});
+    const at = (key, missing) => { const v = state[key]; if (v === "") return missing; const k = steps.findIndex((x) => x >= Number(v)); return k < 0 ? last : key.endsWith("-") && steps[k] > Number(v) && k ? k - 1 : k; };
+    const handle = (key, missing, name) => h("input", { type: "range", min: 0, max: last, step: 1, value: at(key, missing), "aria-label": `${column.label} ${name}` });
+    const from = handle(`${column.key}+`, 0, "from"), to = handle(`${column.key}-`, last, "to");
+    const tell = () => { said.textContent = `${column.label} ${number(steps[from.value])} to ${number(steps[to.value])}`; };
+    from.addEventListener("input", () => { if (Number(from.value) > Number(to.value)) to.value = from.value; tell(); change(`${column.key}+`, Number(from.value) ? String(steps[from.value]) : ""); change(`${column.key}-`, Number(to.value) < last ? String(steps[to.value]) : ""); });
+    to.addEventListener("input", () => { if (Number(to.value) < Number(from.value)) from.value = to.value; tell(); change(`${column.key}+`, Number(from.value) ? String(steps[from.value]) : ""); change(`${column.key}-`, Number(to.value) < last ? String(steps[to.value]) : ""); });
+    tell();
+    return h("div", { class: "range" }, said, from, to);
   };
+
   Fclib.pages.catalogue = async (page, rest, params, keep) => {
-    const s = site(), cat = await catalogue(), { read } = cat;
-    const state = Object.fromEntries(["q", "family", "formulation", "min", "max", "runs", "view"].map((key) => [key, params.get(key) || ""]));
-    const says = h("p", { class: "small soft", role: "status" });
-    const rows = () => {
-      const { test, wrong } = parseFilter(state.q, read);
-      const found = cat.rows.filter(({ k }) => (!state.family || read.family(k) === state.family) && (!state.formulation || read.formulation(k) === state.formulation) &&
-        (!state.min || read.nc(k) >= Number(state.min)) && (!state.max || read.nc(k) <= Number(state.max)) && (!state.runs || read.runs(k)) && (!state.view || read.view(k)) && test(k));
-      says.textContent = `${found.length} of ${cat.size} problems${wrong.length ? `; not understood: ${wrong.join(", ")}` : ""}`;
-      return found;
+    const cat = await catalogue(), { read } = cat, shownColumns = cat.columns.filter((c) => !c.hidden && c.key !== "thumb");
+    const tags = TAGS.filter(([key]) => read[key]).map(([key, label]) => [key, label, [...new Set(cat.rows.flatMap((row) => many(row[key])))].sort()]).filter(([, , values]) => values.length > 1);
+    const sliders = SLIDERS.map((key) => cat.columns.find((c) => c.key === key)).filter(Boolean);
+    const keys = ["q", "family", "runs", ...tags.map(([key]) => key), ...sliders.flatMap((c) => [`${c.key}+`, `${c.key}-`])];
+    const state = Object.fromEntries(keys.map((key) => [key, params.get(key) || ""]));
+    const chosen = (key) => new Set(state[key] ? state[key].split("~") : []);
+    // names, titles and what the family says: where a plain word is looked for
+    const about = new Map(site().families.map((f) => [f.name, [f.title, f.description, f.application, f.kind].join(" ").toLowerCase()]));
+    const memory = new Map();
+    const words = (k) => {
+      if (!memory.has(k)) memory.set(k, `${[read.id(k), read.title && read.title(k), ...TAGS.map(([key]) => read[key] && read[key](k)), about.get(read.family(k))].filter(Boolean).join(" ")}`.toLowerCase());
+      return memory.get(k);
     };
-    const format = { view: (v) => v ? "yes" : "", slater: shown, best_tol: (v) => v ? Fclib.tolerance(v) : "–" };
-    const columns = cat.columns.filter((c) => !c.hidden).map((c) => ({
+    const says = h("p", { class: "small", role: "status" });
+    let listed = [];
+    const rows = () => {
+      let parsed;
+      try { parsed = Fclib.parseFilter(state.q, { columns: shownColumns, read, words }); } catch (error) {
+        says.className = "small bad";
+        says.textContent = `The filter is not understood: ${error.message}. ${listed.length ? "Listed is what was there before." : "Nothing is listed."}`;
+        return listed;
+      }
+      const limits = sliders.flatMap(({ key }) => [[`${key}+`, (v, x) => v >= x], [`${key}-`, (v, x) => v <= x]].filter(([name]) => state[name] !== "").map(([name, within]) => (k) => { const v = read[key](k); return v !== null && v !== undefined && within(v, Number(state[name])); }));
+      const sets = tags.map(([key]) => [key, chosen(key)]).filter(([, own]) => own.size).map(([key, own]) => (k) => many(read[key](k)).some((tag) => own.has(tag)));
+      const tests = [parsed.test, ...limits, ...sets, ...state.family ? [(k) => read.family(k) === state.family] : [], ...state.runs ? [(k) => read.runs(k)] : []];
+      listed = cat.rows.filter(({ k }) => tests.every((test) => test(k)));
+      const lost = listed.length ? [] : parsed.parts.filter((part) => !cat.rows.some(({ k }) => part.test(k))).map((part) => part.text);
+      says.className = "small soft";
+      says.textContent = `${listed.length} of ${cat.size} problems${lost.length ? `; no problem at all has: ${lost.join(", ")}` : ""}`;
+      return listed;
+    };
+    const format = { view: (v) => v ? "yes" : "", slater: shown, best_tol: (v) => v ? Fclib.tolerance(v) : "–", solved_by: (v) => v === null ? "–" : Fclib.percent(v) };
+    const picture = (row) => read.thumb && row.thumb ? h("img", { class: "thumb", src: `thumbs/${row.k}.webp`, alt: "", loading: "lazy", width: 64, height: 48 }) : null;
+    const columns = shownColumns.map((c) => ({
       key: c.key, label: c.label, title: c.doc, head: c.key === "id", format: format[c.key],
-      type: c.words || ["id", "family", "formulation", "status", "best_solver", "view"].includes(c.key) ? "text" : "number",
-      cell: c.key === "id" ? (row) => problemLink(row.id)
+      type: c.words || ["id", "family", "formulation", "status", "best_solver", "view", "kind", "class", "application"].includes(c.key) ? "text" : "number",
+      cell: c.key === "id" ? (row) => h("span", { class: "named" }, picture(row), problemLink(row.id))
         : c.key === "family" ? (row) => h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family)
           : c.key === "best_solver" ? (row) => solverLink(row.best_solver) : c.key === "status" ? (row) => row.status ? status(row.status) : "–" : undefined,
     }));
     const table = Fclib.table({ caption: "Problems", name: "catalogue", columns, rows: rows(), page: 50, search: false, ...remembered(params, keep) });
     let waiting = 0;
-    const change = (key) => (value) => {
-      state[key] = value === true ? "1" : value || "";
+    const update = (changes) => {
+      Object.assign(state, changes);
       clearTimeout(waiting);
-      waiting = setTimeout(() => { keep({ [key]: state[key], page: "" }); table.update(rows()); }, 80);
+      waiting = setTimeout(() => { keep({ ...state, page: "" }); table.update(rows()); }, 60);
     };
+    const change = (key) => (value) => update({ [key]: value === true ? "1" : value || "" });
+    const chips = ([key, label, values]) => h("fieldset", { class: "choices" }, h("legend", {}, label), values.map((value) => h("label", {}, h("input", { type: "checkbox", checked: chosen(key).has(String(value)), onchange: (e) => {
+      const own = chosen(key);
+      if (e.target.checked) own.add(String(value)); else own.delete(String(value));
+      update({ [key]: [...own].join("~") });
+    } }), String(value))));
     const values = (key) => [["", "all"], ...[...new Set(cat.rows.map((row) => row[key]))].sort().map((v) => [v, v])];
-    const amount = (label, key) => h("label", {}, label, h("input", { type: "number", min: 0, value: state[key], oninput: (e) => change(key)(e.target.value) }));
-    const check = (label, key, there) => there && h("label", { class: "check" }, h("input", { type: "checkbox", checked: Boolean(state[key]), onchange: (e) => change(key)(e.target.checked) }), label);
-    const names = columns.map((c) => c.key).join(" ");
+    const narrowed = keys.some((key) => key !== "q" && key !== "family" && key !== "runs" && state[key]);
     page.append(h("h1", {}, "Catalogue"),
-      h("div", { class: "controls" }, search("filter", state.q, change("q"), "mu_max<0.5 best_solver=nsgs"), select("family", values("family"), state.family, change("family")), select("form", values("formulation"), state.formulation, change("formulation")),
-        amount("contacts from", "min"), amount("to", "max"), check("with runs", "runs", read.runs), check("with 3D view", "view", read.view)),
-      h("details", {}, h("summary", {}, "What the filter knows"), h("p", { class: "small" }, "Words are looked for in names and titles; conditions have one of = < > <= >= between a column and a value, without blanks, and all must hold. The columns are: ", h("code", {}, names), ". The address of this page keeps the filter.")),
-      says, table);
+      h("div", { class: "controls" }, search("filter", state.q, change("q"), "masonry contacts>50 class=hard"), select("family", values("family"), state.family, change("family")),
+        read.runs && h("label", { class: "check" }, h("input", { type: "checkbox", checked: Boolean(state.runs), onchange: (e) => change("runs")(e.target.checked) }), "with runs")),
+      says,
+      h("details", { open: narrowed || !Fclib.isNarrow() }, h("summary", {}, "Narrow it down"), h("div", { class: "ranges" }, sliders.map((c) => slider(c, cat.rows.map((row) => row[c.key]).filter((v) => typeof v === "number"), state, (key, value) => update({ [key]: value })))), tags.map(chips)),
+      table,
+      h("details", {}, h("summary", {}, "What the columns are"), facts(shownColumns.map((c) => [c.label, [c.doc, c.doc && " ", h("code", {}, c.key)]]))),
+      h("details", {}, h("summary", {}, "What the filter understands"),
+        h("p", { class: "small" }, "A word is looked for in names, titles, kinds, classes, applications and what families say of themselves. A condition is a column, by its label or its name, one of = != < > <= >= and a value. Blanks between mean ", h("code", {}, "and"), "; ", h("code", {}, "or"), ", ", h("code", {}, "not"), " and brackets work; what has blanks stands in \"quotes\"."),
+        h("ul", { class: "small" }, ["contacts > 100 and μ max < 0.5", "masonry (class = hard or class = open)", "form != G3DFC", "best solver = nsgs", "\"tower of\" not rt444", "solved by < 50%"].map((text) => h("li", {}, h("a", { href: to("catalogue", [], { q: text }) }, h("code", {}, text))))),
+        h("p", { class: "small" }, "The address of this page keeps the filter.")));
+    Fclib.selection && page.querySelector("h1").after(Fclib.selection(cat, () => listed));
   };
 
   // ---- a family
@@ -274,7 +306,7 @@
     const f = s.families.find((one) => one.name === name && (one.set || "") === set) || s.families.find((one) => one.name === name);
     if (!f) throw new Fclib.NotHere(`There is no family ${rest.join("/")}.`);
     page.append(h("h1", {}, f.title || f.name),
-      h("div", { class: "two" }, f.scene ? h("figure", {}, h("img", { src: f.scene, alt: f.description || f.name })) : null,
+      h("div", { class: "two" }, f.scene || f.thumb ? h("figure", {}, h("img", { src: f.scene || f.thumb, alt: f.description || f.name })) : null,
         h("div", {}, h("p", {}, f.description || ""), (f.text || []).map((text) => h("p", { class: "small" }, prose(text))),
           facts([["name", f.set ? `${f.set}/${f.name}` : f.name], ["problems", link("catalogue", [], { family: f.name }, String(f.problems))], ["application", f.application], ["friction", f.friction], ["original by", f.authors], ["formulations", f.formulations.join(", ")],
             ...Object.entries(f.ranges).map(([key, ends]) => [{ nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key], range(ends)])]))));
@@ -305,11 +337,14 @@
     const neighbour = (j, text) => j >= 0 && j < cat.size && read.family(j) === row.family ? h("a", { href: problemHref(read.id(j)) }, text) : null;
     page.append(h("h1", {}, id), h("p", { class: "small" }, [neighbour(k - 1, "← previous"), h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family), neighbour(k + 1, "next →")].filter(Boolean).map((a, i) => [i ? " · " : "", a])),
       read.title && row.title && row.title !== id && h("p", {}, row.title));
-    const labelled = cat.columns.filter((c) => !c.hidden && !["id", "family", "view"].includes(c.key)).map((c) => [h("span", { title: c.doc }, c.label), row[c.key] === null || row[c.key] === undefined ? null : c.key === "best_solver" ? solverLink(row.best_solver) : c.key === "status" ? status(row.status) : c.key === "best_tol" ? Fclib.tolerance(row.best_tol) : shown(row[c.key])]);
+    const labelled = cat.columns.filter((c) => !c.hidden && !["id", "family", "view", "thumb"].includes(c.key)).map((c) => [c.label, row[c.key] === null || row[c.key] === undefined ? null : c.key === "best_solver" ? solverLink(row.best_solver) : c.key === "status" ? status(row.status) : c.key === "best_tol" ? Fclib.tolerance(row.best_tol) : c.key === "solved_by" ? Fclib.percent(row.solved_by) : shown(row[c.key])]);
     const half = Math.ceil(labelled.length / 2);
-    page.append(h("div", { class: "two panel" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))));
+    const docs = cat.columns.filter((c) => !c.hidden && c.doc && row[c.key] !== null && row[c.key] !== undefined).map((c) => [c.label, c.doc]);
+    page.append(h("div", { class: "panel" }, h("div", { class: "two" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))), h("details", {}, h("summary", {}, "What these are"), facts(docs))));
     if (view) {
-      page.append(...Fclib.pictures(view, id));
+      const f = s.families.find((one) => one.name === row.family && one.set === (read.collection ? row.collection : "")), own = read.number && row.number;
+      const steps = f && f.steps && { numbers: f.steps, count: f.steps.length, number: own, load: () => load(`sequences/${f.set}/${f.name}`), href: (n) => problemHref(`${f.set}/${f.name}/${String(n).padStart(4, "0")}`) };
+      page.append(...Fclib.pictures(view, id, steps));
       if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({
         caption: "Recomputed from the file", rows: s.merits.filter(([name]) => name in view.merit),
         columns: [{ key: 0, label: "part", head: true }, { key: "value", label: "value", type: "number", value: ([name]) => view.merit[name] }, { key: 1, label: "what it is", wrap: true }],
@@ -376,7 +411,8 @@
         caption, rows: entries, columns: [
           { key: 0, label: "problem", type: "text", head: true, cell: (e) => problemLink(cat.read.id(e[0])) },
           { key: 1, label: "CPU [s]", type: "number", format: (v) => v === null ? h("span", { class: "bad" }, "failed") : number(v) },
-          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", wrap: true, cell: (e) => solverLink(e[3]) }],
+          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", wrap: true, cell: (e) => solverLink(e[3]) },
+          { key: "ratio", label: "ratio", type: "number", value: (e) => e[1] === null || e[2] === null ? null : e[1] / e[2], format: (v) => v === null ? "–" : number(v) }],
       });
       page.append(h("div", { class: "two" }, best.length ? list("Where it is best", best) : h("p", {}, "It is nowhere the fastest."), worst.length ? list("Where it is worst", worst) : h("p", {}, "It is the fastest everywhere.")));
     });

@@ -6,6 +6,10 @@
   const FEWEST = 1000; // values of x up to which each is drawn
   Fclib.stroke = (k) => ({ color: colour(`c${k % 7}`), dash: DASHES[Math.floor(k / 7) % DASHES.length] });
   Fclib.swatch = (k) => h("span", { class: "swatch", "aria-hidden": true, style: `border-top: 3px ${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]} var(--c${k % 7})` });
+  // the buttons of a chart and of a picture in space: these and no others, none that sends data; none for fingers
+  Fclib.BUTTONS = { plane: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], space: [["orbitRotation", "pan3d"], ["resetCameraDefault3d"]] };
+  Fclib.isTouched = () => matchMedia("(pointer: coarse)").matches;
+  Fclib.SYMBOLS = ["circle", "square", "diamond", "cross", "x", "triangle-up", "triangle-down", "star", "hexagon", "pentagon"];
   Fclib.isNarrow = () => innerWidth < 600;
 
   const look = () => {
@@ -31,8 +35,8 @@
       if (!box.isConnected) return;
       const { data, layout } = options.draw();
       await Plotly.react(box, data, { template: look(), uirevision: "kept", ...layout }, {
-        responsive: true, displaylogo: false, scrollZoom: "gl3d", displayModeBar: options.still ? false : "hover",
-        modeBarButtonsToRemove: ["toImage", "select2d", "lasso2d", "autoScale2d", "resetCameraLastSave3d", "tableRotation"],
+        responsive: true, displaylogo: false, scrollZoom: "gl3d", displayModeBar: options.still || Fclib.isTouched() ? false : "hover",
+        modeBarButtons: Fclib.BUTTONS[options.space ? "space" : "plane"], plotlyServerURL: "", topojsonURL: "none:",
       });
       if (options.href && !box.dataset.drawn) box.on("plotly_click", ({ points: [point] }) => { location.hash = options.href(point); });
       box.dataset.drawn = data.length;
@@ -121,7 +125,7 @@
           const own = options.points.filter((p) => p.group === k);
           return {
             type: "scatter", mode: "markers", name: group, x: own.map((p) => p.x ?? end), y: own.map((p) => p.y ?? end), customdata: own.map((p) => p.problem), text: own.map(says),
-            hovertemplate: "%{text}<extra></extra>", marker: { color: colour(`c${k % 7}`), size: 8, opacity: 0.65 },
+            hovertemplate: "%{text}<extra></extra>", marker: { color: colour(`c${k % 7}`), symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8, opacity: 0.7 },
           };
         }),
         layout: {

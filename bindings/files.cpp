@@ -13,6 +13,7 @@
 #include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
 #include "io/siconos/siconos.hpp"
+#include "merit/merit.hpp"
 #include "module.hpp"
 
 namespace fclib::bindings {
@@ -29,16 +30,17 @@ std::string signature(const std::string& name, const std::string& rest, const st
   return "def " + name + "(" + path_type + rest + ") -> " + result;
 }
 
-const std::string guesses_type =
-    "guesses: collections.abc.Sequence[" + solution_type + "] | numpy.typing.NDArray[typing.Any]";
+const std::string list_type =
+    "collections.abc.Sequence[" + solution_type + "] | numpy.typing.NDArray[typing.Any]";
+const std::string guesses_type = "guesses: " + list_type;
 const std::string compression_type =
     "compression: int = " + std::to_string(WriteOptions{}.compression);
 
-std::vector<Solution> solutions_from(const nb::object& given) {
+std::vector<Solution> solutions_from(const nb::object& given, const std::string& what) {
   std::vector<Solution> result;
   for (const nb::handle one : given) {
-    result.push_back(
-        solution_from(one, ("guesses[" + std::to_string(result.size()) + "]").c_str()));
+    const std::string name = what + "[" + std::to_string(result.size()) + "]";
+    result.push_back(solution_from(one, name.c_str()));
   }
   return result;
 }
@@ -96,6 +98,39 @@ void bind_hdf5(nb::module_& m) {
       nb::sig(signature("read_guesses", "", "list[Solution]").c_str()), nb::call_guard<Unlocked>(),
       "The stored guesses of a file, of the problem that a solution would belong to. Raises "
       "FileError.");
+  m.def(
+      "read_solutions", [](const fs::path& path) { return read_solutions(path.string()); },
+      "path"_a, nb::sig(signature("read_solutions", "", "list[Solution]").c_str()),
+      nb::call_guard<Unlocked>(),
+      "All known solutions of the problem of a file, where it has several and they are stored. "
+      "Raises FileError.");
+  m.def(
+      "write_solutions",
+      [](const fs::path& path, const nb::object& given, int compression) {
+        const std::vector<Solution> solutions = solutions_from(given, "solutions");
+        const Unlocked unlocked;
+        const Problem problem = read_owner(path.string());
+        std::vector<Solution> whole;
+        Vector errors(static_cast<Eigen::Index>(solutions.size()));
+        std::visit(
+            [&](const auto& p) {
+              for (const Solution& one : solutions) {
+                whole.push_back(fclib::complete(p, one));
+                errors[static_cast<Eigen::Index>(whole.size()) - 1] = merit(p, one).error;
+              }
+            },
+            problem);
+        write_solutions(path.string(), whole, errors,
+                        {.replace = true, .compression = compression});
+      },
+      "path"_a, "solutions"_a, nb::kw_only(), "compression"_a = WriteOptions{}.compression,
+      nb::sig(signature("write_solutions", ", solutions: " + list_type + ", *, " + compression_type,
+                        "None")
+                  .c_str()),
+      "Puts all solutions that are known of a problem into its file, with Merit.error of each as "
+      "/solutions/error, in place of those it had, atomically. They stay where the one of "
+      "write_solution is replaced. An empty list takes them away.\n\n"
+      "Raises FileError, or ProblemError where the sizes disagree.");
   m.def(
       "contents",
       [](const fs::path& path) {
@@ -155,7 +190,7 @@ void bind_hdf5(nb::module_& m) {
   m.def(
       "write_guesses",
       [](const fs::path& path, const nb::object& given, const std::string& mode, int compression) {
-        const std::vector<Solution> guesses = solutions_from(given);
+        const std::vector<Solution> guesses = solutions_from(given, "guesses");
         const Unlocked unlocked;
         WriteOptions options = options_of(mode, {"replace", "add"}, compression);
         options.append = mode == "add";
@@ -184,7 +219,7 @@ void bind_hdf5(nb::module_& m) {
            const nb::object& given_guesses, const std::string& mode, int compression, bool dense) {
           const bool solved = !given.is_none();
           const Solution solution = solved ? solution_from(given, "solution") : Solution{};
-          const std::vector<Solution> guesses = solutions_from(given_guesses);
+          const std::vector<Solution> guesses = solutions_from(given_guesses, "guesses");
           const Unlocked unlocked;
           WriteOptions options = options_of(mode, {"overwrite", "add", "replace"}, compression);
           options.dense = dense;

@@ -39,11 +39,13 @@ from fclib._core import (
     read_guesses,
     read_siconos,
     read_solution,
+    read_solutions,
     write,
     write_attributes,
     write_guesses,
     write_siconos,
     write_solution,
+    write_solutions,
 )
 from fclib._core import version as __version__
 from fclib._derivatives import Gradient, Tangent, jvp, vjp
@@ -162,6 +164,7 @@ __all__ = [
     "read_guesses",
     "read_siconos",
     "read_solution",
+    "read_solutions",
     "sequence",
     "solve",
     "solve_batch",
@@ -173,6 +176,7 @@ __all__ = [
     "write_guesses",
     "write_siconos",
     "write_solution",
+    "write_solutions",
 ]
 
 # messages and tracebacks show the names that users import

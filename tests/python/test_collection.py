@@ -283,7 +283,58 @@ def test_analysis_is_in_the_catalogue_where_it_was_asked_for(built: Path, tmp_pa
         assert row["slater"]
         assert row["existence"] == "exists by Slater"
     assert set(catalog.ANALYSIS) <= set(table.column_names)
-    assert not set(catalog.ANALYSIS) & set(collections.read_catalog(built).column_names)
+
+
+def test_files_say_what_is_cheaply_known(built: Path, tmp_path: Path) -> None:
+    for row in collections.read_catalog(built).to_pylist()[::7]:
+        whole, local = read(built / row["global_file"]), read(built / row["local_file"])
+        rank = int(np.linalg.matrix_rank(local.W.toarray()))
+        assert local.matrix_info["W"].rank == rank == row["rank_W"]
+        assert local.matrix_info["W"].comment.startswith("sparsity ")
+        assert whole.matrix_info["M"].rank == whole.n
+        for problem in (whole, local):
+            assert "Existence: exists by Slater" in problem.info.math_info
+            assert "Left out: conditioning of H" in problem.info.math_info
+        assert row["existence"] == "exists by Slater"
+        assert row["conditioning_H"] is None
+        # the digest is of the data
+        assert fclib.digest(whole) == row["digest"]
+    alone = collections.build([plan(problems=2, references=False)], tmp_path, pictures=False)
+    for row in alone.to_pylist():
+        assert not read(tmp_path / row["local_file"]).matrix_info
+    assert not set(catalog.ANALYSIS) & set(alone.column_names)
+
+
+def test_what_is_cheaply_known_is_what_the_analysis_finds(built: Path) -> None:
+    pytest.importorskip("clarabel")
+    from fclib import analysis
+
+    row = collections.read_catalog(built).to_pylist()[-1]
+    whole = read(built / row["global_file"])
+    for problem in (whole, read(built / row["local_file"]), whole.replace(mu=0 * whole.mu)):
+        local = problem.condense() if problem.n else problem
+        found = analysis.brief(problem, local, None, 1e-8)
+        known = analysis.analyze(problem).record
+        for name, value in found.record.items():
+            if isinstance(value, (bool, str)):
+                assert value == known[name], name
+            elif value is not None:
+                assert value == pytest.approx(known[name], rel=1e-2), name
+
+
+def test_all_known_solutions_are_stored(tmp_path: Path) -> None:
+    own = collections.plan_of("existence/ManySolutions", count=6)
+    table = collections.build([own], tmp_path, pictures=False)
+    counts = set()
+    for row in table.to_pylist():
+        for form in ("global", "local"):
+            path = tmp_path / row[f"{form}_file"]
+            problem, solutions = read(path), fclib.read_solutions(path)
+            counts.add(len(solutions))
+            for k, one in enumerate(solutions):
+                assert fclib.merit(problem, one).error < 1e-12
+                assert all(np.abs(one.r - other.r).max() > 1e-6 for other in solutions[:k])
+    assert counts >= {0, 3}
 
 
 # ---- verifying

@@ -1043,3 +1043,27 @@ def test_python_goes_on_while_a_file_is_written(tmp_path: Path) -> None:
     writer.join(60)
     assert not writer.is_alive()
     assert fclib.read_solution(path) is not None
+
+
+def test_several_solutions_are_kept_beside_the_one(written: Path) -> None:
+    path = written / "p.hdf5"
+    planted = planted_local(1)
+    r = planted.solution.r
+    assert fclib.read_solutions(path) == []
+    fclib.write_solutions(path, [r, 0 * r])
+    assert fclib.contents(path) == ["local"]
+    first, second = fclib.read_solutions(path)
+    np.testing.assert_array_equal(first.r, r)
+    assert first.u is not None
+    assert not second.r.any()
+    with h5py.File(path) as file:
+        assert file["solutions/number_of_solutions"][0] == 2
+        assert file["solutions/error"][0] < 1e-10 < file["solutions/error"][1]
+    # they stay where the solution is replaced, and go with the problem
+    fclib.write_solution(path, r)
+    assert len(fclib.read_solutions(path)) == 2
+    fclib.write(path, planted_local(2).problem, mode="replace")
+    assert fclib.read_solutions(path) == []
+    fclib.write_solutions(path, [])
+    with pytest.raises(fclib.ProblemError, match="solutions"):
+        fclib.write_solutions(path, [r, "r"])

@@ -12,16 +12,25 @@ std::vector<std::string> kinds_of(const Group& root) {
   return kinds;
 }
 
+namespace {
+
+Index count_of(const Group& root, const Numbered& list) {
+  if (!root.has(list.group)) return 0;
+  const Handle handle = open_group(root, list.group);
+  const Group group{handle.id(), root.child(list.group)};
+  const auto count = read_number<Index>(group, list.count);
+  if (count < 0) fail(group.child(list.count), "is negative");
+  return count;
+}
+
+}  // namespace
+
 Contents contents_of(const Group& root) {
   Contents contents;
   contents.kinds = kinds_of(root);
   contents.solution = root.has("solution");
-  if (root.has("guesses")) {
-    const Handle handle = open_group(root, "guesses");
-    const Group guesses{handle.id(), "/guesses"};
-    contents.guesses = read_number<Index>(guesses, "number_of_guesses");
-    if (contents.guesses < 0) fail(guesses.child("number_of_guesses"), "is negative");
-  }
+  contents.guesses = count_of(root, guesses_list);
+  contents.solutions = count_of(root, solutions_list);
   return contents;
 }
 

@@ -14,6 +14,14 @@ namespace fclib::hdf5 {
 
 std::vector<std::string> kinds_of(const Group& root);
 
+/// A group of numbered solutions, and the number that says how many.
+struct Numbered {
+  const char* group;
+  const char* count;
+};
+constexpr Numbered guesses_list{"guesses", "number_of_guesses"};
+constexpr Numbered solutions_list{"solutions", "number_of_solutions"};
+
 Contents contents_of(const Group& root);
 
 /// The kind of the problem that a solution of the file belongs to.

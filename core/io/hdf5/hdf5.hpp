@@ -5,6 +5,7 @@
 //   /fclib_local_rolling, /fclib_global_rolling: the same, and vectors/mu_r
 //   /solution/{v,u,r,l}
 //   /guesses/{number_of_guesses, 1/{v,u,r,l}, 2/, ...}
+//   /solutions/{number_of_solutions, error, 1/{v,u,r,l}, 2/, ...}: all that are known
 //   matrix group: nzmax, m, n, nz, p, i, x; nz >= 0 triplet, -1 CSC, -2 CSR, -3 dense
 //
 // Every function throws Error (file) that names the file and the dataset. Writes are atomic: the

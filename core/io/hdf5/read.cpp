@@ -236,18 +236,31 @@ std::optional<Solution> read_solution(const std::string& path) {
   });
 }
 
-std::vector<Solution> read_guesses(const std::string& path) {
-  return read_from(path, [](const Group& root) {
-    std::vector<Solution> guesses;
-    const Index count = contents_of(root).guesses;
-    if (count == 0) return guesses;
-    const Handle handle = open_group(root, "guesses");
-    const Group group{handle.id(), root.child("guesses")};
+namespace {
+
+std::vector<Solution> read_list(const std::string& path, const Numbered& list,
+                                Index Contents::* how_many) {
+  return read_from(path, [&](const Group& root) {
+    std::vector<Solution> found;
+    const Index count = contents_of(root).*how_many;
+    if (count == 0) return found;
+    const Handle handle = open_group(root, list.group);
+    const Group group{handle.id(), root.child(list.group)};
     for (Index k = 1; k <= count; ++k) {
-      guesses.push_back(read_solution_group(group, std::to_string(k)));
+      found.push_back(read_solution_group(group, std::to_string(k)));
     }
-    return guesses;
+    return found;
   });
+}
+
+}  // namespace
+
+std::vector<Solution> read_guesses(const std::string& path) {
+  return read_list(path, guesses_list, &Contents::guesses);
+}
+
+std::vector<Solution> read_solutions(const std::string& path) {
+  return read_list(path, solutions_list, &Contents::solutions);
 }
 
 }  // namespace fclib

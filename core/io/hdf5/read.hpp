@@ -14,7 +14,8 @@ namespace fclib {
 struct Contents {
   std::vector<std::string> kinds;  ///< "local", "global", ...
   bool solution = false;
-  Index guesses = 0;  ///< how many
+  Index guesses = 0;    ///< how many
+  Index solutions = 0;  ///< known ones, beside the one in /solution
 };
 
 Contents read_contents(const std::string& path);
@@ -32,5 +33,8 @@ std::optional<Solution> read_solution(const std::string& path);
 
 /// The stored guesses, as read_solution.
 std::vector<Solution> read_guesses(const std::string& path);
+
+/// All solutions that are known of the problem, where it has several.
+std::vector<Solution> read_solutions(const std::string& path);
 
 }  // namespace fclib

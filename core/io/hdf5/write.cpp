@@ -106,19 +106,19 @@ void make_room(const Group& root, const std::string& name, bool replace) {
   check(H5Ldelete(root.id, name.c_str(), H5P_DEFAULT), root.child(name));
 }
 
-/// Guesses number `first` and the following ones of a file.
-void write_guesses_from(const Target& guesses, std::size_t first,
-                        const std::vector<Solution>& values) {
+/// Numbers `first` and the following ones of a list.
+void write_from(const Target& group, const Numbered& list, std::size_t first,
+                const std::vector<Solution>& values) {
   for (std::size_t k = 0; k < values.size(); ++k) {
-    write_solution_group(guesses, std::to_string(first + k), values[k]);
+    write_solution_group(group, std::to_string(first + k), values[k]);
   }
-  write_number(guesses, "number_of_guesses", static_cast<Index>(first - 1 + values.size()));
+  write_number(group, list.count, static_cast<Index>(first - 1 + values.size()));
 }
 
 /// Throws where a problem that was added is the one that a solution or a guess now belongs to,
 /// though it was written for another; or where it is not, though they are its own.
 void require_owner(const Group& root, const std::string& kind, bool owned_before, bool brings) {
-  const bool others = root.has("solution") || root.has("guesses");
+  const bool others = root.has("solution") || root.has("guesses") || root.has("solutions");
   const bool owner = owner_of(kinds_of(root)) == kind;
   if (!owned_before && owner && others) {
     fail("/",
@@ -159,6 +159,7 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
       // those of another problem stay
       if (owned) make_room(root, "solution", options.replace);
       if (owned) make_room(root, "guesses", options.replace);
+      if (owned) make_room(root, "solutions", options.replace);
       if (owned) remove_geometry(root);
     }
     std::visit(
@@ -178,7 +179,7 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
     }
     if (!guesses.empty()) {
       make_room(root, "guesses", options.replace);
-      write_guesses_from(NewGroup(root, "guesses").target(), 1, guesses);
+      write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
     }
   });
 }
@@ -208,12 +209,30 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
       const Handle group = open_group(root, "guesses");
       const Target target{{group.id(), root.child("guesses")}, root.compression, root.scratch};
       make_room(target, "number_of_guesses", true);
-      write_guesses_from(target, static_cast<std::size_t>(there) + 1, guesses);
+      write_from(target, guesses_list, static_cast<std::size_t>(there) + 1, guesses);
       return;
     }
     // an empty group is no reason to refuse
     make_room(root, "guesses", options.replace || options.append);
-    write_guesses_from(NewGroup(root, "guesses").target(), 1, guesses);
+    write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
+  });
+}
+
+void write_solutions(const std::string& path, const std::vector<Solution>& solutions,
+                     const Vector& errors, const WriteOptions& options) {
+  change_file(path, Start::existing, options.compression, [&](const Target& root) {
+    if (options.validate) {
+      const Problem outline = outline_of(root);
+      for (std::size_t k = 0; k < solutions.size(); ++k) {
+        const std::string where = "/solutions/" + std::to_string(k + 1);
+        std::visit([&](const auto& p) { validate(solutions[k], p, where); }, outline);
+      }
+    }
+    make_room(root, "solutions", options.replace);
+    if (solutions.empty()) return;
+    const NewGroup group(root, "solutions");
+    write_from(group.target(), solutions_list, 1, solutions);
+    write_numbers(group.target(), "error", errors);
   });
 }
 

@@ -39,4 +39,9 @@ void write_solution(const std::string& path, const Solution& solution,
 void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
                    const WriteOptions& options = {.replace = true});
 
+/// Puts all solutions that are known of a problem into its file, in place of those it had, with the
+/// error of each. They stay where /solution is replaced, and go with the problem.
+void write_solutions(const std::string& path, const std::vector<Solution>& solutions,
+                     const Vector& errors, const WriteOptions& options = {.replace = true});
+
 }  // namespace fclib

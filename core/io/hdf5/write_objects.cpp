@@ -13,8 +13,7 @@ constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 /// What the index of a dataset in chunks takes, in bytes.
 constexpr std::size_t index_bytes = 254;
 /// What filters are tried on.
-constexpr std::size_t sample_entries = std::size_t{1} << 16;
-constexpr std::size_t cheap_sample_entries = std::size_t{1} << 12;
+constexpr std::size_t sample_entries = std::size_t{1} << 12;
 /// What is packed cheaply shrinks to this part: the time that deflate takes goes with what it
 /// leaves.
 constexpr double cheap_part = 1.0 / 16;
@@ -72,10 +71,10 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
 /// gathers the bytes that numbers of one size share, but hides numbers that come again.
 Filter best_filter(const Target& group, const Array& array) {
   const bool cheap = group.compression < 0;
-  if (cheap && array.size < 8 * cheap_sample_entries) return Filter::none;  // not worth a trial
+  if (cheap && array.size < 8 * sample_entries) return Filter::none;  // not worth a trial
   if (array.size < chunked_from || group.compression == 0) return Filter::none;
   Array sample = array;
-  sample.size = std::min(array.size, cheap ? cheap_sample_entries : sample_entries);
+  sample.size = std::min(array.size, sample_entries);
   Filter best = Filter::none;
   std::size_t least = sample.bytes();
   if (cheap) least = static_cast<std::size_t>(cheap_part * static_cast<double>(least));

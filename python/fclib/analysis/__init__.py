@@ -8,6 +8,7 @@ Existence is decided by conic programs, for which Clarabel is needed: ``pip inst
 "fclib[analysis]"``.
 
 _analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _self_stress.py
+_brief.py       what of that is cheap, for every file that is built. Needs _analyze.py
 _existence.py   whether there is a solution. Needs _enumerate.py, _conic.py and _certificate.py
 _self_stress.py whether reactions can grow without moving anything. Needs _existence.py
 _enumerate.py   all solutions of a small problem. Needs _rational.py and _spatial.py
@@ -23,6 +24,7 @@ _data.py        a problem's matrices and its local form, which all others start 
 """
 
 from fclib.analysis._analyze import Analysis, Definiteness, Uniqueness, Units, analyze
+from fclib.analysis._brief import Brief, brief
 from fclib.analysis._certificate import (
     Certificate,
     CertificateError,
@@ -58,6 +60,7 @@ __all__ = [
     "UNDECIDED",
     "VERDICTS",
     "Analysis",
+    "Brief",
     "Certificate",
     "CertificateError",
     "Confirmation",
@@ -73,6 +76,7 @@ __all__ = [
     "Uniqueness",
     "Units",
     "analyze",
+    "brief",
     "check",
     "check_arrays",
     "contacts",

@@ -294,9 +294,9 @@ def analyze(
             sign = replace(sign, word=UNKNOWN)
     full = rank == problem.m and sign.word == DEFINITE[0]
     # W = H^T M^-1 H, whatever its size
-    semidefinite = sign.word in DEFINITE[:2] or (sign.word == UNKNOWN and _definite_by_bodies(data))
+    semidefinite = sign.word in DEFINITE[:2] or (sign.word == UNKNOWN and definite_by_bodies(data))
     condition = slater(data, semidefinite, full, time_limit)
-    unique = _uniqueness(data, sign, full, dense)
+    unique = uniqueness(data, sign, full, dense)
     states = None
     # one solution, by theorems; else the states of the contacts say how many
     if not (condition.holds and unique.verdict == "unique" and unique.reactions):
@@ -326,7 +326,7 @@ def analyze(
     )
 
 
-def _definite_by_bodies(data: Data) -> bool:
+def definite_by_bodies(data: Data) -> bool:
     """Whether M is positive definite and no joint follows from others, so that W' is what it is."""
     M, G = data.matrices.get("M"), data.matrices.get("G")
     if M is None or (M != M.T).nnz or not lower_bound(M) > 0:
@@ -351,7 +351,7 @@ def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> 
     return Definiteness(word, low, high, method, threshold)
 
 
-def _uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqueness:
+def uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqueness:
     """By the contraction of the fixed point on s (Acary, Cadoux, Lemarechal & Malick 2011)."""
     if data.problem.nc == 0:
         return Uniqueness("unique", "there is no contact", 0.0, True)

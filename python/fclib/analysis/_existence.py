@@ -143,7 +143,9 @@ def _refined(
     return result, x[number.size :] if p else None
 
 
-def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0) -> Slater:
+def slater(
+    data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0, *, conic: bool = True
+) -> Slater:
     """Looks for a velocity strictly inside K*.
 
     Args:
@@ -152,6 +154,7 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
             semidefinite; else the condition says nothing of solutions, and is not looked at.
         full: whether that part has full rank: each velocity can be reached.
         time_limit: [s] of the conic solver.
+        conic: whether a conic program decides what nothing simpler does.
 
     Raises:
         ImportError: Clarabel is needed, and not installed.
@@ -178,6 +181,8 @@ def slater(data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0)
         x = lsmr(A, inside - c, atol=1e-14, btol=1e-14, maxiter=500)[0]
         if found := _witness(data, A, c, B, e, x, "least squares"):
             return found
+    if not conic:
+        return Slater(None, np.nan, None, "left out: the conic program")
     own = shares(data)
     k = A.shape[1]
     program = Program(k + 1 + own)  # x, t and what rolling needs

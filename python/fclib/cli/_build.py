@@ -39,7 +39,7 @@ SelectOption = Annotated[
     Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
 ]
 Analyze = Annotated[
-    bool, typer.Option("--analyze", help="Also ranks, conditioning, existence; slow.")
+    bool, typer.Option("--analyze", help="Ranks, conditioning, existence whatever they cost.")
 ]
 Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
 
@@ -87,6 +87,12 @@ def build_plans(
             out.print(
                 f"{len(other)} problems differ from the published ones, as {', '.join(other[:3])}:"
                 f" fclib collection verify {folder} says by how much"
+            )
+        brief = [plan for plan in plans if plan.references and not plan.analyze]
+        if rows and brief:
+            out.print(
+                "Left out of MATRIX_INFO and MATH_INFO, which --analyze has too: conditioning of H,"
+                " existence by conic programs and by the states of contacts; math_info says it."
             )
         out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
     raise typer.Exit(int(report.failed))

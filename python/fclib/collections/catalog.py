@@ -61,7 +61,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
 # of the files' paths and SHA-256
 FILES = ("global_file", "global_sha256", "local_file", "local_sha256")
 
-# further columns where a build was asked to analyze; docs/analysis.md has their meaning
+# further columns, of which a build fills what is cheap, or what it was asked to analyze: all;
+# docs/analysis.md has their meaning
 ANALYSIS: tuple[str, ...] = (
     "islands",
     "largest_island",

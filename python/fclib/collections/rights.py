@@ -24,8 +24,14 @@ def of(plan: Plan) -> dict[str, str | None]:
     return {"license": LICENSE, "citation": citation}
 
 
-def stamped(info: _core.ProblemInfo, plan: Plan, number: int) -> _core.ProblemInfo:
-    """The info with all of it in the JSON that ends its description, and the problem's name."""
+def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -> _core.ProblemInfo:
+    """The info with all of it in the JSON that ends its description, and the problem's name.
+
+    The facts are what is known of existence and uniqueness, after what the family says of them.
+    """
+    if facts:
+        said = info.math_info.rstrip(". ")
+        info = info.replace(math_info=f"{said}. {facts}" if said else facts)
     *words, last = info.description.split("\n")
     try:
         origin: Any = json.loads(last)

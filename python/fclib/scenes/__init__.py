@@ -15,9 +15,9 @@ its file or in one of its own (`chute.py`, `rolling_chute.py`).
 from __future__ import annotations
 
 import dataclasses
+import functools
 import importlib
 import pkgutil
-from collections.abc import Iterator
 from typing import Any
 
 from fclib.scenes.shared.family import Assembled, Assembly, Described, Family, Law, Scene, parameter
@@ -46,7 +46,8 @@ def assemblies() -> dict[str, type[Assembly]]:
     return {name: member for name, member in found() if hasattr(member, "problem")}
 
 
-def found() -> Iterator[tuple[str, Any]]:
+@functools.cache
+def found() -> tuple[tuple[str, Any], ...]:
     """The dataclasses of this folder's files, by name."""
     members: dict[str, Any] = {}
     for module_info in pkgutil.iter_modules(__path__):
@@ -57,7 +58,7 @@ def found() -> Iterator[tuple[str, Any]]:
             own = isinstance(member, type) and member.__module__ == module.__name__
             if own and dataclasses.is_dataclass(member):
                 members[name] = member
-    yield from sorted(members.items())
+    return tuple(sorted(members.items()))
 
 
 def get(name: str) -> type[Family]:

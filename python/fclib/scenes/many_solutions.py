@@ -43,6 +43,7 @@ class ManySolutions:
     friction: ClassVar[str] = "Coulomb"
     collection: ClassVar[str] = "existence"
     problems: ClassVar[int] = len(KINDS) * STEPS
+    several: ClassVar[bool] = True  # solutions, all of which are stored
 
     angle: float = parameter(1.1, "rad", "of the rod above the ground, in (0, pi/2)")
     slope: float = parameter(0.3, "rad", "of the wedge's faces to the vertical, in (0, pi/2)")

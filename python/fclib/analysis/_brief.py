@@ -1,0 +1,180 @@
+"""What is cheaply known of a problem: for every file that is built.
+
+Ranks and conditioning by dense eigenvalues of blocks up to a small size, of W on the bodies where
+these are fewer: the eigenvalues of W that are not zero are those of M^-1/2 H H^T M^-1/2. Slater's
+condition without a conic program, uniqueness where a theorem gives it. `analyze` does the rest.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from fclib import _core, _solve
+from fclib.analysis._analyze import (
+    DEFINITE,
+    UNKNOWN,
+    Definiteness,
+    definite_by_bodies,
+    uniqueness,
+)
+from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
+from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, slater
+from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
+
+SIDE = 1000  # of a block that is treated densely
+
+
+@dataclass(frozen=True)
+class Brief:
+    """What was found, and what was left out.
+
+    Attributes:
+        matrix_info: MATRIX_INFO of RT-0444, by the names of both forms' matrices.
+        words: MATH_INFO of RT-0444.
+        record: for a catalogue; None where nothing is known.
+        left_out: what `analyze` would look at, in words.
+    """
+
+    matrix_info: dict[str, _core.MatrixInfo] = field(default_factory=dict)
+    words: str = ""
+    record: dict[str, Any] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+
+def brief(problem: _solve.Problem, local: Local, error: float | None, tol: float) -> Brief:
+    """What is known of a problem, its local form at hand.
+
+    Args:
+        problem: any formulation.
+        local: its local form, or itself.
+        error: of the solution at hand; None without one.
+        tol: up to which it is a solution.
+    """
+    data = Data(problem, local)
+    matrices = data.matrices
+    left_out = ["conditioning of H", "conic programs", "states of the contacts"]
+    skewness = asymmetry(matrices["W"])
+    found = spectrum_of_W(data, skewness)
+    spectra: dict[str, Spectrum] = {}
+    if found is None:
+        left_out.insert(0, "rank of W" if problem.p == 0 else "rank of W' = W - V R^-1 V^T")
+        sign = Definiteness(UNKNOWN, np.nan, np.nan, "left out", np.nan)
+    else:
+        spectra["W"] = found
+        sign = sign_of(data, found)
+    for name in ("M", "R"):
+        if name in matrices and not blocks_of(matrices[name], SIDE, square=True).sparse:
+            spectra[name] = spectrum(matrices[name], SIDE)
+    rank = found.rank if found is not None else None
+    full = rank == problem.m and sign.word == DEFINITE[0]
+    semidefinite = sign.word in DEFINITE[:2] or (found is None and definite_by_bodies(data))
+    condition = slater(data, semidefinite, full, conic=False)
+    unique = uniqueness(data, sign, full, SIDE if full else 0)
+    existence = reason = None
+    if condition.holds:
+        existence, reason = EXISTS_SLATER, f"Slater's condition holds ({condition.method})"
+    elif error is not None and error <= tol:
+        existence = EXISTS_AT_HAND
+        reason = f"solved to an error of {error:.0e} relative to ||q||, which is no proof"
+    words = [f"Existence: {existence}: {reason}."] if existence else []
+    if unique.verdict == "unique":
+        words.append(f"Velocity: unique: {unique.reason}.")
+    if found is not None:
+        words.append(f"W is {sign.word}, of rank {rank} of {problem.m}.")
+    words.append(f"Left out: {', '.join(left_out)}.")
+    numbers = local.islands().contact
+    return Brief(
+        matrix_info_of(matrices, spectra),
+        " ".join(words),
+        {
+            "islands": int(numbers.max(initial=-1)) + 1,
+            "largest_island": int(np.bincount(numbers).max(initial=0)),
+            "asymmetry_W": skewness,
+            "definiteness": None if found is None else sign.word,
+            "rank_W": rank,
+            "conditioning_W": None if found is None else digits(found.conditioning),
+            "hyperstaticity": None if rank is None else problem.m - rank,
+            "slater": condition.holds,
+            "existence": existence,
+            "uniqueness": unique.verdict if unique.verdict == "unique" else None,
+        },
+        tuple(left_out),
+    )
+
+
+def spectrum_of_W(data: Data, skewness: float) -> Spectrum | None:
+    """Of W, on the bodies where they are fewer; None where there are joints, or it costs much."""
+    problem = data.problem
+    if problem.p or skewness > SYMMETRIC:
+        return None
+    if problem.n and problem.n < problem.m:
+        gram = on_bodies(data)
+        if gram is None or blocks_of(gram, SIDE, square=True).sparse:
+            return None
+        found = spectrum(gram, SIDE)
+        return replace(found, method=f"{found.method} on the bodies")
+    if blocks_of(data.W, SIDE, square=True).sparse:
+        return None
+    return spectrum(data.W, SIDE)
+
+
+def on_bodies(data: Data) -> Any:
+    """M^-1/2 H H^T M^-1/2 as csc_array; None where M is not positive definite, or too large."""
+    M, H = data.matrices["M"], data.matrices["H"]
+    if data.problem.n > SIDE or asymmetry(M) > SYMMETRIC:
+        return None
+    # zeros between bodies stay exact zeros, and the blocks are found again
+    gram = (H @ H.T).toarray()
+    try:
+        factor = cholesky(M.toarray(), lower=True)
+    except np.linalg.LinAlgError:
+        return None
+    for _ in range(2):
+        gram = solve_triangular(factor, gram, lower=True).T
+    return columns((gram + gram.T) / 2)
+
+
+def sign_of(data: Data, found: Spectrum) -> Definiteness:
+    """The sign of W: on the bodies it is a square, and has no negative eigenvalue."""
+    size = data.problem.m
+    bodies = data.problem.n and data.problem.n < size
+    low, high = found.extremes if found.extremes is not None else (0.0, found.largest)
+    low = 0.0 if bodies else low
+    threshold = max(found.threshold, 10 * np.finfo(float).eps * high)
+    if low < -threshold:
+        word = DEFINITE[2]
+    elif found.rank < size:
+        word = DEFINITE[1]
+    else:
+        word = DEFINITE[0]
+    return Definiteness(word, low, high, found.method, threshold)
+
+
+def matrix_info_of(
+    matrices: dict[str, Any], spectra: dict[str, Spectrum]
+) -> dict[str, _core.MatrixInfo]:
+    """Sparsity of each matrix, and what is known of its singular values."""
+    known = {}
+    for name, matrix in matrices.items():
+        entries = max(1, matrix.shape[0] * matrix.shape[1])
+        comment = f"sparsity {matrix.nnz / entries:.3g}"
+        found = spectra.get(name)
+        if found is None:
+            known[name] = _core.MatrixInfo(comment=comment)
+            continue
+        of = "" if found.rank == min(matrix.shape) else " of what is not singular"
+        comment += f"; rank and conditioning{of} by {found.method}"
+        comment += f", zero below {found.threshold:.0e}"
+        known[name] = _core.MatrixInfo(
+            comment=comment, rank=found.rank, conditioning=digits(found.conditioning)
+        )
+    return known
+
+
+def digits(value: float) -> float:
+    """Three digits, which all machines agree on."""
+    return float(f"{value:.2e}")

@@ -1,6 +1,12 @@
 #include "io/hdf5/write_objects.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <vector>
 
 namespace fclib::hdf5 {
 
@@ -12,7 +18,7 @@ constexpr std::size_t chunked_from = 64;
 constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 /// What the index of a dataset in chunks takes, in bytes.
 constexpr std::size_t index_bytes = 254;
-/// What filters are tried on.
+/// What the filter of an array is found by.
 constexpr std::size_t sample_entries = std::size_t{1} << 12;
 /// What is packed cheaply shrinks to this part: the time that deflate takes goes with what it
 /// leaves.
@@ -67,17 +73,75 @@ Handle create_array(hid_t group, const std::string& name, const Array& array, Fi
   return dataset;
 }
 
-/// The filter that makes an array smallest, found by trying them on its beginning. Shuffling
-/// gathers the bytes that numbers of one size share, but hides numbers that come again.
+/// How many of these doubles differ from all others.
+std::size_t distinct(const double* values, std::size_t size) {
+  // a table with a place for each, at most half full; 0 stands for nothing, and is counted apart
+  std::vector<std::uint64_t> table(2 * std::bit_ceil(size));
+  std::size_t count = 0;
+  bool zero = false;
+  for (std::size_t k = 0; k < size; ++k) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, values + k, sizeof bits);
+    if (bits == 0) {
+      zero = true;
+      continue;
+    }
+    std::size_t place = (bits * 0x9E3779B97F4A7C15U >> 32U) % table.size();
+    while (table[place] != 0 && table[place] != bits) place = (place + 1) % table.size();
+    if (table[place] == bits) continue;
+    table[place] = bits;
+    ++count;
+  }
+  return count + (zero ? 1 : 0);
+}
+
+/// The bytes that doubles take byte by byte, each in the bits that its frequency among those of its
+/// place asks for.
+double bytes_by_planes(const double* values, std::size_t size) {
+  std::array<std::array<std::uint32_t, 256>, sizeof(double)> counts{};
+  const auto* bytes = reinterpret_cast<const unsigned char*>(values);
+  for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t plane = 0; plane < counts.size(); ++plane) {
+      ++counts[plane][bytes[counts.size() * k + plane]];
+    }
+  }
+  double bits = 0;
+  const auto all = static_cast<double>(size);
+  for (const auto& plane : counts) {
+    for (const std::uint32_t count : plane) {
+      if (count > 0) bits += count * std::log2(all / count);
+    }
+  }
+  return bits / 8;
+}
+
+/// The filter that makes an array small, told from its beginning. Shuffling gathers the bytes that
+/// numbers of one size share, but hides numbers that come again: these deflate finds, at one to two
+/// bytes each. Indices are shuffled. (Against a trial of both: 0.7 % more bytes in the collection.)
+Filter likely_filter(const Array& array) {
+  if (H5Tget_size(array.stored) != sizeof(double)) return Filter::shuffle_and_deflate;
+  const auto* values = static_cast<const double*>(array.data);
+  const std::size_t size = std::min(array.size, sample_entries);
+  const auto fresh = static_cast<double>(distinct(values, size));
+  const double repeated = static_cast<double>(size) - fresh;
+  const double plain = 7.6 * fresh + 1.6 * repeated;
+  const double shuffled = bytes_by_planes(values, size);
+  const double part = static_cast<double>(array.size) / static_cast<double>(size);
+  if (part * std::min(plain, shuffled) + index_bytes > static_cast<double>(array.bytes())) {
+    return Filter::none;
+  }
+  return plain < shuffled ? Filter::deflate : Filter::shuffle_and_deflate;
+}
+
+/// The filter of an array; where only what packs at once is packed, found by a trial.
 Filter best_filter(const Target& group, const Array& array) {
-  const bool cheap = group.compression < 0;
-  if (cheap && array.size < 8 * sample_entries) return Filter::none;  // not worth a trial
   if (array.size < chunked_from || group.compression == 0) return Filter::none;
+  if (group.compression > 0) return likely_filter(array);
+  if (array.size < 8 * sample_entries) return Filter::none;  // not worth a trial
   Array sample = array;
-  sample.size = std::min(array.size, sample_entries);
+  sample.size = sample_entries;
   Filter best = Filter::none;
-  std::size_t least = sample.bytes();
-  if (cheap) least = static_cast<std::size_t>(cheap_part * static_cast<double>(least));
+  auto least = static_cast<std::size_t>(cheap_part * static_cast<double>(sample.bytes()));
   for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
     std::size_t size = index_bytes;
     {

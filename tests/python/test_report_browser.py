@@ -1,6 +1,7 @@
 """The site in a real browser, from the file system: no error, no request, no server."""
 
 import csv
+import hashlib
 import importlib.util
 import io
 import shutil
@@ -38,6 +39,7 @@ PAGES = {
     "problem of a store": "#/problem/Alone/alone",
     "problem without runs": "#/problem/small/BoxesStack/0000",
     "solvers": "#/solvers",
+    "classes": "#/classes",
     "solver": "#/solver/under_score",
     "about": "#/about",
 }
@@ -433,7 +435,7 @@ def test_a_site_without_runs(
     for name in ("overview", "catalogue", "family", "problem without runs", "solvers"):
         assert go(PAGES[name]).inner_text("main h1") != "Not here"
     assert go("#/overview").locator("nav a").all_inner_texts() == [
-        *("Overview", "Catalogue", "Families", "Solvers")
+        *("Overview", "Catalogue", "Families", "Solvers", "Open")
     ]
     for context in go.contexts:
         context.close()
@@ -668,3 +670,102 @@ def test_the_browser_draws_what_the_files_say(go: Opener) -> None:
             apart = np.abs(np.array(corners) - solids.world(shape)).max()
             assert apart < 1e-6 * max(solids.size, solids.reach(shape)), (family, shape)
     assert {0, 1, 2, 3, 5, 6} <= kinds
+
+
+@pytest.fixture(scope="module")
+def masonry(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A site with its files: arches, and what is none."""
+    from fclib import collections
+
+    folder = tmp_path_factory.mktemp("masonry")
+    plans = [
+        collections.plan_of(f"standard/{name}").only(numbers)
+        for name, numbers in (("Arch", (64, 74)), ("SliderCrank", (0,)), ("Walker", (717,)))
+        if set(numbers) <= set(collections.plan_of(f"standard/{name}").chosen or ())
+    ]
+    collections.build(plans, folder / "collection", pictures=False)
+    build_site(None, folder / "site", folder / "collection", with_files=True)
+    return folder / "site"
+
+
+WAYS: dict[str, dict[str, Any]] = {
+    "mouse": {"viewport": {"width": 1440, "height": 900}, "color_scheme": "light"},
+    "keyboard": {"viewport": {"width": 1440, "height": 900}, "color_scheme": "dark"},
+    "touch": {"viewport": PHONE, "color_scheme": "dark", "has_touch": True, "is_mobile": True},
+    "narrow": {"viewport": PHONE, "color_scheme": "light"},
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_hard_problem_is_found_seen_taken_and_cited(
+    way: str, browser: Any, masonry: Path
+) -> None:
+    go = Opener(browser, masonry)
+    page = go("", **WAYS[way])
+    presses = 0
+
+    def press(what: Any) -> None:
+        nonlocal presses
+        presses += 1
+        if way == "touch":
+            what.tap()
+        elif way == "keyboard":
+            what.focus()
+            page.keyboard.press("Enter")
+        else:
+            what.click()
+
+    press(page.get_by_role("link", name="Catalogue", exact=True))
+    page.wait_for_selector("main[data-page=catalogue]")
+    field = page.get_by_label("filter", exact=True)
+    press(field)
+    field.fill("masonry and contacts >= 50 and contacts <= 100 and class = hard")
+    said = page.get_by_role("status").first
+    page.wait_for_function("said => said.textContent[0] === '2'", arg=said.element_handle())
+    press(page.locator("main tbody a", has_text="Arch").first)
+    page.wait_for_selector("main[data-page=problem]")
+    scene = draw(page, ".scene .plot", traces=5)
+    assert "as the file has them" in page.inner_text(".scene")
+    assert scene.evaluate("plot => plot.data.some(t => t.type === 'mesh3d' && t.facecolor)")
+    item = page.locator("ul.files li").first
+    with page.expect_download() as saved:
+        press(item.get_by_role("link"))
+    content = Path(saved.value.path()).read_bytes()
+    assert hashlib.sha256(content).hexdigest() == item.locator("code").inner_text()
+    press(page.get_by_role("link", name="Cite it"))
+    press(page.get_by_role("button", name="Copy BibTeX"))
+    entry = page.locator("#cite + .copy").inner_text()
+    assert entry.startswith("@misc{fclib-problem-standard-Arch-00")
+    assert page.locator("dl.facts code.sum").inner_text() in entry
+    assert presses <= 8
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
+def test_every_page_is_accessible_and_no_button_asks_another_host(
+    go: Opener, masonry: Path, browser: Any
+) -> None:
+    axe = pytest.importorskip("axe_playwright_python")
+    script = Path(axe.__file__).parent / "axe.min.js"
+    other = Opener(browser, masonry)
+    pages = [(go, address) for name, address in PAGES.items() if name != "problem of a store"]
+    pages += [(other, "#/problem/standard/Arch/0064"), (other, "#/catalogue")]
+    for number, (opener, address) in enumerate(pages):
+        page = opener(address, color_scheme="dark" if number % 2 else "light")
+        page.add_script_tag(path=script)
+        page.wait_for_timeout(200)  # the fade is over
+        found = page.evaluate("axe.run(document, { resultTypes: ['violations'], preload: false })")
+        assert not [(one["id"], one["nodes"][0]["html"][:200]) for one in found["violations"]], (
+            address
+        )
+        # every button, those of charts too; what it asks for is heard
+        page.evaluate(
+            """() => document.querySelectorAll("main button, main .modebar-btn, main summary")
+              .forEach((one) => one.click())"""
+        )
+        page.wait_for_timeout(300)
+        page.close()
+    for context in other.contexts:
+        context.close()
+    assert not other.wrong

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections import Counter
 from dataclasses import replace
 from enum import Enum
@@ -43,6 +44,26 @@ Rating = Enum("Rating", {name: name for name in standing.CLASSES}, type=str)  # 
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
 Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
+
+
+ListFile = Annotated[
+    Path | None,
+    typer.Option("--list", help="File of names, a line each, as the report's catalogue saves it."),
+]
+
+
+def named(names: list[str] | None, path: Path | None) -> list[str]:
+    """The names that were given, and those of a list."""
+    found = list(names or [])
+    if path is not None:
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeError) as error:
+            fail(f"{path}: cannot be read as a list of names: {error}")
+        found += [line.strip() for line in lines if line.strip() and line.strip()[0] != "#"]
+        if not found:
+            fail(f"{path}: names nothing")
+    return found
 
 
 @app.command("list")
@@ -167,8 +188,10 @@ def show_set(name: str, as_json: bool) -> None:
 @app.command()
 def build(
     names: Annotated[
-        list[str] | None, typer.Argument(help="Sets or families, see fclib collection list.")
+        list[str] | None,
+        typer.Argument(help="Sets, families, or problems: SET/FAMILY/NUMBER."),
     ] = None,
+    listed: ListFile = None,
     every: Annotated[bool, typer.Option("--all", help="All families of the set rt444.")] = False,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
         "collection"
@@ -198,10 +221,11 @@ def build(
     Problems, reference solutions and catalogue are stored; goes on after a kill. Families without
     a stored trajectory are simulated first.
     """
+    names = named(names, listed)
     if every == bool(names):
-        raise typer.BadParameter("name sets or families, or say --all")
+        raise typer.BadParameter("name sets, families or problems, or say --all")
     try:
-        folders = collections.folders(names or ["rt444"], version)
+        folders = collections.numbered(names or ["rt444"], version)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     try:
@@ -217,6 +241,10 @@ def build(
                 references=references,
             )
             for own in folders
+        ]
+        plans = [
+            plan.only(numbers) if numbers else plan
+            for plan, numbers in zip(plans, folders.values(), strict=True)
         ]
         if source is not None:
             plans = [collections.from_folder(plan, source) for plan in plans]
@@ -561,13 +589,20 @@ def publish(
 
 @app.command()
 def get(
-    names: Names,
     url: Annotated[str, typer.Option("--from", help="Where registry.txt lies.")],
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Sets or families; of a problem its family comes.")
+    ] = None,
+    listed: ListFile = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
         "collection"
     ),
 ) -> None:
     """Fetch published families, check them and unpack them; goes on where it broke off."""
+    # an archive holds a family
+    names = list(dict.fromkeys(re.sub(r"/[0-9]+$", "", name) for name in named(names, listed)))
+    if not names:
+        raise typer.BadParameter("name sets or families, or a --list of problems")
     try:
         with many_bars() as bars:
             fetched = collections.get(names, url, folder, bars)

@@ -78,8 +78,9 @@ def build(
     out.mkdir(parents=True, exist_ok=True)
     todo = [plan for plan in plans if not is_finished(plan, out)]
     report = progress or (lambda name, done, total: None)
+    todo = [joined(plan, out) for plan in todo]
     for plan in plans:
-        if plan not in todo:
+        if plan.name not in {one.name for one in todo}:
             report(plan.name, plan.total, plan.total)
     if jobs <= 1 or len(todo) <= 1:
         for plan in todo:
@@ -143,12 +144,39 @@ def is_finished(plan: Plan, out: Path) -> bool:
         found = (state / "plan.json").read_text(encoding="utf-8")
     else:
         return False
-    if found != plan.fingerprint():
+    if found != plan.fingerprint() and not (part.is_file() and is_more(found, plan)):
         raise BuildError(
             f"{folder}: was built with other settings ({difference(found, plan.fingerprint())});"
             " remove it, or choose another folder"
         )
-    return part.is_file()
+    return part.is_file() and set(plan.numbers().tolist()) <= numbers_in(found, plan)
+
+
+def is_more(found: str, plan: Plan) -> bool:
+    """Whether a folder was built by this plan, but for which of its problems were chosen."""
+    old, new = (json.loads(text) for text in (found, plan.fingerprint()))
+    for one in (old, new):
+        if one.pop("count") is not None:
+            return False
+        one.pop("chosen")
+    return bool(old == new)
+
+
+def numbers_in(found: str, plan: Plan) -> set[int]:
+    """The numbers that a folder was built with."""
+    chosen = json.loads(found)["chosen"]
+    return set(range(plan.total)) if chosen is None else set(chosen)
+
+
+def joined(plan: Plan, out: Path) -> Plan:
+    """The plan with what a folder has of its problems already, which is then made again."""
+    part = out / plan.name / catalog.FILE
+    if plan.chosen is None or not part.is_file():
+        part.unlink(missing_ok=True)
+        return plan
+    found = catalog.read_catalog(part).schema.metadata.get(catalog.FINGERPRINT, b"{}").decode()
+    part.unlink()
+    return replace(plan, chosen=tuple(sorted({*plan.chosen, *numbers_in(found, plan)})))
 
 
 def difference(found: str, asked: str) -> str:

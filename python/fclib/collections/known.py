@@ -136,6 +136,31 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
     return list(found)
 
 
+def numbered(names: Sequence[str], version: str | None = None) -> dict[str, tuple[int, ...]]:
+    """The folders SET/FAMILY of names, with the problems that are named; none where all are.
+
+    Args:
+        names: as `folders` takes them, and single problems: SET/FAMILY/NUMBER or FAMILY/NUMBER.
+        version: as for `folders`.
+
+    Raises:
+        KeyError: a name is none of these.
+    """
+    found: dict[str, set[int] | None] = {}
+    for name in names:
+        own, _, number = name.rpartition("/")
+        if own and number.isdecimal():
+            (folder,) = folders([own], version) if own not in sets() else ("",)
+            if not folder:
+                raise KeyError(f"{name}: a problem is named SET/FAMILY/NUMBER")
+            wanted = found.setdefault(folder, set())
+            if wanted is not None:
+                wanted.add(int(number))
+        else:
+            found |= dict.fromkeys(folders([name], version))
+    return {folder: tuple(sorted(wanted or ())) for folder, wanted in found.items()}
+
+
 def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: Any) -> Plan:
     """The plan of a folder SET/FAMILY of `folders`; those of a list keep their own seeds.
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -131,6 +132,15 @@ class Plan:
         count = self.total if self.count is None else min(self.count, self.total)
         numbers = np.rint(np.linspace(0, self.total - 1, count)).astype(np.int64)
         return np.unique(numbers)
+
+    def only(self, numbers: Sequence[int]) -> Plan:
+        """The plan of some of its problems alone. ValueError where it has one of them not."""
+        own = np.arange(self.total) if self.chosen is None else np.array(self.chosen)
+        missing = sorted(set(numbers) - set(own.tolist()))
+        if missing:
+            there = f"{own[0]} to {own[-1]}" if self.chosen is None else ", ".join(map(str, own))
+            raise ValueError(f"{self.name}: has no problem {missing[0]}; its numbers are {there}")
+        return replace(self, chosen=tuple(sorted(numbers)), count=None, select="every")
 
     def fingerprint(self) -> str:
         """All that decides what is built, as JSON."""

@@ -14,7 +14,8 @@ solids.py      shapes of bodies in their places, as the file has them
 picture.py     a small picture of them
 drawn.py       what the site draws of each problem
 taking.py      what one can take of a problem from the site
-recipes.py     lines to copy: how to get and solve a problem
+recipes.py     lines to copy: how to get, read and solve a problem
+citing.py      BibTeX of all that it shows; references.bib has the papers
 paper.py       figures and tables for a paper
 libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError

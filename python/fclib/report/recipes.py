@@ -6,8 +6,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
-BUILD = "fclib collection build {family} --out collection\n"
+BUILD = "fclib collection build {id} --out collection\n"
 SHELL = "fclib solve --tol 1e-8 {path}\nfclib view {path}"
 PYTHON = """\
 import fclib
@@ -31,9 +32,11 @@ int main(void)
     return fclib_solve_{kind}(problem, "auto", &options, &solution, &result);
 }}"""
 
+H5PY = Path(__file__).with_name("assets") / "h5py.txt"
+
 
 def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
-    """By formulation (RT-0444's abbreviations): `shell`, `python`, `c`.
+    """By formulation (RT-0444's abbreviations): `shell`, `python`, `c`, `h5py`.
 
     `build` and `load` take the place of the first lines where the problem is of a collection.
     """
@@ -44,15 +47,22 @@ def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
             "load": PYTHON % 'load("{id}")',
             "python": PYTHON % 'read("{path}")',
             "c": _c(name),
+            "h5py": H5PY.read_text(encoding="utf-8").strip().replace("{kind}", _kind(name)),
         }
         for name in formulations
     }
 
 
+def _kind(formulation: str) -> str:
+    """The kind of a problem, as its group in a file is named."""
+    whole = "global" if formulation.startswith("G") else "local"
+    return whole + ("_rolling" if "R" in formulation else "")
+
+
 def _c(formulation: str) -> str:
     whole = formulation.startswith("G")
     mixed = "M" in formulation
-    kind = ("global" if whole else "local") + ("_rolling" if "R" in formulation else "")
+    kind = _kind(formulation)
     size = "problem->H->n" if whole else "problem->W->m"
     sizes = {"v": "problem->M->n" if whole else "", "u": size, "r": size, "l": ""}
     if mixed:

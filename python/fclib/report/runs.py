@@ -21,6 +21,7 @@ DIGITS = 6  # of costs on the site
 LEFT_OUT = 0.1  # share of instances that may be left out for solvers that have not run them
 EXTREMES = 8  # problems on which a solver is best, and worst
 REPORTS = 80  # points of a convergence curve
+BANDED = 20_000  # costs up to which the curves of a headline have bands
 TAUS = 160  # points of a headline's curve
 CODES = "0123456789abcdefghijklmnopqrstuvwxyz"  # of statuses; "." where nothing was run
 NOT_RUN = "."
@@ -192,8 +193,13 @@ class Campaigns:
             groups[instance.family].append(k)
         tables = {"": profiles.summary(costs)}
         tables |= {family: profiles.summary(costs.of(own)) for family, own in groups.items()}
-        return {
+        found: dict[str, Any] = {}
+        if costs.values.size <= BANDED:
+            ends = profiles.bands(costs, lambda own: profiles.performance_profile(own, taus))
+            found["bands"] = rounded(list(ends), 4)
+        return found | {
             "instances": len(costs.instances),
+            "limits": sorted({rounded(instance.limit) for instance in costs.instances}),
             "left_out": costs.left_out,
             "solvers": list(costs.solvers),
             "taus": rounded(taus, DIGITS),

@@ -26,10 +26,11 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _registry
+from fclib.bench import profiles
 from fclib.bench.job import MERITS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog, sets, standing
-from fclib.report import drawn, taking
+from fclib.report import citing, drawn, taking
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
@@ -40,25 +41,24 @@ MARK = "data/site.js"  # by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
     *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
-    *("scene.js", "profiles.js", "pages.js", "site.js"),
+    *("scene.js", "profiles.js", "take.js", "choose.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
 COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("id", "problem", "its name"),
-    ("collection", "set", "the set of families"),
-    ("family", "family", "the scene that it is from"),
-    ("kind", "kind", "the set that its family is of first: masonry, granular, mixed, ..."),
-    ("application", "application", "what such problems are from"),
-    ("formulation", "form", "in the abbreviations of RT-0444: G global, M mixed, R rolling"),
+    ("nc", "contacts", "number of contacts"),
     (
         "class",
         "class",
         "easy: solved by more than half of the solvers that take it; hard: by fewer; open: by none",
     ),
+    ("n", "dof", "degrees of freedom of the bodies that contacts move"),
+    ("family", "family", "the scene that it is from"),
+    ("kind", "kind", "the set that its family is of first: masonry, granular, mixed, ..."),
+    ("formulation", "form", "in the abbreviations of RT-0444: G global, M mixed, R rolling"),
+    ("application", "application", "what such problems are from"),
     ("solved_by", "solved by", "share of the solvers that take it and solve it, for its class"),
     ("spacedim", "d", "components of a contact"),
-    ("nc", "contacts", "number of contacts"),
-    ("n", "dof", "degrees of freedom of the bodies that contacts move"),
     ("p", "bilateral", "bilateral constraints"),
     ("bodies", "bodies", "bodies, or trees of bodies, among which the contacts are"),
     ("density", "density", "contact components for a degree of freedom"),
@@ -104,6 +104,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("solved", "solved", "runs whose recomputed error met the tolerance"),
     ("view", "view", "whether its page has a picture to turn"),
     ("thumb", "picture", "whether there is a small picture of it"),
+    ("collection", "set", "the set of families"),
 )
 # of a catalogue, and of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
@@ -328,6 +329,14 @@ class _Writer:
         site["families"] = self._families(steps)
         site["views"] = views
         site["standings"] = _standings(self.problems.standings)
+        here = {row["id"] for row in self.problems.rows}
+        site["known"] = [
+            one["problem"]
+            for own in site["standings"]
+            for one in own["open"]
+            if one["problem"] in here
+        ]
+        site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
         site["problems"] = len(self.problems.rows)
         site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
         site["files"] = self.taking.kind
@@ -384,6 +393,7 @@ class _Writer:
             "tolerances": campaigns.tolerances,
             "judged": JUDGED[campaigns.rows[0]["merit"]],
             "headlines": headlines,
+            "work": rounded(profiles.work_precision(campaigns.rows), DIGITS),
             "solvers": [
                 _solver(label, first[label]["solver_name"], first[label])
                 for label in campaigns.solvers
@@ -474,6 +484,7 @@ class _Writer:
                 record["steps"] = steps[collection, name]
             if name in known:
                 record |= _family(known[name])
+            record["bibtex"] = citing.family(record)
             shown = [k for k in places if self.problems.rows[k].get("thumb")]
             if shown:
                 record["thumb"] = f"thumbs/{shown[len(shown) // 2]}.webp"
@@ -553,10 +564,14 @@ def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
     if row:
         found |= {key: row[key] for key in ("options", "version", "origin")}
         found["family"] = row["solver_family"]
+    version = f"{found.get('origin') or 'fclib'} {found.get('version') or _core.version}"
+    found["bibtex"] = citing.implementation(name, "", version)
     try:
         info = _registry.find_solver(name)
     except _core.Error:
         return found  # of another machine, or a program of the user's
+    found["bibtex"] = citing.implementation(name, info.title, version)
+    found["papers"] = citing.papers_of(info.citation)
     return found | {
         "title": info.title,
         "citation": info.citation,

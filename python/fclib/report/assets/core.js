@@ -60,7 +60,7 @@ Fclib.copyable = (text, label) => {
     setTimeout(() => { button.textContent = "copy"; }, 1500);
   } }, "copy");
   const code = Fclib.h("code", {}, text);
-  return Fclib.h("div", { class: "copy" }, Fclib.h("pre", { tabindex: 0, role: "region", "aria-label": label || "To copy" }, code), button);
+  return Fclib.h("div", { class: "copy" }, Fclib.h("pre", { tabindex: 0, role: "region", "aria-label": label || `To copy: ${text.split("\n").find((line) => line && !line.startsWith("import") && !line.startsWith("#")) || text}` }, code), button);
 };
 // a text as a file to keep
 Fclib.save = (name, text) => {

@@ -57,6 +57,13 @@
     { key: "worst ratio", label: "worst ratio", type: "number" },
   ];
 
+  // ---- what was run, under a chart
+  const machine = (o) => [o.node, o.cpu].filter(Boolean).join(", ") || "an unknown machine";
+  const caption = (head, t) => {
+    const rows = (head.tables[""] || []).filter((r) => r.solver !== "virtual best"), of = rows.reduce((sum, r) => sum + r.of, 0), lost = of - rows.reduce((sum, r) => sum + r.solved, 0);
+    return `${head.instances} instances to ${Fclib.tolerance(site().tolerances[t])}, ${site().judged}; ${head.limits ? `${head.limits.map((v) => number(v)).join(" or ")} s of CPU time a run, ` : ""}${machine(site().overview)}; ${lost} of ${of} runs failed`;
+  };
+
   // ---- overview
   Fclib.pages.overview = async (page, rest, params, keep) => {
     const s = site(), o = s.overview;
@@ -68,20 +75,26 @@
         h("em", {}, "solved"), ` means that the relative error meets the tolerance within the limits; ${s.judged}.`),
       h("ul", { class: "figures" }, [[s.problems, "problems"], [s.families.length, "families"], [s.solvers.length, "solvers"], [o.runs, "runs"], [Fclib.percent(o.solved / o.runs), "of them solved"]].map(([value, name]) =>
         h("li", {}, h("b", {}, value.toLocaleString("en").replaceAll(",", " ")), h("span", {}, name)))));
+      page.append(Fclib.chooser(catalogue, params, keep));
       page.append(h("h2", {}, "Performance profiles"), h("p", {}, "How many of the instances a solver has solved within a multiple τ of the CPU time of the best solver on each. At the left: how often it is the fastest. At the right: how often it succeeds at all."));
       const charts = h("div", { class: "two" });
       s.headlines.forEach((head, t) => {
         if (!head) return;
         const mean = head.curves.map((curve) => curve.reduce((a, b) => a + b, 0));
-        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: styleOf(name), mean: mean[k] })).sort((a, b) => b.mean - a.mean);
+        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: styleOf(name), mean: mean[k], band: head.bands && [head.bands[0][k], head.bands[1][k]] })).sort((a, b) => b.mean - a.mean);
         charts.append(h("section", {}, h("h3", {}, `Tolerance ${Fclib.tolerance(s.tolerances[t])}`),
           Fclib.lines({
             half: true, name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
             ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
-            note: `${head.instances} instances; ${s.judged}${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
+            note: `${caption(head, t)}${head.bands ? "; bands: 95 % by drawing problems anew" : ""}${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
           }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
       });
-      page.append(charts, h("h2", {}, "Solvers"));
+      page.append(charts);
+      if (s.tolerances.length > 1 && s.work && s.work.length) page.append(h("h2", {}, "What an accuracy costs"), Fclib.work({
+        name: "work-precision", title: "CPU time by tolerance", rows: s.work, style: styleOf, xlabel: "CPU time in the mean [s]",
+        note: `Shifted geometric means over the problems that all have run at a tolerance, a failure charged ${s.charges.penalty} times the limit; ${machine(o)}.`,
+      }));
+      page.append(h("h2", {}, "Solvers"));
       const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "" };
       const rows = () => ((s.headlines[state.tol] || { tables: {} }).tables[state.family]) || [];
       const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run; the virtual best is the fastest of all on each", columns: summaryColumns(true), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
@@ -97,7 +110,7 @@
   };
 
   const familyCards = (list) => h("div", { class: "cards" }, list.map((f) => h("article", { class: "panel" },
-    f.scene || f.thumb ? h("a", { href: familyHref(f.set, f.name), tabindex: -1, "aria-hidden": true }, h("img", { src: f.scene || f.thumb, alt: "", loading: "lazy" })) : null,
+    f.scene || f.thumb ? h("a", { href: familyHref(f.set, f.name), tabindex: -1, "aria-hidden": "true" }, h("img", { src: f.scene || f.thumb, alt: "", loading: "lazy" })) : null,
     h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
     h("p", { class: "small" }, f.description || ""),
     h("p", { class: "small soft" }, `${f.problems} problem${f.problems === 1 ? "" : "s"}, ${f.ranges.nc ? range(f.ranges.nc) : "?"} contacts, ${f.formulations.join(", ")}`))));
@@ -105,7 +118,7 @@
   Fclib.pages.families = async (page) => {
     const { families: all, problems } = site(), sets = [...new Set(all.map((f) => f.set))];
     page.append(h("h1", {}, "Families"), h("p", {}, `${problems} problems in ${all.length} families${sets.length > 1 ? ` of ${sets.length} sets` : ""}.`),
-      ...sets.flatMap((set) => [sets.length > 1 && h("h2", {}, set || "Of no set"), familyCards(all.filter((f) => f.set === set))]).filter(Boolean));
+      ...sets.flatMap((set) => [h("h2", {}, set || "Of no set"), familyCards(all.filter((f) => f.set === set))]).filter(Boolean));
   };
 
   // ---- profiles
@@ -276,7 +289,7 @@
     const update = (changes) => {
       Object.assign(state, changes);
       clearTimeout(waiting);
-      waiting = setTimeout(() => { keep({ ...state, page: "" }); table.update(rows()); }, 60);
+      waiting = setTimeout(() => { keep({ ...state, page: "" }); table.update(rows()); }, 30);
     };
     const change = (key) => (value) => update({ [key]: value === true ? "1" : value || "" });
     const chips = ([key, label, values]) => h("fieldset", { class: "choices" }, h("legend", {}, label), values.map((value) => h("label", {}, h("input", { type: "checkbox", checked: chosen(key).has(String(value)), onchange: (e) => {
@@ -297,7 +310,7 @@
         h("p", { class: "small" }, "A word is looked for in names, titles, kinds, classes, applications and what families say of themselves. A condition is a column, by its label or its name, one of = != < > <= >= and a value. Blanks between mean ", h("code", {}, "and"), "; ", h("code", {}, "or"), ", ", h("code", {}, "not"), " and brackets work; what has blanks stands in \"quotes\"."),
         h("ul", { class: "small" }, ["contacts > 100 and μ max < 0.5", "masonry (class = hard or class = open)", "form != G3DFC", "best solver = nsgs", "\"tower of\" not rt444", "solved by < 50%"].map((text) => h("li", {}, h("a", { href: to("catalogue", [], { q: text }) }, h("code", {}, text))))),
         h("p", { class: "small" }, "The address of this page keeps the filter.")));
-    Fclib.selection && page.querySelector("h1").after(Fclib.selection(cat, () => listed));
+    says.after(Fclib.selection(() => listed));
   };
 
   // ---- a family
@@ -319,7 +332,8 @@
     if (f.parameters) page.append(h("h2", {}, "Parameters of the scene"), Fclib.table({
       caption: "As in the collection", rows: f.parameters, page: 60,
       columns: [{ key: 0, label: "parameter", head: true }, { key: 1, label: "default", type: "text" }, { key: 2, label: "unit" }, { key: 3, label: "meaning", wrap: true }],
-    }), h("h2", {}, "Get it"), copyable(`fclib collection build ${f.name} --out collection`));
+    }), h("h2", {}, "Take it"), copyable(`fclib collection build ${f.set ? `${f.set}/` : ""}${f.name} --out collection`, "the command"));
+    page.append(...Fclib.citeIt("Cite it", f.bibtex), h("p", { class: "small" }, f.citation ? `The data: ${f.citation}.` : ""));
   };
 
   // ---- a problem
@@ -327,13 +341,13 @@
     const file = (read.global_file && row.global_file) || (read.local_file && row.local_file), name = row.id.split("/").pop();
     const built = file && site().families.some((f) => f.name === row.family && f.parameters), own = site().recipes[row.formulation];
     const filled = (text) => text.replaceAll("{path}", file ? `collection/${file}` : `${name}.hdf5`).replaceAll("{id}", row.id).replaceAll("{family}", row.family);
-    return [["Command line", built ? own.build : own.shell], ["Python", built ? own.load : own.python], ["C", own.c]].map(([title, text]) => [h("h3", {}, title), copyable(filled(text))]);
+    return [["Command line", built ? own.build : own.shell], ["Python", built ? own.load : own.python], ["C", own.c], ["h5py, SciPy and MATLAB", own.h5py]].map(([title, text]) => [h("h3", {}, title), copyable(filled(text))]);
   };
   Fclib.pages.problem = async (page, rest, params, keep) => {
     const s = site(), cat = await catalogue(), id = rest.join("/"), k = cat.places.get(id);
     if (k === undefined) throw new Fclib.NotHere(`There is no problem ${id} in this catalogue.`);
     const row = cat.rows[k], { read } = cat;
-    const [runs, view] = await Promise.all([read.runs && row.runs ? load(`problems/${k}`) : null, read.view && row.view ? load(`views/${k}`) : null]);
+    const [record, runs, view] = await Promise.all([Fclib.fileRecord(k), read.runs && row.runs ? load(`problems/${k}`) : null, read.view && row.view ? load(`views/${k}`) : null]);
     const neighbour = (j, text) => j >= 0 && j < cat.size && read.family(j) === row.family ? h("a", { href: problemHref(read.id(j)) }, text) : null;
     page.append(h("h1", {}, id), h("p", { class: "small" }, [neighbour(k - 1, "← previous"), h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family), neighbour(k + 1, "next →")].filter(Boolean).map((a, i) => [i ? " · " : "", a])),
       read.title && row.title && row.title !== id && h("p", {}, row.title));
@@ -341,6 +355,8 @@
     const half = Math.ceil(labelled.length / 2);
     const docs = cat.columns.filter((c) => !c.hidden && c.doc && row[c.key] !== null && row[c.key] !== undefined).map((c) => [c.label, c.doc]);
     page.append(h("div", { class: "panel" }, h("div", { class: "two" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))), h("details", {}, h("summary", {}, "What these are"), facts(docs))));
+    const buildable = s.families.some((f) => f.name === row.family && f.parameters && f.set === (read.collection ? row.collection : ""));
+    page.append(...Fclib.takeIt(id, record, buildable && Boolean(record.files)), h("p", { class: "small" }, h("a", { href: "#cite", onclick: (e) => { e.preventDefault(); document.getElementById("cite").scrollIntoView(); document.querySelector("#cite + .copy button").focus({ preventScroll: true }); } }, "Cite it")));
     if (view) {
       const f = s.families.find((one) => one.name === row.family && one.set === (read.collection ? row.collection : "")), own = read.number && row.number;
       const steps = f && f.steps && { numbers: f.steps, count: f.steps.length, number: own, load: () => load(`sequences/${f.set}/${f.name}`), href: (n) => problemHref(`${f.set}/${f.name}/${String(n).padStart(4, "0")}`) };
@@ -383,7 +399,7 @@
         page.append(h("h2", {}, "Convergence"), h("div", { class: "controls" }, select("over", [["time", "time"], ["iteration", "iterations"]], state.over, (v) => { state.over = v; keep({ over: v }); draw(); }), select("tolerance", tols.map((v) => [v, Fclib.tolerance(v)]), state.tol, (v) => { state.tol = Number(v); keep({ tol: v }); draw(); })), box);
       }
     } else if (s.overview) page.append(h("p", { class: "soft" }, "No run of it in the stores of this report."));
-    page.append(h("h2", {}, "Get it and solve it"), ...recipes(row, read).flat());
+    page.append(h("h2", {}, "Read it and solve it"), ...recipes(row, read).flat(), ...Fclib.citeIt("Cite it", Fclib.problemCitation(id, record)));
   };
 
   // ---- solvers
@@ -405,26 +421,27 @@
       if (!head || !head.tables[""].some((r) => r.solver === solver.label)) return;
       const rows = Object.entries(head.tables).map(([family, table]) => ({ family, ...table.find((r) => r.solver === solver.label) }));
       const columns = summaryColumns().filter((c) => !["solver", "method"].includes(c.key));
-      page.append(h("h2", {}, `At tolerance ${Fclib.tolerance(s.tolerances[t])}`), Fclib.table({ caption: "By family", rows, columns: [{ key: "family", label: "family", head: true, cell: (r) => r.family ? link("profiles", [], { tol: t, family: r.family }, r.family) : "all" }, ...columns] }));
+      page.append(h("h2", {}, `At tolerance ${Fclib.tolerance(s.tolerances[t])}`), Fclib.table({ caption: `By family, to ${Fclib.tolerance(s.tolerances[t])}`, rows, columns: [{ key: "family", label: "family", head: true, cell: (r) => r.family ? link("profiles", [], { tol: t, family: r.family }, r.family) : "all" }, ...columns] }));
       const { best, worst } = head.extremes[solver.label];
       const list = (caption, entries) => Fclib.table({
         caption, rows: entries, columns: [
           { key: 0, label: "problem", type: "text", head: true, cell: (e) => problemLink(cat.read.id(e[0])) },
+          { key: "ratio", label: "ratio", type: "number", value: (e) => e[1] === null || e[2] === null ? null : e[1] / e[2], format: (v) => v === null ? "–" : number(v) },
           { key: 1, label: "CPU [s]", type: "number", format: (v) => v === null ? h("span", { class: "bad" }, "failed") : number(v) },
-          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", wrap: true, cell: (e) => solverLink(e[3]) },
-          { key: "ratio", label: "ratio", type: "number", value: (e) => e[1] === null || e[2] === null ? null : e[1] / e[2], format: (v) => v === null ? "–" : number(v) }],
+          { key: 2, label: "best other [s]", type: "number", format: (v) => v === null ? "none solves it" : number(v) }, { key: 3, label: "which is", type: "text", wrap: true, cell: (e) => solverLink(e[3]) }],
       });
-      page.append(h("div", { class: "two" }, best.length ? list("Where it is best", best) : h("p", {}, "It is nowhere the fastest."), worst.length ? list("Where it is worst", worst) : h("p", {}, "It is the fastest everywhere.")));
+      page.append(h("div", { class: "two" }, best.length ? list(`Where it is best, to ${Fclib.tolerance(s.tolerances[t])}`, best) : h("p", {}, "It is nowhere the fastest."), worst.length ? list(`Where it is worst, to ${Fclib.tolerance(s.tolerances[t])}`, worst) : h("p", {}, "It is the fastest everywhere.")));
     });
     if (solver.known) page.append(h("h2", {}, "Options"), solver.known.length ? Fclib.table({
       caption: "Set by name=value", rows: solver.known, page: 60,
       columns: [{ key: 0, label: "option", head: true }, { key: 1, label: "type", wrap: true }, { key: 2, label: "default", type: "text" }, { key: 3, label: "unit" }, { key: 4, label: "meaning", wrap: true, cell: (r) => prose(r[4]) }],
     }) : h("p", {}, "It has none."));
+    page.append(...Fclib.citeIt("Cite it", [...(solver.papers || []).map((one) => one.bibtex), solver.bibtex].join("\n\n"), solver.papers || []));
     page.append(h("h2", {}, "Use it"), copyable(`fclib solve --solver ${solver.name} FILE`), copyable(`result = fclib.solve(problem, solver="${solver.name}", tol=1e-8)`));
   };
 
   // ---- what the site is made with
   Fclib.pages.about = async (page) => {
-    page.append(h("h1", {}, "About this site"), h("p", {}, `Made by fclib report, FCLIB ${site().version}, Apache-2.0. It asks no other host for anything.`), h("h2", {}, "Libraries"), Fclib.libraries(site().libraries));
+    page.append(h("h1", {}, "About this site"), h("p", {}, `Made by fclib report, FCLIB ${site().version}, Apache-2.0. It asks no other host for anything.`), ...Fclib.citeIt("Cite the collection and the software", site().cite.collection), h("h2", {}, "Libraries"), Fclib.libraries(site().libraries));
   };
 })();

@@ -3,6 +3,7 @@
 (() => {
   const { h, number, colour } = Fclib;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
+  const BANDED = 6; // curves with a band: more hide each other
   const FEWEST = 1000; // values of x up to which each is drawn
   Fclib.stroke = (k) => ({ color: colour(`c${k % 7}`), dash: DASHES[Math.floor(k / 7) % DASHES.length] });
   Fclib.swatch = (k) => h("span", { class: "swatch", "aria-hidden": true, style: `border-top: 3px ${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]} var(--c${k % 7})` });
@@ -27,7 +28,7 @@
      keys: {key: act(box)}, href(point), table() -> element, above, note, still: no tools and no table */
   Fclib.plot = (options) => {
     const { title } = options, name = options.name.replaceAll("/", "-");
-    const box = h("div", { class: "plot", tabindex: 0, role: "img", "aria-label": `${title}. ${options.says || ""} A table follows.`, style: `height: ${options.height || 400}px` });
+    const box = h("div", { class: "plot", tabindex: 0, role: options.still ? "img" : "application", "aria-label": `${title}. ${options.says || ""} A table follows.`, style: `height: ${options.height || 400}px` });
     const heard = h("p", { class: "unseen", role: "status" });
     box.say = (text) => { heard.textContent = text; };
     box.draw = async () => {
@@ -58,11 +59,14 @@
     const table = h("details", {}, h("summary", {}, "The numbers as a table"));
     const fill = () => { if (table.children.length === 1) table.append(options.table()); return table.lastChild; };
     table.addEventListener("toggle", fill);
-    const save = async (format) => {
+    const saved = async (format) => {
       if (!box.dataset.drawn) await box.draw();
       const Plotly = await Fclib.plotly();
+      if (!box.isConnected) return null;
       return Plotly.downloadImage(box, { format, filename: name, width: box.clientWidth, height: box.clientHeight, scale: format === "png" ? 2 : 1 });
     };
+    // one picture after another
+    const save = (format) => { Fclib.saving = (Fclib.saving || Promise.resolve()).then(() => saved(format), () => saved(format)); return Fclib.saving; };
     const tools = [["SVG", () => save("svg")], ["PNG", () => save("png")], ["CSV", () => fill().api.button(0).trigger()]];
     return figure(options.above, box, heard, options.note && h("figcaption", {}, options.note),
       h("div", { class: "tools" }, tools.map(([what, act]) => h("button", { type: "button", onclick: act, "aria-label": `Download ${name} as ${what}` }, `↓ ${what}`))), table);
@@ -95,10 +99,13 @@
       ...options, height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0), says: `${series.length} curves. Left and right arrows read values.`,
       keys: { ArrowLeft: read(-stride), ArrowRight: read(stride), Escape: (box) => { Plotly.Fx.unhover(box); box.say(""); } },
       draw: () => ({
-        data: curves.map((s, k) => ({
+        data: [...curves.map((s, k) => ({
           type: "scatter", mode: options.ends && series.length === 1 ? "lines+markers" : "lines", name: s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
           hovertemplate: few ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}` : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
-        })),
+        })), ...curves.filter((s) => s.band).slice(0, BANDED).flatMap((s, k) => s.band.map((y, side) => ({
+          type: "scatter", mode: "lines", x, y: x.map((v) => Fclib.at({ x: s.x, y }, v)), line: { width: 0, shape: "hv" }, hoverinfo: "skip", showlegend: false,
+          ...side ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` } : {},
+        })))],
         layout: {
           hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1, legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction" },
           xaxis: { type: xlog ? "log" : "linear", range: log([low, high], xlog), title: { text: options.xlabel }, unifiedhovertitle: { text: `${options.xname} = %{x:.3~g}` } },
@@ -109,6 +116,23 @@
         caption: options.title, name: options.name, page: 25, rows: x.map((v, k) => [v, ...curves.map((s) => s.y[k])]),
         columns: [options.xname, ...series.map((s) => s.name)].map((label, k) => ({ key: k, label, type: "number" })),
       }),
+    });
+  };
+
+  /* what an accuracy costs: a curve a solver, a point a tolerance
+     options: rows [{solver, tol, mean, solved, of}], style(solver), xlabel, note, name, title */
+  Fclib.work = (options) => {
+    const names = [...new Set(options.rows.map((r) => r.solver))];
+    return Fclib.plot({
+      ...options, height: (Fclib.isNarrow() ? 330 : 400) + 20 * Math.ceil(names.length / 4), says: `${names.length} solvers.`,
+      draw: () => ({
+        data: names.map((name) => {
+          const own = options.rows.filter((r) => r.solver === name), k = options.style(name);
+          return { type: "scatter", mode: "lines+markers", name, x: own.map((r) => r.mean), y: own.map((r) => r.tol), text: own.map((r) => `${r.solved} of ${r.of} solved`), line: { ...Fclib.stroke(k), width: 2 }, marker: { symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8 }, hovertemplate: "%{fullData.name}, %{y}: %{x:.3~g} s, %{text}<extra></extra>" };
+        }),
+        layout: { hovermode: "closest", showlegend: true, xaxis: { type: "log", title: { text: options.xlabel } }, yaxis: { type: "log", title: { text: "tolerance" }, autorange: "reversed" } },
+      }),
+      table: () => Fclib.table({ caption: options.title, name: options.name, rows: options.rows, page: 40, columns: [{ key: "solver", label: "solver", head: true }, { key: "tol", label: "tolerance", format: Fclib.tolerance }, { key: "mean", label: "mean CPU time [s]", type: "number" }, { key: "solved", label: "solved" }, { key: "of", label: "of" }] }),
     });
   };
 

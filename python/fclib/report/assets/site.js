@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const { h } = Fclib;
-  const NAVIGATION = [["overview", "Overview"], ["profiles", "Profiles"], ["catalogue", "Catalogue"], ["families", "Families"], ["solvers", "Solvers"]];
+  const NAVIGATION = [["overview", "Overview"], ["profiles", "Profiles"], ["catalogue", "Catalogue"], ["families", "Families"], ["solvers", "Solvers"], ["classes", "Open"]];
   const ABOVE = { family: "families", problem: "catalogue", solver: "solvers" };
   const main = document.querySelector("main");
   let turn = 0;

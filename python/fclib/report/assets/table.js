@@ -25,7 +25,8 @@
     const buttons = [csv, ...wide ? [{ extend: "colvis", text: "columns", background: false, collectionLayout: "three-column" }] : []];
     const api = new DataTable(table, {
       data: rows, autoWidth: false, deferRender: true, caption: null, pageLength: page, displayStart: at * page,
-      search: { search: q }, order: columns.flatMap((c, k) => sort && String(c.key) === String(sort.key) ? [[k, sort.down ? "desc" : "asc"]] : []),
+      // a table that is not searched needs no words of all its rows
+      searching: search, search: { search: q }, order: columns.flatMap((c, k) => sort && String(c.key) === String(sort.key) ? [[k, sort.down ? "desc" : "asc"]] : []),
       columns: columns.map((c, k) => ({
         name: String(c.key), type: "value", searchable: !numeric[k], cellType: c.head ? "th" : "td",
         className: `${numeric[k] ? "right" : "left"}${c.wrap ? " wrap" : ""}`,

@@ -1,0 +1,80 @@
+// which solver for mine: a sentence by the runs of problems like it; and the page of classes and open problems
+"use strict";
+(() => {
+  const { h, number, load, link, to } = Fclib;
+  const site = () => Fclib.values.site;
+  const select = (label, options, value, onchange) => h("label", {}, label, h("select", { onchange: (e) => onchange(e.target.value) }, options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text))));
+  const SIZES = [["", "any"], ["0-10", "up to 10"], ["10-50", "10 to 50"], ["50-200", "50 to 200"], ["200-1000", "200 to 1000"], ["1000-", "more than 1000"]];
+  /* Wilson's interval of a share, 95 % */
+  Fclib.odds = (k, n) => {
+    const z = 1.96, p = k / n, middle = (p + z * z / (2 * n)) / (1 + z * z / n), half = z * Math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n);
+    return [Math.max(0, middle - half), Math.min(1, middle + half)];
+  };
+  /* solvers by the shifted geometric mean of their CPU time, a failure charged `charge` times the limit; those
+     that do not take a problem have no run of it */
+  Fclib.ranked = (bench, costs, keep, charge, shift, unsuitable) => {
+    const rows = costs.map((own, s) => {
+      let sum = 0, of = 0, solved = 0, refused = 0;
+      bench.problems.forEach((problem, i) => {
+        const code = bench.statuses[s][i];
+        if (code === "." || !keep(problem)) return;
+        if (code === unsuitable) { refused++; return; }
+        of++;
+        if (own[i] !== null) solved++;
+        sum += Math.log((own[i] === null ? charge * bench.limits[i] : own[i]) + shift);
+      });
+      return { s, of, solved, refused, mean: of ? Math.exp(sum / of) - shift : Infinity };
+    });
+    // who has run half of the most does not win by absence
+    const most = Math.max(...rows.map((r) => r.of));
+    return rows.filter((r) => r.of && r.of >= most / 2).sort((a, b) => a.mean - b.mean);
+  };
+
+  Fclib.chooser = (catalogue, params, keep) => {
+    const s = site(), state = { kind: params.get("kind") || "", size: params.get("size") || "", ctol: Number(params.get("ctol") ?? s.tolerances.length - 1), weight: Number(params.get("weight") ?? 1) };
+    const says = h("p", { role: "status", class: "answer" }, "…"), table = h("div", {});
+    const draw = async () => {
+      const [cat, bench, costs] = await Promise.all([catalogue(), load(`t${state.ctol}`), load(`t${state.ctol}-cpu_s`)]);
+      const { read } = cat, [from, end] = state.size ? state.size.split("-").map((x) => x === "" ? Infinity : Number(x)) : [0, Infinity];
+      const like = (k) => (!state.kind || read.kind(k) === state.kind) && read.nc(k) >= from && read.nc(k) <= end;
+      const unsuitable = (s.statuses.find(([, name]) => name === "unsuitable") || [""])[0];
+      const rows = Fclib.ranked(bench, costs, like, 10 ** state.weight, s.charges.shift, unsuitable), runs = rows.reduce((sum, r) => sum + r.of, 0);
+      const name = (r) => s.solvers[r.s].label, tol = Fclib.tolerance(s.tolerances[state.ctol]);
+      if (!rows.length) { says.replaceChildren("No problem like that was run to this tolerance."); table.replaceChildren(); return; }
+      const [best, second] = rows, [low, high] = Fclib.odds(best.solved, best.of);
+      says.replaceChildren("Take ", h("b", {}, link("solver", [name(best)], {}, name(best))), `: it solved ${best.solved} of ${best.of} such problems to ${tol} (${Fclib.percent(best.solved / best.of)}; for the next one ${Math.round(100 * low)} to ${Math.round(100 * high)} %), in ${number(best.mean)} s in the mean`,
+        ...second ? [`; then `, link("solver", [name(second)], {}, name(second)), `, ${second.solved} of ${second.of} in ${number(second.mean)} s`] : [], `. By ${runs} runs: `, h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"), ".");
+      table.replaceChildren(h("details", {}, h("summary", {}, "All solvers by this weight"), Fclib.table({
+        caption: "Solvers, the best first; a failure is charged so many times the limit as the weight says", rows, page: 20, sort: { key: "mean", down: false },
+        columns: [{ key: "solver", label: "solver", head: true, value: name, cell: (r) => link("solver", [name(r)], {}, name(r)) }, { key: "solved", label: "solved" }, { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved }, { key: "refused", label: "does not take it" }, { key: "mean", label: "mean [s]", type: "number" }],
+      })));
+    };
+    const change = (key) => (value) => { state[key] = ["ctol", "weight"].includes(key) ? Number(value) : value; keep({ [key]: value }); draw(); };
+    const weight = h("label", {}, "speed … certainty", h("input", { type: "range", min: 0, max: 4, step: 0.5, value: state.weight, "aria-label": "Weight of certainty against speed", onchange: (e) => change("weight")(e.target.value) }));
+    const kinds = h("span", {});
+    catalogue().then((cat) => {
+      const values = cat.read.kind ? [...new Set(cat.rows.map((row) => row.kind).filter(Boolean))].sort() : [];
+      if (values.length > 1) kinds.replaceWith(select("kind", [["", "any"], ...values.map((v) => [v, v])], state.kind, change("kind")));
+      draw();
+    });
+    return h("section", { class: "panel" }, h("h2", {}, "Which solver for mine?"), h("div", { class: "controls" }, kinds, select("contacts", SIZES, state.size, change("size")), select("tolerance", s.tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]), state.ctol, change("ctol")), weight), says, table);
+  };
+
+  // ---- classes, and what is open
+  Fclib.pages.classes = async (page) => {
+    const s = site(), list = s.standings || [];
+    page.append(h("h1", {}, "Easy, hard and open"), h("p", {}, "A problem is easy where more than half of the solvers that take it solve it, hard where fewer do, and open where none has, and no solution that came from elsewhere is within the tolerance."));
+    if (!list.length) page.append(h("p", {}, "No stored runs came with this report: they are in the package fclib-collection."));
+    for (const one of list) {
+      page.append(h("h2", {}, one.set), h("p", { class: "small" }, `Classes ${one.basis}.`));
+      if (one.open.length) page.append(Fclib.table({
+        caption: `Open problems of ${one.set}: the best error known, and by whom`, rows: one.open, page: 50,
+        columns: [{ key: "problem", label: "problem", head: true, cell: (r) => s.known && s.known.includes(r.problem) ? h("a", { href: to("problem", r.problem.split("/")) }, r.problem) : r.problem }, { key: "error", label: "best error", type: "number" }, { key: "by", label: "by", wrap: true }, { key: "date", label: "date" }],
+      }), h("p", {}, "Better one of them:"), Fclib.copyable(`fclib collection status ${one.open[0].problem} --out open.hdf5      # the problem, with the best solution known\nfclib check open.hdf5                                 # its error, as it will be judged\nfclib collection take yours.hdf5 --by "you, and how"  # taken where it is better by a tenth`, "the commands"));
+      page.append(Fclib.table({
+        caption: `Classes of ${one.set}, by family`, rows: one.families, page: 60,
+        columns: [{ key: "family", label: "family", head: true }, { key: "easy", label: "easy" }, { key: "hard", label: "hard" }, { key: "open", label: "open" }],
+      }));
+    }
+  };
+})();

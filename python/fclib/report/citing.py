@@ -1,0 +1,124 @@
+"""How to cite: BibTeX of the collection, families and problems, and of solvers and their papers.
+
+references.bib has the papers, each by its first author and its year, as solvers name them:
+"Alart & Curnier 1991; Acary, Bremond & Huber 2018" is alart1991 and acary2018.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+import unicodedata
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fclib import _core
+
+REFERENCES = Path(__file__).with_name("references.bib")
+REPORT = """\
+@techreport{fclib2014,
+  author = {Acary, Vincent and Br{\\'e}mond, Maurice and Koziara, Tomasz and P{\\'e}rignon, Franck},
+  title = {{FCLIB}: a collection of discrete {3D} Frictional Contact problems},
+  institution = {Inria},
+  type = {Technical report},
+  number = {RT-0444},
+  year = {2014},
+  url = {https://hal.inria.fr/hal-00945820}
+}"""
+SOFTWARE = """\
+@software{{fclib,
+  author = {{{{The FCLIB developers}}}},
+  title = {{{{FCLIB}}: discrete frictional contact problems, and a test bench for their solvers}},
+  version = {{{version}}}
+}}"""
+
+
+def references() -> Mapping[str, str]:
+    """The papers, by their keys."""
+    return _read(REFERENCES.read_text(encoding="utf-8"))
+
+
+@functools.cache
+def _read(text: str) -> Mapping[str, str]:
+    entries = re.split(r"\n\n(?=@)", text.strip())
+    return {entry.partition("{")[2].partition(",")[0]: entry for entry in entries}
+
+
+def keys_of(citation: str) -> list[str]:
+    """The keys of the papers that a solver names; what has no year is no paper."""
+    found = []
+    for part in citation.split(";"):
+        year = re.search(r"\b(1[89]|20)\d\d\b", part)
+        if year is None:
+            continue
+        first = re.split(r",| & | et al| \d", part.strip())[0]
+        plain = unicodedata.normalize("NFKD", first).encode("ascii", "ignore").decode()
+        key = re.sub("[^a-z]", "", plain.lower()) + year[0]
+        # the paper came out a year after its report
+        found.append({"fukushima2002": "fukushima2001"}.get(key, key))
+    return found
+
+
+def papers_of(citation: str) -> list[dict[str, str]]:
+    """BibTeX and DOI of the papers that a solver names."""
+    known = references()
+    found = []
+    for key in keys_of(citation):
+        if key in known:
+            doi = re.search(r"doi = \{([^}]*)\}", known[key])
+            title = re.search(r"title = \{(.*)\},?\n", known[key])
+            found.append(
+                {
+                    "key": key,
+                    "bibtex": known[key],
+                    "title": re.sub(r"[{}]", "", title[1]) if title else key,
+                    "doi": doi[1] if doi else "",
+                }
+            )
+    return found
+
+
+def software() -> str:
+    """BibTeX of this software, as CITATION.cff has it."""
+    return SOFTWARE.format(version=_core.version)
+
+
+def collection() -> str:
+    """BibTeX of the collection: the report that began it, and the software that has it."""
+    return f"{REPORT}\n\n{software()}"
+
+
+def family(record: Mapping[str, Any]) -> str:
+    """BibTeX of a family."""
+    name = f"{record['set']}/{record['name']}" if record.get("set") else record["name"]
+    note = [f"set {record['set']}"] if record.get("set") else []
+    note += [f"version {record['version']}"] if record.get("version") else []
+    note += [f"original by {record['authors']}"] if record.get("authors") else []
+    note += [f"FCLIB {_core.version}"]
+    return entry("family", name, f"{record.get('title') or name}: problems of {name}", note)
+
+
+def problem() -> str:
+    """BibTeX of a problem, with {id}, {key}, {version} and {digest} to fill in."""
+    note = ["version {version}", "fclib.digest {digest}", f"FCLIB {_core.version}"]
+    return entry("problem", "{key}", "Frictional contact problem {id}", note)
+
+
+def implementation(name: str, title: str, version: str) -> str:
+    """BibTeX of a solver as it is here, or where it is from."""
+    return entry(
+        "solver", name, f"{title or name}: solver {name}", [version or f"FCLIB {_core.version}"]
+    )
+
+
+def entry(kind: str, name: str, title: str, note: list[str]) -> str:
+    """An entry of BibTeX by the developers."""
+    key = re.sub(r"[^\w{}-]+", "-", name)
+    return (
+        f"@misc{{fclib-{kind}-{key},\n"
+        "  author = {{The FCLIB developers}},\n"
+        f"  title = {{{title}}},\n"
+        f"  note = {{{', '.join(note)}}}\n"
+        "}"
+    )

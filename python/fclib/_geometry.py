@@ -9,7 +9,7 @@ the unit that the bodies name.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Final
 
@@ -319,17 +319,36 @@ def carried(
             away = np.linalg.norm(before.point[rest] - now.point[i], axis=1)
             source[i] = rest.pop(int(away.argmin()))
 
-    found = source >= 0
-    result = np.zeros((len(now), d))
     force, axis = (2, 2) if planar else (3, 1)
-    old, new, given = before.frame[source[found]], now.frame[found], local[source[found]]
-    for part, axes in (
-        (slice(0, force), slice(0, force)),
-        (slice(force, d), slice(axis, axis + d - force)),
-    ):
+    parts = (slice(0, force), slice(0, force)), (slice(force, d), slice(axis, axis + d - force))
+    limits = (now.shape < 0).any(axis=1)
+    return turned(local, source, before.frame, now.frame, parts, limits)
+
+
+def turned(
+    r: Numbers,
+    source: npt.NDArray[Any],
+    before: Numbers,
+    now: Numbers,
+    parts: Sequence[tuple[slice, slice]],
+    limits: npt.NDArray[np.bool_],
+) -> Numbers:
+    """Reactions of contacts in their new frames (d nc), by way of the world.
+
+    Args:
+        r: those of the other step, a row for each contact of it.
+        source: (nc) which of these each contact was, -1 for none: it gets no reaction.
+        before: (... x 3 x 3) frames of the other step, N, T1, T2 in rows.
+        now: (nc x 3 x 3) those of this one.
+        parts: components of a vector, and the axes of the frame that they are along.
+        limits: (nc) contacts without a frame, whose components go as they are.
+    """
+    found = source >= 0
+    result = np.zeros((len(source), r.shape[1]))
+    old, new, given = before[source[found]], now[found], r[source[found]]
+    for part, axes in parts:
         world = np.einsum("cij,ci->cj", old[:, axes], given[:, part])
         result[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
-    # a limit has no frame: its components go as they are
-    limit = found & (now.shape < 0).any(axis=1)
-    result[limit] = local[source[limit]]
+    still = found & limits
+    result[still] = r[source[still]]
     return result.ravel()

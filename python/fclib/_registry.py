@@ -256,15 +256,20 @@ def solvers() -> list[_core.SolverInfo]:
     return [found[name] for name in sorted(found)]
 
 
+@functools.cache
+def _of_the_core() -> dict[str, _core.SolverInfo]:
+    return {info.name: info for info in _core.solvers()}
+
+
 def find_solver(name: str) -> _core.SolverInfo:
     """The solver of this name: of fclib, registered, or external.
 
     Raises:
         OptionError: there is none, with the known names, or with what is missing.
     """
-    for info in _core.solvers():
-        if info.name == name:
-            return info
+    own = _of_the_core().get(name)
+    if own is not None:
+        return own
     if name in _registered:
         return _registered[name]
     for provider in _providers():

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core, _solve
+from fclib import _core, _geometry, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
@@ -208,16 +208,8 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
         candidates = known.get((first, second))
         if candidates:
             source[i] = candidates.pop(0)
-    r = np.zeros((len(contacts), contacts.dimension))
-    found = source >= 0
-    old, new, local = state.frame[source[found]], contacts.frame[found], state.r[source[found]]
-    for part, axes in contacts.parts:
-        world = np.einsum("cij,ci->cj", old[:, axes], local[:, part])
-        r[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
-    # the frame of a limit is zero, its only component goes as it is
-    limit = found & (contacts.pair[:, 0] < 0)
-    r[limit] = state.r[source[limit]]
-    return r.ravel()
+    limits = contacts.pair[:, 0] < 0
+    return _geometry.turned(state.r, source, state.frame, contacts.frame, contacts.parts, limits)
 
 
 def describe(

@@ -321,7 +321,7 @@ def carried(
 
     force, axis = (2, 2) if planar else (3, 1)
     parts = (slice(0, force), slice(0, force)), (slice(force, d), slice(axis, axis + d - force))
-    limits = (now.shape < 0).any(axis=1)
+    limits = np.any(now.shape < 0, axis=1)
     return turned(local, source, before.frame, now.frame, parts, limits)
 
 

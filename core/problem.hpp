@@ -1,8 +1,6 @@
 // What holds for every formulation: the union of them, their names and their validation.
 #pragma once
 
-#include <array>
-#include <charconv>
 #include <cmath>
 #include <concepts>
 #include <limits>
@@ -15,6 +13,7 @@
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/
 #include "friction.hpp"
+#include "number_text.hpp"
 #include "solution.hpp"
 
 namespace fclib {
@@ -124,12 +123,6 @@ inline void require_size(Index actual, Index expected, Dim dim, const std::strin
                     std::string(name_of(dim)) + " = " + std::to_string(expected),
                 where);
   }
-}
-
-/// A number with as few digits as tell it from all others.
-inline std::string shortest(double value) {
-  std::array<char, 32> digits{};
-  return {digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr};
 }
 
 template <class Struct>

@@ -5,10 +5,10 @@
 
 namespace fclib {
 
-/// Of the calling thread [s].
+/// Of the calling thread [s]; where the system has no such clock, that of the wall.
 inline double cpu_time() {
   timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) != 0) clock_gettime(CLOCK_MONOTONIC, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 

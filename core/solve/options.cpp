@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "error.hpp"
+#include "number_text.hpp"
 
 namespace fclib {
 
@@ -18,10 +19,7 @@ std::string to_text(const OptionValue& value) {
   struct Printer {
     std::string operator()(bool v) const { return v ? "true" : "false"; }
     std::string operator()(std::int64_t v) const { return std::to_string(v); }
-    std::string operator()(double v) const {
-      std::array<char, 32> buffer{};
-      return {buffer.data(), std::to_chars(buffer.data(), buffer.data() + buffer.size(), v).ptr};
-    }
+    std::string operator()(double v) const { return shortest(v); }
     std::string operator()(const std::string& v) const { return v; }
   };
   return std::visit(Printer{}, value);
@@ -33,11 +31,18 @@ std::string listed(const auto& names) {
   return list;
 }
 
+std::from_chars_result read(const char* first, const char* last, std::int64_t& number) {
+  return std::from_chars(first, last, number);
+}
+std::from_chars_result read(const char* first, const char* last, double& number) {
+  return read_number(first, last, number);
+}
+
 template <class Number>
 Number parse_number(const OptionInfo& info, const std::string& text, const char* what) {
   Number number{};
   const char* end = text.data() + text.size();
-  const auto [stop, code] = std::from_chars(text.data(), end, number);
+  const auto [stop, code] = read(text.data(), end, number);
   if (code != std::errc{} || stop != end || !std::isfinite(static_cast<double>(number))) {
     bad_option(info.name, "'" + text + "' is not " + what);
   }

@@ -19,6 +19,8 @@ LAYERS: list[set[str]] = [
         "friction.hpp",
         "function_ref.hpp",
         "merit_kind.hpp",
+        "number_text.cpp",
+        "number_text.hpp",
         "version.hpp",
     },
     {"problem_info.hpp", "geometry.hpp"},

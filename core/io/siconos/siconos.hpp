@@ -31,6 +31,9 @@ namespace fclib {
 /// Throws Error (file) that names the file and the line, or Error (problem) as validate() does.
 Problem read_siconos(const std::string& path, std::string_view kind = {});
 
+/// The same of a text in memory, without a title and a file's name in messages.
+Problem parse_siconos(std::string_view text, std::string_view kind = {});
+
 /// Writes a text file, or replaces the old one whole, atomically. Each matrix keeps its storage;
 /// one by rows, which Siconos has no sparse text for, is written in blocks of d x d where its sides
 /// are those of the contacts (W), by columns elsewhere. Duplicates are added up, and blocks on the

@@ -3,24 +3,13 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <limits>
 
 #include "error.hpp"
+#include "number_text.hpp"
 
 namespace fclib::siconos {
 
 namespace {
-
-/// A number that from_chars finds too small or too large: rounded, as by any reader, to what a
-/// double holds next to it.
-double beyond_range(std::string_view text) {
-  long double value = 0;
-  if (std::from_chars(text.data(), text.data() + text.size(), value).ec == std::errc()) {
-    return static_cast<double>(value);
-  }
-  const bool small = text.find("e-") != text.npos || text.find("E-") != text.npos;
-  return small ? 0.0 : std::numeric_limits<double>::infinity();
-}
 
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
@@ -87,11 +76,10 @@ double Words::number(What what) {
   const std::string_view text = token(what);
   const std::string_view bare = text.substr(text.front() == '+' ? 1 : 0);
   double value = 0;
-  const auto [end, error] = std::from_chars(bare.data(), bare.data() + bare.size(), value);
+  const auto [end, error] = read_number(bare.data(), bare.data() + bare.size(), value);
   if (end != bare.data() + bare.size() || error == std::errc::invalid_argument) {
     fail(quoted(text) + " is not a number (" + std::string(what) + ")");
   }
-  if (error == std::errc::result_out_of_range) value = beyond_range(bare);
   if (!std::isfinite(value)) {
     fail(quoted(text) + " is not a finite number (" + std::string(what) + ")");
   }

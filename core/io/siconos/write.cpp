@@ -1,5 +1,4 @@
 #include <algorithm>
-#include <charconv>
 #include <vector>
 
 #include "io/replace_file.hpp"
@@ -20,9 +19,9 @@ class Writer {
     text_ += text;
     return *this;
   }
-  Writer& operator<<(Index value) { return put(value); }
+  Writer& operator<<(Index value) { return *this << std::to_string(value); }
   /// As few digits as it takes to read the number back equal.
-  Writer& operator<<(double value) { return put(value); }
+  Writer& operator<<(double value) { return *this << shortest(value); }
 
   void line(const double* values, std::size_t size) {
     for (std::size_t k = 0; k < size; ++k) *this << (k > 0 ? " " : "") << values[k];
@@ -32,13 +31,6 @@ class Writer {
   [[nodiscard]] const std::string& text() const { return text_; }
 
  private:
-  template <class Number>
-  Writer& put(Number value) {
-    char digits[32];
-    const auto end = std::to_chars(std::begin(digits), std::end(digits), value).ptr;
-    text_.append(std::begin(digits), end);
-    return *this;
-  }
   std::string text_;
 };
 

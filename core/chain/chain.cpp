@@ -6,6 +6,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "linalg/cpu_time.hpp"
@@ -48,9 +49,17 @@ class Tracker {
   /// The squared error of all contacts but those worked on now.
   void set_others(double squared) { others_ = squared; }
 
-  /// Counts iterations and tells of the error that is left. Whether to end the stage: because
-  /// everything stops, or because the iterate is not finite.
-  bool report(std::int64_t iterations, double error) {
+  /// All reactions, and the contacts of the island that is worked on now; no contacts: all of them.
+  void set_island(const Vector& all, std::span<const Index> contacts, int d) {
+    if (!monitor_.watched()) return;
+    all_ = all;
+    contacts_ = contacts;
+    d_ = d;
+  }
+
+  /// Counts iterations and tells of the error that is left, with r of the island. Whether to end
+  /// the stage: because everything stops, or because the iterate is not finite.
+  bool report(std::int64_t iterations, double error, const Vector& r) {
     const bool first = iterations_ == 0 && !reported_;
     iterations_ += iterations;
     reported_ = true;
@@ -59,7 +68,7 @@ class Tracker {
     if (!stopped_ && (iterations > 0 || first)) {
       // what has overflown is not an error to tell of, but its iterations count
       if (finite) told_ = all;
-      stopped_ = monitor_.report(iterations_, told_);
+      stopped_ = monitor_.report(iterations_, told_, shown(r));
     }
     return stopped_.has_value() || !finite;
   }
@@ -88,6 +97,16 @@ class Tracker {
   }
 
  private:
+  /// All reactions, for who looks on.
+  const Vector* shown(const Vector& r) {
+    if (!monitor_.watched() || contacts_.empty()) return &r;
+    for (std::size_t k = 0; k < contacts_.size(); ++k) {
+      const auto from = static_cast<Eigen::Index>(k) * d_;
+      all_.segment(Eigen::Index{contacts_[k]} * d_, d_) = r.segment(from, d_);
+    }
+    return &all_;
+  }
+
   Monitor monitor_;
   double others_ = 0;
   double told_ = std::numeric_limits<double>::max();  // the last error that was finite
@@ -96,6 +115,9 @@ class Tracker {
   bool reported_ = false;
   std::optional<Status> stopped_;
   std::vector<Stage> stages_;
+  Vector all_;
+  std::span<const Index> contacts_;
+  int d_ = 0;
 };
 
 template <class Cone>
@@ -124,7 +146,7 @@ class Island {
     best_ = r_;
     error_ = relative_error<Cone>(problem_, u_, r_);
     if (!std::isfinite(error_)) error_ = endless;  // anything is better
-    tracker_.report(0, error_);
+    tracker_.report(0, error_, r_);
     for (const StageRule& rule : table_) {
       if (done()) break;
       if (rule.when.on != on) continue;
@@ -213,7 +235,7 @@ class Island {
       error_ = error;
       best_ = r;
     }
-    return tracker_.report(iterations, error) || done();
+    return tracker_.report(iterations, error, r) || done();
   }
 
   /// Sweeps from the best iterate; what is kept of each contact is lost where it has overflown.
@@ -338,7 +360,7 @@ class Island {
         if (violation(r) > rules.outside || !(rate > 0) || left > static_cast<double>(limit)) {
           return;
         }
-        if (tracker_.report(trial, error_)) return;
+        if (tracker_.report(trial, error_, best_)) return;
         last = size;
       }
       if (size <= tolerance_ * problem_.scale) {
@@ -355,7 +377,7 @@ class Island {
       direction = z + (next / rz) * direction;
       rz = next;
     }
-    if (limit < rules.limit) tracker_.report(limit % trial, error_);
+    if (limit < rules.limit) tracker_.report(limit % trial, error_, best_);
   }
 
   void project(Vector& r) const {
@@ -373,7 +395,7 @@ class Island {
   void proximal(const ProximalRules& rules, Vector r) {
     ProximalPoint<Cone> method(problem_, system());
     const double error =
-        method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at); });
+        method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at, r); });
     take(0, error, r);
   }
 
@@ -449,7 +471,7 @@ class Island {
     double least = std::numeric_limits<double>::infinity();
     newton.solve(rules, r, [&](double error) {
       least = std::min(least, error);
-      return tracker_.report(1, error) || error <= tolerance_ || --left == 0;
+      return tracker_.report(1, error, r) || error <= tolerance_ || --left == 0;
     });
     take(0, least, r);
     tracker_.add_cpu(newton.system().others_cpu());
@@ -484,7 +506,7 @@ class Island {
           return true;
         }
       }
-      return tracker_.report(1, error_);
+      return tracker_.report(1, error_, best_);
     });
   }
 
@@ -554,6 +576,7 @@ void walk(const ReducedProblem& problem, const Table& table, int threads, Tracke
   const Index nc = problem.nc();
   const double tolerance = tracker.tolerance();
   tracker.set_others(0);
+  tracker.set_island(r, {}, D);
   std::optional<Island<Cone>> whole;
   const auto proves = [&](const Vector& y) {
     return problem.proves_no_solution != nullptr && (*problem.proves_no_solution)(y);
@@ -607,6 +630,7 @@ void walk(const ReducedProblem& problem, const Table& table, int threads, Tracke
       x.template segment<D>(D * j) = r.template segment<D>(D * contacts[j]);
     sum = std::max(0.0, sum - squared[k]);
     tracker.set_others(sum);
+    tracker.set_island(r, contacts, D);
     const auto proves_island = [&](const Vector& y) {
       Vector padded = Vector::Zero(nc);
       for (Eigen::Index j = 0; j < size; ++j) padded[contacts[static_cast<std::size_t>(j)]] = y[j];
@@ -645,7 +669,7 @@ Outcome iterate(const ReducedProblem& problem, const Table& table, int threads,
   for (Index a = 0; a < nc && separating; ++a) separating = problem.q[D * a] >= 0;
   if (separating) {
     r.setZero();
-    tracker.report(0, 0.0);
+    tracker.report(0, 0.0, r);
     return outcome();
   }
 

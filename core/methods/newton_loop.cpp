@@ -11,13 +11,14 @@ Outcome run_newton(const ReducedProblem& problem, ContactFunctionKind function,
     Monitor monitor(settings);
     Vector u;
     problem.velocity(r, u);
-    if (const auto stop = monitor.report(0, relative_error<Cone>(problem, u, r))) return {*stop, 0};
+    const double error = relative_error<Cone>(problem, u, r);
+    if (const auto stop = monitor.report(0, error, &r)) return {*stop, 0};
 
     SemismoothNewton<Cone> newton(problem, function);
     std::int64_t iterations = 0;
     std::optional<Status> stopped;
-    const NewtonEnd end = newton.solve(rules, r, [&](double error) {
-      stopped = monitor.report(++iterations, error);
+    const NewtonEnd end = newton.solve(rules, r, [&](double at) {
+      stopped = monitor.report(++iterations, at, &r);
       return stopped.has_value();
     });
     const Status otherwise = end == NewtonEnd::not_finite ? Status::diverged : Status::stalled;

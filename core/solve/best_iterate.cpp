@@ -27,7 +27,7 @@ template <class Cone>
 bool BestIterate<Cone>::report(std::int64_t count, const Vector& r, double error) {
   last_ = error;
   keep(count, r, error);
-  if (first_ || count > 0) stopped_ = monitor_.report(iterations_, error);
+  if (first_ || count > 0) stopped_ = monitor_.report(iterations_, error, &r);
   first_ = false;
   return stopped_.has_value();
 }
@@ -37,7 +37,7 @@ bool BestIterate<Cone>::glance(std::int64_t count, const Vector& r) {
   problem_.velocity(r, fresh_);
   const double error = relative_error<Cone>(problem_, fresh_, r);
   const std::int64_t now = iterations_ + count;
-  const auto status = monitor_.report(now, error);
+  const auto status = monitor_.report(now, error, &r);
   const bool last = now >= monitor_.max_iterations() || monitor_.elapsed() > time_limit_;
   if (!status || (*status == Status::converged && !last)) return false;
   keep(count, r, error);

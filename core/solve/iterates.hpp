@@ -35,7 +35,7 @@ class Iterates {
                       !(value < std::numeric_limits<double>::infinity());
     if (!told) return std::nullopt;
     last_told_ = iteration;
-    if (const auto stop = monitor_.report(iteration, value)) return Outcome{*stop, iteration};
+    if (const auto stop = monitor_.report(iteration, value, &r)) return Outcome{*stop, iteration};
     return std::nullopt;
   }
 

@@ -58,9 +58,10 @@ constexpr std::string_view name_of(Status status) {
 /// A point of the convergence history.
 struct Progress {
   std::int64_t iteration = 0;
-  double error = 0;        ///< the solver's own, relative to ReducedProblem::scale
-  double time = 0;         ///< wall clock since the solver started [s]
-  std::string_view stage;  ///< of a solver that chains others; empty for a plain one
+  double error = 0;           ///< the solver's own, relative to ReducedProblem::scale
+  double time = 0;            ///< wall clock since the solver started [s]
+  std::string_view stage;     ///< of a solver that chains others; empty for a plain one
+  const Vector* r = nullptr;  ///< the iterate, or the best one so far
 };
 
 /// What a caller asks of any solver.
@@ -86,16 +87,19 @@ class Monitor {
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
   [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
 
+  /// Whether somebody looks on, for whom the iterate is to be put together.
+  [[nodiscard]] bool watched() const { return static_cast<bool>(settings_.callback); }
+
   /// Wall clock since the solver started [s].
   [[nodiscard]] double elapsed() const { return now(settings_.clock) - start_; }
 
   /// Names the stage of the reports to come.
   void enter(std::string_view stage) { stage_ = stage; }
 
-  /// The reason to stop at this iterate, if there is one.
-  std::optional<Status> report(std::int64_t iteration, double error) {
+  /// The reason to stop at this iterate, if there is one. `r` is the iterate, for who looks on.
+  std::optional<Status> report(std::int64_t iteration, double error, const Vector* r = nullptr) {
     if (!(error < std::numeric_limits<double>::infinity())) return Status::diverged;
-    if (settings_.callback && !settings_.callback({iteration, error, elapsed(), stage_})) {
+    if (settings_.callback && !settings_.callback({iteration, error, elapsed(), stage_, r})) {
       return Status::interrupted;
     }
     if (error <= settings_.tolerance) return Status::converged;

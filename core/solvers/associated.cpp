@@ -39,7 +39,7 @@ Outcome iterate(const ReducedProblem& problem, InteriorPointRules rules, const S
   Vector u;
   problem.velocity(r, u);
   const double first = relative_error<Coulomb<D>>(problem, u, r);
-  if (const auto stop = monitor.report(0, first)) return {*stop, 0};
+  if (const auto stop = monitor.report(0, first, &r)) return {*stop, 0};
 
   CoupledSystem system(problem);
   InteriorPoint<D> method(problem, system);
@@ -52,7 +52,7 @@ Outcome iterate(const ReducedProblem& problem, InteriorPointRules rules, const S
     if (at.allFinite()) r = at;
     solved = method.tau() <= share * monitor.tolerance() &&
              method.residual() <= share * monitor.tolerance();
-    stopped = monitor.report(method.iterations(), error);
+    stopped = monitor.report(method.iterations(), error, &r);
     return stopped.has_value() || solved;
   });
   return {stopped.value_or(solved ? Status::inaccurate : Status::stalled), method.iterations()};

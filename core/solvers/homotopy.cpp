@@ -61,7 +61,7 @@ Outcome iterate(const ReducedProblem& problem, Options options, const Settings& 
   Vector u;
   problem.velocity(r, u);
   double best = relative_error<Cone>(problem, u, r);
-  if (const auto stop = monitor.report(0, best)) return {*stop, 0};
+  if (const auto stop = monitor.report(0, best, &r)) return {*stop, 0};
 
   CoupledSystem system(problem);
   Homotopy<Cone> method(problem, system);
@@ -75,7 +75,7 @@ Outcome iterate(const ReducedProblem& problem, Options options, const Settings& 
       best = error;
       r = at;
     }
-    stopped = monitor.report(++iterations, error);
+    stopped = monitor.report(++iterations, error, &r);
     return stopped.has_value();
   };
   const auto polish = [&](std::int64_t factorisations) {

@@ -143,7 +143,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   Monitor monitor(settings);
   Iteration<Cone> at(problem, r);
   double error = at.error();
-  if (const auto stop = monitor.report(0, error)) return {*stop, 0};
+  if (const auto stop = monitor.report(0, error, &r)) return {*stop, 0};
   double best = error;
   std::int64_t sweeps = 0;
   double caution = 1;  // factor of alpha, after inner problems that were not solved
@@ -165,7 +165,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
         best = error;
         r = at.r();
       }
-      if (const auto stop = monitor.report(sweeps, error)) return {*stop, sweeps};
+      if (const auto stop = monitor.report(sweeps, error, &at.r())) return {*stop, sweeps};
       inner_error = at.inner_error();
       if (inner_error <= options.inner_accuracy * start) break;
     }

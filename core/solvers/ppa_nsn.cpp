@@ -70,14 +70,14 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   Vector u;
   problem.velocity(r, u);
   const double error = relative_error<Cone>(problem, u, r);
-  if (const auto stop = monitor.report(0, error)) return {*stop, 0};
+  if (const auto stop = monitor.report(0, error, &r)) return {*stop, 0};
 
   CoupledSystem system(problem);
   ProximalPoint<Cone> method(problem, system);
   std::int64_t iterations = 0;
   std::optional<Status> stopped;
   method.solve(options.to_rules(), monitor.tolerance(), r, [&](double at) {
-    stopped = monitor.report(++iterations, at);
+    stopped = monitor.report(++iterations, at, &r);
     return stopped.has_value();
   });
   return {stopped.value_or(Status::stalled), iterations};

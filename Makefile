@@ -13,13 +13,14 @@ JOBS ?= auto
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
-.PHONY: setup demo test docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
+.PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
         collection-wheel campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
+	@echo "make wasm    the core as a module for browsers, into $(BUILD)/wasm/fclib (needs Emscripten)"
 	@echo "make docs    set up, then build the documentation into $(BUILD)/site"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make asan    the C++ tests under the sanitizers of addresses and of undefined behaviour"
@@ -50,7 +51,17 @@ demo: setup
 test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	cmake --build $(BUILD) --target fclib_tests fclib
 	ctest --test-dir $(BUILD) --output-on-failure
+	@if command -v emcmake >/dev/null && command -v node >/dev/null; then $(MAKE) wasm; \
+	  else echo "== there is no Emscripten: the tests of the module for browsers are skipped"; fi
 	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+
+wasm:
+	@command -v emcmake >/dev/null && command -v node >/dev/null || { echo "make wasm needs Emscripten \
+	and Node. Debian, Ubuntu: apt-get install emscripten; conda: conda install -c conda-forge emscripten"; exit 1; }
+	emcmake cmake --preset wasm
+	cmake --build --preset wasm
+	@gzip -9 -c build/wasm/fclib/fclib-core.wasm | wc -c | \
+	  awk '{ printf "build/wasm/fclib: fclib-core.wasm has %.2f MB, compressed\n", $$1 / 1e6 }'
 
 docs: setup $(VENV)/.docs-tools
 	$(BIN)/python scripts/site/build.py $(BUILD)/site

@@ -32,6 +32,10 @@ if ! { PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true; } | grep -q
 if [ "${1-}" = test ] && ! { command -v chromium || command -v chromium-browser; } >/dev/null 2>&1; then
   optional="$optional chromium"
 fi
+# makes the module for browsers, and Node runs it (make wasm)
+if [ "${1-}" = test ] && ! { command -v emcmake && command -v node; } >/dev/null 2>&1; then
+  optional="$optional emscripten"
+fi
 
 if [ -z "$missing$optional" ]; then
   echo "== system packages: all there"
@@ -57,5 +61,11 @@ if [ "$(id -u)" -ne 0 ]; then
 fi
 echo "== installing them by apt"
 $sudo apt-get update -qq
+had=
+for package in $optional; do # what this system has not is left out
+  if apt-cache show "$package" >/dev/null 2>&1; then had="$had $package"; fi
+done
+optional=$had
+[ -n "$missing$optional" ] || exit 0
 # shellcheck disable=SC2086
 $sudo env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $missing $optional

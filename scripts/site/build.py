@@ -44,7 +44,15 @@ MENU = {
     "The collection": ["collection", "families/index", "families-of-your-own", "recorders"],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
-    "Interfaces": ["command-line", "python", "compiled", "embedding", "recipes", "browser", "c-api"],
+    "Interfaces": [
+        "command-line",
+        "python",
+        "compiled",
+        "embedding",
+        "recipes",
+        "browser",
+        "c-api",
+    ],
     "Around it": [
         "comparison",
         "migrating",

@@ -82,9 +82,12 @@ def test_a_solve_is_watched_and_stopped(browser: Module) -> None:
     assert len(found["reports"]) == 3
     assert {report["size"] for report in found["reports"]} == {m}
     errors: list[float] = []
-    fclib.solve(
-        problem, "nsgs", callback=lambda _i, error, _t, _s: errors.append(error) or len(errors) < 3
-    )
+
+    def report(_iteration: int, error: float, _seconds: float, _stage: str) -> bool:
+        errors.append(error)
+        return len(errors) < 3
+
+    fclib.solve(problem, "nsgs", callback=report)
     close([report["error"] for report in found["reports"]], errors)
     assert browser("solve_throwing", problem) == "of the page"
     hard = golden_work.GENERATED["bodies, at the limit"]()
@@ -130,7 +133,7 @@ def test_merits_are_those_of_python(browser: Module, path: Path) -> None:
 
 
 def test_condensed_problems_are_those_of_python(browser: Module) -> None:
-    problem = planted_global(8, nc=8, p=4).problem
+    problem: Any = planted_global(8, nc=8, p=4).problem
     found = browser("condense", problem)
     native = browser_module.decoded(browser_module.encoded(problem.condense()))
     assert found["kind"] == "local"

@@ -45,7 +45,7 @@ OTHERS = [
     for b in blocks
     if b.language not in ("python", "sh", *WORDS) and b.runs
 ]
-LANGUAGES = {"python", "sh", "toml", "c", "cpp", "fortran", "cmake", *WORDS}
+LANGUAGES = {"python", "sh", "toml", "c", "cpp", "fortran", "cmake", "js", *WORDS}
 # what a page's Python uses and does not define, since it shows a part of a file
 BEFORE = {
     "docs/analysis.md": "import fclib\nproblem = fclib.read('problem.hdf5')",

@@ -11,7 +11,7 @@ JOBS ?= auto
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
-CXX_SOURCES := $(shell find core bindings include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
+CXX_SOURCES := $(shell find core bindings browser include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format man sdist wheel wheels \
         collection-wheel campaigns deb release clean help

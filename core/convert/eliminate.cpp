@@ -81,8 +81,7 @@ void require_agreement(const std::vector<Index>& dropped, const Vector& gap, con
   if (worst < 0) return;
   throw Error(ErrorKind::unsuitable,
               "contradicts the others, from which it follows: where they hold it is off by " +
-                  shortest(std::abs(gap[worst])) + ", " + shortest(most) +
-                  " of its terms",
+                  shortest(std::abs(gap[worst])) + ", " + shortest(most) + " of its terms",
               "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }
 

@@ -89,6 +89,7 @@ def opened(site: Path) -> dict[str, float]:
                     page.wait_for_selector("main h1")
 
                 note(name, tools, open_page)
+                page.wait_for_timeout(1000)  # nobody types before
                 for text in (FILTER, f"{FILTER} arch") if name == "catalogue" else ():
                     note("filter", tools, lambda page=page, text=text: page.evaluate(answer, text))
                 page.close()

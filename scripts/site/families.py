@@ -22,16 +22,18 @@ def pages(draws: bool) -> Iterator[tuple[str, str | bytes]]:
     known = plan.families()
     order = {name: place for place, name in enumerate(KNOWN)}
     by_set = sorted(known, key=lambda name: (order.get(known[name].collection, 99), name))
-    yield "families/index.md", index({name: known[name] for name in by_set})
+    drawn = set()
     for name in by_set:
         picture = draw(name) if draws else None
         if picture is not None:
+            drawn.add(name)
             yield f"families/{name}.png", picture
         yield f"families/{name}.md", page(name, known[name], picture is not None)
+    yield "families/index.md", index({name: known[name] for name in by_set}, drawn)
 
 
-def index(families: dict[str, Kind]) -> str:
-    """The sets and the families, in tables."""
+def index(families: dict[str, Kind], drawn: set[str]) -> str:
+    """The sets and the families, in tables, with a small picture where one is drawn."""
     lines = [
         "# Families",
         "",
@@ -43,9 +45,10 @@ def index(families: dict[str, Kind]) -> str:
         "|---|---|---|",
     ]
     lines += [f"| {name} | {version} | {what} |" for name, (version, what) in KNOWN.items()]
-    lines += ["", "| set | family | problems | what |", "|---|---|---:|---|"]
+    lines += ["", "| | set | family | problems | what |", "|---|---|---|---:|---|"]
     lines += [
-        f"| {kind.collection} | [{name}]({name}.md) | {kind.problems} | {kind.description} |"
+        f"| {f'![]({name}.png){{width=96px}}' if name in drawn else ''}"
+        f" | {kind.collection} | [{name}]({name}.md) | {kind.problems} | {kind.description} |"
         for name, kind in families.items()
     ]
     return "\n".join(lines) + "\n"

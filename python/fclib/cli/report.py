@@ -57,6 +57,9 @@ def command(
     files_at: Annotated[
         str, typer.Option(help="Address where the collection's folder is served, for links to it.")
     ] = "",
+    docs: Annotated[
+        str, typer.Option(help="Address where the documentation is served, for links to it.")
+    ] = "",
     jobs: Annotated[
         int | None, typer.Option(help="Processes that draw; one a core.", min=1)
     ] = None,
@@ -94,6 +97,7 @@ def command(
                 title=title,
                 with_files=with_files,
                 files_at=files_at,
+                docs=docs,
                 jobs=jobs,
                 progress=show,
             )

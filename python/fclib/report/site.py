@@ -124,6 +124,7 @@ def build_site(
     title: str = "",
     with_files: bool = False,
     files_at: str = "",
+    docs: str = "",
     jobs: int | None = 1,
     progress: Callable[[str, int, int], None] = _no_progress,
 ) -> dict[str, int]:
@@ -138,6 +139,7 @@ def build_site(
         title: of the site.
         with_files: copy the problems into the site, with their reference solutions and pictures.
         files_at: an address where the folder of the collection is served, for links to it.
+        docs: an address where the documentation is served, for links to it.
         jobs: processes that draw; None: one a core.
         progress: is told what is done, how far, of how many.
 
@@ -158,7 +160,9 @@ def build_site(
     part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
     try:
         taken = taking.Taking(part, problems.folder, with_files, files_at)
-        counts = _Writer(part, campaigns, problems, views, title, progress, taken, jobs).write()
+        writer = _Writer(part, campaigns, problems, views, title, progress, taken, jobs)
+        writer.docs = docs.rstrip("/")
+        counts = writer.write()
         part.chmod(0o755)
         if out.exists():
             old = Path(tempfile.mkdtemp(prefix=f".{out.name}-old-", dir=out.parent))
@@ -293,6 +297,7 @@ class _Writer:
     ) -> None:
         self.taking = taken
         self.jobs = jobs
+        self.docs = ""
         self.folder = folder
         self.campaigns = campaigns
         self.problems = problems
@@ -312,6 +317,7 @@ class _Writer:
         site: dict[str, Any] = {
             "title": self.title or "Frictional contact problems",
             "version": _core.version,
+            "docs": self.docs,
             "metrics": {name: label for name, (label, _) in METRICS.items()},
             "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
             "merits": [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS],

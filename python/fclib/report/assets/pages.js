@@ -257,6 +257,8 @@
       if (!memory.has(k)) memory.set(k, `${[read.id(k), read.title && read.title(k), ...TAGS.map(([key]) => read[key] && read[key](k)), about.get(read.family(k))].filter(Boolean).join(" ")}`.toLowerCase());
       return memory.get(k);
     };
+    // there before they are asked for
+    (window.requestIdleCallback || setTimeout)(() => { for (let k = 0; k < cat.size; k++) words(k); });
     const says = h("p", { class: "small", role: "status" });
     let listed = [];
     const rows = () => {
@@ -284,7 +286,7 @@
         : c.key === "family" ? (row) => h("a", { href: familyHref(read.collection ? row.collection : "", row.family) }, row.family)
           : c.key === "best_solver" ? (row) => solverLink(row.best_solver) : c.key === "status" ? (row) => row.status ? status(row.status) : "–" : undefined,
     }));
-    const table = Fclib.table({ caption: "Problems", name: "catalogue", columns, rows: rows(), page: 50, search: false, ...remembered(params, keep) });
+    const table = Fclib.table({ caption: "Problems", name: "catalogue", columns, rows: rows(), page: 25, search: false, ...remembered(params, keep) });
     let waiting = 0;
     const update = (changes) => {
       Object.assign(state, changes);
@@ -323,6 +325,7 @@
         h("div", {}, h("p", {}, f.description || ""), (f.text || []).map((text) => h("p", { class: "small" }, prose(text))),
           facts([["name", f.set ? `${f.set}/${f.name}` : f.name], ["problems", link("catalogue", [], { family: f.name }, String(f.problems))], ["application", f.application], ["friction", f.friction], ["original by", f.authors], ["formulations", f.formulations.join(", ")],
             ...Object.entries(f.ranges).map(([key, ends]) => [{ nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key], range(ends)])]))));
+    if (s.docs) page.append(h("p", {}, h("a", { href: `${s.docs}/families/${f.name}.html` }, "This family in the documentation")));
     if (f.distribution) page.append(h("h2", {}, "Distribution"), h("figure", {}, h("img", { src: f.distribution, alt: `Histograms of contacts, degrees of freedom and density: ${f.problems} problems` }), h("figcaption", {}, "The numbers are in the ", link("catalogue", [], { family: f.name }, "catalogue"), ".")));
     if (s.headlines.some((head) => head && head.tables[f.name])) {
       const t = Number(params.get("tol") ?? lastTolerance()), head = s.headlines[t];
@@ -361,7 +364,7 @@
       const f = s.families.find((one) => one.name === row.family && one.set === (read.collection ? row.collection : "")), own = read.number && row.number;
       const steps = f && f.steps && { numbers: f.steps, count: f.steps.length, number: own, load: () => load(`sequences/${f.set}/${f.name}`), href: (n) => problemHref(`${f.set}/${f.name}/${String(n).padStart(4, "0")}`) };
       page.append(...Fclib.pictures(view, id, steps));
-      if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), Fclib.table({
+      if (view.merit) page.append(h("h2", {}, "Merit of the reference solution"), s.docs ? h("p", { class: "small" }, h("a", { href: `${s.docs}/mathematics.html` }, "How the error is defined")) : "", Fclib.table({
         caption: "Recomputed from the file", rows: s.merits.filter(([name]) => name in view.merit),
         columns: [{ key: 0, label: "part", head: true }, { key: "value", label: "value", type: "number", value: ([name]) => view.merit[name] }, { key: 1, label: "what it is", wrap: true }],
       }));
@@ -442,6 +445,6 @@
 
   // ---- what the site is made with
   Fclib.pages.about = async (page) => {
-    page.append(h("h1", {}, "About this site"), h("p", {}, `Made by fclib report, FCLIB ${site().version}, Apache-2.0. It asks no other host for anything.`), ...Fclib.citeIt("Cite the collection and the software", site().cite.collection), h("h2", {}, "Libraries"), Fclib.libraries(site().libraries));
+    page.append(h("h1", {}, "About this site"), h("p", {}, `Made by fclib report, FCLIB ${site().version}, Apache-2.0. It asks no other host for anything.`), site().docs ? h("p", {}, h("a", { href: `${site().docs}/index.html` }, "The documentation"), "; ", h("a", { href: `${site().docs}/glossary.html` }, "its glossary"), "; ", h("a", { href: `${site().docs}/report.html` }, "how this report is made")) : "", ...Fclib.citeIt("Cite the collection and the software", site().cite.collection), h("h2", {}, "Libraries"), Fclib.libraries(site().libraries));
   };
 })();

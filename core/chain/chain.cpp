@@ -290,17 +290,50 @@ class Island {
     }
   }
 
+  /// Steps that a stage may make, by what they cost.
+  double paid_for(const Patience& rules) {
+    const double factorisations =
+        rules.worth > 0 ? rules.worth : static_cast<double>(system().factorisations());
+    const double steps =
+        factorisations * factorisation_cost(problem_, system()) / sweep_cost(problem_);
+    return rules.worth > 0 && steps < 2.0 * static_cast<double>(rules.first_look) ? 0.0 : steps;
+  }
+
+  /// Looks at the least error since the last look, whether its rate ends within what is paid for.
+  class Prospect {
+   public:
+    Prospect(const Patience& rules, double budget, double tolerance)
+        : rules_(rules), budget_(budget), tolerance_(tolerance) {}
+
+    /// After k steps.
+    bool hopeless(std::int64_t k, double error) {
+      least_ = std::min(least_, error);
+      if (k < 2 * mark_ || k < rules_.first_look) return false;
+      const double rate = std::log(marked_ / least_) / static_cast<double>(k - mark_);
+      const double left = std::log(least_ / tolerance_) / rate;
+      if (!(rate > 0) || left > rules_.slack * (budget_ - static_cast<double>(k))) return true;
+      marked_ = least_;
+      least_ = endless;
+      mark_ = k;
+      return false;
+    }
+
+   private:
+    Patience rules_;
+    double budget_;
+    double tolerance_;
+    double least_ = endless;   // error since the last look
+    double marked_ = endless;  // ... and before it
+    std::int64_t mark_ = 0;    // steps at the last look
+  };
+
   void run(const SweepOnStage& rules) {
-    const std::int64_t interval = rules.interval;
-    const double budget = static_cast<double>(system().factorisations()) *
-                          factorisation_cost(problem_, system()) / sweep_cost(problem_);
+    const double budget = paid_for(rules);
+    Prospect prospect(rules, budget, tolerance_);
     r_ = best_;
     problem_.velocity(r_, u_);
-    double least = std::numeric_limits<double>::infinity();  // error since the last look
-    double marked = least;                                   // ... and before it
-    std::int64_t mark = 0;                                   // sweeps at the last look
-    for (std::int64_t k = interval; static_cast<double>(k) < budget; k += interval) {
-      const std::int64_t count = std::min(interval, tracker_.left());
+    for (std::int64_t k = rules.interval; static_cast<double>(k) < budget; k += rules.interval) {
+      const std::int64_t count = std::min(rules.interval, tracker_.left());
       for (std::int64_t j = 0; j < count; ++j) gauss_seidel_->sweep(r_, u_);
       problem_.velocity(r_, u_);
       const double error = relative_error<Cone>(problem_, u_, r_);
@@ -308,15 +341,28 @@ class Island {
         if (!std::isfinite(error)) return_to_best();
         return;
       }
-      least = std::min(least, error);
-      if (k < 2 * mark || k < rules.first_look) continue;
-      const double rate = std::log(marked / least) / static_cast<double>(k - mark);
-      const double left = std::log(least / tolerance_) / rate;
-      if (!(rate > 0) || left > rules.slack * (budget - static_cast<double>(k))) return;
-      marked = least;
-      least = std::numeric_limits<double>::infinity();
-      mark = k;
+      if (prospect.hopeless(k, error)) return;
     }
+  }
+
+  void run(const SpectralGradientStage& rules) {
+    const double budget = paid_for(rules);
+    if (!(budget > 0)) return;
+    Prospect prospect(rules, budget, tolerance_);
+    Vector r = start_of(rules.from);
+    Vector u(problem_.m());
+    problem_.velocity(r, u);
+    std::int64_t k = 0;
+    spectral_gradient<Cone>(problem_, {}, r, u, [&](const Vector&) {
+      if (++k % rules.interval != 0) return tracker_.left() <= k % rules.interval;
+      double error = relative_error<Cone>(problem_, u, r);
+      if (error <= tolerance_) {
+        problem_.velocity(r, u);
+        error = relative_error<Cone>(problem_, u, r);
+      }
+      return take(rules.interval, error, r) || static_cast<double>(k) > budget ||
+             prospect.hopeless(k, error);
+    });
   }
 
   void run(const ConjugateGradientsStage& rules) {

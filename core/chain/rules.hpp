@@ -26,6 +26,7 @@
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
 #include "methods/semismooth_newton.hpp"
+#include "methods/spectral_gradient.hpp"
 #include "solve/options.hpp"
 
 namespace fclib::chain {
@@ -169,39 +170,67 @@ struct GaussSeidelStage {
   }
 };
 
-/// Sweeps from the best iterate: for a loose tolerance they often end where interior points fail.
-struct SweepOnStage {
-  static constexpr std::string_view name = "sweep_on";
-  static constexpr std::string_view families = "splitting";
-  static constexpr std::string_view doc =
-      "sweeps from the best iterate, while they may end for what all factorisations have cost";
+/// How long a method goes on whose steps cost little and converge slowly.
+struct Patience {
+  double worth = 0;
   std::int64_t interval = 10;
   std::int64_t first_look = 50;
   double slack = 2;
+};
+
+template <class O>
+constexpr auto patience_fields() {
+  return std::tuple{
+      OptionField<O, double>{.name = "worth",
+                             .member = &O::worth,
+                             .unit = "factorisations",
+                             .doc = "that all steps may cost; where these do not pay for twice the "
+                                    "first look the stage is left out; 0: as many as there were",
+                             .lowest = 0},
+      OptionField<O, std::int64_t>{.name = "interval",
+                                   .member = &O::interval,
+                                   .unit = "steps",
+                                   .doc = "between two looks at the error",
+                                   .lowest = 1,
+                                   .highest = 1e6},
+      OptionField<O, std::int64_t>{.name = "first_look",
+                                   .member = &O::first_look,
+                                   .unit = "steps",
+                                   .doc = "before the first look at the rate; the next ones "
+                                          "come after twice as many",
+                                   .lowest = 1,
+                                   .highest = 1e6},
+      OptionField<O, double>{.name = "slack",
+                             .member = &O::slack,
+                             .unit = "1",
+                             .doc = "how many times the steps that are left to be paid for may "
+                                    "be needed",
+                             .lowest = 0},
+  };
+}
+
+/// Sweeps from the best iterate: for a loose tolerance they often end where interior points fail,
+/// or long before one factorisation would.
+struct SweepOnStage : Patience {
+  static constexpr std::string_view name = "sweep_on";
+  static constexpr std::string_view families = "splitting";
+  static constexpr std::string_view doc =
+      "sweeps from the best iterate, while they may end for what factorisations cost";
+
+  static constexpr auto fields() { return patience_fields<SweepOnStage>(); }
+};
+
+/// Many contacts in a dense W: a factorisation costs as much as thousands of products with W.
+struct SpectralGradientStage : Patience {
+  static constexpr std::string_view name = "spectral_gradient";
+  static constexpr std::string_view families = "optimisation";
+  static constexpr std::string_view doc =
+      "spectral projected gradients, while they may end for what factorisations cost";
+  Start from = Start::best;
 
   static constexpr auto fields() {
-    using O = SweepOnStage;
-    return std::tuple{
-        OptionField<O, std::int64_t>{.name = "interval",
-                                     .member = &O::interval,
-                                     .unit = "sweeps",
-                                     .doc = "between two looks at the error",
-                                     .lowest = 1,
-                                     .highest = 1e6},
-        OptionField<O, std::int64_t>{.name = "first_look",
-                                     .member = &O::first_look,
-                                     .unit = "sweeps",
-                                     .doc = "before the first look at the rate; the next ones "
-                                            "come after twice as many",
-                                     .lowest = 1,
-                                     .highest = 1e6},
-        OptionField<O, double>{.name = "slack",
-                               .member = &O::slack,
-                               .unit = "1",
-                               .doc = "how many times the sweeps that are left to be paid for may "
-                                      "be needed",
-                               .lowest = 0},
-    };
+    using O = SpectralGradientStage;
+    return std::tuple_cat(std::tuple{start_field<O>()}, patience_fields<O>());
   }
 };
 
@@ -546,9 +575,9 @@ struct HomotopyStage {
   }
 };
 
-using Method = std::variant<GaussSeidelStage, SweepOnStage, ConjugateGradientsStage, NewtonStage,
-                            PolishStage, ProximalStage, InteriorPointStage, AssociatedStage,
-                            NoSolutionStage, HomotopyStage>;
+using Method = std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage,
+                            ConjugateGradientsStage, NewtonStage, PolishStage, ProximalStage,
+                            InteriorPointStage, AssociatedStage, NoSolutionStage, HomotopyStage>;
 
 struct StageRule {
   std::string name;

@@ -25,6 +25,8 @@ conjugate gradients             : conjugate_gradients at_least=20               
 proximal newton                 : polish              at_least=5 below=0.03 guessed=true bodies=fewer limit=12
 newton from the guess           : semismooth_newton   at_least=5 below=0.03 guessed=true bodies=more from=best function=alart_curnier sweeps=0 patience=3 limit=12
 gauss-seidel                    : gauss_seidel                                         limit=100
+# large and dense, to a loose tolerance: a factorisation costs as much as hundreds of products with W
+spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
 # from near what the sweeps have; then, where its path folds, from far away
 interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60

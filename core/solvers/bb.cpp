@@ -19,15 +19,12 @@
 // - inner products have the weights tr(W_aa) / d, so that masses may differ;
 // - W d is known from the line search: an iteration costs one product with W.
 
-#include <algorithm>
-#include <array>
 #include <cstdint>
 
 #include "methods/shared_options.hpp"
+#include "methods/spectral_gradient.hpp"
 #include "reduced/convex_residual.hpp"
 #include "reduced/convex_sets.hpp"
-#include "reduced/de_saxce_shift.hpp"
-#include "reduced/scale.hpp"
 #include "reduced/with_cone.hpp"
 #include "solve/best_iterate.hpp"
 
@@ -35,12 +32,9 @@ namespace fclib::bb {
 
 namespace {
 
-enum class Step { longest, shortest, alternating };
-constexpr std::array<std::string_view, 3> steps{"long", "short", "alternating"};
-
 struct Options {
   Shift shift = Shift::iterated;
-  Step step = Step::alternating;
+  SpectralStep step = SpectralStep::alternating;
   std::int64_t memory = 10;
   double decrease = 1e-4;
   bool weights = true;
@@ -49,10 +43,10 @@ struct Options {
     using O = Options;
     return std::tuple{
         shift_field<O>(),
-        OptionField<O, Step>{.name = "step",
-                             .member = &O::step,
-                             .doc = "which of the two steps of Barzilai and Borwein",
-                             .choices = steps},
+        OptionField<O, SpectralStep>{.name = "step",
+                                     .member = &O::step,
+                                     .doc = "which of the two steps of Barzilai and Borwein",
+                                     .choices = spectral_steps},
         OptionField<O, std::int64_t>{.name = "memory",
                                      .member = &O::memory,
                                      .unit = "iterations",
@@ -74,85 +68,28 @@ struct Options {
   }
 };
 
-constexpr double least_step = 1e-6;
-constexpr double greatest_step = 1e6;
-
-/// The next alpha, from the last step: pp = <dr, dr>, pw = <dr, W dr>, ww = <W dr, W dr>.
-double next_step(Step step, std::int64_t k, double pp, double pw, double ww) {
-  if (!(pp > 0 && pw > 0)) return greatest_step;
-  const bool short_one = step == Step::shortest || (step == Step::alternating && k % 2 == 0);
-  return std::clamp(short_one ? pw / ww : pp / pw, least_step, greatest_step);
-}
-
 template <class Cone>
 Outcome iterate(const ReducedProblem& problem, const Options& options, const Settings& settings,
                 Vector& r) {
-  constexpr int D = Cone::dim;
-  using Vec = typename Cone::Vec;
-  const Index nc = problem.nc();
   const Cones<Cone> cones(problem.friction);
   BestIterate<Cone> best(problem, settings, r);
   Vector u(problem.m());
   problem.velocity(r, u);
   if (best.report(0, r, u)) return best.outcome(r);
-
-  Vector weight = contact_weights(problem);
-  if (!options.weights) weight.setConstant(nc > 0 ? weight.mean() : 1.0);
-  Vector shift = Vector::Zero(nc);
-  Vector last_shift = shift;
-  Vector d(problem.m());
-  Vector wd(problem.m());
-  const Vector zero = Vector::Zero(problem.m());
-  std::vector<double> values(static_cast<std::size_t>(options.memory), -1e300);
-  double value = 0;  // of the objective, but for a constant
-  values[0] = value;
-  double alpha = 1;
-  for (std::int64_t k = 1;; ++k) {
-    if (options.shift == Shift::iterated) {
-      last_shift.swap(shift);
-      de_saxce_shift<Cone>(u, problem.friction, shift);
-      if (k == 1) last_shift = shift;
-      // the objective of before, with the new shift
-      double moved = 0;
-      for (Index a = 0; a < nc; ++a) moved += (shift[a] - last_shift[a]) * r[D * a];
-      for (double& past : values) past += moved;
-      value += moved;
-    }
-    double slope = 0;
-    double pp = 0;
-    for (Index a = 0; a < nc; ++a) {
-      Vec g = u.template segment<D>(D * a);
-      g[0] += shift[a];
-      const Vec now = r.template segment<D>(D * a);
-      const Vec step = cones.project(a, now - (alpha / weight[a]) * g, now) - now;
-      d.template segment<D>(D * a) = step;
-      slope += g.dot(step);
-      pp += weight[a] * step.squaredNorm();
-    }
-    problem.W.multiply_add(d, zero, wd);
-    const double pw = d.dot(wd);
-    double ww = 0;
-    for (Index a = 0; a < nc; ++a) ww += wd.template segment<D>(D * a).squaredNorm() / weight[a];
-
-    // along d the objective is the parabola slope lambda + pw lambda^2 / 2
-    double lambda = 1;
-    const double highest = *std::max_element(values.begin(), values.end());
-    if (value + slope + 0.5 * pw > highest + options.decrease * slope && pw > 0) {
-      lambda = std::clamp(-slope / pw, 1e-3, 1.0);
-    }
-    r += lambda * d;
-    u += lambda * wd;
-    value += lambda * (slope + 0.5 * lambda * pw);
-    values[static_cast<std::size_t>(k % options.memory)] = value;
-    alpha = next_step(options.step, k, pp, pw, ww);
-
-    if (k % 100 == 0) problem.velocity(r, u);
-    if (best.report(1, r, u)) return best.outcome(r);
-    if (options.shift == Shift::none &&
-        convex_residual(problem, cones, shift, r, u) <= best.tolerance()) {
-      return best.outcome(r);  // solved, and not Coulomb's law
-    }
-  }
+  const bool relaxed = options.shift == Shift::none;
+  spectral_gradient<Cone>(
+      problem,
+      {.shifted = !relaxed,
+       .step = options.step,
+       .memory = options.memory,
+       .decrease = options.decrease,
+       .weights = options.weights},
+      r, u, [&](const Vector& shift) {
+        // a relaxation that is solved is not Coulomb's law
+        return best.report(1, r, u) ||
+               (relaxed && convex_residual(problem, cones, shift, r, u) <= best.tolerance());
+      });
+  return best.outcome(r);
 }
 
 Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,

@@ -378,6 +378,23 @@ def test_a_chain_of_ones_own() -> None:
     assert stage_names(result) == ["b"]
 
 
+@pytest.mark.parametrize("method", ["sweep_on", "spectral_gradient"])
+def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
+    packing: Any = fclib.scenes.assemblies()["Packing"]()
+    problem = packing.of_size(400, 0.0, 0)
+    result = fclib.solve(problem, tol=1e-3, chain=f"a : {method} worth=1000")
+    assert result.converged
+    (stage,) = result.stages
+    assert stage.factorisations == 0
+    # what they may cost does not pay for twice the first look
+    result = fclib.solve(problem, tol=1e-3, chain=f"a : {method} worth=1 first_look=10000")
+    assert [stage.iterations for stage in result.stages] == [0]
+    # the rate that is seen says that 1e-12 is out of reach
+    result = fclib.solve(problem, tol=1e-12, chain=f"a : {method} worth=30 first_look=20")
+    assert not result.converged
+    assert 20 <= result.iterations < 2000
+
+
 @pytest.mark.parametrize(
     ("chain", "message"),
     [

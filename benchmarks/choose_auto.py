@@ -1,6 +1,6 @@
 """Which stages and thresholds of `auto` pay: each change of its table, on problems of two halves.
 
-    .venv/bin/python benchmarks/choose_auto.py FILE... [--problems 12] [--seconds 10]
+    .venv/bin/python benchmarks/choose_auto.py FILE... [--problems 12] [--seconds 10] [--tol 1e-8]
         [--only NAME...] [--results auto-stages]
     .venv/bin/python benchmarks/choose_auto.py FILE... --against OTHER_PYTHON [--limits 1 10 60]
 
@@ -82,17 +82,18 @@ class Run:
 class Worker:
     """A process that solves files with the fclib of its Python."""
 
-    def __init__(self, python: str = sys.executable) -> None:
+    def __init__(self, python: str = sys.executable, tol: float = TOLERANCE) -> None:
         self._python = python
+        self._tol = tol
         self._process = subprocess.Popen(
             [python, "-c", WORKER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
 
-    def run(self, file: Path, limit: float, tol: float = TOLERANCE, chain: str = "") -> Run:
+    def run(self, file: Path, limit: float, tol: float = 0.0, chain: str = "") -> Run:
         """One solve."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        job = {"file": str(file), "limit": limit, "tol": tol, "chain": chain}
+        job = {"file": str(file), "limit": limit, "tol": tol or self._tol, "chain": chain}
         self._process.stdin.write(json.dumps(job) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
@@ -150,6 +151,11 @@ def inserted(after: str, line: str) -> Callable[[list[str]], list[str]]:
     return change
 
 
+def inserted_before(number: int, line: str) -> Callable[[list[str]], list[str]]:
+    """The change that puts a stage before another."""
+    return lambda lines: [*lines[:number], line, *lines[number:]]
+
+
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
     """The change that puts a stage before all others of islands."""
     return lambda lines: [
@@ -204,6 +210,14 @@ def changes(lines: list[str]) -> list[Change]:
         result.append(
             Change(f"sweeps on islands: {value}", "gauss-seidel", with_rules(island, limit=value))
         )
+    spectral = "spectral gradient"
+    at_spectral = place(lines, spectral)
+    line = "gauss-seidel : sweep_on at_least=150 law=coulomb worth=3"
+    change = inserted_before(at_spectral, line)
+    result.append(Change(f"{spectral}: after sweeps", spectral, change))
+    for key, number in (("worth", 1), ("worth", 5), ("first_look", 50), ("first_look", 250)):
+        change = with_rules(at_spectral, **{key: number})
+        result.append(Change(f"{spectral}: {key}={number}", spectral, change))
     polish = place(lines, "proximal newton", 1)
     for below in ("1e-6", "1e-4", "1e-3"):
         result.append(
@@ -350,7 +364,7 @@ def measured(
 def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     """All changes on both halves."""
     lines = table()
-    worker = Worker()
+    worker = Worker(tol=arguments.tol)
     found = {p: worker.run(p.file, arguments.seconds) for p in problems}
     for half in ("choose", "judge"):
         own = [run for p, run in found.items() if p.half == half]
@@ -376,7 +390,7 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
             arguments.results,
             [row.shown() for row in rows],
             title="What the stages of auto are worth",
-            note=f"Limit {arguments.seconds:g} s of CPU, tolerance {TOLERANCE:g}; at most "
+            note=f"Limit {arguments.seconds:g} s of CPU, tolerance {arguments.tol:g}; at most "
             f"{arguments.problems} problems of a family.",
         )
 
@@ -434,6 +448,7 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--problems", type=int, default=12, help="of a family at most")
     parser.add_argument("--seconds", type=float, default=10, help="limit of a solve")
+    parser.add_argument("--tol", type=float, default=TOLERANCE)
     parser.add_argument("--only", nargs="+", help="changes whose names have one of these in them")
     _results.add_option(parser)
     parser.add_argument("--against", help="the Python of another fclib")

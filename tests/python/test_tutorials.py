@@ -46,9 +46,11 @@ def test_a_tutorial_works_as_it_is_written(page: Path, tmp_path: Path) -> None:
         environment |= c_library(tmp_path / "prefix")
     folder = tmp_path / "work"
     folder.mkdir()
+    text = " ".join(page.read_text(encoding="utf-8").split())
     commands = 0
     for block in blocks:
         if block.file:
+            assert f"as `{block.file}`" in text, f"{block}: the reader is not told its name"
             (folder / block.file).write_text(block.code)
             continue
         assert block.language == "sh", f"{block}: neither a file nor commands"

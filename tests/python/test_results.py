@@ -6,6 +6,7 @@ import csv
 import importlib.util
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -120,6 +121,20 @@ def test_every_table_says_what_made_it_and_is_on_a_page() -> None:
         assert all(about[key] for key in results.ABOUT if key != "note"), path
         for script in re.findall(r"(?:benchmarks|scripts|tests)/[\w/]+\.py", about["command"]):
             assert (ROOT / script).is_file(), f"{path.stem}.json names {script}, which is not there"
+
+
+def test_every_table_names_a_commit_that_is_there() -> None:
+    git = ["git", "-C", str(ROOT)]
+    shallow = subprocess.run(
+        [*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True
+    ).stdout.strip()
+    if shallow != "false":
+        pytest.skip("this is no repository with its history")
+    for path in TABLES:
+        _, about = results.Results(FOLDER).load(path.stem)
+        commit = about["commit"].rstrip("+")
+        known = subprocess.run([*git, "merge-base", "--is-ancestor", commit, "HEAD"], check=False)
+        assert known.returncode == 0, f"{path.stem}.json: {commit} is not in the history"
 
 
 def test_a_table_goes_from_a_script_to_a_page(

@@ -60,6 +60,14 @@ def command(
     docs: Annotated[
         str, typer.Option(help="Address where the documentation is served, for links to it.")
     ] = "",
+    module: Annotated[
+        Path | None,
+        typer.Option("--browser", help="Folder of `make wasm`, for pages that check and solve."),
+    ] = None,
+    serve: Annotated[
+        bool,
+        typer.Option("--serve", help="Then serve the site to this machine alone, until Ctrl-C."),
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(help="Processes that draw; one a core.", min=1)
     ] = None,
@@ -67,13 +75,22 @@ def command(
 ) -> None:
     """Make a site to browse from stores and a catalogue.
 
-    Open its index.html; no server is needed.
+    Open its index.html; no server is needed, but for pages that check and solve problems
+    (--with-files): --serve alone serves a site that is there.
     """
     try:
         from fclib import report
         from fclib.collections import CatalogError
     except ImportError as error:
         fail(f'{error}; pip install "fclib[report]"')
+    if serve and pdf:
+        raise typer.BadParameter("--serve serves a site, and --pdf makes none")
+    if serve and not (stores or catalogue):
+        try:
+            _serve(folder)
+        except report.ReportError as error:
+            fail(str(error))
+        return
     if not stores and (pdf or catalogue is None):
         raise typer.BadParameter("name stores, a catalogue by --catalog, or both")
     try:
@@ -98,6 +115,7 @@ def command(
                 with_files=with_files,
                 files_at=files_at,
                 docs=docs,
+                module=module,
                 jobs=jobs,
                 progress=show,
             )
@@ -110,3 +128,17 @@ def command(
         f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
         highlight=False,
     )
+    if with_files and not counts["module"]:
+        out.print(
+            "The pages do not check and solve problems: there is no module for browsers (make wasm,"
+            " --browser DIR).",
+            highlight=False,
+        )
+    if serve:
+        _serve(folder)
+
+
+def _serve(folder: Path) -> None:
+    from fclib import report
+
+    report.serve(folder, lambda address: out.print(f"{address} (Ctrl-C ends it)", highlight=False))

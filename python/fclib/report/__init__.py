@@ -14,6 +14,8 @@ solids.py      shapes of bodies in their places, as the file has them
 picture.py     a small picture of them
 drawn.py       what the site draws of each problem
 taking.py      what one can take of a problem from the site
+browser.py     the module with which its pages check and solve problems
+serving.py     a site at an address of this machine
 recipes.py     lines to copy: how to get, read and solve a problem
 citing.py      BibTeX of all that it shows; references.bib has the papers
 paper.py       figures and tables for a paper
@@ -28,7 +30,16 @@ and view.py network.py; paper.py needs runs.py.
 from fclib.report.error import ReportError
 from fclib.report.paper import write_paper
 from fclib.report.runs import Campaigns
+from fclib.report.serving import serve
 from fclib.report.site import build_site
 from fclib.report.view import view_of, write_view
 
-__all__ = ["Campaigns", "ReportError", "build_site", "view_of", "write_paper", "write_view"]
+__all__ = [
+    "Campaigns",
+    "ReportError",
+    "build_site",
+    "serve",
+    "view_of",
+    "write_paper",
+    "write_view",
+]

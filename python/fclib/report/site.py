@@ -9,6 +9,7 @@
     data/views/  thumbs/          pictures; drawn.py
     pictures/SET/FAMILY/          of the catalogue
     files/                        the problems themselves, where that is asked for
+    assets/browser/               the core that checks and solves them on a page; browser.py
 
 A data file calls `Fclib.put(name, value)`: a script loads from a folder of files, JSON does not.
 """
@@ -30,7 +31,7 @@ from fclib.bench import profiles
 from fclib.bench.job import MERITS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog, sets, standing
-from fclib.report import citing, drawn, taking
+from fclib.report import browser, citing, drawn, taking
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
@@ -41,7 +42,7 @@ MARK = "data/site.js"  # by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
     *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
-    *("scene.js", "profiles.js", "take.js", "choose.js", "pages.js", "site.js"),
+    *("scene.js", "profiles.js", "take.js", "compute.js", "choose.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
 COLUMNS: tuple[tuple[str, str, str], ...] = (
@@ -125,6 +126,7 @@ def build_site(
     with_files: bool = False,
     files_at: str = "",
     docs: str = "",
+    module: Path | None = None,
     jobs: int | None = 1,
     progress: Callable[[str, int, int], None] = _no_progress,
 ) -> dict[str, int]:
@@ -140,11 +142,13 @@ def build_site(
         with_files: copy the problems into the site, with their reference solutions and pictures.
         files_at: an address where the folder of the collection is served, for links to it.
         docs: an address where the documentation is served, for links to it.
+        module: the folder of the module for browsers, with which the pages of a site that has its
+            files compute; None: that of a checkout, where it is built.
         jobs: processes that draw; None: one a core.
         progress: is told what is done, how far, of how many.
 
     Returns:
-        How many problems, runs, views and bytes the site holds.
+        How many problems, runs, views and bytes the site holds, and the bytes of the module.
 
     Raises:
         ReportError: there is nothing to show, `out` holds something else, or a library is not
@@ -155,6 +159,9 @@ def build_site(
         raise ReportError("a report needs a store, a catalogue, or both")
     if out.exists() and not (out / MARK).is_file() and (not out.is_dir() or any(out.iterdir())):
         raise ReportError(f"{out}: is there, and is no site that fclib report has made")
+    if module is not None and not with_files:
+        raise ReportError("the module computes with a site's own files: say --with-files")
+    found = browser.find(module) if with_files else None
     problems = Problems(campaigns, catalogue)
     out.parent.mkdir(parents=True, exist_ok=True)
     part = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=out.parent))
@@ -162,6 +169,7 @@ def build_site(
         taken = taking.Taking(part, problems.folder, with_files, files_at)
         writer = _Writer(part, campaigns, problems, views, title, progress, taken, jobs)
         writer.docs = docs.rstrip("/")
+        writer.module = found
         counts = writer.write()
         part.chmod(0o755)
         if out.exists():
@@ -298,6 +306,7 @@ class _Writer:
         self.taking = taken
         self.jobs = jobs
         self.docs = ""
+        self.module: Path | None = None
         self.folder = folder
         self.campaigns = campaigns
         self.problems = problems
@@ -346,6 +355,9 @@ class _Writer:
         site["problems"] = len(self.problems.rows)
         site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
         site["files"] = self.taking.kind
+        site["module"] = browser.copy(self.module, self.folder) if self.module else 0
+        if self.module:
+            site["libraries"].append(browser.READER)
         for first in range(0, len(self.problems.rows), taking.CHUNK):
             rows = self.problems.rows[first : first + taking.CHUNK]
             self.put(f"files/{first // taking.CHUNK}", [self.taking.record(row) for row in rows])
@@ -356,6 +368,7 @@ class _Writer:
             "runs": len(self.campaigns.rows) if self.campaigns is not None else 0,
             "views": views,
             "bytes": self.bytes,
+            "module": site["module"],
         }
 
     def _libraries(self) -> list[dict[str, str]]:

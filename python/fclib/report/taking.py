@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
+from fclib.bench.job import MERITS
 from fclib.collections.catalog import sha256
 from fclib.report.error import ReportError
 
@@ -60,6 +62,7 @@ class Taking:
             if self.with_files:
                 self._copy(path, digest)
                 own["href"] = f"files/{path}"
+                own["merit"] = merit_of(self.source / path)
             elif self.address:
                 own["href"] = f"{self.address}/{path}"
             files.append(own)
@@ -114,3 +117,18 @@ def write_reference(file: Path, target: Path) -> bool:
     kept: dict[str, Any] = {name: x for name, x in arrays.items() if x is not None and len(x)}
     np.savez_compressed(target, **kept)
     return True
+
+
+def merit_of(file: Path) -> dict[str, float | None] | None:
+    """All merits of the solution in a file, to their last digit; None where it has none.
+
+    What is not finite is None: JSON knows no such number.
+    """
+    if "solution" not in _core.contents(file):
+        return None
+    problem: Any = _core.read(file)
+    solution = _core.read_solution(file)
+    assert solution is not None
+    merit = _core.merit(problem, solution)
+    found = {name: getattr(merit, name) for name in MERITS}
+    return {name: value if math.isfinite(value) else None for name, value in found.items()}

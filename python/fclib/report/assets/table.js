@@ -60,7 +60,7 @@
   /* the libraries that a page carries, with their licences */
   Fclib.libraries = (list) => Fclib.table({
     caption: "Shipped with this site, each under its own licence", rows: list,
-    columns: [{ key: "name", label: "library", head: true }, { key: "version", label: "version" }, { key: "purpose", label: "for" }, { key: "package", label: "from the Python package" },
+    columns: [{ key: "name", label: "library", head: true }, { key: "version", label: "version" }, { key: "purpose", label: "for" }, { key: "package", label: "from the package" },
       { key: "licence", label: "licence", cell: (one) => one.text.startsWith("assets/") ? h("a", { href: one.text }, one.licence) : h("details", {}, h("summary", {}, one.licence), h("pre", {}, one.text)) }],
   });
 })();

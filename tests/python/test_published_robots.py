@@ -54,6 +54,10 @@ def published() -> Any:
     spec = importlib.util.spec_from_file_location("published_robots", path)
     assert spec is not None
     assert spec.loader is not None
+    # scripts of benchmarks/ import what stands beside them
+    folder = str(path.parent)
+    if folder not in sys.path:
+        sys.path.append(folder)
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)

@@ -142,7 +142,10 @@ def test_the_line_that_builds_names_one_problem() -> None:
 
 def test_every_solver_has_its_papers() -> None:
     known = citing.references()
+    shipped = {"fclib", "siconos", "clarabel", "scs", "pinocchio"}
     for solver in _registry.solvers():
+        if solver.origin not in shipped:
+            continue  # of another test in this process
         keys = citing.keys_of(solver.citation)
         assert set(keys) <= set(known), solver.name
         assert keys or "this project" in solver.citation, solver.name

@@ -29,7 +29,8 @@ int main(void)
     struct fclib_solve_options options = {{0}};
     options.tolerance = 1e-8;
     struct fclib_solve_result result;
-    return fclib_solve_{kind}(problem, "auto", &options, &solution, &result);
+    if (!fclib_solve_{kind}(problem, "auto", &options, &solution, &result)) return 1;
+    return result.status == FCLIB_CONVERGED ? 0 : 1;
 }}"""
 
 H5PY = Path(__file__).with_name("assets") / "h5py.txt"

@@ -160,9 +160,11 @@
       const [a, b] = box.layout[key].range, middle = (a + b) / 2;
       return [`${key}.range`, [middle + (a - middle) * factor, middle + (b - middle) * factor]];
     })));
-    const keys = flat
+    const moves = flat
       ? { "+": zoom(0.85), "=": zoom(0.85), "-": zoom(1 / 0.85), 0: (box) => Plotly.relayout(box, { "xaxis.range": window2d.xaxis, "yaxis.range": window2d.yaxis }) }
       : { ArrowLeft: move(-0.1, 0, 1), ArrowRight: move(0.1, 0, 1), ArrowUp: move(0, 0.1, 1), ArrowDown: move(0, -0.1, 1), "+": move(0, 0, 0.85), "=": move(0, 0, 0.85), "-": move(0, 0, 1 / 0.85), 0: (box) => look(box, start) };
+    // a button may be pressed before the picture is drawn
+    const keys = Object.fromEntries(Object.entries(moves).map(([key, act]) => [key, (box) => (box.matches(".js-plotly-plot") ? act(box) : undefined)]));
 
     // ---- controls
     const redraw = () => figure.plot.dataset.drawn && figure.plot.draw();

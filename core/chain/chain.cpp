@@ -353,14 +353,17 @@ class Island {
     Vector u(problem_.m());
     problem_.velocity(r, u);
     std::int64_t k = 0;
+    std::int64_t since = 0;  // the last look
     spectral_gradient<Cone>(problem_, {}, r, u, [&](const Vector&) {
-      if (++k % rules.interval != 0) return tracker_.left() <= k % rules.interval;
+      if (++since < std::min(rules.interval, tracker_.left())) return false;
       double error = relative_error<Cone>(problem_, u, r);
       if (error <= tolerance_) {
         problem_.velocity(r, u);
         error = relative_error<Cone>(problem_, u, r);
       }
-      return take(rules.interval, error, r) || static_cast<double>(k) > budget ||
+      k += since;
+      const std::int64_t count = std::exchange(since, 0);
+      return take(count, error, r) || static_cast<double>(k) > budget ||
              prospect.hopeless(k, error);
     });
   }

@@ -386,6 +386,9 @@ def test_cheap_steps_come_where_a_factorisation_is_dear(method: str) -> None:
     assert result.converged
     (stage,) = result.stages
     assert stage.factorisations == 0
+    # the limit of iterations holds to the last one
+    result = fclib.solve(problem, tol=1e-9, chain=f"a : {method} worth=1000", max_iterations=17)
+    assert (result.status, result.iterations) == ("iteration_limit", 17)
     # what they may cost does not pay for twice the first look
     result = fclib.solve(problem, tol=1e-3, chain=f"a : {method} worth=1 first_look=10000")
     assert [stage.iterations for stage in result.stages] == [0]

@@ -41,7 +41,14 @@ MENU = {
         "examples/index",
     ],
     "The problem": ["mathematics", "format", "analysis", "glossary"],
-    "The collection": ["collection", "families/index", "families-of-your-own", "recorders"],
+    "The collection": [
+        "collection",
+        "family-groups",
+        "families/index",
+        "families-of-your-own",
+        "simulate",
+        "recorders",
+    ],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
     "The bench": ["bench", "measurement", "report"],
     "Interfaces": [

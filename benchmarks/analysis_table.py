@@ -83,9 +83,7 @@ def main() -> None:
     if arguments.results:
         note = f"At most {arguments.time_limit:g} s of wall-clock time a solve; seconds are of CPU."
         _results.store(arguments.results, rows, title="What the problems are", note=note)
-        _results.store(
-            f"{arguments.results}-counts", found, title="Problems by verdict", note=note
-        )
+        _results.store(f"{arguments.results}-counts", found, title="Problems by verdict", note=note)
 
 
 if __name__ == "__main__":

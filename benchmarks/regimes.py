@@ -60,33 +60,17 @@ class Regime:
 
 
 STEEL = {"young": 2e11, "density": 7800.0, "time_step": 0.0125}
+CHUTE = {"hexahedra": True, "gaps": True, "spheres": 0.0, "slope": 0.6}
 REGIMES: dict[str, Regime] = {
     "Chute1000": Regime(
         "Chute_1000",
-        {
-            "hexahedra": True,
-            "gaps": True,
-            "spheres": 0.0,
-            "slope": 0.6,
-            "layers": 8,
-            "time_step": 2e-3,
-            "grains": 930,
-        },
+        CHUTE | {"layers": 8, "time_step": 2e-3, "grains": 930},
         keep=24,
         steps=440,
     ),
     "Chute4000": Regime(
         "Chute_4000",
-        {
-            "hexahedra": True,
-            "gaps": True,
-            "spheres": 0.0,
-            "slope": 0.6,
-            "layers": 14,
-            "across": 14,
-            "time_step": 1e-3,
-            "grains": 3340,
-        },
+        CHUTE | {"layers": 14, "across": 14, "time_step": 1e-3, "grains": 3340},
         keep=6,
         steps=800,
     ),

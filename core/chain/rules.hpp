@@ -26,6 +26,7 @@
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
 #include "methods/semismooth_newton.hpp"
+#include "methods/shared_options.hpp"
 #include "methods/spectral_gradient.hpp"
 #include "solve/options.hpp"
 
@@ -441,30 +442,7 @@ struct InteriorPointStage : InteriorPointRules {
                                    .doc = "complementarity at first over the error of the start, "
                                           "between tau and 1; 0: tau",
                                    .lowest = 0},
-            OptionField<O, double>{.name = "smoothing",
-                                   .member = &O::smoothing,
-                                   .unit = "1",
-                                   .doc = "width of the smoothed kink of de Saxce's term, over "
-                                          "the mean complementarity gap",
-                                   .lowest = 0},
-            OptionField<O, double>{.name = "step_cap",
-                                   .member = &O::step_cap,
-                                   .unit = "1",
-                                   .doc = "highest share of the step to the boundary of the cones",
-                                   .lowest = 0.1,
-                                   .highest = 0.9999},
-            OptionField<O, double>{.name = "delta",
-                                   .member = &O::delta,
-                                   .unit = "mean of tr(W_aa) / d",
-                                   .doc = "regularisation of the system at first",
-                                   .lowest = 1e-8,
-                                   .highest = 1},
-            OptionField<O, int>{.name = "patience",
-                                .member = &O::patience,
-                                .unit = "iterations",
-                                .doc = "in which the error must halve",
-                                .lowest = 1,
-                                .highest = 1e6},
+            smoothing_field<O>(), step_cap_field<O>(), delta_field<O>(), patience_field<O>(),
             OptionField<O, double>{.name = "own_accuracy",
                                    .member = &O::own_accuracy,
                                    .unit = "1",

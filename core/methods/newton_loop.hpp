@@ -1,7 +1,10 @@
-// What the semismooth Newton solvers share: their options, and a run under a Monitor.
+// What the semismooth Newton solvers share: their options, a run under a Monitor, and the entry of
+// all of them in the registry.
 #pragma once
 
 #include <array>
+#include <string>
+#include <vector>
 
 #include "methods/semismooth_newton.hpp"
 #include "solve/solver.hpp"
@@ -13,10 +16,9 @@ inline constexpr std::array<std::string_view, 4> rho_rules{"constant", "spectral
 inline constexpr std::array<std::string_view, 4> line_searches{"none", "armijo", "goldstein_price",
                                                                "fischer_burmeister"};
 
-/// Defaults are those of NewtonRules; a solver may derive from it to have others.
 struct NewtonOptions : NewtonRules {
-  template <class O>
-  static constexpr auto fields_of() {
+  static constexpr auto fields() {
+    using O = NewtonOptions;
     return std::tuple{
         OptionField<O, RhoRule>{
             .name = "rho_rule",
@@ -60,8 +62,9 @@ struct NewtonOptions : NewtonRules {
   }
 };
 
-/// One run from r; an iteration is a step of Newton, or the sweeps in the place of one.
-Outcome run_newton(const ReducedProblem& problem, ContactFunctionKind function,
-                   const NewtonRules& rules, const Settings& settings, Vector& r);
+/// The entry of the solver with this function. An iteration is a step of Newton, or the sweeps in
+/// the place of one.
+Solver newton_entry(std::string name, std::string title, std::string citation,
+                    std::vector<int> rolling_dimensions, ContactFunctionKind function);
 
 }  // namespace fclib

@@ -7,7 +7,48 @@
 
 namespace fclib {
 
-/// Of methods/interior_point.hpp.
+/// Of methods/interior_point.hpp; a stage of a chain has some of them.
+template <class O>
+constexpr auto step_cap_field() {
+  return OptionField<O, double>{.name = "step_cap",
+                                .member = &O::step_cap,
+                                .unit = "1",
+                                .doc = "highest share of the step to the boundary of the cones",
+                                .lowest = 0.1,
+                                .highest = 0.9999};
+}
+
+template <class O>
+constexpr auto delta_field() {
+  return OptionField<O, double>{.name = "delta",
+                                .member = &O::delta,
+                                .unit = "mean of tr(W_aa) / d",
+                                .doc = "regularisation of the system at first",
+                                .lowest = 1e-8,
+                                .highest = 1};
+}
+
+template <class O>
+constexpr auto smoothing_field() {
+  return OptionField<O, double>{.name = "smoothing",
+                                .member = &O::smoothing,
+                                .unit = "1",
+                                .doc =
+                                    "width of the smoothed kink of de Saxce's term, over the "
+                                    "mean complementarity gap",
+                                .lowest = 0};
+}
+
+template <class O>
+constexpr auto patience_field() {
+  return OptionField<O, int>{.name = "patience",
+                             .member = &O::patience,
+                             .unit = "iterations",
+                             .doc = "in which the error must halve",
+                             .lowest = 1,
+                             .highest = 1e6};
+}
+
 template <class O>
 constexpr auto interior_point_fields() {
   return std::tuple{
@@ -18,18 +59,8 @@ constexpr auto interior_point_fields() {
                                     "it starts",
                              .lowest = 1e-12,
                              .highest = 1e6},
-      OptionField<O, double>{.name = "step_cap",
-                             .member = &O::step_cap,
-                             .unit = "1",
-                             .doc = "highest share of the step to the boundary of the cones",
-                             .lowest = 0.1,
-                             .highest = 0.9999},
-      OptionField<O, double>{.name = "delta",
-                             .member = &O::delta,
-                             .unit = "mean of tr(W_aa) / d",
-                             .doc = "regularisation of the system at first",
-                             .lowest = 1e-8,
-                             .highest = 1},
+      step_cap_field<O>(),
+      delta_field<O>(),
       OptionField<O, bool>{.name = "delta_follows",
                            .member = &O::delta_follows,
                            .doc = "whether delta is at most 1e4 times the complementarity"},

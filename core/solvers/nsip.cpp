@@ -35,22 +35,10 @@ struct Options : InteriorPointRules {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(
-        interior_point_fields<O>(),
-        std::tuple{
-            OptionField<O, int>{.name = "patience",
-                                .member = &O::patience,
-                                .unit = "iterations",
-                                .doc = "in which the error must halve",
-                                .lowest = 1,
-                                .highest = 1e6},
-            OptionField<O, double>{.name = "smoothing",
-                                   .member = &O::smoothing,
-                                   .unit = "1",
-                                   .doc = "width of the smoothed kink of de Saxce's term, "
-                                          "over the mean complementarity gap",
-                                   .lowest = 0},
-            OptionField<O, std::int64_t>{.name = "sweeps",
+    return std::tuple_cat(interior_point_fields<O>(),
+                          std::tuple{patience_field<O>(), smoothing_field<O>(),
+                                     OptionField<O, std::int64_t>{
+                                         .name = "sweeps",
                                          .member = &O::sweeps,
                                          .unit = "sweeps",
                                          .doc = "of Gauss-Seidel at most, where the steps of "

@@ -23,32 +23,10 @@
 
 namespace fclib::nsn_ac {
 
-namespace {
-
-struct Options : NewtonOptions {
-  static constexpr auto fields() { return fields_of<Options>(); }
-};
-
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  return run_newton(problem, ContactFunctionKind::alart_curnier, parse_options<Options>(values),
-                    settings, r);
-}
-
-}  // namespace
-
 const Solver& solver() {
-  static const Solver entry{
-      .name = "nsn-ac",
-      .family = "newton",
-      .title = "Nonsmooth Newton, Alart and Curnier",
-      .citation = "Alart & Curnier 1991; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {3, 5},
-      .options = describe_options<Options>(),
-      .max_iterations = 10'000,
-      .solve = solve,
-  };
+  static const Solver entry =
+      newton_entry("nsn-ac", "Nonsmooth Newton, Alart and Curnier", "Alart & Curnier 1991", {3, 5},
+                   ContactFunctionKind::alart_curnier);
   return entry;
 }
 

@@ -24,32 +24,10 @@
 
 namespace fclib::nsn_fb {
 
-namespace {
-
-struct Options : NewtonOptions {
-  static constexpr auto fields() { return fields_of<Options>(); }
-};
-
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  return run_newton(problem, ContactFunctionKind::fischer_burmeister,
-                    parse_options<Options>(values), settings, r);
-}
-
-}  // namespace
-
 const Solver& solver() {
-  static const Solver entry{
-      .name = "nsn-fb",
-      .family = "newton",
-      .title = "Nonsmooth Newton, Fischer and Burmeister",
-      .citation = "Fukushima, Luo & Tseng 2001; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {},
-      .options = describe_options<Options>(),
-      .max_iterations = 10'000,
-      .solve = solve,
-  };
+  static const Solver entry =
+      newton_entry("nsn-fb", "Nonsmooth Newton, Fischer and Burmeister",
+                   "Fukushima, Luo & Tseng 2001", {}, ContactFunctionKind::fischer_burmeister);
   return entry;
 }
 

@@ -24,32 +24,10 @@
 
 namespace fclib::nsn_jm {
 
-namespace {
-
-struct Options : NewtonOptions {
-  static constexpr auto fields() { return fields_of<Options>(); }
-};
-
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  return run_newton(problem, ContactFunctionKind::jean_moreau, parse_options<Options>(values),
-                    settings, r);
-}
-
-}  // namespace
-
 const Solver& solver() {
-  static const Solver entry{
-      .name = "nsn-jm",
-      .family = "newton",
-      .title = "Nonsmooth Newton, Jean and Moreau",
-      .citation = "Jean & Moreau 1987; Christensen et al. 1998; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {3, 5},
-      .options = describe_options<Options>(),
-      .max_iterations = 10'000,
-      .solve = solve,
-  };
+  static const Solver entry = newton_entry("nsn-jm", "Nonsmooth Newton, Jean and Moreau",
+                                           "Jean & Moreau 1987; Christensen et al. 1998", {3, 5},
+                                           ContactFunctionKind::jean_moreau);
   return entry;
 }
 

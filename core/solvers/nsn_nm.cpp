@@ -22,32 +22,10 @@
 
 namespace fclib::nsn_nm {
 
-namespace {
-
-struct Options : NewtonOptions {
-  static constexpr auto fields() { return fields_of<Options>(); }
-};
-
-Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
-              Vector& r) {
-  return run_newton(problem, ContactFunctionKind::natural_map, parse_options<Options>(values),
-                    settings, r);
-}
-
-}  // namespace
-
 const Solver& solver() {
-  static const Solver entry{
-      .name = "nsn-nm",
-      .family = "newton",
-      .title = "Nonsmooth Newton, natural map",
-      .citation = "De Saxce & Feng 1998; Acary, Bremond & Huber 2018",
-      .dimensions = {2, 3},
-      .rolling_dimensions = {3, 5},
-      .options = describe_options<Options>(),
-      .max_iterations = 10'000,
-      .solve = solve,
-  };
+  static const Solver entry =
+      newton_entry("nsn-nm", "Nonsmooth Newton, natural map", "De Saxce & Feng 1998", {3, 5},
+                   ContactFunctionKind::natural_map);
   return entry;
 }
 

@@ -12,6 +12,33 @@ namespace {
 /// The bodies are tried only where a contact touches few of their coordinates.
 constexpr Eigen::Index longest_column = 64;
 
+void sort_once(std::vector<Index>& rows) {
+  std::sort(rows.begin(), rows.end());
+  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+}
+
+/// The pattern of d x d blocks whose columns have these rows, in any order, and their diagonal.
+BlockPattern pattern_of(std::vector<std::vector<Index>>& columns, int d) {
+  BlockPattern pattern;
+  pattern.d = d;
+  pattern.first.assign(1, 0);
+  for (std::size_t col = 0; col < columns.size(); ++col) {
+    auto& rows = columns[col];
+    rows.push_back(static_cast<Index>(col));
+    sort_once(rows);
+    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
+    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
+  }
+  return pattern;
+}
+
+/// Which block of the pattern is at this row of this column; there is one.
+std::int64_t place_in(const BlockPattern& pattern, Index row, Index col) {
+  const auto begin = pattern.row.begin() + pattern.first[col];
+  const auto end = pattern.row.begin() + pattern.first[col + 1];
+  return std::lower_bound(begin, end, row) - pattern.row.begin();
+}
+
 }  // namespace
 
 CoupledSystem::CoupledSystem(const ReducedProblem& problem, Form form, int threads)
@@ -45,27 +72,13 @@ template <int D>
 void CoupledSystem::analyse_contacts_of() {
   const Index nc = problem_.nc();
   const auto count = static_cast<std::size_t>(nc);
-  BlockPattern pattern;
-  pattern.d = D;
   std::vector<std::vector<Index>> columns(count);
   problem_.W.template for_each_block<D>([&](Index row, Index col, const auto&) {
     columns[col].push_back(row);
     columns[row].push_back(col);
   });
-  pattern.first.assign(1, 0);
-  for (Index col = 0; col < nc; ++col) {
-    auto& rows = columns[col];
-    rows.push_back(col);
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
-    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
-  }
-  const auto find = [&](Index row, Index col) {
-    const auto begin = pattern.row.begin() + pattern.first[col];
-    const auto end = pattern.row.begin() + pattern.first[col + 1];
-    return static_cast<std::int64_t>(std::lower_bound(begin, end, row) - pattern.row.begin());
-  };
+  const BlockPattern pattern = pattern_of(columns, D);
+  const auto find = [&](Index row, Index col) { return place_in(pattern, row, col); };
   place_.clear();
   problem_.W.template for_each_block<D>(
       [&](Index row, Index col, const auto&) { place_.push_back(find(row, col)); });
@@ -89,8 +102,7 @@ bool CoupledSystem::analyse_bodies() {
       for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at)
         rows.push_back(static_cast<Index>(at.row()));
     }
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    sort_once(rows);
     if (static_cast<Eigen::Index>(rows.size()) > longest_column) return false;
     for (const Index row : rows) {
       auto& column = columns[row];
@@ -103,22 +115,8 @@ bool CoupledSystem::analyse_bodies() {
       columns[at.row()].push_back(col);
     }
   }
-  BlockPattern pattern;
-  pattern.d = 1;
-  pattern.first.assign(1, 0);
-  for (Index col = 0; col < n; ++col) {
-    auto& rows = columns[col];
-    rows.push_back(col);
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
-    pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
-  }
-  const auto find = [&](Index row, Index col) {
-    const auto begin = pattern.row.begin() + pattern.first[col];
-    const auto end = pattern.row.begin() + pattern.first[col + 1];
-    return static_cast<std::int64_t>(std::lower_bound(begin, end, row) - pattern.row.begin());
-  };
+  const BlockPattern pattern = pattern_of(columns, 1);
+  const auto find = [&](Index row, Index col) { return place_in(pattern, row, col); };
   fixed_.assign(pattern.row.size(), 0.0);
   for (Index col = 0; col < n; ++col) {
     for (SparseColumns::InnerIterator at(M, col); at; ++at) {

@@ -23,6 +23,19 @@ Problem: TypeAlias = (
 # what is taken where a solution or a guess is
 Given: TypeAlias = _core.Solution | _core.Result | npt.ArrayLike
 MeritKind: TypeAlias = Literal["both", "natural"]
+# the numbers of a Merit: its errors, and how many contacts are open, stick and slide
+ERRORS = (
+    "error",
+    "natural",
+    "scaled_natural",
+    "dynamics",
+    "bilateral",
+    "kinematics",
+    "cone",
+    "dual_cone",
+    "complementarity",
+)
+MERITS = (*ERRORS, "open", "stick", "slide")
 Value: TypeAlias = bool | int | float | str | Path | list[str]
 
 

@@ -97,10 +97,11 @@ PYTHON: dict[str, set[str]] = {
         "simulate",
         "collections",
     },
-    "report": {"_core", "_geometry", "_registry", "bench", "collections"},
+    "report": {"_core", "_geometry", "_registry", "_solve", "bench", "collections"},
     "demo": {"__init__", "scenes", "simulate", "bench"},
     "doctor": {"_core", "__init__", "external"},
     "cli": {
+        "_solve",
         "__init__",
         "external",
         "analysis",

@@ -21,8 +21,9 @@ from typer.testing import CliRunner
 
 import fclib
 from fclib import bench, cli
+from fclib._solve import MERITS
 from fclib.bench.campaign import parse_solver
-from fclib.bench.job import MERITS, Job, Record
+from fclib.bench.job import Job, Record
 from helpers import planted_global, planted_local
 
 KILLS = int(os.environ.get("FCLIB_TEST_KILLS", "4"))

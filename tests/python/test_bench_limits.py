@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import fclib
-from fclib import analysis, bench
+from fclib import _solve, analysis, bench
 from fclib.bench import problems, processes
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
@@ -599,7 +599,7 @@ def test_what_is_measured(folder: Path, supervisor: SupervisorClient) -> None:
     record = supervisor.do(job(folder, "nsgs", history=True))
     assert record.status == "converged"
     assert record.merits is not None
-    assert set(record.merits) == set(bench.job.MERITS)
+    assert set(record.merits) == set(_solve.MERITS)
     assert record.cpu_s is not None
     assert record.total_cpu_s is not None
     assert 0 < record.cpu_s <= record.total_cpu_s

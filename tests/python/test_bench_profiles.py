@@ -20,8 +20,9 @@ from hypothesis.extra import numpy as hnp
 from typer.testing import CliRunner
 
 from fclib import bench
+from fclib._solve import MERITS
 from fclib.bench import campaign, profiles
-from fclib.bench.job import MERITS, Job, ProblemFacts, Record
+from fclib.bench.job import Job, ProblemFacts, Record
 from fclib.cli import app
 
 # CPU times of three solvers on four problems; None: failed

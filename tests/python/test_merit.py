@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import fclib
+from fclib._solve import ERRORS, MERITS
 from helpers import (
     STORAGES,
     Planted,
@@ -17,17 +18,6 @@ from helpers import (
 )
 
 FORMS = list(itertools.product(["local", "global"], [2, 3], [0, 3], STORAGES))
-NUMBERS = [
-    "natural",
-    "scaled_natural",
-    "dynamics",
-    "bilateral",
-    "kinematics",
-    "cone",
-    "dual_cone",
-    "complementarity",
-    "error",
-]
 
 
 def planted(kind: str, seed: int, d: int, p: int, storage: str, nc: int = 6) -> Planted:
@@ -38,7 +28,7 @@ def planted(kind: str, seed: int, d: int, p: int, storage: str, nc: int = 6) -> 
 def assert_agree(problem: fclib.Problem, solution: fclib.Solution) -> None:
     """Every figure to 1e-12 of the largest number that it is made of, which is that of rounding."""
     merit, verdict = fclib.merit(problem, solution), judge(problem, solution)
-    for name in NUMBERS:
+    for name in ERRORS:
         assert getattr(merit, name) == pytest.approx(
             getattr(verdict, name), rel=1e-12, abs=1e-12
         ), name
@@ -116,9 +106,13 @@ def test_the_storage_changes_nothing() -> None:
             fclib.merit(case.problem, wrong_solution(case.problem, 3))
             for case in (planted(kind, 2, d, p, storage) for storage in STORAGES)
         ]
-        for name in NUMBERS:
+        for name in ERRORS:
             values = [getattr(merit, name) for merit in merits]
             assert values == pytest.approx([values[0]] * len(values), rel=1e-12), name
+
+
+def test_the_list_of_a_merits_numbers_has_all_of_them() -> None:
+    assert tuple(name for name, it in vars(fclib.Merit).items() if type(it) is property) == MERITS
 
 
 def test_condensation_keeps_the_natural_error_and_the_statuses() -> None:

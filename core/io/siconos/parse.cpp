@@ -20,9 +20,12 @@ void read_numbers(Words& in, Count count, What what, std::vector<double>& values
   for (Count k = 0; k < count; ++k) values.push_back(in.number(what));
 }
 
+Matrix empty_matrix(Storage storage, Index rows, Index cols) {
+  return {.storage = storage, .rows = rows, .cols = cols, .p = {}, .i = {}, .x = {}, .info = {}};
+}
+
 Matrix read_dense(Words& in, Index rows, Index cols, What what) {
-  Matrix a{
-      .storage = Storage::dense, .rows = rows, .cols = cols, .p = {}, .i = {}, .x = {}, .info = {}};
+  Matrix a = empty_matrix(Storage::dense, rows, cols);
   const Index again[2] = {in.integer(what, 0, largest_index), in.integer(what, 0, largest_index)};
   if (again[0] != rows || again[1] != cols) {
     in.fail(std::string(what) + " is " + std::to_string(rows) + " x " + std::to_string(cols) +
@@ -69,13 +72,7 @@ Matrix read_blocks(Words& in, Index rows, Index cols, What what) {
     block_col.push_back(in.integer(what, 0, Count{block_cols} - 1));
   }
 
-  Matrix a{.storage = Storage::triplet,
-           .rows = rows,
-           .cols = cols,
-           .p = {},
-           .i = {},
-           .x = {},
-           .info = {}};
+  Matrix a = empty_matrix(Storage::triplet, rows, cols);
   for (std::size_t row = 0; row + 1 < pointers.size(); ++row) {
     for (Index block = pointers[row]; block < pointers[row + 1]; ++block) {
       const auto col = static_cast<std::size_t>(block_col[static_cast<std::size_t>(block)]);
@@ -131,13 +128,7 @@ Matrix read_sparse(Words& in, Index rows, Index cols, What what) {
     in.fail(std::string(what) + " is of origin " + std::to_string(origin) + ", but " +
             (header.triplet ? "" : "not ") + "a list of triplets");
   }
-  Matrix a{.storage = Storage::triplet,
-           .rows = rows,
-           .cols = cols,
-           .p = {},
-           .i = {},
-           .x = {},
-           .info = {}};
+  Matrix a = empty_matrix(Storage::triplet, rows, cols);
   constexpr Count shortest_entry = 6;  // "0 : 1" and the end of a line
   in.require_room(header.nnz, shortest_entry, what);
   a.i.reserve(static_cast<std::size_t>(header.nnz));

@@ -124,20 +124,7 @@ class Reference:
         """What the file says of /solution: the merits, the algorithms, versions and date."""
         if self.solution is None or self.merit is None:
             raise _core.ProblemError("there is no solution to speak of")
-        merits = {
-            f"merit_{name}": float(getattr(self.merit, name))
-            for name in (
-                "error",
-                "natural",
-                "scaled_natural",
-                "dynamics",
-                "bilateral",
-                "kinematics",
-                "cone",
-                "dual_cone",
-                "complementarity",
-            )
-        }
+        merits = {f"merit_{name}": float(getattr(self.merit, name)) for name in _solve.ERRORS}
         said = [
             f"{run.solver} ({'+'.join(run.families)}) from {run.start}: error {run.error:.1e}, "
             f"velocity differs by {run.difference:.1e}"

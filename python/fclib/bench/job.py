@@ -54,20 +54,6 @@ ORDERLY = frozenset(
         "unsuitable",
     )
 )
-MERITS = (
-    "error",
-    "natural",
-    "scaled_natural",
-    "dynamics",
-    "bilateral",
-    "kinematics",
-    "cone",
-    "dual_cone",
-    "complementarity",
-    "open",
-    "stick",
-    "slide",
-)
 
 
 @dataclass(frozen=True)

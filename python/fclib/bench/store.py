@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
-from fclib.bench.job import MERITS, Job, ProblemFacts, Record
+from fclib._solve import MERITS
+from fclib.bench.job import Job, ProblemFacts, Record
 
 # of the schema; 1 had neither certificates nor `merit`, which was "natural"; 2 had no faults, but
 # runs that were killed or unreadable, and does not say how a run was measured

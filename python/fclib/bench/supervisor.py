@@ -31,8 +31,9 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
+from fclib._solve import MERITS
 from fclib.bench import machine, processes
-from fclib.bench.job import MERITS, ORDERLY, STATUSES, Record
+from fclib.bench.job import ORDERLY, STATUSES, Record
 from fclib.bench.meter import Meter
 from fclib.bench.worker import (
     CERTIFICATE,

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib._solve import MERITS
 from fclib.cli._files import read_owner
 from fclib.cli._output import (
     Files,
@@ -22,19 +23,7 @@ from fclib.cli._output import (
     out,
 )
 
-PARTS = (
-    "natural",
-    "scaled_natural",
-    "dynamics",
-    "bilateral",
-    "kinematics",
-    "cone",
-    "dual_cone",
-    "complementarity",
-    "open",
-    "stick",
-    "slide",
-)
+PARTS = MERITS[1:]  # of the error
 
 
 def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, Any]]:

@@ -78,22 +78,18 @@ def command(
     Open its index.html; no server is needed, but for pages that check and solve problems
     (--with-files): --serve alone serves a site that is there.
     """
+    if serve and pdf:
+        raise typer.BadParameter("--serve serves a site, and --pdf makes none")
+    alone = serve and not (stores or catalogue)
+    if not (stores or alone) and (pdf or catalogue is None):
+        raise typer.BadParameter("name stores, a catalogue by --catalog, or both")
     try:
         from fclib import report
         from fclib.collections import CatalogError
-    except ImportError as error:
-        fail(f'{error}; pip install "fclib[report]"')
-    if serve and pdf:
-        raise typer.BadParameter("--serve serves a site, and --pdf makes none")
-    if serve and not (stores or catalogue):
-        try:
+
+        if alone:
             _serve(folder)
-        except report.ReportError as error:
-            fail(str(error))
-        return
-    if not stores and (pdf or catalogue is None):
-        raise typer.BadParameter("name stores, a catalogue by --catalog, or both")
-    try:
+            return
         with ExitStack() as stack:
             campaigns = None
             if stores:
@@ -119,23 +115,23 @@ def command(
                 jobs=jobs,
                 progress=show,
             )
-    except (fclib.Error, CatalogError) as error:
-        fail(str(error))
-    except ImportError as error:
-        fail(f'{error}; pip install "fclib[report]"')
-    out.print(
-        f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
-        f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
-        highlight=False,
-    )
-    if with_files and not counts["module"]:
         out.print(
-            "The pages do not check and solve problems: there is no module for browsers (make wasm,"
-            " --browser DIR).",
+            f"{counts['problems']} problems, {counts['runs']} runs, {counts['views']} views,"
+            f" {counts['bytes'] / 1e6:.1f} MB of data: {folder / 'index.html'}",
             highlight=False,
         )
-    if serve:
-        _serve(folder)
+        if with_files and not counts["module"]:
+            out.print(
+                "The pages do not check and solve problems: there is no module for browsers"
+                " (make wasm, --browser DIR).",
+                highlight=False,
+            )
+        if serve:
+            _serve(folder)
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[report]"')
+    except (fclib.Error, CatalogError) as error:
+        fail(str(error))
 
 
 def _serve(folder: Path) -> None:

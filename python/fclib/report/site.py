@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core, _registry
+from fclib._solve import MERITS
 from fclib.bench import profiles
-from fclib.bench.job import MERITS
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog, sets, standing
 from fclib.report import browser, citing, drawn, taking

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core
-from fclib.bench.job import MERITS
+from fclib._solve import MERITS
 from fclib.collections.catalog import sha256
 from fclib.report.error import ReportError
 

@@ -54,21 +54,15 @@ class BouncingPile:
         random = np.random.Generator(np.random.PCG64(seed))
         draws = random.uniform(-self.offset, self.offset, size=(self.spheres, 3))
         pitch = 2.5 * self.radius
+        friction = mjcf.surface(self.mu)
         bodies = mjcf.walls(0.5 * pitch * self.across, pitch * self.across, self.mu)
         for i, draw in enumerate(draws):
             layer, cell = divmod(i, self.across**2)
             place = np.array([*divmod(cell, self.across), layer]) * pitch
             place[:2] -= 0.5 * pitch * (self.across - 1)
             place[2] += self.radius + self.height
-            bodies.append(
-                mjcf.grain(
-                    f"sphere{i}",
-                    place + self.radius * draw,
-                    f'type="sphere" size="{self.radius!r}" density="{self.density!r}"',
-                    mjcf.surface(self.mu),
-                    mjcf.shade(i, self.spheres),
-                )
-            )
+            place += self.radius * draw
+            bodies.append(mjcf.sphere(i, self.spheres, place, self.radius, self.density, friction))
         return Scene.of(
             self,
             seed,

@@ -69,15 +69,8 @@ class SpheresBox:
             layer, cell = divmod(i, self.along_x * self.along_y)
             place = pitch * (np.array(divmod(cell, self.along_y)) - 0.5 * (sides - 1))
             place += self.radius * draw
-            bodies.append(
-                mjcf.grain(
-                    f"sphere{i}",
-                    np.append(place, (layer + 0.5) * rise),
-                    f'type="sphere" size="{self.radius!r}" density="{self.density!r}"',
-                    friction,
-                    mjcf.shade(i, self.spheres),
-                )
-            )
+            place = np.append(place, (layer + 0.5) * rise)
+            bodies.append(mjcf.sphere(i, self.spheres, place, self.radius, self.density, friction))
         layers = -(-self.spheres // (self.along_x * self.along_y))
         x, y = (0.5 * pitch * sides).tolist()
         height, half = rise * layers, 0.5 * self.radius

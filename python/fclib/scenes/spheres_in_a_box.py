@@ -59,6 +59,7 @@ class SpheresInABox:
         radii = self.radius * (1 - self.spread * draws[:, 0])
         pitch = 2 * self.radius + self.gap
         side = math.floor(self.width / pitch)
+        friction = mjcf.surface(self.mu)
         bodies = mjcf.walls(0.5 * self.width, self.width, self.mu)
         for i, radius in enumerate(radii.tolist()):
             layer, cell = divmod(i, side * side)
@@ -66,15 +67,7 @@ class SpheresInABox:
             room = self.radius - radius
             x, y = pitch * (np.array(divmod(cell, side)) - 0.5 * (side - 1))
             place = np.array([x, y, pitch * (layer + 0.5)]) + room * (2 * draws[i, 1:] - 1)
-            bodies.append(
-                mjcf.grain(
-                    f"sphere{i}",
-                    place,
-                    f'type="sphere" size="{radius!r}" density="{self.density!r}"',
-                    mjcf.surface(self.mu),
-                    mjcf.shade(i, self.spheres),
-                )
-            )
+            bodies.append(mjcf.sphere(i, self.spheres, place, radius, self.density, friction))
         return Scene.of(
             self,
             seed,

@@ -169,6 +169,14 @@ def polyhedron_mesh(name: str, corners: npt.NDArray[np.float64]) -> str:
     return f'<mesh name="{name}" vertex="{"  ".join(numbers(*corner) for corner in corners)}"/>'
 
 
+def sphere(
+    index: int, count: int, place: Iterable[float], radius: float, density: float, friction: str
+) -> str:
+    """Free sphere `index` of `count`: place and radius in m, density in kg/m^3, a `surface`."""
+    shape = f'type="sphere" size="{radius!r}" density="{density!r}"'
+    return grain(f"sphere{index}", place, shape, friction, shade(index, count))
+
+
 def rotations(random: np.random.Generator, count: int) -> npt.NDArray[np.float64]:
     """Unit quaternions (count x 4), uniform over all rotations."""
     draws = random.standard_normal(size=(count, 4))

@@ -132,16 +132,21 @@ void bind_hdf5(nb::module_& m) {
       "write_solution is replaced. An empty list takes them away.\n\n"
       "Raises FileError, or ProblemError where the sizes disagree.");
   m.def(
+      "kinds", [](const fs::path& path) { return read_contents(path.string()).kinds; }, "path"_a,
+      nb::sig(signature("kinds", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
+      "The kinds of the problems of a file. Raises FileError.");
+  m.def(
       "contents",
       [](const fs::path& path) {
         Contents contents = read_contents(path.string());
         if (contents.solution) contents.kinds.emplace_back("solution");
         if (contents.guesses > 0) contents.kinds.emplace_back("guesses");
+        if (contents.solutions > 0) contents.kinds.emplace_back("solutions");
         return contents.kinds;
       },
       "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
-      "What a file holds: the kinds of its problems, \"solution\" and \"guesses\". Raises "
-      "FileError.");
+      "What a file holds: the kinds of its problems, \"solution\", \"guesses\", and \"solutions\"\n"
+      "where several are known. Raises FileError.");
   m.def(
       "write_solution",
       [](const fs::path& path, const nb::object& given, int compression) {

@@ -11,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
+from fclib._same import Same
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class BatchResult:
-    """What ``fclib.solve_batch`` returns: arrays over the problems.
+class BatchResult(Same):
+    """What ``fclib.solve_batch`` returns: arrays over the problems. Equal where they are.
 
     Attributes:
         r: reactions [N s], of the shape of q.

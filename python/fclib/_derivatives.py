@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
+from fclib._same import Same
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Smooth: TypeAlias = _core.LocalProblem | _core.GlobalProblem
@@ -32,8 +33,8 @@ RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Tangent:
-    """What ``fclib.jvp`` returns: how the solution changes.
+class Tangent(Same):
+    """What ``fclib.jvp`` returns: how the solution changes. Equal where the arrays are.
 
     Attributes:
         r, u: (m,) reactions and velocities of the contacts.
@@ -52,7 +53,7 @@ class Tangent:
 
 
 @dataclass(frozen=True, eq=False)
-class Gradient:
+class Gradient(Same):
     """What ``fclib.vjp`` returns: the derivative by each datum, of its shape.
 
     Those of another formulation are None. The entries of a matrix are taken as independent of each

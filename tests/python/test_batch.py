@@ -1,5 +1,7 @@
 """Many small problems in one call."""
 
+import copy
+import pickle
 import subprocess
 import threading
 from pathlib import Path
@@ -51,6 +53,17 @@ def test_numbers_of_contacts_may_vary() -> None:
     again = fclib.solve_batch(W, q, mu, guess=np.split(flat.r, flat.offsets[1:-1]))
     assert again.iterations.sum() <= flat.iterations.sum()
     assert repr(flat).startswith("<BatchResult: 3 of 3 converged")
+
+
+def test_results_are_values() -> None:
+    W, q, mu = problems(2, 4)
+    found, again = (fclib.solve_batch(W, q, mu) for _ in range(2))
+    assert found == again
+    assert hash(found) == hash(again)
+    assert pickle.loads(pickle.dumps(found)) == copy.deepcopy(found) == found
+    assert found != fclib.solve_batch(W[:3], q[:3], mu[:3])
+    assert found != fclib.solve_batch(W, 2 * q, mu)
+    assert found != "found"
 
 
 def test_what_is_not_finished_goes_the_whole_way() -> None:

@@ -112,6 +112,13 @@ def test_info_shows_each_problem_of_a_file(both: Path) -> None:
     assert (local["formulation"], local["solution"], local["guesses"]) == ("3DFC", False, 0)
 
 
+def test_info_counts_the_known_solutions(both: Path) -> None:
+    assert [row["solutions"] for row in records(run("info", "--json", both))] == [0, 0]
+    fclib.write_solutions(both, [planted_global(1).solution] * 3)
+    assert [row["solutions"] for row in records(run("info", "--json", both))] == [3, 0]
+    assert fclib.contents(both) == ["global", "local", "solution", "guesses", "solutions"]
+
+
 def test_info_shows_what_is_known_of_a_matrix(tmp_path: Path) -> None:
     path, problem = tmp_path / "known.hdf5", planted_local(1).problem
     fclib.write(path, problem)

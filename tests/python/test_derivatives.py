@@ -1,5 +1,8 @@
 """Derivatives of solutions, against differences of solutions."""
 
+import copy
+import dataclasses
+import pickle
 from typing import Any
 
 import numpy as np
@@ -128,6 +131,23 @@ def test_redundant_contacts_leave_u_determined() -> None:
     assert result.solution.u is not None
     difference = (other.solution.u - result.solution.u) / 1e-6
     assert np.abs(tangent.u - difference).max() < 1e-3
+
+
+def test_derivatives_are_values() -> None:
+    planted: Any = planted_global(seed=0, nc=3)
+    problem, solution = planted.problem, planted.solution
+    change = {"f": np.arange(problem.n, dtype=float)}
+    tangents = [fclib.jvp(problem, solution, **change) for _ in range(2)]
+    gradients = [fclib.vjp(problem, solution, r=np.ones(problem.m)) for _ in range(2)]
+    for one, again in (tangents, gradients):
+        assert one == again
+        assert hash(one) == hash(again)
+        assert pickle.loads(pickle.dumps(one)) == copy.deepcopy(one) == one
+    assert tangents[0] != fclib.jvp(problem, solution, f=2 * change["f"])
+    other = fclib.vjp(problem, solution, r=2 * np.ones(problem.m))
+    assert gradients[0] != other
+    assert gradients[0] != tangents[0]
+    assert gradients[0] != dataclasses.replace(gradients[0], H=other.H)
 
 
 def test_wrong_input_is_refused_by_its_name() -> None:

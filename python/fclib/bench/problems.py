@@ -84,7 +84,7 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     Raises:
         fclib.Error: it cannot be read.
     """
-    kinds = [name for name in _core.contents(path) if name not in ("solution", "guesses")]
+    kinds = _core.kinds(path)
     kind = "global" if "global" in kinds else kinds[0] if kinds else None
     problem = _core.read(path, kind)
     matrix: Any = getattr(problem, "W", None)

@@ -10,12 +10,13 @@ import fclib
 
 @dataclass(frozen=True)
 class Contents:
-    """The problems of a file, by their kinds, and which of them its solution and guesses are of."""
+    """The problems of a file, by their kinds, and which of them all else is of."""
 
     kinds: tuple[str, ...]
     owner: str | None
     solution: bool
     guesses: bool
+    solutions: bool
 
 
 def contents_of(path: Path) -> Contents:
@@ -25,9 +26,10 @@ def contents_of(path: Path) -> Contents:
         fclib.FileError: the file cannot be read.
     """
     names = fclib.contents(path)
-    kinds = tuple(name for name in names if name not in ("solution", "guesses"))
+    others = ("solution", "guesses", "solutions")
+    kinds = tuple(name for name in names if name not in others)
     owner = "global" if "global" in kinds else kinds[0] if kinds else None
-    return Contents(kinds, owner, "solution" in names, "guesses" in names)
+    return Contents(kinds, owner, *(name in names for name in others))
 
 
 def read_owner(path: Path) -> fclib.Problem:

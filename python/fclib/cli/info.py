@@ -37,6 +37,7 @@ def describe(path: Path, kind: str | None, contents: Contents) -> dict[str, Any]
         "mu_max": float(problem.mu.max()) if problem.nc else None,
         "solution": own and contents.solution,
         "guesses": len(fclib.read_guesses(path)) if own and contents.guesses else 0,
+        "solutions": len(fclib.read_solutions(path)) if own and contents.solutions else 0,
         "matrix_info": {
             name: {key: getattr(info, key) for key in MATRIX_INFO}
             for name, info in problem.matrix_info.items()

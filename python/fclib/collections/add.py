@@ -168,7 +168,7 @@ class Part:
 
     def _store(self, path: Path, number: int) -> dict[str, Any]:
         """Write the copy of a file, and return its row."""
-        kinds = [kind for kind in _core.contents(path) if kind not in ("solution", "guesses")]
+        kinds = _core.kinds(path)
         if not kinds:
             raise _core.FileError(f"{path}: holds no problem of FCLIB")
         # what a solution in the file belongs to

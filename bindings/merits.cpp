@@ -12,6 +12,18 @@ namespace fclib::bindings {
 
 using namespace nb::literals;
 
+namespace {
+
+/// `judge` of a problem and what is given for a solution, without Python's lock.
+template <class P, class Judge>
+auto judged(const P& problem, const nb::object& given, const Judge& judge) {
+  const Solution solution = solution_from(given, "solution");
+  const Unlocked unlocked;
+  return judge(problem, solution);
+}
+
+}  // namespace
+
 void bind_merits(nb::module_& m) {
   nb::class_<Merit> merit_class(m, "Merit", "How good a solution is, judged from the data alone.");
   def_fields(merit_class);
@@ -44,22 +56,17 @@ void bind_merits(nb::module_& m) {
     };
     m.def(
         "merit_1",
-        [](const P& p, const nb::object& given) {
-          const Solution s = solution_from(given, "solution");
-          const Unlocked unlocked;
-          return merit_1(p, s);
+        [](const P& problem, const nb::object& given) {
+          return judged(problem, given, [](const auto& p, const auto& s) { return merit_1(p, s); });
         },
         "problem"_a, "solution"_a, nb::sig(signature("merit_1", "float").c_str()),
         "What libfclib calls MERIT_1, for comparisons with it.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "contact_merits",
-        [](const P& p, const nb::object& given) {
-          const Solution s = solution_from(given, "solution");
-          const ContactMerits merits = [&] {
-            const Unlocked unlocked;
-            return contact_merits(p, s);
-          }();
+        [](const P& problem, const nb::object& given) {
+          const ContactMerits merits = judged(
+              problem, given, [](const auto& p, const auto& s) { return contact_merits(p, s); });
           nb::list status;
           for (const ContactStatus one : merits.status) {
             status.append(one == ContactStatus::open    ? "open"
@@ -98,10 +105,8 @@ void bind_merits(nb::module_& m) {
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "merit",
-        [](const P& p, const nb::object& given) {
-          const Solution s = solution_from(given, "solution");
-          const Unlocked unlocked;
-          return merit(p, s);
+        [](const P& problem, const nb::object& given) {
+          return judged(problem, given, [](const auto& p, const auto& s) { return merit(p, s); });
         },
         "problem"_a, "solution"_a, nb::sig(signature("merit", "Merit").c_str()),
         "The merit of a solution, which may be a Result, or the reactions alone. A missing v is "

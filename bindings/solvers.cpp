@@ -9,8 +9,10 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
+#include <concepts>
 #include <string>
 #include <tuple>
+#include <type_traits>
 
 #include "arrays.hpp"
 #include "fields.hpp"
@@ -126,50 +128,45 @@ void take(Member& member, const nb::dict& values, const char* name) {
   member = nb::cast<Member>(values[name]);
 }
 
-nb::dict state_of(const OptionInfo& option) {
+/// Visits (name, member) of what an option is made of.
+template <class OptionOrConst, class Visitor>
+  requires std::same_as<std::remove_const_t<OptionOrConst>, OptionInfo>
+void for_each_part(OptionOrConst& option, const Visitor& visit) {
+  visit("name", option.name);
+  visit("type", option.type);
+  visit("default", option.default_value);
+  visit("unit", option.unit);
+  visit("doc", option.doc);
+  visit("choices", option.choices);
+  visit("lowest", option.lowest);
+  visit("highest", option.highest);
+}
+
+/// ... and a stage.
+template <class StageOrConst, class Visitor>
+  requires std::same_as<std::remove_const_t<StageOrConst>, Stage>
+void for_each_part(StageOrConst& stage, const Visitor& visit) {
+  visit("name", stage.kind.name);
+  visit("families", stage.kind.families);
+  visit("calls", stage.calls);
+  visit("solved", stage.solved);
+  visit("iterations", stage.iterations);
+  visit("factorisations", stage.factorisations);
+  visit("time", stage.time);
+}
+
+template <class Class>
+  requires requires(Class& one) { for_each_part(one, [](const char*, auto&) {}); }
+nb::dict state_of(const Class& one) {
   nb::dict values;
-  values["name"] = option.name;
-  values["type"] = option.type;
-  values["default"] = option.default_value;
-  values["unit"] = option.unit;
-  values["doc"] = option.doc;
-  values["choices"] = option.choices;
-  values["lowest"] = option.lowest;
-  values["highest"] = option.highest;
+  for_each_part(one, [&](const char* name, const auto& member) { values[name] = member; });
   return values;
 }
 
-void set_state(OptionInfo& option, const nb::dict& values) {
-  take(option.name, values, "name");
-  take(option.type, values, "type");
-  take(option.default_value, values, "default");
-  take(option.unit, values, "unit");
-  take(option.doc, values, "doc");
-  take(option.choices, values, "choices");
-  take(option.lowest, values, "lowest");
-  take(option.highest, values, "highest");
-}
-
-nb::dict state_of(const Stage& stage) {
-  nb::dict values;
-  values["name"] = stage.kind.name;
-  values["families"] = stage.kind.families;
-  values["calls"] = stage.calls;
-  values["solved"] = stage.solved;
-  values["iterations"] = stage.iterations;
-  values["factorisations"] = stage.factorisations;
-  values["time"] = stage.time;
-  return values;
-}
-
-void set_state(Stage& stage, const nb::dict& values) {
-  take(stage.kind.name, values, "name");
-  take(stage.kind.families, values, "families");
-  take(stage.calls, values, "calls");
-  take(stage.solved, values, "solved");
-  take(stage.iterations, values, "iterations");
-  take(stage.factorisations, values, "factorisations");
-  take(stage.time, values, "time");
+template <class Class>
+  requires requires(Class& one) { for_each_part(one, [](const char*, auto&) {}); }
+void set_state(Class& one, const nb::dict& values) {
+  for_each_part(one, [&](const char* name, auto& member) { take(member, values, name); });
 }
 
 bool same(const Stage& a, const Stage& b) {

@@ -2,28 +2,7 @@
  *
  *   by_name FOLDER
  */
-#include <fclib.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define CHECK(condition)                                                               \
-  do {                                                                                 \
-    if (!(condition)) {                                                                \
-      fprintf(stderr, "line %d: %s (%s)\n", __LINE__, #condition, fclib_last_error()); \
-      exit(1);                                                                         \
-    }                                                                                  \
-  } while (0)
-#define SAYS(text) CHECK(strstr(fclib_last_error(), text))
-
-static char folder[512];
-
-static const char* path_of(const char* name) {
-  static char path[1024];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  return path;
-}
+#include "checks.h"
 
 /* two balls on a plane, one of them pushed against the other: nsgs needs some sweeps */
 static int columns[] = {0, 2, 3, 4, 6, 7, 8}, rows[] = {0, 3, 1, 2, 0, 3, 4, 5};
@@ -33,26 +12,10 @@ static int each[] = {0, 1, 2, 3, 4, 5, 6};
 static double mass[] = {2, 2, 2, 2, 2, 2}, ones[] = {1, 1, 1, 1, 1, 1};
 static struct fclib_matrix M = {6, 6, 6, each, each, mass, -1, NULL};
 static struct fclib_matrix H = {6, 6, 6, each, each, ones, -1, NULL};
-static double q[] = {-1, 2, 0, -2, 0.1, 0}, mu[] = {0.5, 0.3}, w[6];
+static double q[] = {-1, 2, 0, -2, 0.1, 0}, mu[] = {0.5, 0.3};
 
-static struct fclib_local local(void) {
-  struct fclib_local a = {0};
-  a.W = &W;
-  a.q = q;
-  a.mu = mu;
-  a.spacedim = 3;
-  return a;
-}
-static struct fclib_global global(void) {
-  struct fclib_global a = {0};
-  a.M = &M;
-  a.H = &H;
-  a.f = q;
-  a.w = w;
-  a.mu = mu;
-  a.spacedim = 3;
-  return a;
-}
+static struct fclib_local local(void) { return local_of(&W, q, mu); }
+static struct fclib_global global(void) { return global_of(&M, &H, q, mu); }
 
 static int told;
 static int tell(int iteration, double error, double time, const char* stage, void* context) {

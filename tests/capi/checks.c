@@ -2,54 +2,18 @@
  *
  *   checks FOLDER
  */
-#include <fclib.h>
-#include <math.h>
+#include "checks.h"
+
 #include <pthread.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#define CHECK(condition)                                                               \
-  do {                                                                                 \
-    if (!(condition)) {                                                                \
-      fprintf(stderr, "line %d: %s (%s)\n", __LINE__, #condition, fclib_last_error()); \
-      exit(1);                                                                         \
-    }                                                                                  \
-  } while (0)
-#define SAYS(text) CHECK(strstr(fclib_last_error(), text))
-
-static char folder[512];
-
-static const char* path_of(const char* name) {
-  static _Thread_local char path[1024];
-  snprintf(path, sizeof path, "%s/%s", folder, name);
-  return path;
-}
 
 /* one contact of a ball on a plane, sliding */
 static int columns[] = {0, 1, 2, 3, 4, 5}, rows[] = {0, 1, 2, 3, 4};
 static double one[] = {1, 1, 1, 1, 1};
 static struct fclib_matrix identity = {3, 3, 3, columns, rows, one, -1, NULL};
-static double q[] = {-1, 2, 0}, mu[] = {0.5}, zero[5];
+static double q[] = {-1, 2, 0}, mu[] = {0.5};
 static double u[] = {0, 1.5, 0}, r[] = {1, -0.5, 0}, v[] = {0, 1.5, 0};
-static struct fclib_local local(void) {
-  struct fclib_local a = {0};
-  a.W = &identity;
-  a.q = q;
-  a.mu = mu;
-  a.spacedim = 3;
-  return a;
-}
-static struct fclib_global global(void) {
-  struct fclib_global a = {0};
-  a.M = &identity;
-  a.H = &identity;
-  a.f = q;
-  a.w = zero;
-  a.mu = mu;
-  a.spacedim = 3;
-  return a;
-}
+static struct fclib_local local(void) { return local_of(&identity, q, mu); }
+static struct fclib_global global(void) { return global_of(&identity, &identity, q, mu); }
 
 static void errors(void) {
   struct fclib_local a = local();
@@ -339,9 +303,12 @@ static void certificates(void) {
   CHECK(result.status == FCLIB_CONVERGED && result.certificate_bound == 0 && y[0] == 1);
 }
 
-/* each thread with its own file, and its own last error */
+/* each thread with its own file, its own solves, and its own last error */
 static void* work(void* number) {
   struct fclib_local a = local();
+  double mine[3];
+  struct fclib_solution s = {NULL, NULL, mine, NULL};
+  struct fclib_solve_result result;
   char name[32];
   snprintf(name, sizeof name, "thread%d", *(int*)number);
   for (int k = 0; k < 20; k++) {
@@ -351,6 +318,8 @@ static void* work(void* number) {
     SAYS(name);
     struct fclib_local* back = fclib_read_local(path_of(name));
     CHECK(back && !*fclib_last_error() && back->q[1] == 2);
+    CHECK(fclib_solve_local(back, k % 2 ? "auto" : "nsgs", NULL, &s, &result));
+    CHECK(result.status == FCLIB_CONVERGED && fabs(mine[1] + 0.5) < 1e-8);
     fclib_delete_local(back);
     free(back);
   }
@@ -358,13 +327,14 @@ static void* work(void* number) {
 }
 
 static void threads(void) {
-  pthread_t all[4];
-  int numbers[4];
-  for (int k = 0; k < 4; k++) {
+  enum { count = 8 };
+  pthread_t all[count];
+  int numbers[count];
+  for (int k = 0; k < count; k++) {
     numbers[k] = k;
     CHECK(!pthread_create(&all[k], NULL, work, &numbers[k]));
   }
-  for (int k = 0; k < 4; k++) pthread_join(all[k], NULL);
+  for (int k = 0; k < count; k++) pthread_join(all[k], NULL);
 }
 
 int main(int argc, char** argv) {

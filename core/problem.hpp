@@ -129,14 +129,14 @@ template <class Struct>
 void validate_vector(const Vector& values, Index expected, const Field<Struct, Vector>& field,
                      const std::string& where) {
   require_size(static_cast<Index>(values.size()), expected, field.rows, where, "entries");
+  const auto entry = [&](Eigen::Index k) { return where + "[" + std::to_string(k) + "]"; };
   for (Eigen::Index k = 0; k < values.size(); ++k) {
-    const std::string entry = where + "[" + std::to_string(k) + "]";
     if (!std::isfinite(values[k])) {
-      throw Error(ErrorKind::problem, "the value is not a finite number", entry);
+      throw Error(ErrorKind::problem, "the value is not a finite number", entry(k));
     }
     if (field.range == Range::nonnegative && values[k] < 0) {
       throw Error(ErrorKind::problem, "is " + shortest(values[k]) + ", but must not be negative",
-                  entry);
+                  entry(k));
     }
   }
 }

@@ -7,7 +7,7 @@
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
-#include "linalg/cpu_time.hpp"
+#include "linalg/cpu_watch.hpp"
 
 namespace fclib {
 
@@ -22,6 +22,7 @@ struct Request {
   const Settings& settings;
   const OptionValues& options;
   const Deadline& deadline;  ///< of all, conversions included
+  CpuWatch& watch;           ///< ... the same
 };
 
 /// What the merit is relative to.
@@ -106,14 +107,14 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
   double least = std::numeric_limits<double>::infinity();
   Solution best;
   for (int correction = 0;; ++correction) {
-    const double start = cpu_time();
-    const Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
-    const double own = cpu_time() - start;
+    const double start = request.watch.read();
+    Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
+    const double own = request.watch.read() - start;
     result.cpu_s += outcome.cpu_s.value_or(own);
     result.setup_s -= own;
     result.iterations += outcome.iterations;
     result.status = outcome.status;
-    result.stages = outcome.stages;
+    result.stages = std::move(outcome.stages);
     // a word that nothing stands behind is not passed on
     if (result.status == Status::infeasible && !result.certificate.proven())
       result.status = Status::stalled;
@@ -263,12 +264,12 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
-  const double start = cpu_time();
+  CpuWatch watch;
   const Deadline deadline(settings.time_limit, settings.clock);
-  const Request request{solver, settings, options, deadline};
+  const Request request{solver, settings, options, deadline, watch};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
-  result.setup_s += cpu_time() - start;  // what the thread spent in the solver is taken off already
+  result.setup_s += watch.read();  // what the thread spent in the solver is taken off already
   return result;
 }
 

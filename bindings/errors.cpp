@@ -4,22 +4,30 @@
 
 #include "error.hpp"
 #include "module.hpp"
+#include "solve/plugin.hpp"
 
 namespace fclib::bindings {
 
 namespace {
 
 PyObject* exception_of[4];
+PyObject* solver_error;
+
+void raise(PyObject* type, const Error& error) {
+  // a path need not be valid UTF-8
+  const std::string text = error.what();
+  const nb::object message =
+      nb::steal(PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace"));
+  PyErr_SetObject(type, message.ptr());
+}
 
 void translate(const std::exception_ptr& pointer, void*) {
   try {
     std::rethrow_exception(pointer);
+  } catch (const SolverError& error) {
+    raise(solver_error, error);
   } catch (const Error& error) {
-    // a path need not be valid UTF-8
-    const std::string text = error.what();
-    const nb::object message = nb::steal(
-        PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace"));
-    PyErr_SetObject(exception_of[static_cast<int>(error.kind)], message.ptr());
+    raise(exception_of[static_cast<int>(error.kind)], error);
   }
 }
 
@@ -34,9 +42,12 @@ void bind_errors(nb::module_& m) {
     return type;
   };
   const nb::object base = define("Error", PyExc_Exception, "Base of all errors of fclib.");
-  const auto derived = [&](ErrorKind kind, const char* name, PyObject* standard, const char* doc) {
+  const auto derive = [&](PyObject*& type, const char* name, PyObject* standard, const char* doc) {
     const nb::tuple bases = nb::make_tuple(base, nb::borrow(standard));
-    exception_of[static_cast<int>(kind)] = define(name, bases, doc).release().ptr();
+    type = define(name, bases, doc).release().ptr();
+  };
+  const auto derived = [&](ErrorKind kind, const char* name, PyObject* standard, const char* doc) {
+    derive(exception_of[static_cast<int>(kind)], name, standard, doc);
   };
   derived(ErrorKind::file, "FileError", PyExc_OSError,
           "A file cannot be read or written, or is not in the FCLIB layout.");
@@ -46,6 +57,8 @@ void bind_errors(nb::module_& m) {
           "An unknown solver or option, or a value out of its range.");
   derived(ErrorKind::unsuitable, "UnsuitableError", PyExc_ValueError,
           "What is asked cannot be done for this problem.");
+  derive(solver_error, "SolverError", PyExc_RuntimeError,
+         "A solver from outside of the core failed: it raised, crashed, or returned no solution.");
   nb::register_exception_translator(translate);
 }
 

@@ -8,6 +8,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "linalg/cpu_watch.hpp"
+#include "solve/plugin.hpp"
 
 namespace fclib {
 
@@ -276,6 +277,7 @@ Result solve_any(const P& problem, const Solver& solver, const Settings& setting
 }  // namespace
 
 const Solver& find_solver(std::string_view name) {
+  if (name.starts_with(plugin_prefix)) return load_plugin(name);
   std::string known;
   for (const Solver* solver : solvers()) {
     if (solver->name == name) return *solver;

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from fclib import _core
 
 GROUP = "fclib.solvers"
+SolverError = _core.SolverError
 Function = TypeVar("Function", bound=Callable[..., Any])
 RESERVED = {
     "problem",
@@ -37,10 +38,6 @@ RESERVED = {
     "history",
 }
 OPTION_TYPES = {bool: "bool", int: "int", float: "float"}
-
-
-class SolverError(_core.Error, RuntimeError):
-    """A solver from outside of the core failed: it raised, crashed, or returned no solution."""
 
 
 @dataclass(frozen=True)

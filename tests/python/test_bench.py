@@ -755,6 +755,8 @@ def test_solvers_as_texts() -> None:
     parsed = parse_solver("nsgs relaxation=1.2 shuffle=true")
     assert parsed == {"name": "nsgs", "options": {"relaxation": "1.2", "shuffle": "true"}}
     assert parse_solver("cmd:./pgs {input} a=b") == {"name": "cmd:./pgs {input} a=b"}
+    plugin = parse_solver("plugin:./pgs.so step=0.5")
+    assert (plugin["name"], plugin["options"]) == ("plugin:./pgs.so", {"step": "0.5"})
 
 
 def test_groups_have_limits_of_their_own() -> None:

@@ -20,7 +20,7 @@ import fclib
 from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
 from fclib.external import command, siconos
-from helpers import local_problem, planted_global, planted_local
+from helpers import local_problem, planted_global, planted_local, planted_rolling
 
 DOCS = "docs/solvers-of-your-own.md"
 
@@ -614,6 +614,32 @@ def test_unknown_solvers_of_siconos_come_with_the_known_ones() -> None:
 # ---- shared objects
 
 
+# r becomes what the options are, which is told by the merit alone
+TELLS_OF_ITS_OPTIONS = """
+#include <fclib_plugin.h>
+#include <math.h>
+#include <string.h>
+static const char* const shapes[] = {"disc", "square", 0};
+static const struct fclib_plugin_option options[] = {
+    {"count", "int", "2", "1", "how many", 0, 1, 9},
+    {"shape", "choice", "disc", "", "of what", shapes, 0, 0},
+    {"loud", "bool", "false", "", "", 0, 0, 0},
+    {"note", "text", "", "", "", 0, 0, 0},
+    {0, 0, 0, 0, 0, 0, 0, 0}};
+static const struct fclib_plugin_about about = {sizeof about, 0, "Tells", "nobody", options};
+const struct fclib_plugin_about* fclib_plugin_describe(void) { return &about; }
+int fclib_plugin_solve(const struct fclib_plugin_problem* p, double* r) {
+  r[0] = p->number(p->context, "count");
+  r[1] = p->number(p->context, "shape") + 10 * p->number(p->context, "loud");
+  r[2] = (double)strlen(p->text(p->context, "note"));
+  if (strcmp(p->text(p->context, "shape"), shapes[(int)p->number(p->context, "shape")])) return 1;
+  if (!isnan(p->number(p->context, "none")) || p->text(p->context, "none")) return 2;
+  if (!isnan(p->number(p->context, "note")) || p->text(p->context, "count")) return 3;
+  return 0;
+}
+"""
+
+
 @pytest.fixture(scope="module")
 def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Plugins: the example, as C++ too, one that refuses, and one without the function."""
@@ -624,11 +650,17 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "double *r) {\n  (void)p, (void)r;\n  return 7;\n}\n"
     )
     (folder / "other.c").write_text("int other(void) { return 0; }\n")
+    (folder / "told.c").write_text(TELLS_OF_ITS_OPTIONS)
+    (folder / "wrong.c").write_text(TELLS_OF_ITS_OPTIONS.replace('"2"', '"two"'))
+    (folder / "unsized.c").write_text(TELLS_OF_ITS_OPTIONS.replace("sizeof about", "0"))
     sources = {
         "pgs": ROOT / "examples/plugin/pgs.c",
         "pgs-cpp": folder / "pgs.cpp",
         "refuse": folder / "refuse.c",
         "other": folder / "other.c",
+        "told": folder / "told.c",
+        "wrong": folder / "wrong.c",
+        "unsized": folder / "unsized.c",
     }
     for name, source in sources.items():
         tool = compiler("C++" if source.suffix == ".cpp" else "C")
@@ -655,12 +687,62 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
     assert (limited.status, limited.iterations) == ("iteration_limit", 3)
 
 
+def test_a_shared_object_has_options(shared_objects: Path) -> None:
+    name = f"plugin:{shared_objects}/libtold.so"
+    info = fclib.find_solver(name)
+    assert (info.title, info.citation, info.origin) == ("Tells", "nobody", "plugin")
+    assert [(o.name, o.type, o.default) for o in info.options] == [
+        ("count", "int", 2),
+        ("shape", "choice", "disc"),
+        ("loud", "bool", False),
+        ("note", "text", ""),
+    ]
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5])
+
+    def told(**options: Any) -> list[float]:
+        return list(fclib.solve(problem, name, **options).solution.r)
+
+    assert told() == [2, 0, 0]
+    assert told(count=9, shape="square", loud=True, note="four") == [9, 11, 4]
+    with pytest.raises(fclib.OptionError, match=r"10 is outside \[1, 9\]"):
+        told(count=10)
+    with pytest.raises(fclib.OptionError, match="unknown; this solver has: count, shape, loud, n"):
+        told(size=1)
+    with pytest.raises(fclib.UnsuitableError, match="does not take R2DFC"):
+        fclib.solve(planted_rolling(3, 1)[0], name)
+    assert fclib.find_solver(name) is fclib.find_solver(name)
+
+
+@pytest.mark.parametrize("d", [3, 5])
+def test_a_shared_object_solves_rolling_problems(shared_objects: Path, d: int) -> None:
+    problem, _ = planted_rolling(d, 3, nc=4)
+    name = f"plugin:{shared_objects}/libpgs.so"
+    result = fclib.solve(problem, name, step=0.4)
+    assert result.status == "converged"
+    assert fclib.merit(problem, result.solution).error <= 1e-8
+    assert fclib.solve(problem, name, step=0.2).iterations > result.iterations
+
+
+def test_shared_objects_from_c(shared_objects: Path, tmp_path: Path) -> None:
+    fclib.write(tmp_path / "a.hdf5", planted_local(3, nc=3).problem)
+    program = compile_program(ROOT / "tests/capi/plugin.c", tmp_path / "plugin")
+    done = subprocess.run(
+        [program, tmp_path / "a.hdf5", f"plugin:{shared_objects}/libpgs.so"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
     problem = planted_local(3, nc=2).problem
     for name, error in {
         "libnone.so": "no such file",
         "pgs.cpp": "cannot be loaded",
         "libother.so": "has no function fclib_plugin_solve",
+        "libwrong.so": "its default is wrong: option count: 'two' is not an integer",
+        "libunsized.so": "fclib_plugin_describe returned no struct fclib_plugin_about with",
     }.items():
         with pytest.raises(fclib.OptionError, match=error):
             fclib.solve(problem, f"plugin:{shared_objects}/{name}")
@@ -679,7 +761,7 @@ def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -
     done = subprocess.run(
         [
             *(sys.executable, "-m", "fclib", "bench", "--problems", "a.hdf5"),
-            *("--solver", f"plugin:{shared_objects}/libpgs.so", "--store", "store.db"),
+            *("--solver", f"plugin:{shared_objects}/libpgs.so step=0.9", "--store", "store.db"),
         ],
         capture_output=True,
         text=True,

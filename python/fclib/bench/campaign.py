@@ -456,8 +456,8 @@ def _solvers(
 
 
 def parse_solver(text: str) -> dict[str, Any]:
-    """A solver as one text: "nsgs relaxation=1.2"; what follows cmd: or plugin: is one name."""
-    if text.startswith(("cmd:", "plugin:")):
+    """A solver as one text: "nsgs relaxation=1.2"; what follows cmd: is one name."""
+    if text.startswith("cmd:"):
         return {"name": text}
     name, *pairs = shlex.split(text) or [""]
     options = {}

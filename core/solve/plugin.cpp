@@ -1,0 +1,228 @@
+#include "solve/plugin.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <exception>
+#include <filesystem>
+#include <limits>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include <fclib_plugin.h>
+#include "reduced/by_rows.hpp"
+
+#if __has_include(<dlfcn.h>) && !defined(__EMSCRIPTEN__)
+#include <dlfcn.h>
+#define FCLIB_LOADS_PLUGINS
+#endif
+
+namespace fclib {
+
+namespace {
+
+using Function = decltype(&fclib_plugin_solve);
+using Describe = decltype(&fclib_plugin_describe);
+
+constexpr std::int64_t endless = 1'000'000;  // iterations, where the caller sets none
+
+[[noreturn]] void bad_plugin(std::string_view name, const std::string& message) {
+  throw Error(ErrorKind::option, message, "solver '" + std::string(name) + "'");
+}
+
+std::string text_of(const char* text) { return text != nullptr ? text : ""; }
+
+/// A call of a plugin: what its functions look at. Nothing is thrown through the plugin.
+struct Call {
+  const ReducedProblem& problem;
+  const OptionValues& options;
+  const std::vector<OptionInfo>& infos;
+  Monitor monitor;
+  Vector r = {};
+  std::int64_t iterations = -1;  // the first is the starting point
+  std::optional<Status> reason = {};
+  std::exception_ptr thrown = {};
+
+  bool stop(const double* iterate) {
+    try {
+      ++iterations;
+      r = Eigen::Map<const Vector>(iterate, problem.m());
+      reason = monitor.report(iterations, error_of(problem, r), &r);
+    } catch (...) {
+      thrown = std::current_exception();
+    }
+    return thrown != nullptr || reason.has_value();
+  }
+
+  [[nodiscard]] double number(std::string_view name) const {
+    const auto found = options.find(name);
+    if (found == options.end()) return std::numeric_limits<double>::quiet_NaN();
+    struct Reader {
+      const std::vector<OptionInfo>& infos;
+      std::string_view name;
+      double operator()(bool value) const { return value ? 1 : 0; }
+      double operator()(std::int64_t value) const { return static_cast<double>(value); }
+      double operator()(double value) const { return value; }
+      double operator()(const std::string& value) const {
+        for (const OptionInfo& info : infos) {
+          if (info.name == name && info.type == "choice") {
+            return static_cast<double>(info.place_of(value));
+          }
+        }
+        return std::numeric_limits<double>::quiet_NaN();
+      }
+    };
+    return std::visit(Reader{infos, name}, found->second);
+  }
+
+  [[nodiscard]] const char* text(std::string_view name) const {
+    const auto found = options.find(name);
+    if (found == options.end()) return nullptr;
+    const auto* value = std::get_if<std::string>(&found->second);
+    return value != nullptr ? value->c_str() : nullptr;
+  }
+};
+
+Outcome run(Function function, const std::string& name, const std::vector<OptionInfo>& infos,
+            const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
+            Vector& r) {
+  const OptionValues options = parse_options(infos, values);
+  const Matrix W = by_rows(problem.W);
+  Call call{problem, options, infos, Monitor(settings)};
+  fclib_plugin_problem given{};
+  given.size = sizeof given;
+  given.spacedim = problem.d();
+  given.contacts = problem.nc();
+  given.start = W.p.data();
+  given.column = W.i.data();
+  given.value = W.x.data();
+  given.q = problem.q.data();
+  given.mu = problem.friction.mu.data();
+  given.tolerance = settings.tolerance;
+  given.stop = [](void* context, const double* iterate) {
+    return static_cast<Call*>(context)->stop(iterate) ? 1 : 0;
+  };
+  given.context = &call;
+  given.mu_r = problem.rolling() ? problem.friction.mu_r.data() : nullptr;
+  given.number = [](void* context, const char* option) {
+    return static_cast<Call*>(context)->number(text_of(option));
+  };
+  given.text = [](void* context, const char* option) {
+    return static_cast<Call*>(context)->text(text_of(option));
+  };
+  const int code = function(&given, r.data());
+  if (call.thrown) std::rethrow_exception(call.thrown);
+  if (code != 0) {
+    throw SolverError("fclib_plugin_solve returned " + std::to_string(code), "solver " + name);
+  }
+  return {.status = call.reason.value_or(Status::converged),
+          .iterations = std::max<std::int64_t>(call.iterations, 0)};
+}
+
+/// An option as the plugin tells of it. Throws Error (option) where it does not hold together.
+OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
+  OptionInfo info{.name = told.name,
+                  .type = text_of(told.type),
+                  .default_value = text_of(told.value),
+                  .unit = text_of(told.unit),
+                  .doc = text_of(told.doc)};
+  if (told.lowest != 0 || told.highest != 0) {
+    info.lowest = told.lowest;
+    info.highest = told.highest;
+  }
+  for (const char* const* choice = told.choices; choice != nullptr && *choice != nullptr;
+       ++choice) {
+    info.choices.emplace_back(*choice);
+  }
+  constexpr std::string_view types[] = {"bool", "int", "float", "choice", "text"};
+  if (std::find(std::begin(types), std::end(types), info.type) == std::end(types)) {
+    bad_plugin(plugin, "its option " + info.name + " is of the type '" + info.type +
+                           "', none of bool, int, float, choice, text");
+  }
+  try {
+    info.default_value = parse_options({info}, {}).at(info.name);
+  } catch (const Error& error) {
+    bad_plugin(plugin, std::string("its default is wrong: ") + error.what());
+  }
+  return info;
+}
+
+#ifdef FCLIB_LOADS_PLUGINS
+
+/// What a shared object exports under this name, of this type.
+template <class Exported>
+Exported exported(void* handle, const char* name) {
+  return reinterpret_cast<Exported>(dlsym(handle, name));
+}
+
+void* opened(std::string_view name) {
+  const std::filesystem::path path(name.substr(plugin_prefix.size()));
+  std::error_code failed;
+  if (!std::filesystem::is_regular_file(path, failed)) bad_plugin(name, "there is no such file");
+  const auto whole = std::filesystem::absolute(path, failed);
+  void* handle = dlopen(whole.c_str(), RTLD_NOW | RTLD_LOCAL);
+  if (handle == nullptr) bad_plugin(name, "cannot be loaded: " + text_of(dlerror()));
+  return handle;
+}
+
+Solver entry_of(void* handle, std::string_view name) {
+  const auto function = exported<Function>(handle, "fclib_plugin_solve");
+  if (function == nullptr) {
+    bad_plugin(name, "has no function fclib_plugin_solve (include/fclib_plugin.h)");
+  }
+  Solver entry{.name = std::string(name),
+               .family = "plugin",
+               .title = "A function of a shared object",
+               .citation = {},
+               .dimensions = {2, 3},
+               .rolling_dimensions = {},
+               .options = {},
+               .max_iterations = endless,
+               .solve = {},
+               .origin = "plugin"};
+  if (const auto describe = exported<Describe>(handle, "fclib_plugin_describe")) {
+    const fclib_plugin_about* about = describe();
+    if (about == nullptr || about->size < static_cast<int>(sizeof *about)) {
+      bad_plugin(name, "fclib_plugin_describe returned no struct fclib_plugin_about with its size");
+    }
+    if (about->title != nullptr) entry.title = about->title;
+    entry.citation = text_of(about->citation);
+    if (about->rolling != 0) entry.rolling_dimensions = {3, 5};
+    for (const fclib_plugin_option* option = about->options;
+         option != nullptr && option->name != nullptr; ++option) {
+      entry.options.push_back(option_of(*option, name));
+    }
+  }
+  entry.solve = [function, name = entry.name, options = entry.options](
+                    const ReducedProblem& problem, const OptionValues& values,
+                    const Settings& settings, Vector& r) {
+    return run(function, name, options, problem, values, settings, r);
+  };
+  return entry;
+}
+
+#endif
+
+}  // namespace
+
+const Solver& load_plugin(std::string_view name) {
+#ifdef FCLIB_LOADS_PLUGINS
+  // by what was loaded: the same path may be another file by then
+  static std::mutex guard;
+  static std::map<std::pair<void*, std::string>, std::unique_ptr<const Solver>> loaded;
+  const std::lock_guard lock(guard);
+  void* handle = opened(name);
+  std::unique_ptr<const Solver>& entry = loaded[{handle, std::string(name)}];
+  if (entry) {
+    dlclose(handle);  // the first time keeps it
+  } else {
+    entry = std::make_unique<const Solver>(entry_of(handle, name));
+  }
+  return *entry;
+#else
+  bad_plugin(name, "this system loads no shared objects");
+#endif
+}
+
+}  // namespace fclib

@@ -1,0 +1,26 @@
+// Solvers of other people in shared objects, by include/fclib_plugin.h.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "error.hpp"
+#include "solve/solver.hpp"
+
+namespace fclib {
+
+inline constexpr std::string_view plugin_prefix = "plugin:";
+
+/// A solver that is not of fclib failed.
+class SolverError : public Error {
+ public:
+  SolverError(std::string message, std::string where)
+      : Error(ErrorKind::unsuitable, std::move(message), std::move(where)) {}
+};
+
+/// The solver of the shared object `plugin:PATH`, which stays loaded until the process ends. It is
+/// called in the thread of the caller. Throws Error (option) where it cannot be loaded, or is none.
+const Solver& load_plugin(std::string_view name);
+
+}  // namespace fclib

@@ -20,28 +20,21 @@ from fclib import _layer
 def solve(
     W: Any, q: Any, mu: Any, *, spacedim: int = 3, tol: float = 1e-10, threads: int = 1
 ) -> tuple[Any, Any]:
-    """Reactions and velocities of local problems, u = W r + q with Coulomb's law.
+    """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
-    A callback of the host, with a derivative in reverse mode: that of ``fclib.vjp``, by one element
-    of the generalised Jacobian where a contact grazes or rests on the limit of friction, by the
-    least change of r where redundant contacts leave r undetermined. Inside all is computed in
-    double precision; the result is of q's type, single where ``jax_enable_x64`` is not set.
+    A callback of the host, with the derivative of ``fclib.vjp`` in reverse mode. Inside all is
+    computed in double precision; the result is of the common type of W, q and mu, single where
+    ``jax_enable_x64`` is not set.
 
-    Args:
-        W: (..., m, m), m = spacedim * nc. Leading sizes are broadcast with those of q and mu.
-        q: (..., m)
-        mu: (..., nc)
-        spacedim: 3, or 2 for planar problems.
-        tol: bound on ``Merit.error``; gradients need one far below 1e-6.
-        threads: that share a batch, 0 for all.
+    W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
+    arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
 
     Returns:
         r and u, (..., m).
 
     Raises:
-        ProblemError: shapes that do not agree. Inside the callback, where JAX makes them errors of
-            its own: entries that are not finite, a negative mu.
-        SolverError: the same, where a problem was not solved to the tolerance.
+        ProblemError: shapes that do not agree. What is found inside the callback, wrong entries and
+            problems that are not solved, JAX makes errors of its own.
     """
     W, q, mu = (jnp.asarray(one) for one in (W, q, mu))
     batch = _layer.check_shapes(W.shape, q.shape, mu.shape, spacedim)

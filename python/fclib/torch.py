@@ -60,26 +60,19 @@ def solve(
     tol: float = 1e-10,
     threads: int = 1,
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Reactions and velocities of local problems, u = W r + q with Coulomb's law.
+    """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
-    The gradient is that of ``fclib.vjp``: by one element of the generalised Jacobian where a
-    contact grazes or rests on the limit of friction, by the least change of r where redundant
-    contacts leave r undetermined. There is no second derivative. All is computed in double
+    The gradient is that of ``fclib.vjp``; there is no second one. All is computed in double
     precision on the CPU, and comes back as q is.
 
-    Args:
-        W: (..., m, m), m = spacedim * nc. Leading sizes are broadcast with those of q and mu.
-        q: (..., m)
-        mu: (..., nc)
-        spacedim: 3, or 2 for planar problems.
-        tol: bound on ``Merit.error``; gradients need one far below 1e-6.
-        threads: that share a batch, 0 for all.
+    W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
+    arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
 
     Returns:
         r and u, (..., m).
 
     Raises:
-        ProblemError: shapes that do not agree, entries that are not finite, a negative mu.
+        ProblemError: as there, and shapes that do not agree.
         SolverError: a problem was not solved to the tolerance, or has no solution.
     """
     batch = _layer.check_shapes(tuple(W.shape), tuple(q.shape), tuple(mu.shape), spacedim)

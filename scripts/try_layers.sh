@@ -1,0 +1,23 @@
+#!/bin/sh
+# Tests fclib.torch and fclib.jax in an environment of its own, on top of the one that is there.
+#
+#   scripts/try_layers.sh build/layers [torch] [jax]
+#
+# Without names both are tried. They are large: nothing else of the project needs them.
+set -eu
+there=${1:?"usage: scripts/try_layers.sh FOLDER [torch] [jax]"}
+shift
+test $# -gt 0 || set -- torch jax
+base=.venv/bin/python
+test -x "$base" || { echo "there is no $base: make setup makes it" >&2; exit 1; }
+
+"$base" -m venv "$there"
+own=$("$there/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+"$base" -c 'import sysconfig; print("import site; site.addsitedir(%r)" % sysconfig.get_path("purelib"))' \
+  > "$own/base.pth"
+for package in "$@"; do
+  "$there/bin/python" -m pip install --quiet "$package"
+  "$there/bin/python" -c "import $package, fclib.$package; print('$package', $package.__version__)"
+  "$there/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_layer.py -k "$package"
+done
+"$there/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_docs_code.py -k recipes

@@ -87,7 +87,9 @@ def lines_of_cpp(build: Path) -> Lines:
     """The counts of gcov."""
     out = build / "cpp-lines.json"
     tool = Path(sys.executable).with_name("gcovr")
-    command = [tool, "--root", ROOT, "--object-directory", build, build, "--json", out]
+    # a target each: beside them is what CMake tried the compiler on, whose sources are gone
+    targets = sorted((build / "CMakeFiles").glob("*.dir"))
+    command = [tool, "--root", ROOT, "--object-directory", build, *targets, "--json", out]
     command += ["--filter", "core/", "--filter", "bindings/", "-j", str(os.cpu_count() or 1)]
     command += ["--merge-mode-functions", "separate", "--gcov-ignore-parse-errors", "all"]
     subprocess.run(list(map(str, command)), cwd=ROOT, check=True)

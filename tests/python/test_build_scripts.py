@@ -3,6 +3,8 @@
 import hashlib
 import importlib.util
 import json
+import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -137,6 +139,34 @@ def test_a_line_that_one_instance_runs_is_run(coverage_report: ModuleType) -> No
     ]
     assert coverage_report.merged([{"file": "a.hpp", "lines": lines}]) == {
         "a.hpp": {1: True, 2: False}
+    }
+
+
+def test_what_cmake_tried_the_compiler_on_is_no_part_of_the_counts(
+    coverage_report: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("gcovr", reason="of make coverage")
+    compiler = shutil.which("g++")
+    if compiler is None:
+        pytest.skip("there is no g++")
+    build = tmp_path / "build" / "coverage"
+    one, tried = build / "CMakeFiles" / "one.dir", build / "CMakeFiles" / "tried"
+    for folder in (one, tried, tmp_path / "core"):
+        folder.mkdir(parents=True)
+    source = tmp_path / "core" / "a.cpp"
+    source.write_text("int main(int n, char**) {\n  if (n > 1)\n    return 1;\n  return 0;\n}\n")
+    gone = tried / "gone.cpp"
+    gone.write_text("int gone() { return 0; }\n")
+    compile_it = [compiler, "--coverage", "-O0"]
+    subprocess.run([*compile_it, "-c", gone.name, "-o", "gone.o"], cwd=tried, check=True)
+    gone.unlink()
+    subprocess.run([*compile_it, "-c", source, "-o", one / "a.o"], cwd=build, check=True)
+    subprocess.run([*compile_it, one / "a.o", "-o", build / "a"], cwd=build, check=True)
+    subprocess.run([build / "a"], cwd=build, check=True)
+
+    monkeypatch.setattr(coverage_report, "ROOT", tmp_path)
+    assert coverage_report.lines_of_cpp(build) == {
+        "core/a.cpp": {1: True, 2: True, 3: False, 4: True}
     }
 
 

@@ -5,6 +5,9 @@
 .venv/bin/python scripts/coverage_report.py build/coverage tests/contract   of Python, these only
 
 It ends with an error where less than the asked part of the lines of a language is run.
+
+Counters are not atomic, with which small loops take fifty times as long: threads may lose counts of
+a line, and whether it was run at all is what is asked.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ const Value& named(const std::vector<std::pair<std::string, Value>>& all, const 
 template <class C>
 fclib_report* solve_with(const C* c, const fclib_options* options) {
   return guarded<fclib_report*>(nullptr, [&] {
-    const auto problem = valid_problem(given(c, "problem"));
+    const auto problem = problem_of(given(c, "problem"));
     static const fclib_options none;
     if (options == nullptr) options = &none;
     static const std::vector<OptionInfo> own = describe_options<Asked>();

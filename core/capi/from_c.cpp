@@ -105,7 +105,7 @@ CoreOf<C> problem_as_given(const C& c) {
 }
 
 template <class C>
-CoreOf<C> valid_problem(const C& c) {
+CoreOf<C> problem_of(const C& c) {
   using P = CoreOf<C>;
   P problem = problem_as_given(c);
   for_each_field<P>([&]<class Type>(const Field<P, Type>& field) {
@@ -118,6 +118,12 @@ CoreOf<C> valid_problem(const C& c) {
       a.x.resize(std::min(a.x.size(), entries));
     }
   });
+  return problem;
+}
+
+template <class C>
+CoreOf<C> valid_problem(const C& c) {
+  CoreOf<C> problem = problem_of(c);
   validate(problem);
   return problem;
 }
@@ -136,6 +142,7 @@ Solution solution_of(const fclib_solution& c, const P& problem, Parts parts) {
 
 #define FCLIB_FROM_C(kind)                                             \
   template CoreOf<fclib_##kind> problem_as_given(const fclib_##kind&); \
+  template CoreOf<fclib_##kind> problem_of(const fclib_##kind&);       \
   template CoreOf<fclib_##kind> valid_problem(const fclib_##kind&);    \
   template Solution solution_of(const fclib_solution&, const CoreOf<fclib_##kind>&, Parts);
 

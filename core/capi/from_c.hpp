@@ -15,7 +15,11 @@ Vector vector(const double* values, Index size, const std::string& where);
 template <class C>
 CoreOf<C> problem_as_given(const C& c);
 
-/// The problem, valid, without the room that nzmax leaves.
+/// The same without the room that nzmax leaves, for who validates it.
+template <class C>
+CoreOf<C> problem_of(const C& c);
+
+/// ... and valid.
 template <class C>
 CoreOf<C> valid_problem(const C& c);
 

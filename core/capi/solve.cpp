@@ -46,7 +46,7 @@ template <class C>
 int solve_problem(const C* c, const char* solver, const fclib_solve_options* options,
                   fclib_solution* solution, fclib_solve_result* result) {
   return guarded(0, [&] {
-    const auto problem = valid_problem(given(c, "problem"));
+    const auto problem = problem_of(given(c, "problem"));
     fclib_solution& target = given(solution, "solution");
     if (problem.size(Dim::m) > 0) given(target.r, "solution->r");
 

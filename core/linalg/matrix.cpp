@@ -14,34 +14,34 @@ namespace {
 }
 
 void require_length(std::size_t actual, std::size_t expected, const std::string& where,
-                    const char* what) {
+                    const char* array, const char* what) {
   if (actual != expected) {
-    invalid(where, std::string(what) + " has " + std::to_string(actual) + " entries, expected " +
-                       std::to_string(expected));
+    invalid(where + array, std::string(what) + " has " + std::to_string(actual) +
+                               " entries, expected " + std::to_string(expected));
   }
 }
 
-void require_indices(const std::vector<Index>& indices, Index bound, const std::string& where) {
+void require_indices(const std::vector<Index>& indices, Index bound, const std::string& where,
+                     const char* array) {
   for (std::size_t k = 0; k < indices.size(); ++k) {
     if (indices[k] < 0 || indices[k] >= bound) {
       invalid(
-          where + "[" + std::to_string(k) + "]",
+          where + array + "[" + std::to_string(k) + "]",
           "index " + std::to_string(indices[k]) + " is outside 0.." + std::to_string(bound - 1));
     }
   }
 }
 
 void require_pointers(const Matrix& a, Index count, const std::string& where) {
-  require_length(a.p.size(), static_cast<std::size_t>(count) + 1, where + "/p",
-                 "the pointer array");
+  require_length(a.p.size(), static_cast<std::size_t>(count) + 1, where, "/p", "the pointer array");
   if (a.p.front() != 0) invalid(where + "/p[0]", "the first pointer must be 0");
   for (std::size_t k = 1; k < a.p.size(); ++k) {
     if (a.p[k] < a.p[k - 1]) {
       invalid(where + "/p[" + std::to_string(k) + "]", "pointers must not decrease");
     }
   }
-  require_length(a.i.size(), static_cast<std::size_t>(a.p.back()), where + "/i", "the index array");
-  require_length(a.x.size(), static_cast<std::size_t>(a.p.back()), where + "/x", "the value array");
+  require_length(a.i.size(), static_cast<std::size_t>(a.p.back()), where, "/i", "the index array");
+  require_length(a.x.size(), static_cast<std::size_t>(a.p.back()), where, "/x", "the value array");
 }
 
 }  // namespace
@@ -50,23 +50,23 @@ void validate(const Matrix& a, const std::string& where) {
   if (a.rows < 0 || a.cols < 0) invalid(where, "a size is negative");
   switch (a.storage) {
     case Storage::triplet:
-      require_length(a.i.size(), a.x.size(), where + "/i", "the row index array");
-      require_length(a.p.size(), a.x.size(), where + "/p", "the column index array");
-      require_indices(a.i, a.rows, where + "/i");
-      require_indices(a.p, a.cols, where + "/p");
+      require_length(a.i.size(), a.x.size(), where, "/i", "the row index array");
+      require_length(a.p.size(), a.x.size(), where, "/p", "the column index array");
+      require_indices(a.i, a.rows, where, "/i");
+      require_indices(a.p, a.cols, where, "/p");
       break;
     case Storage::csc:
       require_pointers(a, a.cols, where);
-      require_indices(a.i, a.rows, where + "/i");
+      require_indices(a.i, a.rows, where, "/i");
       break;
     case Storage::csr:
       require_pointers(a, a.rows, where);
-      require_indices(a.i, a.cols, where + "/i");
+      require_indices(a.i, a.cols, where, "/i");
       break;
     case Storage::dense:
       require_length(a.x.size(),
-                     static_cast<std::size_t>(a.rows) * static_cast<std::size_t>(a.cols),
-                     where + "/x", "the value array");
+                     static_cast<std::size_t>(a.rows) * static_cast<std::size_t>(a.cols), where,
+                     "/x", "the value array");
       break;
   }
   for (std::size_t k = 0; k < a.x.size(); ++k) {

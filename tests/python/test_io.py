@@ -1051,7 +1051,7 @@ def test_several_solutions_are_kept_beside_the_one(written: Path) -> None:
     r = planted.solution.r
     assert fclib.read_solutions(path) == []
     fclib.write_solutions(path, [r, 0 * r])
-    assert fclib.contents(path) == ["local"]
+    assert fclib.contents(path) == ["local", "solutions"]
     first, second = fclib.read_solutions(path)
     np.testing.assert_array_equal(first.r, r)
     assert first.u is not None

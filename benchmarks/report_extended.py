@@ -1,11 +1,12 @@
 """What the site of the whole set `extended` costs, from a part of it: size, and time to open it.
 
-    python benchmarks/report_extended.py COLLECTION [--problems 10914] [--keep FOLDER]
+    python benchmarks/report_extended.py COLLECTION [--problems N] [--keep FOLDER] [--results NAME]
 
 COLLECTION is a built folder with some problems of each family, `standard` for one. Each is drawn,
 and the bytes of its view and its small picture are counted; a family of `extended` has as many
 problems as it has, each of the mean size of those drawn. The catalogue that is opened has all rows,
-each with a small picture.
+each with a small picture. `--results NAME` stores two tables, NAME of the size and NAME-pages of
+the times.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ import tempfile
 import time
 from collections import defaultdict
 from pathlib import Path
-from statistics import mean
+from statistics import mean, median
 from typing import Any
+
+import _results
 
 from fclib.collections import catalog, families, read_catalog, sets
 from fclib.report import build_site
 from fclib.report.view import as_json
 
+REPEATS = 5  # times that each page is opened
 FILTER = "masonry contacts > 50 class = hard"
 
 
@@ -52,8 +56,8 @@ def busy(tools: Any) -> float:
     return float(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
 
 
-def opened(site: Path) -> dict[str, float]:
-    """Seconds until the overview and the catalogue are there, and until the filter has answered."""
+def opened(site: Path) -> dict[str, tuple[float, float]]:
+    """Seconds, and of CPU, until a page is there or the filter has answered; medians."""
     from playwright.sync_api import sync_playwright
 
     answer = """async (text) => {
@@ -65,19 +69,19 @@ def opened(site: Path) -> dict[str, float]:
       while (said.textContent === before) await new Promise((done) => setTimeout(done, 2));
       return (performance.now() - start) / 1000;
     }"""
-    found: dict[str, list[float]] = defaultdict(list)
+    found: dict[str, list[tuple[float, float]]] = defaultdict(list)
 
     def note(name: str, tools: Any, act: Any) -> None:
         before = busy(tools)
         start = time.perf_counter()
         act()
-        found[name].append(time.perf_counter() - start)
-        found[f"{name}, CPU"].append(busy(tools) - before)
+        seconds = time.perf_counter() - start
+        found[name].append((seconds, busy(tools) - before))
 
     with sync_playwright() as playwright:
         chromium = shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for _ in range(5):
+        for _ in range(REPEATS):
             for name in ("overview", "catalogue"):
                 page = browser.new_page()
                 tools = page.context.new_cdp_session(page)
@@ -94,7 +98,10 @@ def opened(site: Path) -> dict[str, float]:
                     note("filter", tools, lambda page=page, text=text: page.evaluate(answer, text))
                 page.close()
         browser.close()
-    return {name: sorted(own)[len(own) // 2] for name, own in found.items()}
+    return {
+        name: (median(own[0] for own in all_), median(own[1] for own in all_))
+        for name, all_ in found.items()
+    }
 
 
 def main() -> None:
@@ -103,6 +110,7 @@ def main() -> None:
     parser.add_argument("collection", type=Path)
     parser.add_argument("--problems", type=int, help="rows; by default as many as the set has")
     parser.add_argument("--keep", type=Path, help="a folder for the site of the part")
+    _results.add_option(parser)
     options = parser.parse_args()
     rows = read_catalog(options.collection).to_pylist()
     known = families()
@@ -110,15 +118,19 @@ def main() -> None:
     total = options.problems or sum(wanted.values())
     with tempfile.TemporaryDirectory() as folder:
         part = options.keep or Path(folder) / "part"
-        busy = time.process_time()
         if not part.is_dir():
             build_site(None, part, options.collection)
-        print(f"drawn       {len(rows)} problems, {time.process_time() - busy:.0f} s of CPU")
         each = sizes(part, rows)
         bytes_ = sum(count * each.get(name, mean(each.values())) for name, count in wanted.items())
         lacking = [name for name in wanted if name not in each]
-        print(f"size        {bytes_ / 1e6:.0f} MB for {sum(wanted.values())} problems")
-        print(f"  by the mean of others: {', '.join(lacking) or 'none'}")
+        size = {
+            "problems": sum(wanted.values()),
+            "drawn for it": len(rows),
+            "families drawn": len(wanted) - len(lacking),
+            "families": len(wanted),
+            "views and pictures [MB]": bytes_ / 1e6,
+        }
+        print(_results.table(list(size), [size]))
         base = Path(folder) / "many"
         base.mkdir()
         catalog.write_catalog(base / catalog.FILE, many(rows, total))
@@ -129,8 +141,26 @@ def main() -> None:
         for k in range(total):
             shutil.copyfile(pictures[k % len(pictures)], site / "thumbs" / f"{k}.webp")
         (site / "data" / "catalogue.js").write_text(with_pictures(site, total), encoding="utf-8")
-        for name, seconds in opened(site).items():
-            print(f"{name:16}{seconds:.3f} s")
+        pages = [
+            {"what": name, "CPU [s]": cpu, "clock [s]": seconds}
+            for name, (seconds, cpu) in opened(site).items()
+        ]
+    print(_results.table(list(pages[0]), pages))
+    if options.results:
+        others = f" By the mean of all others: {', '.join(lacking)}." if lacking else ""
+        _results.store(
+            options.results,
+            [size],
+            title="The site of the set extended",
+            note=f"Each family's problems are taken as large as those drawn of it.{others}",
+        )
+        _results.store(
+            f"{options.results}-pages",
+            pages,
+            title=f"A catalogue of {total} problems with small pictures",
+            note=f"Medians of {REPEATS} or more, in Chromium without a graphics card; "
+            "other programs used the machine, so CPU time tells more.",
+        )
 
 
 def with_pictures(site: Path, total: int) -> str:

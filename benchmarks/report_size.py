@@ -1,10 +1,11 @@
 """What a report of a large campaign costs: to build, to keep, and to open in a browser.
 
-    python benchmarks/report_size.py [--problems 5000] [--solvers 40] [--out FOLDER]
+    python benchmarks/report_size.py [--problems 5000] [--solvers 40] [--results NAME]
 
 The runs are made up. The times to open need Playwright and a Chromium: from the call to the moment
 that the page shows what it is about, the files in the system's cache; and how much of that its main
-thread computed, which tells more where others use the machine.
+thread computed, which tells more where others use the machine. `--results NAME` stores two tables,
+NAME of the build and NAME-pages of the opening.
 """
 
 from __future__ import annotations
@@ -14,13 +15,18 @@ import hashlib
 import random
 import resource
 import shutil
+import statistics
 import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
+import _results
+
 from fclib.bench import Store
 from fclib.report import Campaigns, build_site
+
+REPEATS = 5  # times that each page is opened
 
 
 def fill(path: Path, problems: int, solvers: int) -> None:
@@ -70,16 +76,16 @@ def run(draw: random.Random, problem: int, solver: int) -> tuple[Any, ...]:
 
 
 def open_pages(site: Path) -> dict[str, tuple[float, float]]:
-    """Seconds, and of CPU, until each page shows what it is about; medians of five."""
+    """Seconds, and of CPU, until each page shows what it is about; medians."""
     from playwright.sync_api import sync_playwright
 
     marks = {
-        "overview": ("#/overview", "main table tbody tr"),
-        "its profile": ("#/overview", "main .plot[data-drawn]"),
-        "profiles": ("#/profiles", "main table tbody tr"),
-        "its curves": ("#/profiles", "main .plot[data-drawn]"),
+        "overview, its table of solvers": ("#/overview", "main table tbody tr"),
+        "overview, its first profile": ("#/overview", "main .plot[data-drawn]"),
         "catalogue": ("#/catalogue", "main table tbody tr"),
-        "problem": ("#/problem/Family1/00001", "main table tbody tr"),
+        "a problem": ("#/problem/Family1/00001", "main table tbody tr"),
+        "profiles, their table of statuses": ("#/profiles", "main table tbody tr"),
+        "profiles, their curves": ("#/profiles", "main .plot[data-drawn]"),
     }
     found: dict[str, tuple[float, float]] = {}
     with sync_playwright() as playwright:
@@ -87,7 +93,7 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for name, (address, mark) in marks.items():
             times, busy = [], []
-            for _ in range(5):
+            for _ in range(REPEATS):
                 page = browser.new_page()
                 tools = page.context.new_cdp_session(page)
                 tools.send("Performance.enable", {"timeDomain": "threadTicks"})
@@ -98,7 +104,7 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
                 metrics = tools.send("Performance.getMetrics")["metrics"]
                 busy.append(next(m["value"] for m in metrics if m["name"] == "TaskDuration"))
                 page.close()
-            found[name] = sorted(times)[2], sorted(busy)[2]
+            found[name] = statistics.median(times), statistics.median(busy)
         browser.close()
     return found
 
@@ -109,28 +115,45 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=5000)
     parser.add_argument("--solvers", type=int, default=40)
     parser.add_argument("--out", type=Path, help="keep the site here")
+    _results.add_option(parser)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         store = Path(folder) / "runs.sqlite"
         fill(store, options.problems, options.solvers)
         site = options.out or Path(folder) / "site"
-        start, busy = time.perf_counter(), time.process_time()
+        busy = time.process_time()
         with Campaigns([store]) as campaigns:
             counts = build_site(campaigns, site, views=0)
         busy = time.process_time() - busy
-        print(f"built       {time.perf_counter() - start:.1f} s, {busy:.1f} s of CPU")
-        print(f"runs        {counts['runs']}")
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        print(f"memory      {memory:.0f} MB")
-        files = list((site / "data").rglob("*.js"))
-        print(f"data        {counts['bytes'] / 1e6:.1f} MB in {len(files)} files")
+        built = {
+            "runs": counts["runs"],
+            "CPU [s]": busy,
+            "memory [MB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+            "data [MB]": counts["bytes"] / 1e6,
+            "files": len(list((site / "data").rglob("*.js"))),
+        }
+        print(_results.table(list(built), [built]))
         for name in ("site", "catalogue", "t0", "t0-cpu_s"):
             print(f"  {name:10}{(site / 'data' / f'{name}.js').stat().st_size / 1e6:.2f} MB")
         try:
-            for name, (seconds, busy) in open_pages(site).items():
-                print(f"open {name:12}{seconds:.2f} s, {busy:.2f} s of CPU")
+            opened = open_pages(site)
         except ImportError:
-            print("the times to open need Playwright")
+            parser.exit(1, "the times to open need Playwright\n")
+    pages = [
+        {"page": name, "CPU [s]": busy, "clock [s]": seconds}
+        for name, (seconds, busy) in opened.items()
+    ]
+    print(_results.table(list(pages[0]), pages))
+    if options.results:
+        about = f"{options.problems} made-up problems by {options.solvers} solvers"
+        _results.store(options.results, [built], title=f"A site of {about}")
+        _results.store(
+            f"{options.results}-pages",
+            pages,
+            title=f"Pages of a site of {about}, until each shows what it is about",
+            note=f"Medians of {REPEATS}, in Chromium without a graphics card; "
+            "other programs used the machine, so CPU time tells more.",
+        )
 
 
 if __name__ == "__main__":

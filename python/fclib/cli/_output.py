@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from enum import StrEnum
+from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
@@ -35,11 +35,13 @@ if not out.is_terminal:
 err = Console(stderr=True, soft_wrap=True, markup=False, emoji=False)
 
 
-class MeritKind(StrEnum):
-    """What a tolerance bounds."""
+class MeritKind(str, Enum):
+    """What a tolerance bounds; StrEnum would need Python 3.11."""
 
     both = "both"
     natural = "natural"
+
+    __str__ = str.__str__
 
 
 WRAPPED = (

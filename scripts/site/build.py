@@ -31,6 +31,8 @@ AS_THEY_ARE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
 }
+MODULE = ROOT / "build" / "wasm" / "fclib"
+MODULE_FILES = ("fclib.js", "fclib-core.mjs", "fclib-core.wasm")
 # the menu; FOLDER/* stands for the generated pages of a folder
 MENU = {
     "Start": [
@@ -40,7 +42,7 @@ MENU = {
         "tutorial-embed",
         "examples/index",
     ],
-    "The problem": ["mathematics", "format", "analysis", "glossary"],
+    "The problem": ["contact-problem", "mathematics", "format", "analysis", "glossary"],
     "The collection": [
         "collection",
         "family-groups",
@@ -81,6 +83,12 @@ div.math math { margin: 0.4em 0; }
 article img { max-width: 100%; height: auto; }
 article table { font-size: 0.85em; }
 article .align-right { margin: 0 0 1em 1.5em; }
+.contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
+.contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }
+.contact-pictures svg[tabindex] { cursor: grab; }
+.contact-sliders { display: grid; gap: 0.3em 1.5em; grid-template-columns: repeat(auto-fill, minmax(14em, 1fr)); }
+.contact-sliders label { display: grid; font-size: 0.85em; }
+.contact-says { font-size: 0.85em; opacity: 0.85; }
 @media (max-width: 46em) { article .align-right { float: none; margin: 1em 0; } }
 """
 
@@ -90,12 +98,25 @@ def pages(quick: bool) -> Iterator[tuple[str, str | bytes]]:
     for source, page in AS_THEY_ARE.items():
         yield page, (ROOT / source).read_text(encoding="utf-8")
     yield "_static/site.css", STYLE
+    yield from figures()
     yield from families.pages(draws=not quick)
     yield from solvers.pages(ROOT)
     yield from commands.pages()
     yield from python_api.pages()
     yield from c_api.pages(ROOT)
     yield from examples.pages(ROOT, runs=not quick)
+
+
+def figures() -> Iterator[tuple[str, str | bytes]]:
+    """What solves on docs/contact-problem.md, where `make wasm` has built the module for it."""
+    script = (HERE / "assets" / "contact.js").read_text(encoding="utf-8")
+    if all((MODULE / name).is_file() for name in MODULE_FILES):
+        script = script.replace("const BUILT = false", "const BUILT = true")
+        for name in MODULE_FILES:
+            yield f"_static/browser/{name}", (MODULE / name).read_bytes()
+    else:
+        print("docs/contact-problem.md has pictures alone: make wasm makes them figures to play with")
+    yield "_static/contact.js", script
 
 
 def gather(folder: Path, quick: bool) -> None:

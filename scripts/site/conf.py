@@ -30,6 +30,7 @@ html_copy_source = False
 html_show_sphinx = False
 html_show_copyright = False
 html_css_files = ["site.css"]
+html_js_files = [("contact.js", {"defer": "defer"})]
 copybutton_exclude = ".linenos, .gp, .go"
 
 

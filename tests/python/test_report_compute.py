@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import shutil
 import signal
@@ -13,13 +14,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 import browser_module
+import fclib
 import golden_work
 from fclib.cli import app
 from fclib.report import ReportError, browser, build_site, serving
+from fclib.report.solids import solids_of
+from fclib.report.view import view_of
+from helpers import planted_global, planted_local
 from helpers_report import read_data
 
 pytest.importorskip("pyarrow")
@@ -157,8 +163,23 @@ def test_a_tower_is_checked_and_solved_on_its_page(page: Any, site: Path) -> Non
     def newest() -> list[str]:
         return [str(cell).strip() for cell in rows.first.locator("th, td").all_inner_texts()]
 
-    for count, solver in enumerate(("auto", "nsgs")):
-        page.locator("select:has(option[value=nsgs])").select_option(solver)
+    # its options come from the solver's list, with units and bounds, and are heard
+    solvers = page.locator("select:has(option[value=nsgs])").first
+    solvers.select_option("nsgs")
+    page.get_by_text("Options of nsgs").click()
+    relaxation = page.get_by_label("relaxation", exact=True)
+    lowest, highest = relaxation.get_attribute("min"), relaxation.get_attribute("max")
+    option = next(one for one in fclib.find_solver("nsgs").options if one.name == "relaxation")
+    assert (float(lowest), float(highest)) == (option.lowest, option.highest)
+    relaxation.fill(str(2 * option.highest))
+    start.click()
+    with pytest.raises(fclib.OptionError) as refused:
+        fclib.solve(planted_local(1).problem, "nsgs", relaxation=2 * option.highest)
+    page.get_by_text(str(refused.value)).wait_for()
+    solvers.select_option("auto")
+
+    for count, solver in enumerate(("auto", "nsgs", "admm")):
+        solvers.select_option(solver)
         start.click()
         page.get_by_text(re.compile(f"^{solver}: converged after")).wait_for()
         rows.nth(count).wait_for()
@@ -166,6 +187,9 @@ def test_a_tower_is_checked_and_solved_on_its_page(page: Any, site: Path) -> Non
         assert found[:3] == [solver, "1e-8", "converged"]
         assert float(found[5]) <= 1e-8
     assert page.locator("svg.curve polyline").get_attribute("points")
+
+    # the picture follows the iterates
+    assert page.evaluate("document.querySelector('figure.live').drawn") > 3
 
     # without an end: it is watched and stopped, and the page lives on
     page.get_by_label("tolerance", exact=True).fill("0")
@@ -179,8 +203,8 @@ def test_a_tower_is_checked_and_solved_on_its_page(page: Any, site: Path) -> Non
         }).observe(document.querySelector("main"), { childList: true, subtree: true })"""
     )
     start.click()
-    page.get_by_text(re.compile("nsgs: interrupted after")).wait_for()
-    rows.nth(2).wait_for()
+    page.get_by_text(re.compile("admm: interrupted after")).wait_for()
+    rows.nth(3).wait_for()
     found = newest()
     assert found[2] == "interrupted"
     assert float(found[5]) > 0
@@ -196,3 +220,148 @@ def test_a_tower_is_checked_and_solved_on_its_page(page: Any, site: Path) -> Non
     page.goto((site / "index.html").as_uri() + TOWER)
     page.get_by_text(f"fclib report --serve --out '{site}'").wait_for()
     assert page.get_by_role("button", name="Check it here").count() == 0
+
+
+def move(page: Any, slider: str, values: list[float]) -> None:
+    """Drag a slider of the panel through values, one a picture of the screen."""
+    page.locator(f".what-if input[aria-label^='{slider}']").evaluate(
+        """async (input, values) => {
+          for (const value of values) {
+            input.value = value;
+            input.dispatchEvent(new Event("input"));
+            await new Promise(requestAnimationFrame);
+          }
+        }""",
+        values,
+    )
+
+
+def counts(page: Any) -> dict[str, int]:
+    """The contacts of each status that the panel tells, once it has followed."""
+    page.wait_for_function("document.querySelector('.what-if').ariaBusy === 'false'")
+    said = page.locator(".what-if [role=status]").inner_text()
+    return {name: int(count) for count, name in re.findall(r"(\d+) (open|stick|slide)", said)}
+
+
+@pytest.mark.slow
+def test_a_tower_slides_where_friction_is_taken_from_it(page: Any) -> None:
+    page.get_by_role("button", name="What if").click()
+    page.locator(".what-if").wait_for()
+    at_rest = counts(page)
+    assert at_rest == {"open": 0, "stick": 144, "slide": 0}
+    move(page, "turn of f, from z to x", [2, 4, 6, 8, 10, 12])
+    turned = counts(page)
+    move(page, "μ", [0.7 - 0.02 * k for k in range(31)])
+    slippery = counts(page)
+    assert sum(slippery.values()) == 144
+    assert slippery["slide"] > turned["slide"] + 50
+
+    # so it does natively; reactions are not unique here, and a status is its reaction's
+    problem: Any = fclib.read(golden_work.TINY / "KaplasTower" / "0030-global.hdf5")
+    f = problem.f.copy().reshape(-1, 6)
+    angle = np.radians(12)
+    x, z = f[:, 0].copy(), f[:, 2].copy()
+    f[:, 0], f[:, 2] = np.cos(angle) * x + np.sin(angle) * z, np.cos(angle) * z - np.sin(angle) * x
+    changed = problem.replace(f=f.ravel(), mu=np.full(144, 0.1))
+    status = list(fclib.contact_merits(changed, fclib.solve(changed).solution)["status"])
+    assert min(slippery["slide"], status.count("slide")) > turned["slide"] + 50
+
+    # one contact alone, a gap that opens it, a load without weight
+    page.get_by_role("button", name="Reset").click()
+    assert counts(page) == at_rest
+    page.get_by_label("μ and gap of contact").fill("5")
+    move(page, "gap over time step", [200])
+    assert counts(page)["open"] >= 1
+    page.get_by_role("button", name="Reset").click()
+    move(page, "size of f", [0])
+    counts(page)
+    page.get_by_label("μ and gap of contact").fill("144")
+    page.get_by_text("there is none of the number 144; they go from 0 to 143").wait_for()
+    assert page.evaluate("document.querySelector('figure.live').drawn") > 10
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.mark.slow
+def test_a_file_of_ones_own_is_read_drawn_and_solved(page: Any, tmp_path: Path) -> None:
+    page.get_by_role("link", name="Your file").click()
+    page.get_by_role("heading", name="Your own file").wait_for()
+    chooser = page.locator("input[type=file]")
+    for path in sorted(golden_work.TINY.glob("*/*.hdf5")):
+        problem: Any = fclib.read(path)
+        chooser.set_input_files(path)
+        facts = page.locator("dl.facts", has_text=path.name)
+        facts.wait_for()
+        words = dict(re.findall(r"(.+)\n(.+)", facts.inner_text()))
+        assert words["formulation"] == problem.formulation
+        assert int(words["contacts"]) == problem.nc
+    assert page.locator("figure.live canvas").count() == 1
+
+    page.get_by_role("button", name="Solve it here").click()
+    page.get_by_role("button", name="Start").click()
+    page.get_by_text(re.compile("^auto: converged after")).wait_for()
+
+    # a text of Siconos, a file of several problems, and what is none
+    local, whole = planted_local(3), planted_global(3)
+    text = tmp_path / "text.dat"
+    fclib.write_siconos(text, local.problem)
+    chooser.set_input_files(text)
+    page.locator("dl.facts", has_text="text.dat").wait_for()
+    bad = tmp_path / "bad.hdf5"
+    for content in (b"3 2 0 six", b"\x89HDF", path.read_bytes()[:700]):
+        bad.write_bytes(content)
+        with pytest.raises(fclib.Error) as native:
+            (fclib.read if content[0] == 0x89 else fclib.read_siconos)(bad)
+        chooser.set_input_files(bad)
+        message = str(native.value).replace(str(bad), bad.name)
+        page.get_by_text(message, exact=True).wait_for()
+    both = tmp_path / "both.hdf5"
+    fclib.write(both, whole.problem, whole.solution)
+    chooser.set_input_files(both)
+    page.get_by_role("button", name="Check it here").click()
+    page.locator("table", has_text="of the file: its merits").locator("tbody tr").first.wait_for()
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+@pytest.mark.slow
+def test_a_file_is_drawn_where_python_draws_it(page: Any, tmp_path: Path) -> None:
+    """Shapes of all kinds and contact points, of a periodic cell too, from the bytes of a file."""
+    from fclib.collections import known, trajectory
+
+    problems: dict[str, Any] = {}
+    for family in ("Chute", "Carrier", "Humanoid", "PeriodicBox"):
+        plan = known.plan_of(f"standard/{family}")
+        assert plan is not None
+        assert plan.trajectory is not None
+        problems[family] = trajectory.read(plan.trajectory).problem(0).problem
+    kinds = set()
+    for name, problem in problems.items():
+        path = tmp_path / f"{name}.hdf5"
+        fclib.write(path, problem)
+        solids = solids_of(problem.bodies, problem.contacts)
+        kinds |= set(problem.bodies.shape_kind.tolist())
+        found = page.evaluate(
+            """async (data) => {
+              const fclib = await Fclib.core();
+              const bytes = Uint8Array.from(atob(data), (one) => one.charCodeAt(0));
+              const { problem } = await fclib.read(bytes);
+              const { network, solids } = await Fclib.viewOf(fclib, problem);
+              const corners = solids.kind.map((_, k) => Fclib.corners(solids, k));
+              return { corners, network, period: solids.period ?? null };
+            }""",
+            base64.b64encode(path.read_bytes()).decode(),
+        )
+        for shape, corners in enumerate(found["corners"]):
+            apart = np.abs(np.array(corners) - solids.world(shape)).max()
+            assert apart < 1e-9 * max(1.0, solids.reach(shape)), (name, shape)
+        drawn = view_of(problem)["network"]
+        own = found["network"]
+        np.testing.assert_allclose(own["points"], drawn["points"], rtol=1e-6, atol=1e-6)
+        assert own["pairs"] == drawn["pairs"]
+        for key in ("limits", "crossing"):
+            assert own.get(key, []) == drawn.get(key, [])
+        np.testing.assert_allclose(
+            own.get("images", []), drawn.get("images", []), rtol=1e-4, atol=1e-4
+        )
+        assert (found["period"] or []) == solids.period.tolist()
+    assert {0, 1, 2, 3, 5, 6} <= kinds
+    assert len(problems["PeriodicBox"].bodies.period) == 2

@@ -42,7 +42,8 @@ MARK = "data/site.js"  # by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
     *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
-    *("scene.js", "profiles.js", "take.js", "compute.js", "choose.js", "pages.js", "site.js"),
+    *("scene.js", "profiles.js", "take.js", "live.js", "whatif.js", "compute.js", "own.js"),
+    *("choose.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
 COLUMNS: tuple[tuple[str, str, str], ...] = (

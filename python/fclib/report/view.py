@@ -102,6 +102,9 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
         record["network"]["images"] = rounded((network.points - network.shifts)[crossing])
     if network.frames is not None:
         record["network"]["normals"] = rounded(network.frames[:, :, 0])
+        if network.source == "H":
+            # a page turns reactions of its own into forces; a file's contacts say them
+            record["network"]["tangents"] = rounded(network.frames[:, :, 1])
     if solution is not None:
         record.update(_solved(problem, solution, network))
     return record

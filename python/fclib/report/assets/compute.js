@@ -8,9 +8,10 @@
   const GRACE = 5; // [s] after which a solver that did not look at its limit is ended
   const SAME = 1e-12;
   const MOST = 1000; // points of the curve
+  const EDGE = 1e-6; // of a cone: what is so near to it, relative, is at it
 
   let worker = null;
-  const core = async () => {
+  const core = Fclib.core = async () => {
     const { FclibWorker } = await import(new URL(MODULE, document.baseURI).href);
     return worker ||= new FclibWorker();
   };
@@ -36,9 +37,10 @@
     return apart <= SAME * Math.max(1, Math.abs(stored)) ? "equal to 1e-12" : `differs by ${number(apart)}`;
   };
   const meritTable = (stored, here) => Fclib.table({
-    caption: "The stored solution: stored merits, and those recomputed here", page: 60,
-    rows: Fclib.values.site.merits.filter(([name]) => name in stored).map(([name, doc]) => ({ name, doc, stored: stored[name], here: here[name], same: compared(stored[name], here[name]) })),
-    columns: [{ key: "name", label: "part", head: true }, { key: "stored", label: "stored", type: "number" }, { key: "here", label: "here", type: "number" }, { key: "same", label: "compared", cell: (r) => h("span", { class: r.same.startsWith("differs") || r.same.startsWith("one") ? "bad" : "good" }, r.same) }, { key: "doc", label: "what it is", wrap: true }],
+    caption: stored ? "The stored solution: stored merits, and those recomputed here" : "The solution of the file: its merits, computed here", page: 60,
+    rows: Fclib.values.site.merits.filter(([name]) => name in (stored || here)).map(([name, doc]) => ({ name, doc, here: here[name], ...stored ? { stored: stored[name], same: compared(stored[name], here[name]) } : {} })),
+    columns: [{ key: "name", label: "part", head: true }, ...stored ? [{ key: "stored", label: "stored", type: "number" }] : [], { key: "here", label: "here", type: "number" },
+      ...stored ? [{ key: "same", label: "compared", cell: (r) => h("span", { class: r.same.startsWith("differs") || r.same.startsWith("one") ? "bad" : "good" }, r.same) }] : [], { key: "doc", label: "what it is", wrap: true }],
   });
 
   /* the error over time, as it falls */
@@ -72,24 +74,57 @@
     } };
   };
 
-  /* solver, tolerance and limits, the error as it falls, a stop, and what came out */
-  const solving = (problem, solvers, attempt) => {
-    const chosen = h("select", {}, [...solvers].sort((a, b) => (b.name === "auto") - (a.name === "auto")).map(({ name, title }) => h("option", { value: name, title }, name)));
+  /* the options of a solver as fields: their values where they are not the defaults */
+  const optionsOf = ({ name, options }) => {
+    const fields = options.map((option) => {
+      const { type, lowest, highest, choices } = option, start = option.default, bounded = (x) => Number.isFinite(x) ? x : null;
+      const range = [Number.isFinite(lowest) && `from ${number(lowest)}`, Number.isFinite(highest) && `to ${number(highest)}`].filter(Boolean).join(" ");
+      const input = type === "bool" ? h("input", { type: "checkbox", checked: start })
+        : choices.length ? h("select", {}, choices.map((one) => h("option", { value: one, selected: one === start }, one)))
+          : type === "text" ? h("input", { type: "text", value: start })
+            : h("input", { type: "number", step: type === "int" ? 1 : "any", min: bounded(lowest), max: bounded(highest), value: String(start) });
+      const value = () => {
+        if (type === "bool") return input.checked;
+        if (choices.length || type === "text") return input.value;
+        if (input.value === "") throw new Error(`${option.name}: not a number`);
+        return Number(input.value);
+      };
+      const unit = option.unit && option.unit !== "1" ? ` [${option.unit}]` : "";
+      // a field may write its default otherwise: what is not touched is left out
+      return { name: option.name, value, start: value(), row: h("div", { class: "option" }, h("label", { class: type === "bool" ? "check" : null }, `${option.name}${unit}`, input), h("span", { class: "small soft" }, Fclib.prose(option.doc), range && ` (${range})`)) };
+    });
+    const box = fields.length ? h("details", {}, h("summary", {}, `Options of ${name}`), fields.map(({ row }) => row)) : h("p", { class: "small soft" }, `${name} has no options.`);
+    return { box, values: () => Object.fromEntries(fields.map((one) => [one.name, one.value(), one.start]).filter(([, value, start]) => value !== start)) };
+  };
+
+  /* the contacts as a picture colours them by reactions alone: without one, inside the cone, at its edge */
+  const byCone = (problem, r) => {
+    const d = problem.spacedim, parts = d === 2 || (d === 3 && "mu_r" in problem) ? 2 : 3;
+    return Array.from(problem.mu, (mu, k) => { const t = Math.hypot(...r.slice(d * k + 1, d * k + parts)); return r[d * k] <= 0 ? 0 : t < (1 - EDGE) * mu * r[d * k] ? 1 : 2; }).join("");
+  };
+
+  /* solver, its options, tolerance and limits, the error as it falls, a stop, and what came out */
+  const solving = (problem, solvers, attempt, figure, show) => {
+    const settings = h("div", {});
+    let own = null;
+    const choose = () => { own = optionsOf(solvers.find(({ name }) => name === chosen.value)); settings.replaceChildren(own.box); };
+    const chosen = h("select", { onchange: () => choose() }, [...solvers].sort((a, b) => (b.name === "auto") - (a.name === "auto")).map(({ name, title }) => h("option", { value: name, title }, name)));
     const tolerance = field("tolerance", { value: "1e-8", min: 0 }), limit = field("time limit [s]", { value: String(LIMIT), min: 0.1 }), most = field("iterations", { value: "", min: 1, step: 1, placeholder: "its own" });
     const live = h("p", { class: "small", role: "status" }), picture = h("div", {});
     const rows = [], table = h("div", {});
     let run = null;
     const stop = h("button", { type: "button", disabled: true, onclick: () => run && run.stop() }, "Stop");
     const start = h("button", { type: "button", onclick: () => attempt(start, "", async () => {
-      const tol = tolerance.value(0), seconds = limit.value(0.1), iterations = most.value(1, null), solver = chosen.value;
+      const tol = tolerance.value(0), seconds = limit.value(0.1), iterations = most.value(1, null), solver = chosen.value, options = own.values();
       const drawn = curve(), fclib = await core();
       picture.replaceChildren(drawn.svg);
       live.textContent = `${solver} runs`;
       const began = performance.now();
       const passed = () => (performance.now() - began) / 1e3;
-      run = fclib.solve(problem, { solver, tol, time_limit: seconds, max_iterations: iterations }, ({ iteration, error, points }) => {
+      run = fclib.solve(problem, { solver, tol, time_limit: seconds, max_iterations: iterations, options }, ({ iteration, error, points, r }) => {
         live.textContent = `${solver}: iteration ${iteration}, error ${number(error)}, ${number(passed(), 2)} s`;
         drawn.add(points);
+        if (figure && r) figure.show(show(r, byCone(problem, r)));
       });
       stop.disabled = false;
       const guard = setTimeout(() => run.stop(), 1e3 * (seconds + GRACE));
@@ -100,8 +135,12 @@
       live.textContent = `${solver}: ${result.status} after ${result.iterations} iterations and ${number(time, 2)} s`;
       let merit = {}, why = null;
       // one that was stopped early has no reactions, or none of bilateral constraints
-      try { merit = await fclib.merit(problem, result.solution); } catch (error) { why = error; }
-      rows.unshift({ solver, tol, status: result.status, iterations: result.iterations, time, merit });
+      try {
+        merit = await fclib.merit(problem, result.solution);
+        if (figure) figure.show(show(result.solution.r, Fclib.digits((await fclib.contact_merits(problem, result.solution)).status)));
+      } catch (error) { why = error; }
+      if (result.certificate) live.textContent += `; ${proof(await fclib.check_certificate(problem, result.certificate.y, result.certificate.z))}`;
+      rows.unshift({ solver: Object.keys(options).length ? `${solver} ${Object.entries(options).map(([key, value]) => `${key}=${value}`).join(" ")}` : solver, tol, status: result.status, iterations: result.iterations, time, merit });
       table.replaceChildren(Fclib.table({
         caption: "What was solved here, the last first; its merits are recomputed from what the solver returned", rows, page: 20,
         columns: [{ key: "solver", label: "solver", head: true }, { key: "tol", label: "tolerance", format: Fclib.tolerance }, { key: "status", label: "status", cell: (r) => h("span", { class: r.status === "converged" ? "good" : "bad" }, r.status) }, { key: "iterations", label: "iterations", type: "number" }, { key: "time", label: "time [s]", type: "number" },
@@ -109,27 +148,18 @@
       }));
       if (why) throw new Error(`The reactions of ${solver} cannot be judged: ${why.message}`);
     }) }, "Start");
-    return [h("div", { class: "controls" }, h("label", {}, "solver", chosen), tolerance.label, limit.label, most.label, start, stop), live, picture, table];
+    choose();
+    return [h("div", { class: "controls" }, h("label", {}, "solver", chosen), tolerance.label, limit.label, most.label, start, stop), settings, live, picture, table];
   };
 
-  /* the panel of a problem whose files the site has, where it has the module too */
-  Fclib.computeIt = (record) => {
-    const files = (record.files || []).filter((one) => one.path.endsWith(".hdf5") && (one.href || "").startsWith("files/"));
-    const bytes = Fclib.values.site.module;
-    if (!files.length || !bytes) return [];
-    const head = h("h2", { id: "compute" }, "Check it here, solve it here");
-    if (location.protocol === "file:") {
-      const folder = decodeURIComponent(location.pathname).replace(/\/[^/]*$/, "");
-      return [head, h("p", {}, "This page can check the stored solution, and solve the problem, in your browser; but a browser loads no module from a folder of files. This serves the site to this machine alone:"),
-        copyable(`fclib report --serve --out '${folder.replaceAll("'", "'\\''")}'`, "the command that serves the site")];
-    }
-    const said = h("p", { class: "small", role: "status" }), merits = h("div", {}), solved = h("div", {});
-    let file = files[0];
-    const opened = new Map();
-    const contents = (one) => {
-      if (!opened.has(one)) opened.set(one, read(one).catch((error) => { opened.delete(one); throw error; }));
-      return opened.get(one);
-    };
+  /* what a certificate proves, once it has been checked */
+  const proof = (found) => !found ? "the certificate proves nothing" : found.bound === Infinity ? "the certificate proves that there is no solution" : `the certificate proves that there is no solution of a norm below ${number(found.bound)}`;
+
+  /* check, solve and change a problem: buttons, and what they bring
+     source(): {read() -> {problem, solution}, merit: as stored, view: as drawn, name}; it is asked at each press */
+  Fclib.panel = (source, more) => {
+    const said = h("p", { class: "small", role: "status" }), merits = h("div", {}), seen = h("div", {}), solved = h("div", {}), changed = h("div", {});
+    let figure = null;
     const attempt = async (button, text, act) => {
       button.disabled = true;
       said.className = "small";
@@ -137,22 +167,62 @@
       try { await act(); said.textContent = ""; } catch (error) { said.className = "small bad"; said.textContent = error.message; }
       button.disabled = false;
     };
+    const live = ({ view, name }) => {
+      if (!figure && view && view.network) { figure = Fclib.live(view, name); seen.replaceChildren(figure); }
+      return figure;
+    };
     const check = h("button", { type: "button", onclick: () => attempt(check, "The file is read and its solution judged.", async () => {
-      const own = file, { problem, solution } = await contents(own);
-      if (!own.merit || !solution) throw new Error("The file has no solution to check.");
+      const own = source(), { problem, solution } = await own.read();
+      if (!solution) throw new Error("The file has no solution to check.");
       const here = await (await core()).merit(problem, solution);
-      if (own === file) merits.replaceChildren(meritTable(own.merit, here));
+      if (own.current()) merits.replaceChildren(meritTable(own.merit, here));
     }) }, "Check it here");
+    const prepared = async () => {
+      const own = source(), { problem, solution } = await own.read(), fclib = await core(), solvers = await fclib.solvers_for(problem);
+      if (!own.current()) return null;
+      own.view ||= await Fclib.viewOf(fclib, problem);
+      const picture = live(own);
+      return { own, problem, solution, fclib, solvers, picture, show: picture && Fclib.shower(problem, own.view) };
+    };
     const solve = h("button", { type: "button", onclick: () => attempt(solve, "The file is read.", async () => {
-      const own = file, { problem } = await contents(own), solvers = await (await core()).solvers_for(problem);
-      if (own === file) solved.replaceChildren(...solving(problem, solvers, attempt));
+      const found = await prepared();
+      if (found) solved.replaceChildren(...solving(found.problem, found.solvers, attempt, found.picture, found.show));
     }) }, "Solve it here");
+    const say = (text) => { said.className = "small bad"; said.textContent = text; };
+    const change = h("button", { type: "button", onclick: () => attempt(change, "The file is read.", async () => {
+      const found = await prepared();
+      if (found) changed.replaceChildren(await Fclib.whatIf(found.fclib, found.problem, found.solution, found.own.view, found.picture, found.solvers, say));
+    }) }, "What if");
+    const clear = () => { figure = null; for (const box of [merits, seen, solved, changed]) box.replaceChildren(); };
+    return { clear, show: () => live(source()), elements: [h("div", { class: "controls" }, more, check, solve, change), said, merits, changed, seen, solved] };
+  };
+
+  /* what a page says that was opened from a folder of files */
+  Fclib.servedBy = (words) => {
+    const folder = decodeURIComponent(location.pathname).replace(/\/[^/]*$/, "");
+    return [h("p", {}, `${words} This serves the site to this machine alone:`), copyable(`fclib report --serve --out '${folder.replaceAll("'", "'\\''")}'`, "the command that serves the site")];
+  };
+
+  /* the panel of a problem whose files the site has, where it has the module too */
+  Fclib.computeIt = (record, view, name) => {
+    const files = (record.files || []).filter((one) => one.path.endsWith(".hdf5") && (one.href || "").startsWith("files/"));
+    const bytes = Fclib.values.site.module;
+    if (!files.length || !bytes) return [];
+    const head = h("h2", { id: "compute" }, "Check it, solve it, change it here");
+    if (location.protocol === "file:") return [head, ...Fclib.servedBy("This page can check the stored solution, solve the problem and change it, in your browser; but a browser loads no module from a folder of files.")];
+    let file = files[0];
+    const opened = new Map();
+    const contents = (one) => {
+      if (!opened.has(one)) opened.set(one, read(one).catch((error) => { opened.delete(one); throw error; }));
+      return opened.get(one);
+    };
+    const source = () => { const own = file; return { read: () => contents(own), current: () => own === file, merit: own.merit, view, name: `${name}-here` }; };
     const form = files.length > 1 ? h("label", {}, "file", h("select", { onchange: (e) => {
       if (worker) worker.close();
       file = files[Number(e.target.value)];
-      merits.replaceChildren();
-      solved.replaceChildren();
+      own.clear();
     } }, files.map((one, k) => h("option", { value: k }, one.what)))) : null;
-    return [head, h("p", { class: "small" }, `By the core itself, in this browser: nothing is sent. ${number(bytes / 1e6)} MB are loaded for it, once.`), h("div", { class: "controls" }, form, check, solve), said, merits, solved];
+    const own = Fclib.panel(source, form);
+    return [head, h("p", { class: "small" }, `By the core itself, in this browser: nothing is sent. ${number(bytes / 1e6)} MB are loaded for it, once.`), ...own.elements];
   };
 })();

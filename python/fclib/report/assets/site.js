@@ -2,7 +2,7 @@
 "use strict";
 (() => {
   const { h } = Fclib;
-  const NAVIGATION = [["overview", "Overview"], ["profiles", "Profiles"], ["catalogue", "Catalogue"], ["families", "Families"], ["solvers", "Solvers"], ["classes", "Open"]];
+  const NAVIGATION = [["overview", "Overview"], ["profiles", "Profiles"], ["catalogue", "Catalogue"], ["families", "Families"], ["solvers", "Solvers"], ["classes", "Open"], ["own", "Your file"]];
   const ABOVE = { family: "families", problem: "catalogue", solver: "solvers" };
   const main = document.querySelector("main");
   let turn = 0;
@@ -44,7 +44,7 @@
   const start = async () => {
     const site = await Fclib.load("site");
     const nav = document.querySelector("nav");
-    const there = NAVIGATION.filter(([page]) => site.tolerances.length || page !== "profiles");
+    const there = NAVIGATION.filter(([page]) => (site.tolerances.length || page !== "profiles") && (site.module || page !== "own"));
     nav.append(...there.map(([page, name]) => h("a", { href: Fclib.to(page), "data-page": page }, name)));
     nav.after(Fclib.themeButton());
     document.querySelector("footer").append(`Made by fclib report, FCLIB ${site.version}. Costs have six digits. `, Fclib.link("about", [], {}, "About this site"));

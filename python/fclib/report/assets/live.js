@@ -37,6 +37,8 @@
     const figure = h("figure", { class: "live" }, canvas, h("figcaption", {}, legend, view.network.source === "graph" ? "A network without positions. The size of a disc is that of the reaction, its colour the contact's status." : "An arrow is the force on that body of the two which it lifts, in the scale of the first picture; its colour is the contact's status.", left && ` ${solid.length} faces are too many to be drawn anew at each step: the bodies are left out.`));
     const colours = () => Object.fromEntries([...STATUS, ...TINTS, "body", "line", "text", "normal"].map((key) => [key, colour(key)]));
     let tints = null;
+    const behind = document.createElement("canvas"); // the bodies, which stay where they are while reactions change
+    let known = "";
     document.addEventListener("fclib-theme", () => { tints = null; if (canvas.isConnected) ask(); });
 
     const draw = () => {
@@ -46,32 +48,40 @@
       if (canvas.width !== Math.round(wide * dense)) canvas.width = Math.round(wide * dense);
       if (canvas.height !== Math.round(tall * dense)) canvas.height = Math.round(tall * dense);
       tints ||= colours();
-      const pen = canvas.getContext("2d"), factor = 0.46 * Math.min(wide, 1.35 * tall) / radius * eye.zoom;
+      const factor = 0.46 * Math.min(wide, 1.35 * tall) / radius * eye.zoom;
       const [c, s, p, t] = [Math.cos(eye.turn), Math.sin(eye.turn), Math.cos(eye.tilt), Math.sin(eye.tilt)];
       // to the right, up, towards the eye; without perspective
       const seen = ([x, y, z]) => {
         const [a, b, d] = [x - middle[0], y - middle[1], z - middle[2]], back = c * b - s * a;
         return [wide / 2 + factor * (c * a + s * b), tall / 2 - factor * (p * d + t * back), t * d - p * back];
       };
-      pen.setTransform(dense, 0, 0, dense, 0, 0);
-      pen.clearRect(0, 0, wide, tall);
-      const path = (list) => { pen.beginPath(); list.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y))); pen.closePath(); };
-      pen.fillStyle = tints.line;
-      pen.globalAlpha = 0.3;
-      if (ground.length < FACES) for (const { at } of ground) { path(at.map(seen)); pen.fill(); }
-      if (!left) {
+      const path = (pen, list) => { pen.beginPath(); list.forEach(([x, y], k) => (k ? pen.lineTo(x, y) : pen.moveTo(x, y))); pen.closePath(); };
+      const drawBodies = () => {
+        Object.assign(behind, { width: canvas.width, height: canvas.height });
+        const pen = behind.getContext("2d");
+        pen.setTransform(dense, 0, 0, dense, 0, 0);
+        pen.fillStyle = tints.line;
+        pen.globalAlpha = 0.3;
+        if (ground.length < FACES) for (const { at } of ground) { path(pen, at.map(seen)); pen.fill(); }
+        if (left) return;
         // those that face the eye, from behind to the front
         const light = ({ normal: [x, y, z] }) => p * (s * x - c * y) + t * z;
         const shades = solid.map((face) => ({ ...face, light: light(face) })).filter((face) => face.light > 0 || !solids);
         for (const face of shades) { face.own = face.at.map(seen); face.deep = face.own[0][2] + face.own[1][2] + face.own[2][2]; }
         for (const { own, tint, light: bright } of shades.sort((a, b) => a.deep - b.deep)) {
-          path(own);
+          path(pen, own);
           pen.fillStyle = tints[tint];
           pen.globalAlpha = 0.25 + 0.45 * Math.abs(bright);
           pen.fill();
         }
-      }
-      pen.globalAlpha = 1;
+      };
+      const wanted = JSON.stringify([eye, canvas.width, canvas.height, tints]);
+      if (known !== wanted) { drawBodies(); known = wanted; }
+      const pen = canvas.getContext("2d");
+      pen.setTransform(1, 0, 0, 1, 0, 0);
+      pen.clearRect(0, 0, canvas.width, canvas.height);
+      pen.drawImage(behind, 0, 0);
+      pen.setTransform(dense, 0, 0, dense, 0, 0);
       const dot = Math.min(4.5, Math.max(2, 55 / Math.sqrt(points.length || 1)));
       for (const k of chosen) {
         const status = now.status ? STATUS[Number(now.status[k])] : "normal", [x, y] = seen(points[k]);
@@ -83,7 +93,7 @@
             const [ex, ey] = [(tip[0] - x) / long, (tip[1] - y) / long];
             pen.lineWidth = 2;
             pen.beginPath(); pen.moveTo(x, y); pen.lineTo(tip[0] - 0.7 * head * ex, tip[1] - 0.7 * head * ey); pen.stroke();
-            path([tip, [tip[0] - head * ex - 0.4 * head * ey, tip[1] - head * ey + 0.4 * head * ex], [tip[0] - head * ex + 0.4 * head * ey, tip[1] - head * ey - 0.4 * head * ex]]);
+            path(pen, [tip, [tip[0] - head * ex - 0.4 * head * ey, tip[1] - head * ey + 0.4 * head * ex], [tip[0] - head * ex + 0.4 * head * ey, tip[1] - head * ey - 0.4 * head * ex]]);
             pen.fill();
           }
         } else if (size > 0) { pen.globalAlpha = 0.4; pen.beginPath(); pen.arc(x, y, 15 * Math.sqrt(size / largest), 0, 7); pen.fill(); pen.globalAlpha = 1; }

@@ -86,7 +86,9 @@ article .align-right { margin: 0 0 1em 1.5em; }
 .contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
 .contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }
 .contact-pictures svg[tabindex] { cursor: grab; }
-.contact-sliders { display: grid; gap: 0.3em 1.5em; grid-template-columns: repeat(auto-fill, minmax(14em, 1fr)); }
+.contact-sliders {
+  display: grid; gap: 0.3em 1.5em; grid-template-columns: repeat(auto-fill, minmax(14em, 1fr));
+}
 .contact-sliders label { display: grid; font-size: 0.85em; }
 .contact-says { font-size: 0.85em; opacity: 0.85; }
 @media (max-width: 46em) { article .align-right { float: none; margin: 1em 0; } }
@@ -115,7 +117,7 @@ def figures() -> Iterator[tuple[str, str | bytes]]:
         for name in MODULE_FILES:
             yield f"_static/browser/{name}", (MODULE / name).read_bytes()
     else:
-        print("docs/contact-problem.md has pictures alone: make wasm makes them figures to play with")
+        print("docs/contact-problem.md has pictures alone: make wasm makes its figures move")
     yield "_static/contact.js", script
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import re
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from html.parser import HTMLParser
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -171,6 +174,88 @@ def test_pages_in_a_browser(site: Path, browser: Any) -> None:
         if width > PHONE["width"]:
             wrong.append(f"{path.name} is {width} wide on a phone")
     assert not wrong
+
+
+def figure(page: Any, name: str, values: dict[str, float]) -> str:
+    """What a figure says, once its sliders (the starts of their names) are there."""
+    said: str = page.locator(f"div[data-figure={name}][data-alive]").evaluate(
+        """(place, values) => {
+          for (const [label, value] of Object.entries(values)) {
+            const input = [...place.querySelectorAll("input")]
+              .find((one) => one.ariaLabel.startsWith(label));
+            input.value = value;
+            input.dispatchEvent(new Event("input"));
+          }
+          return place.querySelector("[role=status]").textContent;
+        }""",
+        values,
+    )
+    return said
+
+
+def test_figures_of_the_contact_page_are_solved_in_it(site: Path, browser: Any) -> None:
+    """What its text says of them: thresholds of sliding, toppling, jamming and of the arch."""
+    page = browser.new_page(viewport=PHONE)
+    page.set_default_timeout(20_000)
+    page.goto((site / "contact-problem.html").as_uri())
+    # a folder of files keeps the pictures, and says how to have more
+    assert page.locator("img[src*=contact-]").count() == 4
+    if not (site / "_static" / "browser").is_dir():
+        page.close()
+        pytest.skip("the module for browsers is not built: make wasm")
+    assert page.get_by_text("python -m http.server").count() == 4
+    wrong: list[str] = []
+    page.on("console", lambda message: wrong.append(message.text))
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    handler = functools.partial(Quiet, directory=str(site))
+    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}/"
+        page.on(
+            "request",
+            lambda r: None if r.url.startswith((address, "data:")) else wrong.append(r.url),
+        )
+        page.goto(f"{address}contact-problem.html")
+        page.locator("div[data-figure=arch][data-alive]").wait_for()
+        assert page.locator("img[src*=contact-]:visible").count() == 0
+        assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+
+        # a mass of 1 kg at 1 m/s downwards and 1.3 m/s along: friction takes mu m/s from it
+        said = figure(page, "single", {"direction": 0})
+        assert "slides: r = (1, −0.6, 0) N s, u = (0, 0.7, 0) m/s, û = (0.42, 0.7, 0)" in said
+        assert "û · r = 0." in said
+        assert "sticks: r = (1, −0.5, 0) N s" in figure(page, "single", {"size of q_T": 0.5})
+        assert "is open" in figure(page, "single", {"q_N": 0.2})
+
+        assert "0 slide" in figure(page, "stack", {"push": 0.28})
+        assert "2 slide" in figure(page, "stack", {"push": 0.32})
+        assert "0 open" in figure(page, "stack", {"μ": 1.3, "push": 1.09})
+        assert "1 open" in figure(page, "stack", {"push": 1.13})
+        assert "0 slide" in figure(page, "stack", {"μ": 0.3, "push": 0, "slope": 16.5})
+        assert "slide" in figure(page, "stack", {"slope": 17}).replace("0 slide", "")
+        assert "0 open" in figure(page, "stack", {"μ": 0.6, "slope": 21.5})
+        assert "1 open" in figure(page, "stack", {"slope": 22})
+
+        two = figure(page, "wedge", {})
+        assert re.search("it leaves at 0.0981 m/s .*error 0.*it stays .*4 stick", two)
+        assert figure(page, "wedge", {"μ": 0.46, "squeeze": 100}).count("it leaves") == 2
+        assert figure(page, "wedge", {"μ": 0.5}).count("it stays") == 1
+
+        assert "stands" in figure(page, "arch", {"thickness": 0.108})
+        assert "falls" in figure(page, "arch", {"thickness": 0.106})
+        assert "stands" in figure(page, "arch", {"stones": 7})
+        assert "stands" in figure(page, "arch", {"thickness": 0.3, "stones": 15, "μ": 0.32})
+        assert "falls" in figure(page, "arch", {"μ": 0.3})
+        server.shutdown()
+    page.close()
+    assert not wrong
+
+
+class Quiet(SimpleHTTPRequestHandler):
+    extensions_map = SimpleHTTPRequestHandler.extensions_map | {".mjs": "text/javascript"}
+
+    def log_message(self, *_: Any) -> None:
+        pass
 
 
 def test_the_search_finds_and_formulas_are_drawn(site: Path, browser: Any) -> None:

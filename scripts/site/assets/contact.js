@@ -179,7 +179,7 @@
       { label: "μ", min: 0, max: 1.5, step: 0.01, value: 0.8 },
       { label: "half angle of the groove", unit: "°", min: 8, max: 50, step: 1, value: 25 },
       { label: "pull over weight", min: 0, max: 4, step: 0.05, value: 2 },
-      { label: "squeeze at the start, over weight", min: 0, max: 20, step: 0.5, value: 10 },
+      { label: "squeeze at the start, over weight", min: 0, max: 100, step: 1, value: 10 },
     ],
     boxes: 2,
     draw: (fclib, [mu, degrees, pull, squeeze], pictures) => {
@@ -200,7 +200,7 @@
 
   const stack = {
     sliders: [
-      { label: "μ", min: 0, max: 1, step: 0.01, value: 0.3 },
+      { label: "μ", min: 0, max: 1.5, step: 0.01, value: 0.3 },
       { label: "boxes", min: 1, max: 8, step: 1, value: 5 },
       { label: "push at the top, over the weight of a box", min: 0, max: 2, step: 0.01, value: 0.45 },
       { label: "slope of the ground", unit: "°", min: 0, max: 40, step: 0.5, value: 0 },
@@ -212,7 +212,7 @@
       const contacts = bodies.flatMap((_, k) => [-wide / 2, wide / 2].map((x) => ({ at: [x, k * high], normal: [0, 1], bodies: [k - 1, k] })));
       const weight = bodies[0].mass * GRAVITY, forces = bodies.map((_, k) => [k === count - 1 ? push * weight : 0, 0]);
       const outcome = solved(fclib, problemOf(bodies, contacts, mu, forces, [Math.sin(slope), -Math.cos(slope)]));
-      drawPlane(picture, { bodies, fixed: [box(-4, -0.4, 8, 0.4)], contacts, outcome, scale: { way: 8, force: LINE / (STEP * weight) }, reach: [-4, -0.4, 4, 5.4] });
+      drawPlane(picture, { bodies, fixed: [box(-4, -0.3, 8, 0.3)], contacts, outcome, scale: { way: 8, force: LINE / (STEP * weight) }, reach: [-3.2, -0.3, 3.2, 5] });
       return `${counted(outcome)}. ${degrees ? `The picture is turned with the ground; tan of its slope is ${shown(Math.tan(slope))}.` : ""}`;
     },
   };
@@ -240,8 +240,8 @@
 
   // ---- the page
   const alive = (place, fclib, { sliders, boxes, turns, draw }) => {
-    const image = place.nextElementSibling, eye = { turn: 0.55, tilt: 0.42 };
-    const pictures = [...Array(boxes)].map(() => svg("svg", { role: "img", "aria-label": image?.querySelector("img")?.alt || "", viewBox: `0 0 ${WIDTH} 400` }));
+    const next = place.nextElementSibling, image = next && (next.matches("img") ? next : next.querySelector("img")), eye = { turn: 0.55, tilt: 0.42 };
+    const pictures = [...Array(boxes)].map(() => svg("svg", { role: "img", "aria-label": image?.alt || "", viewBox: `0 0 ${WIDTH} 400` }));
     const said = make("p", { role: "status", class: "contact-says" });
     const update = () => { try { said.textContent = draw(fclib, controls.map((one) => one.value), pictures, eye); } catch (error) { said.textContent = error.message; } };
     const controls = sliders.map((one) => slider(one, update));
@@ -267,7 +267,7 @@
       });
     }
     update();
-    if (image) image.hidden = true;
+    if (image) next.hidden = true;
     place.dataset.alive = "";
   };
   const start = async () => {

@@ -215,6 +215,8 @@ def test_figures_of_the_contact_page_are_solved_in_it(site: Path, browser: Any) 
             "request",
             lambda r: None if r.url.startswith((address, "data:")) else wrong.append(r.url),
         )
+        # a browser asks for it by itself
+        page.route("**/favicon.ico", lambda route: route.fulfill(status=204))
         page.goto(f"{address}contact-problem.html")
         page.locator("div[data-figure=arch][data-alive]").wait_for()
         assert page.locator("img[src*=contact-]:visible").count() == 0

@@ -50,7 +50,10 @@
           if (wanted === "" || Number.isNaN(bound)) throw new Wrong(`${wanted} is no number, and ${column.label} ${sign} needs one`);
           return note(first.from, value.to, (k) => typeof of(k) === "number" && COMPARE[sign](of(k), bound));
         }
-        const equal = (v) => wanted === "" ? v === null || v === undefined || v === "" : v === bound || (v !== null && v !== undefined && plain(v === true ? "yes" : v === false ? "no" : String(v)) === plain(wanted));
+        // few values stand in many rows: each is compared once
+        const target = plain(wanted), seen = new Map();
+        const same = (v) => wanted === "" ? v === null || v === undefined || v === "" : v === bound || (v !== null && v !== undefined && plain(v === true ? "yes" : v === false ? "no" : String(v)) === target);
+        const equal = (v) => { let known = seen.get(v); if (known === undefined) seen.set(v, known = same(v)); return known; };
         return note(first.from, value.to, (k) => equal(of(k)) === (sign === "="));
       }
       if (isSign(0)) throw new Wrong(`${first.text} stands without a column before it`);

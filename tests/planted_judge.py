@@ -1,6 +1,7 @@
 """Random problems of every formulation whose solution is known, and what `auto` says of them.
 
     python tests/planted_judge.py [COUNT] [FIRST]    problems FIRST.. (20000 of them, from 0)
+    python tests/planted_judge.py --hard [COUNT] [FIRST]          2000 that ask for all digits
     python tests/planted_judge.py --infeasible [COUNT] [FIRST]    2000 that have no solution
 
 Each false word is printed with the number of its problem: `converged` where an independent judge
@@ -92,6 +93,80 @@ def planted(number: int) -> tuple[Any, fclib.Solution, Array | None]:
     return problem, solution, guess
 
 
+def squeezed(rng: np.random.Generator, d: int, nc: int, rolling: bool) -> tuple[Array, Array]:
+    """H and masses of light bodies between heavy ones, one on the other.
+
+    What a light body feels is the small difference of large reactions.
+    """
+    ratio = 10.0 ** rng.uniform(2, 8)
+    size = d if rolling or d == 2 else 3
+    mass, arm = np.ones((nc, size)), 10.0 ** rng.uniform(-3, 0)
+    mass[::2] /= ratio
+    if rolling:  # spheres of this radius
+        mass[:, (d + 1) // 2 :] *= 0.4 * arm**2
+    H = np.zeros((nc * size, d * nc))
+    for a in range(nc):
+        for body, sign in ((a, 1.0), (a - 1, -1.0)):
+            if body < 0:
+                continue
+            block = H[size * body : size * (body + 1), d * a : d * (a + 1)]
+            block[:d, :d] = sign * np.eye(d)
+            if rolling:  # what is tangential turns both the same way
+                tangents = range(1, (d + 1) // 2)
+                for k in tangents:
+                    block[k + len(tangents), k] = arm
+    return H, mass.ravel()
+
+
+def hard(number: int) -> tuple[Any, fclib.Solution, None]:
+    """Problem `number` whose solution asks for all digits, and the solution.
+
+    Joints that nearly follow from each other on bodies of very different masses, or light bodies
+    squeezed between heavy ones.
+    """
+    rng = np.random.default_rng([number, 2028])
+    rolling = bool(rng.integers(2))
+    d = int(rng.choice([3, 5] if rolling else [2, 3]))
+    nc = int(rng.integers(1, 5))
+    law, (u, r, _) = planted_law(rng, d, nc, 0.5, rolling)
+    unit = 10.0 ** rng.choice([0, 0, -6, 6])
+    mixed: dict[str, Any] = {}
+    if number % 2:
+        H, masses = squeezed(rng, d, nc, rolling)
+        G = np.zeros((len(masses), 0))
+        # what goes through a light body leaves next to nothing in it
+        law, u, r = {k: x[:1].repeat(nc) for k, x in law.items()}, u[:1], r[:1]
+        if rolling:
+            u[:, 1 : (d + 1) // 2] = r[:, 1 : (d + 1) // 2] = 0
+        u, r = u.repeat(nc, axis=0), r.repeat(nc, axis=0)
+    else:
+        n = int(rng.integers(d + 3, 2 * d * nc + 6))
+        masses = bodies_of(rng, n, 10.0 ** rng.uniform(0, 9))
+        H = rng.standard_normal((n, d * nc))
+        G = rng.standard_normal((n, 2))
+        gap = 10.0 ** rng.uniform(-9, -2)
+        G[:, 1] = G[:, 0] + gap * rng.standard_normal(n)
+    masses, impulse = unit * masses, unit * r.ravel()
+    f = unit * rng.standard_normal(len(masses))
+    lam = unit * rng.standard_normal(G.shape[1])
+    if G.shape[1]:
+        lam[1] = -lam[0] + unit * rng.standard_normal() * gap
+        lam /= gap
+    v = (H @ impulse + G @ lam + f) / masses
+    if G.shape[1]:
+        mixed = {"G": G, "b": -G.T @ v}
+    kind: Any = fclib.GlobalRollingProblem if rolling else fclib.GlobalProblem
+    problem: Any = kind(
+        spacedim=d, M=np.diag(masses), H=H, f=f, w=u.ravel() - H.T @ v, **law, **mixed
+    )
+    lam_or_none = lam if G.shape[1] else None
+    solution = fclib.Solution(v=v, u=u.ravel(), r=impulse, l=lam_or_none)
+    if rng.integers(2) and not G.shape[1]:  # the local form
+        problem = problem.condense()
+        solution = fclib.Solution(u=u.ravel(), r=impulse)
+    return problem, solution, None
+
+
 def rounding(problem: Any, solution: fclib.Solution) -> float:
     """What the judge's own error is rounded to: u is a sum, r - P_K(r - u^) a difference."""
     r = np.abs(solution.r)
@@ -119,9 +194,13 @@ def rounding(problem: Any, solution: fclib.Solution) -> float:
     return float(8 * np.finfo(float).eps * max(relative(1.0), relative(rho)))
 
 
-def verdict(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
+def verdict(
+    number: int,
+    solve: Callable[..., fclib.Result] = fclib.solve,
+    plant: Callable[[int], tuple[Any, fclib.Solution, Array | None]] = planted,
+) -> str:
     """The word of `auto` on a problem; 'false ...' where it is not true."""
-    problem, solution, guess = planted(number)
+    problem, solution, guess = plant(number)
     own = judge(problem, solution).error
     if own > 0.1 * TOLERANCE:
         return "rounding"  # the data do not hold their own solution
@@ -205,13 +284,13 @@ def claim(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
 def main() -> int:
     """Run the problems; see the top of the file."""
     arguments = sys.argv[1:]
-    infeasible = "--infeasible" in arguments
-    numbers = [int(one) for one in arguments if one != "--infeasible"]
-    count = numbers[0] if numbers else 2000 if infeasible else 20000
+    infeasible, asking = "--infeasible" in arguments, "--hard" in arguments
+    numbers = [int(one) for one in arguments if not one.startswith("--")]
+    count = numbers[0] if numbers else 2000 if infeasible or asking else 20000
     first = numbers[1] if len(numbers) > 1 else 0
     words: Counter[str] = Counter()
     for number in range(first, first + count):
-        word = claim(number) if infeasible else verdict(number)
+        word = claim(number) if infeasible else verdict(number, plant=hard if asking else planted)
         if word.startswith("false"):
             print(f"{number}: {word}", flush=True)
         words[word.split(" (")[0].split(":")[0]] += 1

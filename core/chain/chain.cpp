@@ -5,11 +5,14 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numbers>
 #include <optional>
+#include <random>
 #include <span>
 #include <utility>
 
 #include "linalg/cpu_time.hpp"
+#include "methods/pivoting.hpp"
 #include "reduced/gauss_seidel.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
@@ -28,6 +31,18 @@ double sweep_cost(const ReducedProblem& problem) {
 double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& system) {
   return iteration_operations * static_cast<double>(problem.nc()) + system.flops();
 }
+
+/// Random numbers, the same everywhere.
+class Dice {
+ public:
+  double between(double least, double most) {
+    constexpr int dropped = 11;  // bits of 64 that a double does not hold
+    return least + (most - least) * std::ldexp(static_cast<double>(random_() >> dropped), -53);
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
 
 /// Follows the whole solve: iterations, stages, the error of the islands not being worked on.
 class Tracker {
@@ -441,7 +456,8 @@ class Island {
     return (r - inside).norm() / r.norm();
   }
 
-  void proximal(const ProximalRules& rules, Vector r) {
+  void proximal(ProximalRules rules, Vector r) {
+    rules.own_rolling_rho = true;
     ProximalPoint<Cone> method(problem_, system());
     const double error =
         method.solve(rules, tolerance_, r, [&](double at) { return tracker_.report(1, at, r); });
@@ -515,15 +531,76 @@ class Island {
     if (rules.most_flops > 0 && newton.system().flops() > rules.most_flops * system().flops()) {
       return;
     }
-    Vector r = start_of(rules.from);
-    std::int64_t left = rules.limit;
+    descend(newton, rules, rules.limit, start_of(rules.from));
+    tracker_.add_cpu(newton.system().others_cpu());
+    own_factorisations_ = newton.factorisations();
+  }
+
+  void descend(SemismoothNewton<Cone>& newton, const NewtonRules& rules, std::int64_t left,
+               Vector r) {
     double least = std::numeric_limits<double>::infinity();
     newton.solve(rules, r, [&](double error) {
       least = std::min(least, error);
       return tracker_.report(1, error, r) || error <= tolerance_ || --left == 0;
     });
     take(0, least, r);
-    tracker_.add_cpu(newton.system().others_cpu());
+  }
+
+  void run(const PivotingStage& rules) {
+    const Pivoting<Cone> method(problem_, static_cast<int>(rules.edges));
+    Dice dice;
+    Vector r;
+    Vector cover = Vector::Ones(method.size());
+    for (std::int64_t k = 0; k < rules.tries && !done(); ++k) {
+      const auto most = std::min(rules.pivots, tracker_.left());
+      const int pivots = method.solve(cover, static_cast<int>(most), r);
+      if (tracker_.report(pivots, error_, best_)) return;
+      if (rounding_of_velocity(r) < rules.rounding * tolerance_) {
+        proximal({.patience = endless, .max_factorisations = rules.polish}, r);
+      }
+      for (double& x : cover) x = std::exp(dice.between(-3, 3));
+    }
+  }
+
+  /// About what rounding leaves of u where the reactions are these, relative to the scale.
+  [[nodiscard]] double rounding_of_velocity(const Vector& r) const {
+    const Vector weight = contact_weights(problem_);
+    double size = 0;
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      size = std::hypot(size, weight[a] * r.template segment<D>(D * a).norm());
+    }
+    return std::numeric_limits<double>::epsilon() * size / problem_.scale;
+  }
+
+  void run(const RandomStartsStage& rules) {
+    const Vector unit = contact_weights(problem_).cwiseSqrt().cwiseInverse();
+    double size = 0;  // ||q||, each contact in its own unit
+    for (Index a = 0; a < problem_.nc(); ++a) {
+      size = std::hypot(size, unit[a] * problem_.q.template segment<D>(D * a).norm());
+    }
+    SemismoothNewton<Cone> newton(problem_, ContactFunctionKind::natural_map, threads_);
+    Dice dice;
+    for (std::int64_t k = 0; k < rules.tries && !done(); ++k) {
+      Vector start = Vector::Zero(problem_.m());
+      for (Index a = 0; a < problem_.nc(); ++a) {
+        if (dice.between(0, 3) < 1) continue;
+        auto r = start.template segment<D>(D * a);
+        r[0] = size * unit[a] * std::pow(10.0, dice.between(-2, 2));
+        const Cone cone(problem_.friction, a);
+        for (int g = 0; g < Cone::groups; ++g) {
+          const double angle = dice.between(0, 2 * std::numbers::pi);
+          const double share = std::min(1.0, dice.between(0, 2));
+          const double radius = share * cone.coefficient(g) * r[0];
+          const int at = 1 + g * Cone::group_size;
+          r[at] = radius * (Cone::group_size > 1       ? std::cos(angle)
+                            : angle < std::numbers::pi ? 1
+                                                       : -1);
+          if (Cone::group_size > 1) r[at + Cone::group_size - 1] = radius * std::sin(angle);
+        }
+      }
+      descend(newton, {.sweeps = rules.sweeps}, rules.limit, start);
+      if (!done()) proximal({.max_factorisations = rules.polish}, start);
+    }
     own_factorisations_ = newton.factorisations();
   }
 
@@ -603,14 +680,25 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
                       .scale = problem.scale,
                       .rho = {},
                       .scaled_scale = problem.scaled_scale,
+                      .known_r = {},
+                      .known_u = {},
                       .deadline = problem.deadline};
   const auto count = static_cast<Eigen::Index>(contacts.size());
   if (problem.rho.size() > 0) part.rho = problem.rho(contacts);
   part.q.resize(d * count);
+  const bool known = problem.known_r.size() > 0;
+  if (known) {
+    part.known_r.resize(d * count);
+    part.known_u.resize(d * count);
+  }
   part.friction.mu.resize(count);
   if (problem.rolling()) part.friction.mu_r.resize(count);
   for (Eigen::Index k = 0; k < count; ++k) {
     part.q.segment(d * k, d) = problem.q.segment(d * contacts[k], d);
+    if (known) {
+      part.known_r.segment(d * k, d) = problem.known_r.segment(d * contacts[k], d);
+      part.known_u.segment(d * k, d) = problem.known_u.segment(d * contacts[k], d);
+    }
     part.friction.mu[k] = problem.friction.mu[contacts[k]];
     if (problem.rolling()) part.friction.mu_r[k] = problem.friction.mu_r[contacts[k]];
   }

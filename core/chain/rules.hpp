@@ -553,9 +553,96 @@ struct HomotopyStage {
   }
 };
 
-using Method = std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage,
-                            ConjugateGradientsStage, NewtonStage, PolishStage, ProximalStage,
-                            InteriorPointStage, AssociatedStage, NoSolutionStage, HomotopyStage>;
+/// Where all paths from where the others begin lead elsewhere, as with friction so high that
+/// contacts wedge each other.
+struct PivotingStage {
+  static constexpr std::string_view name = "pivoting";
+  static constexpr std::string_view families = "pivoting";
+  static constexpr std::string_view doc =
+      "Lemke's method on polygons of friction, from several covering vectors, each end polished";
+  std::int64_t tries = 60;
+  std::int64_t edges = 4;
+  std::int64_t pivots = 1000;
+  std::int64_t polish = 100;
+  double rounding = 1;
+
+  static constexpr auto fields() {
+    using O = PivotingStage;
+    return std::tuple{
+        OptionField<O, std::int64_t>{.name = "tries",
+                                     .member = &O::tries,
+                                     .unit = "covering vectors",
+                                     .doc = "at most: of ones, then random ones",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, std::int64_t>{.name = "edges",
+                                     .member = &O::edges,
+                                     .unit = "edges",
+                                     .doc = "of a polygon of friction in space",
+                                     .lowest = 3,
+                                     .highest = 64},
+        OptionField<O, std::int64_t>{.name = "pivots",
+                                     .member = &O::pivots,
+                                     .unit = "pivots",
+                                     .doc = "of a try at most",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        OptionField<O, std::int64_t>{.name = "polish",
+                                     .member = &O::polish,
+                                     .unit = "factorisations",
+                                     .doc = "of the proximal point from where a try ends",
+                                     .lowest = 0,
+                                     .highest = 1e6},
+        OptionField<O, double>{.name = "rounding",
+                               .member = &O::rounding,
+                               .unit = "tolerance",
+                               .doc = "of velocities up to which an end is polished: on a ray "
+                                      "reactions have no bound",
+                               .lowest = 0}};
+  }
+};
+
+/// Newton's method has many basins where contacts wedge each other.
+struct RandomStartsStage {
+  static constexpr std::string_view name = "random_starts";
+  static constexpr std::string_view families = "newton";
+  static constexpr std::string_view doc =
+      "semismooth Newton on the natural map, and a polish, from random reactions";
+  std::int64_t tries = 200;
+  std::int64_t limit = 60;
+  std::int64_t sweeps = 5;
+  std::int64_t polish = 24;
+
+  static constexpr auto fields() {
+    using O = RandomStartsStage;
+    return std::tuple{
+        OptionField<O, std::int64_t>{.name = "tries",
+                                     .member = &O::tries,
+                                     .unit = "starts",
+                                     .doc = "at most",
+                                     .lowest = 1,
+                                     .highest = 1e6},
+        limit_field<O, std::int64_t>(&O::limit, "iterations", "of Newton from each at most"),
+        OptionField<O, std::int64_t>{.name = "sweeps",
+                                     .member = &O::sweeps,
+                                     .unit = "sweeps",
+                                     .doc = "of Gauss-Seidel where Newton stands still, then "
+                                            "twice as many",
+                                     .lowest = 0,
+                                     .highest = 1e6},
+        OptionField<O, std::int64_t>{.name = "polish",
+                                     .member = &O::polish,
+                                     .unit = "factorisations",
+                                     .doc = "of the proximal point from each",
+                                     .lowest = 0,
+                                     .highest = 1e6}};
+  }
+};
+
+using Method =
+    std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage, ConjugateGradientsStage,
+                 NewtonStage, PolishStage, ProximalStage, InteriorPointStage, AssociatedStage,
+                 NoSolutionStage, HomotopyStage, PivotingStage, RandomStartsStage>;
 
 struct StageRule {
   std::string name;

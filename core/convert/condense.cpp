@@ -48,10 +48,14 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
 
 Solution Condensation::expand(const Solution& local) const {
   Solution result = local;
-  Vector momentum = problem_.f;
-  multiply_add(problem_.H, local.r, momentum);
-  if (is_mixed(problem_)) multiply_add(problem_.G, local.l, momentum);
-  result.v = mass_.solve(momentum);
+  // what joints and contacts add to a light body may be far larger than what is left of it
+  using Precise = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
+  Precise momentum = problem_.f.cast<long double>();
+  multiply_add(problem_.H, Precise(local.r.cast<long double>()), momentum);
+  if (is_mixed(problem_)) {
+    multiply_add(problem_.G, Precise(local.l.cast<long double>()), momentum);
+  }
+  result.v = mass_.solve(Vector(momentum.cast<double>()));
   result.u = problem_.w;
   multiply_transposed_add(problem_.H, result.v, result.u);
   return result;

@@ -304,6 +304,24 @@ Solution Elimination::expand(const Solution& plain) const {
   return result;
 }
 
+void Elimination::hold(const GlobalProblem& bodies, const Condensation& condensation,
+                       Solution& solution) const {
+  if (turn_.size() == 0) return;
+  const auto triangle = turn_.triangularView<Eigen::Upper>();
+  const auto correction = [&] {
+    using Precise = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
+    Precise broken = bodies.b.cast<long double>();
+    multiply_transposed_add(bodies.G, Precise(solution.v.cast<long double>()), broken);
+    const Vector left = scale_.cwiseProduct(selected(Vector(broken.cast<double>()), kept_));
+    return multipliers(triangle.transpose().solve(left));
+  };
+  solution.l += correction();
+  solution = condensation.expand(solution);
+  Vector impulse = Vector::Zero(solution.v.size());
+  multiply_add(bodies.G, correction(), impulse);
+  solution.v += condensation.mass().solve(impulse);
+}
+
 LocalProblem eliminate(const LocalProblem& problem) {
   return is_mixed(problem) ? Elimination(problem).plain() : problem;
 }

@@ -39,6 +39,12 @@ class Elimination {
   /// Completes lambda and u from r.
   [[nodiscard]] Solution expand(const Solution& plain) const;
 
+  /// Betters lambda (p) of a whole solution, and takes out of v (n) what its rounding breaks of the
+  /// constraints: where joints nearly follow from each other lambda is so large that light bodies
+  /// feel it.
+  void hold(const GlobalProblem& bodies, const Condensation& condensation,
+            Solution& solution) const;
+
   /// Bilateral constraints that follow from others.
   [[nodiscard]] Eigen::Index redundant() const { return idle_.cols(); }
 

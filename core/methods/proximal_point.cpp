@@ -12,14 +12,31 @@ namespace fclib {
 
 template <class Cone>
 ProximalPoint<Cone>::ProximalPoint(const ReducedProblem& problem, CoupledSystem& system)
-    : problem_(problem), system_(system), inverse_size_(mean_diagonals(problem)) {
-  const double mean = mean_diagonal(problem);
-  for (auto& size : inverse_size_) size = 1.0 / (size > 0 ? size : mean);
+    : problem_(problem), system_(system) {}
+
+template <class Cone>
+void ProximalPoint<Cone>::weigh(bool own_rolling_rho) {
+  const Vector sizes = mean_diagonals(problem_);
+  const double mean = mean_diagonal(problem_);
+  constexpr int moving = 1 + Cone::group_size;  // components that are not rolling
+  inverse_size_.resize(problem_.m());
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    auto inverse = inverse_size_.template segment<D>(D * a);
+    inverse.setConstant(1.0 / (sizes[a] > 0 ? sizes[a] : mean));
+    if (!own_rolling_rho || moving == D) continue;
+    const auto diagonal = problem_.W.template diagonal_block<D>(a).diagonal().eval();
+    const double of_moving = diagonal.template head<moving>().mean();
+    const double of_rolling = diagonal.template tail<D - moving>().mean();
+    if (!(of_moving > 0) || !(of_rolling > 0)) continue;
+    inverse.template head<moving>().setConstant(1.0 / of_moving);
+    inverse.template tail<D - moving>().setConstant(1.0 / of_rolling);
+  }
 }
 
 template <class Cone>
 double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, Vector& r,
                                   FunctionRef<bool(double)> report) {
+  weigh(rules.own_rolling_rho);
   const auto stop_at = system_.factorisations() + rules.max_factorisations;
   double kappa = rules.kappa;
   int cautious = 0;  // steps since a failure
@@ -62,7 +79,8 @@ double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, 
 
 template <class Cone>
 auto ProximalPoint<Cone>::argument(double kappa, const Vector& u, Index a) const -> Vec {
-  return r_.template segment<D>(D * a) - kappa * inverse_size_[a] * u.template segment<D>(D * a);
+  return r_.template segment<D>(D * a) - (kappa * inverse_size_.template segment<D>(D * a))
+                                             .cwiseProduct(u.template segment<D>(D * a));
 }
 
 template <class Cone>
@@ -110,8 +128,8 @@ int ProximalPoint<Cone>::inner(double kappa, std::int64_t stop_at) {
     std::vector<double>& blocks = system_.blocks();
     for (Index a = 0; a < problem_.nc(); ++a) {
       Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
-          kappa * inverse_size_[a] *
-          alart_curnier_jacobian(Cone(problem_.friction, a), argument(kappa, up_, a));
+          alart_curnier_jacobian(Cone(problem_.friction, a), argument(kappa, up_, a)) *
+          (kappa * inverse_size_.template segment<D>(D * a)).asDiagonal();
     }
     if (!system_.factorise()) return 0;
     step_ = -f_;

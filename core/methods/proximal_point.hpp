@@ -3,6 +3,9 @@
 //
 //   p = alart_curnier_projection(r_k - rho (W p + q)),   rho_a = kappa d / tr(W_aa)
 //
+// The rolling components of a contact may have a rho of their own, from their part of W_aa: a small
+// body turns far more easily than it moves, in numbers that depend on the unit of length.
+//
 // and put it into the cones: r_{k+1}. Each Newton step is one CoupledSystem with D = rho
 // alart_curnier_projection'. A large kappa makes a step nearly exact, and W, singular as it may be,
 // is regularised by r - r_k all the same.
@@ -36,6 +39,7 @@ struct ProximalRules {
   double hard = 0.5;      ///< factor on failure
   double patience = 1e3;  ///< the error may rise by this over the best before it is given up
   std::int64_t max_factorisations = 8;
+  bool own_rolling_rho = false;  ///< whether rolling components have their own rho
 };
 
 template <class Cone>
@@ -69,12 +73,15 @@ class ProximalPoint {
   /// values.
   void put_into_cones(double kappa, const Vector& p, const Vector& u, Vector& result) const;
 
+  /// d / tr(W_aa) at the components of each contact, or that of its parts.
+  void weigh(bool own_rolling_rho);
+
   /// One proximal step; leaves it in next_, next_u_, next_error_. Newton steps taken, 0 on failure.
   int inner(double kappa, std::int64_t stop_at);
 
   const ReducedProblem& problem_;
   CoupledSystem& system_;
-  Vector inverse_size_;  // d / tr(W_aa)
+  Vector inverse_size_;  // of each component (m)
   double error_ = 0;
   double next_error_ = 0;
   Vector r_, u_, p_, up_, f_, step_, trial_, trial_u_, next_, next_u_;

@@ -22,7 +22,10 @@ struct ReducedProblem {
   Friction friction;
   double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
   Vector rho;        ///< of the scaled natural map (nc); empty: errors are by the plain one alone
-  double scaled_scale = 1;             ///< errors by the scaled map are relative to this: ||rho q||
+  double scaled_scale = 1;  ///< errors by the scaled map are relative to this: ||rho q||
+  /// Where u is known better than W r + q rounds, if anywhere: with reactions that are large beside
+  /// q, what W adds to it from there rounds less (m each).
+  Vector known_r, known_u;
   const Primal* primal = nullptr;      ///< where the problem is known by its bodies
   const Deadline* deadline = nullptr;  ///< of the solve, if it has one
   /// Whether something near y (nc) proves that the problem as it was given has no solution: what
@@ -38,7 +41,13 @@ struct ReducedProblem {
   [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }
 
   /// u = W r + q.
-  void velocity(const Vector& r, Vector& u) const { W.multiply_add(r, q, u); }
+  void velocity(const Vector& r, Vector& u) const {
+    if (known_r.size() == 0) {
+      W.multiply_add(r, q, u);
+    } else {
+      W.multiply_add(r - known_r, known_u, u);
+    }
+  }
 };
 
 }  // namespace fclib

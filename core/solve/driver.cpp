@@ -18,6 +18,20 @@ namespace {
 /// of the original problem did not (conversions round).
 constexpr int max_corrections = 4;
 
+/// Rounding is in the way of a solve where it leaves more of the velocities than this part of the
+/// tolerance, and may be all that is in the way up to an error of so many times as much.
+constexpr double rounding_in_tolerance = 0.1;
+constexpr double rounding_in_error = 1e3;
+
+/// || |A| |x| || eps: what rounding leaves of A x.
+double rounding_of_product(const Matrix& a, const Vector& x) {
+  Vector sizes = Vector::Zero(a.rows);
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    sizes[row] += std::abs(value) * std::abs(x[col]);
+  });
+  return std::numeric_limits<double>::epsilon() * sizes.stableNorm();
+}
+
 struct Request {
   const Solver& solver;
   const Settings& settings;
@@ -87,6 +101,8 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
                          .scale = Measure::scale(measure.q, measure.rounding),
                          .rho = measure.rho,
                          .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
+                         .known_r = {},
+                         .known_u = {},
                          .primal = primal,
                          .deadline = &request.deadline,
                          .proves_no_solution = &proves};
@@ -136,6 +152,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       return result;
     }
     // a correction may end worse than what it was to better
+    const bool better = result.error < 0.5 * least;
     if (result.error < least) {
       least = result.error;
       best = result.solution;
@@ -147,19 +164,30 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
       }
       return result;
     };
-    if (result.status != Status::converged) return end();
+    const double rounding = rounding_of_product(plain.W, r) / reduced.scale;
+    const bool rounded = rounding > rounding_in_tolerance * request.settings.tolerance;
+    const bool hidden = result.status == Status::stalled && rounded && better &&
+                        result.error < rounding_in_error * rounding;
+    if (result.status != Status::converged && !hidden) return end();
     // the limits hold for all the attempts together
     settings.max_iterations = max_iterations - result.iterations;
     settings.time_limit = request.deadline.left();
     result.status = settings.max_iterations <= 0 ? Status::iteration_limit
                     : settings.time_limit <= 0   ? Status::time_limit
+                    : hidden                     ? Status::stalled
                                                  : Status::inaccurate;
-    if (correction == max_corrections || result.status != Status::inaccurate) return end();
-    settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
+    if (correction == max_corrections || (result.status != Status::inaccurate && !hidden)) {
+      return end();
+    }
+    if (!hidden) settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
     // the velocity is that of the problem as it was given: what conversions lost of it goes into q
     Vector u;
     reduced.velocity(r, u);
     reduced.q += result.solution.u - u;
+    if (rounded) {
+      reduced.known_r = r;
+      reduced.known_u = result.solution.u;
+    }
   }
 }
 
@@ -240,9 +268,12 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const Friction friction = friction_of(problem);
   if (!condensation.finished()) return out_of_time(problem, condensation, request, guess);
   const OwnSizes own = own_sizes(problem, condensation.mass(), &local);
+  const auto judge_complete = [&](Solution& solution) {
+    return judge_and_complete(problem, friction, condensation.mass(), own, solution).error_by(kind);
+  };
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);
-    return judge_and_complete(problem, friction, condensation.mass(), own, solution).error_by(kind);
+    return judge_complete(solution);
   };
   const auto stop = [&] {
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
@@ -255,8 +286,9 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
   const auto judge_expanded = [&](Solution& solution) {
-    solution = elimination.expand(solution);
-    return judge(solution);
+    solution = condensation.expand(elimination.expand(solution));
+    elimination.hold(problem, condensation, solution);
+    return judge_complete(solution);
   };
   return run(elimination.plain(), friction, measure, request, guess, judge_expanded, prove);
 }

@@ -42,6 +42,10 @@ proximal point                  : proximal_point      from=best                 
 # another width of smoothing is another path
 homotopy                        : homotopy                                             smoothing=0.3 limit=1500
 homotopy                        : homotopy                                             smoothing=1 limit=1500
+# contacts that wedge each other: few enough for dense tableaux
+pivoting                        : pivoting            at_most=20                       edges=4 tries=60
+pivoting                        : pivoting            at_most=8                        edges=16 tries=40
+random starts                   : random_starts       at_most=12                       tries=200
 # the last resort
 proximal point                  : proximal_point      from=associated                  wander=true limit=400
 proximal point                  : proximal_point      from=best                        wander=true limit=800

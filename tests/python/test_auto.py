@@ -28,6 +28,7 @@ from helpers import (
     planted_rolling,
     project,
 )
+from planted_judge import hard, planted
 
 Array = npt.NDArray[np.float64]
 
@@ -419,3 +420,49 @@ def test_a_wrong_chain_names_the_stage(chain: str | Path, message: str) -> None:
     with pytest.raises(fclib.OptionError, match=r"option chain") as caught:
         fclib.solve(bodies(4, 5), chain=chain)
     assert message in str(caught.value)
+
+
+# joints that nearly follow from each other, multipliers up to 1e9 times the load
+@pytest.mark.parametrize("number", [144, 196, 234, 324, 682, 900, 1426, 1470, 1802])
+def test_nearly_parallel_joints_on_light_and_heavy_bodies(number: int) -> None:
+    problem, _, _ = hard(number)
+    result = fclib.solve(problem)
+    assert result.status == "converged"
+    merit = fclib.merit(problem, result.solution)
+    assert max(merit.error, merit.dynamics, merit.bilateral) <= 1e-8
+
+
+def test_reactions_whose_rounding_is_more_than_the_tolerance() -> None:
+    # a light body between the ground and a heavy one: reactions of 2^28 of its weight
+    W = np.kron(np.array([[1, -1], [-1, 1 + 2.0**-28]]), np.eye(3))
+    q = np.array([-1, 0.25, 0, -1, 0, 0])
+    problem = fclib.LocalProblem(spacedim=3, W=W, q=q, mu=[0.5, 0.5])
+    result = fclib.solve(problem)
+    assert_honest(problem, result, 1e-8)
+    assert result.converged
+
+
+WEDGED = {  # stages that solve a few contacts of high friction, and problems of theirs
+    "pivoting": [450, 718, 1190, 2304, 2890],
+    "random starts": [1164, 1893],
+}
+
+
+@pytest.mark.parametrize(("stage", "number"), [(s, n) for s in WEDGED for n in WEDGED[s]])
+def test_contacts_that_wedge_each_other(stage: str, number: int) -> None:
+    problem, _, _ = planted(number)
+    own = [line for line in auto_chain() if line.split(":")[0].strip() == stage]
+    assert own
+    result = fclib.solve(problem, chain=own)
+    assert result.status == "converged"
+    assert judge(problem, result.solution).error <= 1.01e-8
+    others = [line for line in auto_chain() if line.split(":")[0].strip() not in WEDGED]
+    assert fclib.solve(problem, chain=others, max_iterations=20000).status == "stalled"
+
+
+def test_pivoting_is_exact_in_the_plane() -> None:
+    # Lemke's method needs no polish where the polygon is the disk
+    for seed in range(20):
+        problem = planted_local(seed, d=2, nc=6).problem
+        chain = "pivoting : pivoting tries=1 polish=0"
+        assert fclib.solve(problem, chain=chain).error < 1e-6

@@ -1,0 +1,134 @@
+#include "methods/pivoting.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "reduced/scale.hpp"
+
+namespace fclib {
+
+namespace {
+
+/// What is smaller in a column of the tableau, relative to its largest entry, is rounding.
+constexpr double rounding = 1e-12;
+/// Ratios that differ by less are equal.
+constexpr double tie = 1e-13;
+
+}  // namespace
+
+template <class Cone>
+Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(problem) {
+  constexpr int size = Cone::group_size;
+  const Eigen::Index nc = problem.nc();
+  const Eigen::Index m = problem.m();
+  const int corners = size == 1 ? 2 : edges;
+  const Eigen::Index sliding = nc * Cone::groups;
+  const Eigen::Index reactions = nc + sliding * corners;
+  const Eigen::Index all = reactions + sliding;
+
+  // the cones stay what they are where each contact has a unit of its own
+  const Vector unit = contact_weights(problem).cwiseSqrt().cwiseInverse();
+  B_ = Eigen::MatrixXd::Zero(m, reactions);
+  M_ = Eigen::MatrixXd::Zero(all, all);
+  for (Index a = 0; a < nc; ++a) {
+    B_(D * a, a) = unit[a];
+    const Cone cone(problem.friction, a);
+    for (int g = 0; g < Cone::groups; ++g) {
+      const Eigen::Index slip = reactions + a * Cone::groups + g;
+      M_(slip, a) = cone.coefficient(g);
+      for (int k = 0; k < corners; ++k) {
+        const Eigen::Index at = nc + (a * Cone::groups + g) * corners + k;
+        const double angle = 2 * std::numbers::pi * k / corners;
+        B_(D * a + 1 + g * size, at) = unit[a] * std::cos(angle);
+        if (size > 1) B_(D * a + 1 + g * size + size - 1, at) = unit[a] * std::sin(angle);
+        M_(at, slip) = 1;
+        M_(slip, at) = -1;
+      }
+    }
+  }
+  const Vector zero = Vector::Zero(m);
+  Eigen::MatrixXd image(m, reactions);
+  Vector column(m);
+  for (Eigen::Index k = 0; k < reactions; ++k) {
+    problem.W.multiply_add(B_.col(k), zero, column);
+    image.col(k) = column;
+  }
+  M_.topLeftCorner(reactions, reactions).noalias() = B_.transpose() * image;
+  Q_ = Vector::Zero(all);
+  Q_.head(reactions) = B_.transpose() * problem.q;
+}
+
+template <class Cone>
+int Pivoting<Cone>::solve(const Vector& cover, int most, Vector& r) const {
+  const Eigen::Index n = size();
+  const double scale = Q_.template lpNorm<Eigen::Infinity>();
+  r = Vector::Zero(problem_.m());
+  if (!(scale > 0)) return 0;
+  // variables: w of n rows, z of n rows, z0; w - M z - cover z0 = Q
+  const Eigen::Index artificial = 2 * n;
+  const Eigen::Index right = 2 * n + 1;
+  Eigen::MatrixXd tableau(n, 2 * n + 2);
+  tableau.leftCols(n).setIdentity();
+  tableau.middleCols(n, n) = -M_;
+  tableau.col(artificial) = -cover;
+  tableau.col(right) = Q_ / scale;
+  std::vector<Eigen::Index> basis(static_cast<std::size_t>(n));
+  std::iota(basis.begin(), basis.end(), Eigen::Index{0});
+
+  Eigen::Index row = 0;
+  Q_.cwiseQuotient(cover).minCoeff(&row);
+  Eigen::Index entering = artificial;
+  Vector column(n);
+  Eigen::RowVectorXd pivot(2 * n + 2);
+  int pivots = 0;
+  while (pivots < most) {
+    ++pivots;
+    pivot = tableau.row(row) / tableau(row, entering);
+    column = tableau.col(entering);
+    column[row] = 0;
+    tableau.noalias() -= column * pivot;
+    tableau.row(row) = pivot;
+    tableau.col(entering).setZero();
+    tableau(row, entering) = 1;
+    const Eigen::Index leaving = std::exchange(basis[static_cast<std::size_t>(row)], entering);
+    if (leaving == artificial) break;
+    entering = leaving < n ? leaving + n : leaving - n;
+
+    // the ratio test; of equal ratios that of z0, else the largest pivot
+    column = tableau.col(entering);
+    const double least = rounding * column.template lpNorm<Eigen::Infinity>();
+    double smallest = std::numeric_limits<double>::infinity();
+    for (Eigen::Index k = 0; k < n; ++k) {
+      if (column[k] > least) smallest = std::min(smallest, tableau(k, right) / column[k]);
+    }
+    const double equal = smallest + tie * std::max(1.0, std::abs(smallest));
+    row = -1;
+    for (Eigen::Index k = 0; k < n; ++k) {
+      if (!(column[k] > least) || !(tableau(k, right) / column[k] <= equal)) continue;
+      if (basis[static_cast<std::size_t>(k)] == artificial) {
+        row = k;
+        break;
+      }
+      if (row < 0 || column[k] > column[row]) row = k;
+    }
+    if (row < 0) break;  // a ray
+  }
+  Vector x = Vector::Zero(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index variable = basis[static_cast<std::size_t>(k)];
+    if (variable >= n && variable < artificial) x[variable - n] = scale * tableau(k, right);
+  }
+  r = B_ * x.head(B_.cols());
+  return pivots;
+}
+
+#define FCLIB_INSTANTIATE(Cone) template class Pivoting<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_INSTANTIATE)
+#undef FCLIB_INSTANTIATE
+
+}  // namespace fclib

@@ -434,6 +434,51 @@ def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
     assert found == len(drawn.kind)
 
 
+@pytest.mark.parametrize(
+    "family", [own for own in known.sets()["standard"] if plan_of(own) is None]
+)
+def test_drawn_positions_of_assembled_families_are_those_of_their_equations(family: str) -> None:
+    """The moments in H are those of the levers that are drawn, to 1e-6 of the smallest body.
+
+    These families have no simulation: H is what their problems are. A body's own axes turn the
+    moments, and leave their sizes.
+    """
+    plan = known.plan_of(family)
+    assert plan.chosen is not None
+    problem: Any = plan.scene.problem(plan.chosen[0])
+    network = network_of(problem)
+    if problem.bodies is None:
+        # nothing is said of places, and nobody is told one
+        assert network.source == "graph"
+        assert "solids" not in view_of(problem)
+        return
+    assert network.source == "file"
+    drawn = record_of(solids_of(problem.bodies, problem.contacts))
+    size = solids_of(problem.bodies, problem.contacts).size
+    place = np.array(problem.bodies.place)
+    shapes = np.array(problem.bodies.shape_body)
+    own = np.abs(np.array(problem.bodies.shape_place)).max(axis=1) == 0
+    # a shape that is its body's own stands where the body is
+    np.testing.assert_allclose(
+        np.array(drawn["place"])[own], place[shapes][own], rtol=0, atol=1e-6 * size
+    )
+    H = problem.H.toarray()
+    row = np.cumsum(problem.bodies.moves == 1) - 1
+    compared = 0
+    for contact, pair in enumerate(problem.contacts.body.tolist()):
+        columns = slice(3 * contact, 3 * contact + 3)
+        for body in pair:
+            if body < 0 or problem.bodies.moves[body] != 1:
+                continue
+            block = H[6 * row[body] : 6 * row[body] + 6, columns]
+            lever = network.points[contact] - place[body]
+            moments = np.linalg.norm(np.cross(lever, block[:3].T), axis=1)
+            expected = np.linalg.norm(block[3:], axis=0)
+            assert np.abs(moments - expected).max() < 1e-6 * size, (contact, body)
+            compared += 1
+    assert compared >= problem.nc
+
+
 def test_positions_do_not_depend_on_bodies_frames(collection: Path) -> None:
     """The rotation of a body turns its part of H and its inertia, and moves nothing."""
     problem = bare(read(sorted(collection.rglob("*-global.hdf5"))[-1]))

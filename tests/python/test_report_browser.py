@@ -1,11 +1,14 @@
 """The site in a real browser, from the file system: no error, no request, no server."""
 
 import csv
+import functools
 import hashlib
+import http.server
 import importlib.util
 import io
 import shutil
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -463,6 +466,21 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
         assert not go.wrong
 
 
+def test_a_page_without_positions_says_so(browser: Any, collection: Path, tmp_path: Path) -> None:
+    problem = read(sorted(collection.rglob("*-local.hdf5"))[-1])
+    bare = problem.replace(bodies=None, contacts=None)
+    write_view(view_of(bare), tmp_path / "page.html")
+    go = Opener(browser, tmp_path / "page.html")
+    page = go("")
+    draw(page, ".scene .plot")
+    said = page.inner_text(".scene")
+    assert "A network without positions" in said
+    assert "To scale" not in said
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
 def test_a_periodic_cell_is_outlined(browser: Any, tmp_path: Path) -> None:
     step = periodic_step()
     record = view_of(step.problem, step.result.solution)
@@ -745,6 +763,64 @@ def test_a_hard_problem_is_found_seen_taken_and_cited(
     for context in go.contexts:
         context.close()
     assert not go.wrong
+
+
+SELECTIONS = {
+    "a filter": "#/catalogue?q=masonry+and+contacts+>%3D+50",
+    "a family": "#/catalogue?family=SliderCrank",
+    "a set": "#/catalogue?collection=standard",
+}
+
+
+@pytest.mark.parametrize("chosen", SELECTIONS)
+def test_a_selection_is_fetched_by_its_list(
+    chosen: str, browser: Any, masonry: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The list that the catalogue saves, and the page's own command, on a served site."""
+    from typer.testing import CliRunner
+
+    from fclib import collections
+    from fclib.cli import app
+
+    go = Opener(browser, masonry)
+    page = go(SELECTIONS[chosen])
+    page.get_by_text("Take what is listed").click()
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="selection.txt").click()
+    monkeypatch.chdir(tmp_path)
+    saved.value.save_as("selection.txt")
+    names = Path("selection.txt").read_text().split()
+    count = int(page.get_by_role("status").first.inner_text().split()[0])
+    assert len(names) == count > 0
+    lines = page.locator("details .copy", has_text="--list").inner_text().splitlines()
+    (line,) = (line for line in lines if "collection get" in line)
+
+    collections.publish(masonry.parent / "collection", tmp_path / "served")
+    handler = functools.partial(QuietHandler, directory=str(tmp_path / "served"))
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://127.0.0.1:{server.server_port}"
+        words = [address if word == "URL" else word for word in line.split()[1:]]
+        done = CliRunner().invoke(app, words)
+        server.shutdown()
+    assert done.exit_code == 0, done.output
+    rows = {row["id"]: row for row in collections.read_catalog("collection").to_pylist()}
+    # an archive holds a family: what was chosen is there, and nothing of another family
+    assert set(names) <= set(rows)
+    assert {name.rpartition("/")[0] for name in rows} == {n.rpartition("/")[0] for n in names}
+    for name in names:
+        content = Path("collection", rows[name]["global_file"]).read_bytes()
+        assert hashlib.sha256(content).hexdigest() == rows[name]["global_sha256"]
+    for context in go.contexts:
+        context.close()
+    assert not go.wrong
+
+
+class QuietHandler(http.server.SimpleHTTPRequestHandler):
+    """Serves a folder, and says nothing."""
+
+    def log_message(self, *_: Any) -> None:
+        pass
 
 
 def test_every_page_is_accessible_and_no_button_asks_another_host(

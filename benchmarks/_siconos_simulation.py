@@ -1,9 +1,8 @@
-"""Run by Siconos' own interpreter: a scene by its mechanics and Bullet, the problems of its steps.
+"""A script of Siconos: a scene by its mechanics and Bullet, in m, kg and s.
 
-    /usr/bin/python3 benchmarks/_siconos_simulation.py KIND BODIES MU STEPS EVERY OUT
+    /usr/bin/python3 benchmarks/_siconos_simulation.py KIND BODIES MU STEPS
 
-OUT/STEP.npz has W in compressed columns, q and mu of each EVERY-th step with contacts, in m, kg
-and s. siconos_scenes.py calls it.
+siconos_scenes.py records its steps.
 """
 
 from __future__ import annotations
@@ -17,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse
 import scipy.spatial
 import siconos.io.mechanics_run as mechanics_run
 import siconos.kernel as kernel
@@ -177,42 +175,20 @@ def towers(scene: Scene, bodies: int) -> None:
 KINDS = {make.__name__: make for make in (rocks, boxes, spheres, capsules, wall, towers)}
 
 
-def dump(out: Path, every: int) -> type:
-    """Siconos' friction problem, which writes what it has solved."""
+class Cold(mechanics_run.FCTrace):  # type: ignore[misc]
+    """A friction problem in blocks, solved without the step before: steps are independent."""
 
-    class Dump(kernel.FrictionContact):  # type: ignore[misc]
-        def __init__(self, dimension: int, options: Any, parameters: Any, nsds: Any) -> None:
-            super().__init__(dimension, options)
-            self.steps = 0
+    def setMStorageType(self, storage: Any) -> None:
+        super().setMStorageType(numerics.NM_SPARSE_BLOCK)
 
-        def setMStorageType(self, storage: Any) -> None:
-            super().setMStorageType(numerics.NM_SPARSE_BLOCK)
-
-        def compute(self, time: float) -> int:
-            self.steps += 1
-            self.setKeepLambdaAndYState(False)
-            if not self.preCompute(time):
-                return 0
-            self.updateMu()
-            if self.getSizeOutput() == 0:
-                return 0
-            info: int = self.solve()
-            if self.steps % every == 0:
-                problem = self.frictionContactProblemPtr()
-                m = 3 * problem.numberOfContacts
-                numerics.NM_clear_not_SBM(problem.M)  # else that of a step before
-                w = scipy.sparse.csc_matrix(numerics.NM_csc(problem.M))
-                arrays = {"data": w.data, "indices": w.indices, "indptr": w.indptr}
-                arrays |= {"q": np.array(self.q())[:m], "mu": np.array(problem.mu)[: m // 3]}
-                np.savez(out / f"{self.steps:05d}.npz", **arrays)
-            self.postCompute()
-            return info
-
-    return Dump
+    def compute(self, time: float) -> int:
+        self.setKeepLambdaAndYState(False)
+        info: int = super().compute(time)
+        return info
 
 
 def main() -> None:
-    kind, bodies, mu, steps, every, out = sys.argv[1:]
+    kind, bodies, mu, steps = sys.argv[1:]
     options = kernel.solver_options_create(numerics.SICONOS_FRICTION_3D_NSGS)
     options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 300
     options.dparam[numerics.SICONOS_DPARAM_TOL] = 1e-5
@@ -220,7 +196,7 @@ def main() -> None:
     bullet.worldScale = 1.0
     bullet.perturbationIterations = 3
     bullet.minimumPointsPerturbationThreshold = 3
-    mechanics_run.FCTrace = dump(Path(out), int(every))
+    mechanics_run.FCTrace = Cold
     with tempfile.TemporaryDirectory() as folder:
         file = str(Path(folder) / "scene.hdf5")
         with mechanics_run.MechanicsHdf5Runner(mode="w", io_filename=file) as io:

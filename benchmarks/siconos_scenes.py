@@ -3,24 +3,19 @@
     .venv/bin/python benchmarks/siconos_scenes.py OUT [--scenes boxes-80-0.5 wall-8-0.6 ...]
         [--steps 400] [--every 25]
 
-A scene is KIND-BODIES-MU; the kinds are in _siconos_simulation.py, which Siconos' own interpreter
-runs (fclib.external.siconos). Contacts, time stepping and the slightly asymmetric W are theirs:
-nothing of it is ours. The problems are for against_siconos.py and `fclib bench`.
+A scene is KIND-BODIES-MU; the kinds are in _siconos_simulation.py, whose steps fclib.recorders
+records. Contacts, time stepping and the slightly asymmetric W are theirs: nothing of it is ours.
+The problems are for against_siconos.py and `fclib bench`.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
-import numpy as np
-import scipy.sparse
-
-import fclib
+from fclib import recorders
 from fclib.external import siconos
 
 SIMULATION = Path(__file__).with_name("_siconos_simulation.py")
@@ -40,22 +35,14 @@ SCENE = re.compile(rf"({'|'.join(KINDS)})-\d+-\d*\.?\d+")
 
 def simulate(scene: str, steps: int, every: int, out: Path) -> int:
     """Write the problems of a scene. Their number."""
-    with tempfile.TemporaryDirectory() as folder:
-        arguments = [*scene.split("-"), str(steps), str(every), folder]
-        command = [siconos.python(), str(SIMULATION), *arguments]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            sys.exit(f"{scene}: {(done.stderr.strip() or done.stdout).splitlines()[-1]}")
-        files = sorted(Path(folder).glob("*.npz"))
-        for file in files:
-            with np.load(file) as data:
-                m = len(data["q"])
-                w = scipy.sparse.csc_array(
-                    (data["data"], data["indices"], data["indptr"]), shape=(m, m)
-                )
-                problem = fclib.LocalProblem(W=w, q=data["q"], mu=data["mu"], spacedim=3)
-            fclib.write(out / f"{scene}-{file.stem}.hdf5", problem)
-    return len(files)
+    arguments = [*scene.split("-"), str(steps)]
+    written = 0
+    for recorded in recorders.siconos(SIMULATION, arguments=arguments, every=every):
+        step = round(recorded.time / recorded.h)
+        if step:  # at the start nothing has moved yet
+            recorded.write(out / f"{scene}-{step:05d}.hdf5")
+            written += 1
+    return written
 
 
 def main() -> None:

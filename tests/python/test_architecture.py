@@ -74,7 +74,7 @@ PYTHON: dict[str, set[str]] = {
     "analysis": {"_core", "_digest", "_registry", "_solve"},
     "scenes": {"_core", "_geometry"},
     "simulate": {"_core", "_geometry", "_solve", "scenes"},
-    "recorders": {"_core", "_solve"},
+    "recorders": {"_core", "_solve", "external"},
     "collections": {"_core", "_digest", "_geometry", "_solve", "analysis", "scenes", "simulate"},
     "__init__": {
         "_batch",

@@ -489,7 +489,7 @@ def test_problems_of_scenes_that_siconos_simulates(tmp_path: Path) -> None:
     siconos("print(1)", needs="siconos.mechanics.collision.bullet, scipy, h5py")
     benchmark = Path(__file__).parents[2] / "benchmarks" / "siconos_scenes.py"
     command: list[str | Path] = [sys.executable, benchmark, tmp_path, "--scenes", "towers-4-0.4"]
-    subprocess.run([*command, "--steps", "40", "--every", "20"], check=True, capture_output=True)
+    subprocess.run([*command, "--steps", "41", "--every", "20"], check=True, capture_output=True)
     files = sorted(tmp_path.glob("towers-4-0.4-*.hdf5"))
     assert len(files) == 2
     for path in files:

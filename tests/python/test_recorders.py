@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from typer.testing import CliRunner
 import fclib
 from fclib import recorders
 from fclib.cli import app
+from fclib.external import siconos
 from helpers import dense
 
 H = 1e-3
@@ -315,9 +317,128 @@ def test_a_script_is_recorded(tmp_path: Path) -> None:
     assert "has files already" in " ".join(again.output.split())
 
 
+# spheres: nothing gyroscopic; the second runs into the first
+SICONOS = """
+import sys, tempfile
+import siconos.io.mechanics_run as mechanics_run
+import siconos.kernel as kernel
+import siconos.numerics as numerics
+from siconos.mechanics.collision.tools import Contactor
+
+scheme, solver, steps = sys.argv[1:4]
+with tempfile.TemporaryDirectory() as folder:
+    file = folder + "/scene.hdf5"
+    with mechanics_run.MechanicsHdf5Runner(mode="w", io_filename=file) as io:
+        io.add_primitive_shape("Ground", "Box", (100, 100, 1))
+        io.add_object("ground", [Contactor("Ground")], translation=[0, 0, -0.5])
+        io.add_primitive_shape("Ball", "Sphere", (0.5,))
+        for i in range(3):
+            io.add_object(
+                f"ball{i}",
+                [Contactor("Ball")],
+                translation=[1.01 * i, 0, 0.5],
+                velocity=[3 - 3 * i, 0, 0, 0, 0, i],
+                mass=1 + i,
+            )
+        io.add_Newton_impact_friction_nsl("contact", mu=0.5, e=0.0)
+    options = kernel.solver_options_create(getattr(numerics, solver))
+    options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = 10000
+    options.dparam[numerics.SICONOS_DPARAM_TOL] = 1e-10
+    with mechanics_run.MechanicsHdf5Runner(mode="r+", io_filename=file) as io:
+        io.run(
+            T=int(steps) * 0.005,
+            h=0.005,
+            theta=0.5,
+            Newton_max_iter=1,
+            osi=getattr(kernel, scheme),
+            solver_options=options,
+            verbose=False,
+            verbose_progress=False,
+            output_frequency=1000,
+        )
+if len(sys.argv) > 4:
+    sys.exit(3)
+"""
+GLOBAL = ("MoreauJeanGOSI", "SICONOS_GLOBAL_FRICTION_3D_NSGS_WR")
+LOCAL = ("MoreauJeanOSI", "SICONOS_FRICTION_3D_NSGS")
+
+
+def needs_siconos() -> None:
+    if siconos.missing():
+        pytest.skip("Siconos is not installed")
+    code = "import siconos.io.mechanics_run, siconos.mechanics.collision.bullet"
+    if subprocess.run([siconos.python(), "-c", code], capture_output=True, check=False).returncode:
+        pytest.skip("Siconos has no mechanics with Bullet")
+
+
+def test_siconos_own_problem_is_recorded(tmp_path: Path) -> None:
+    needs_siconos()
+    script = tmp_path / "balls.py"
+    script.write_text(SICONOS, encoding="utf-8")
+    before: Any = None
+    touched = set()
+    for recorded in recorders.siconos(script, arguments=(*GLOBAL, "12")):
+        problem, v = recorded.problem, np.asarray(recorded.velocity)
+        assert problem.kind == "global"
+        assert problem.n == 18
+        assert recorded.h == pytest.approx(0.005)
+        # the solver's velocity, from its reaction
+        assert recorded.mismatch is not None
+        assert recorded.mismatch < 1e-12
+        if before is not None:
+            # the engine's free velocity: that of the step before, and its gravity
+            free = before + np.tile([0, 0, -9.80665 * recorded.h, 0, 0, 0], 3)
+            np.testing.assert_allclose(problem.f, problem.M @ free, atol=1e-12)
+        before = v
+        assert recorded.guess is not None
+        assert fclib.merit(problem, recorded.guess).error < 1e-6
+        result: Any = fclib.solve(problem, tol=1e-10)
+        assert result.converged
+        np.testing.assert_allclose(result.solution.v, v, atol=1e-6)
+        pairs = described(recorded)["bodies"]
+        assert len(pairs) == problem.nc
+        touched |= {tuple(pair) for pair in pairs}
+    # each ball on the ground, which moves nothing, and next to another
+    assert touched == {(-1, 1), (-1, 2), (-1, 3), (1, 2), (2, 3)}
+
+
+def test_siconos_local_problem_is_recorded(tmp_path: Path) -> None:
+    needs_siconos()
+    script = tmp_path / "balls.py"
+    script.write_text(SICONOS, encoding="utf-8")
+    out = tmp_path / "out"
+    common = ["record", "siconos", str(script), *LOCAL, "12", "--every", "5", "--out", str(out)]
+    done = CliRunner().invoke(app, common)
+    assert done.exit_code == 0, done.output
+    assert "3 of 12 steps" in done.output
+    files = sorted(out.glob("*.hdf5"))
+    assert [path.stem for path in files] == [f"siconos-{k:06d}" for k in (0, 5, 10)]
+    for file in files:
+        problem: Any = fclib.read(file)
+        assert problem.kind == "local"
+        (guess,) = fclib.read_guesses(file)
+        assert fclib.merit(problem, guess).error < 1e-6
+        assert fclib.solve(problem).converged
+
+
+def test_a_script_of_siconos_that_fails_keeps_its_steps(tmp_path: Path) -> None:
+    needs_siconos()
+    script = tmp_path / "balls.py"
+    script.write_text(SICONOS, encoding="utf-8")
+    out = tmp_path / "out"
+    arguments = ["record", "siconos", str(script), *LOCAL, "3", "--out", str(out)]
+    done = CliRunner().invoke(app, [*arguments, "--", "fail"])
+    assert done.exit_code == 1
+    assert "ended with status 3" in " ".join(done.output.split())
+    assert len(list(out.glob("*.hdf5"))) == 3
+
+
 def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
     for arguments, message in (
-        (["nothing", "x.py"], "no engine 'nothing' is recorded; there is: drake, pybullet"),
+        (
+            ["nothing", "x.py"],
+            "no engine 'nothing' is recorded; there is: drake, pybullet, siconos",
+        ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):
         done = CliRunner().invoke(app, ["record", *arguments, "--out", str(tmp_path / "out")])

@@ -12,7 +12,10 @@ from fclib.cli._output import err, fail, out
 
 def command(
     engine: Annotated[
-        str, typer.Argument(help="drake or pybullet, which must be installed.", show_default=False)
+        str,
+        typer.Argument(
+            help="drake, pybullet or siconos, which must be installed.", show_default=False
+        ),
     ],
     script: Annotated[Path, typer.Argument(help="A Python script.", show_default=False)],
     arguments: Annotated[

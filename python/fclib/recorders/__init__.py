@@ -7,7 +7,8 @@
 _assemble.py   what is common: order of rows, redundant joints, limits, dry friction, compliance
 _recorded.py   a recorded step, what is exact in it, and a folder of them
 _scripts.py    steps of somebody's script, while it runs
-_drake.py, _pinocchio.py, _pybullet.py, ...        one engine each
+_drake.py, _pinocchio.py, _pybullet.py, _siconos.py    one engine each
+_siconos_steps.py  run by the interpreter that has Siconos
 
 An engine is imported where its adapter is called.
 """
@@ -27,6 +28,7 @@ from fclib.recorders._pinocchio import pinocchio
 from fclib.recorders._pybullet import pybullet
 from fclib.recorders._recorded import Recorded, Recording
 from fclib.recorders._scripts import ENGINES, record_script
+from fclib.recorders._siconos import siconos
 
 __all__ = [
     "ENGINES",
@@ -43,5 +45,6 @@ __all__ = [
     "pinocchio",
     "pybullet",
     "record_script",
+    "siconos",
     "solve_associated",
 ]

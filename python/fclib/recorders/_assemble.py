@@ -71,8 +71,8 @@ class DryFriction:
 class Assembled:
     """A problem, and what was left out of it."""
 
-    problem: _core.GlobalProblem
-    dofs: int  # n; the problem's degrees of freedom after these are auxiliary
+    problem: Any  # a GlobalProblem; a LocalProblem where the engine tells W alone
+    dofs: int  # n; the problem's degrees of freedom after these are auxiliary; of a local one m
     redundant: tuple[int, ...] = ()  # rows of joints that follow from the others
     violated: float = 0.0  # by how much at most a redundant row is not that combination [m/s]
     info: dict[str, Any] = field(default_factory=dict)

@@ -27,16 +27,20 @@ class Recorded:
     law: str  # what the engine solves, in words
     time: float  # at the start of the step [s]
     h: float  # [s]
-    fields: Mapping[str, Origin]  # of M, f, H, w, mu, G, b: from the engine, or by our formulas
+    fields: Mapping[str, Origin]  # of M, f, H, w, mu, G, b or W, q: from the engine, or by formulas
     guess: _core.Solution | None = None  # the engine's own reaction
-    velocity: Any = None  # (n) after the step, as the engine has it; None: it does not tell
+    # (n), of a local problem (m), after the step, as the engine has it; None: it does not tell
+    velocity: Any = None
     contacts: Contacts | None = None
     notes: tuple[str, ...] = ()
     more: Mapping[str, Any] = field(default_factory=dict)  # in JSON's types
 
     @property
-    def problem(self) -> _core.GlobalProblem:
-        """With a description whose last line, JSON, says where it is from."""
+    def problem(self) -> Any:
+        """With a description whose last line, JSON, says where it is from.
+
+        A `GlobalProblem`, or a `LocalProblem` where the engine tells W alone.
+        """
         origin = {
             "generator": "fclib.recorders",
             "fclib": _core.version,
@@ -57,23 +61,33 @@ class Recorded:
             f"Law of the engine: {self.law}.",
             *self.notes,
         ]
+        problem = self.assembled.problem
+        equations = "u = W r + q"
+        if isinstance(problem, _core.GlobalProblem):
+            equations = "M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0"
+        axes = "N, T" if problem.spacedim == 2 else "N, T1, T2"
         info = _core.ProblemInfo(
             title=f"{self.engine}, t = {self.time:g} s",
             description="\n".join([*words, json.dumps(origin)]),
             math_info=(
-                "M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0; v in m/s and rad/s, r in"
-                f" N s over h = {self.h:g} s, components N, T1, T2"
+                f"{equations}; velocities in m/s and rad/s, r in N s over h = {self.h:g} s,"
+                f" components {axes}"
             ),
         )
-        return self.assembled.problem.replace(info=info)
+        return problem.replace(info=info)
 
     @property
     def mismatch(self) -> float | None:
         """How far the engine's velocity is from the one that its reaction gives [m/s]; the largest.
 
-        None where it tells no reaction or no velocity.
+        The velocity is v, of a local problem u. None where it tells no reaction or no velocity.
         """
         problem = self.assembled.problem
+        if isinstance(problem, _core.LocalProblem):
+            if self.guess is None or self.velocity is None:
+                return None
+            u = problem.W @ self.guess.r + problem.q
+            return float(np.abs(u - np.asarray(self.velocity)).max(initial=0.0))
         untold = self.guess is None and problem.m
         if untold or self.velocity is None or problem.p:
             return None

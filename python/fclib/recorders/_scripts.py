@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fclib.recorders import _drake, _pybullet
+from fclib.recorders import _drake, _pybullet, _siconos
 from fclib.recorders._recorded import Recording
 
 
@@ -74,9 +74,26 @@ def _steps_of_drake(recording: Recording) -> Iterator[None]:
         kind.AdvanceTo = original
 
 
-ENGINES: Final[dict[str, Callable[[Recording], Any]]] = {
-    "drake": _steps_of_drake,
-    "pybullet": _steps_of_pybullet,
+def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], None]:
+    """Run a script while an engine's own functions tell of its steps."""
+
+    def run(recording: Recording, script: Path, arguments: Sequence[str]) -> None:
+        before, path = sys.argv, list(sys.path)
+        sys.argv = [str(script), *arguments]
+        sys.path.insert(0, str(script.parent))
+        try:
+            with steps(recording):
+                runpy.run_path(str(script), run_name="__main__")
+        finally:
+            sys.argv, sys.path[:] = before, path
+
+    return run
+
+
+ENGINES: Final[dict[str, Callable[[Recording, Path, Sequence[str]], None]]] = {
+    "drake": _in_this_process(_steps_of_drake),
+    "pybullet": _in_this_process(_steps_of_pybullet),
+    "siconos": _siconos.record,
 }
 
 
@@ -94,6 +111,7 @@ def record_script(
         ValueError: the engine is not one of `ENGINES`, or `every` is below 1.
         ImportError: the engine is not installed.
         OSError: the script cannot be read, or the folder not written; it may hold no files.
+        ChildProcessError: a script of Siconos ended with an error; steps before it are written.
     """
     if engine not in ENGINES:
         raise ValueError(f"no engine {engine!r} is recorded; there is: {', '.join(ENGINES)}")
@@ -101,12 +119,5 @@ def record_script(
     if not script.is_file():
         raise FileNotFoundError(f"{script}: there is no such script")
     recording = Recording(folder, every)
-    before, path = sys.argv, list(sys.path)
-    sys.argv = [str(script), *arguments]
-    sys.path.insert(0, str(script.parent))
-    try:
-        with ENGINES[engine](recording):
-            runpy.run_path(str(script), run_name="__main__")
-    finally:
-        sys.argv, sys.path[:] = before, path
+    ENGINES[engine](recording, script, arguments)
     return recording

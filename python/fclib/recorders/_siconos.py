@@ -1,0 +1,138 @@
+"""Siconos: the friction problems of a script's steps, in the form in which Siconos solves them.
+
+The script runs in the interpreter that has Siconos (`fclib.external.siconos`), by
+_siconos_steps.py. With `MoreauJeanGOSI` the problem is global: M v = H r + q, u = H^T v + b. With
+other integrators it is local: u = W r + q. Joints and rolling friction are not recorded.
+
+Acary & Perignon, "Siconos: a software platform for modeling, simulation, analysis and control of
+nonsmooth dynamical systems" (2007).
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fclib import _core
+from fclib.external import siconos as installed
+from fclib.recorders._assemble import Assembled, Contacts
+from fclib.recorders._recorded import Origin, Recorded, Recording
+
+STEPS = Path(__file__).with_name("_siconos_steps.py")
+
+
+def siconos(
+    script: str | Path, *, arguments: Sequence[str] = (), every: int = 1
+) -> Iterator[Recorded]:
+    """Run a script of Siconos, and give every so manieth of its steps that has contacts.
+
+    The script runs to its end before the first step is given.
+
+    Raises:
+        ImportError: Siconos is not installed.
+        FileNotFoundError: there is no such script.
+        ChildProcessError: the script ended with an error; raised after the steps before it.
+        ValueError: `every` is below 1.
+    """
+    return (step for step in steps(Path(script), arguments, every) if step is not None)
+
+
+def record(recording: Recording, script: Path, arguments: Sequence[str]) -> None:
+    """Add the steps of a script to a recording."""
+    for step in steps(script, arguments, recording.every):
+        recording.add(step)
+
+
+def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Recorded | None]:
+    """Each step of a script; None where it is not kept, or nothing touches."""
+    if every < 1:
+        raise ValueError(f"every must be at least 1, not {every}")
+    if not script.is_file():
+        raise FileNotFoundError(f"{script}: there is no such script")
+    if word := installed.missing():
+        raise ImportError(word)
+    with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
+        command = [installed.python(), str(STEPS), folder, str(every), str(script), *arguments]
+        status = subprocess.run(command, check=False).returncode
+        end = Path(folder) / "steps.json"
+        told: Any = {"steps": 0}  # it ended before the script began
+        if end.is_file():
+            told = json.loads(end.read_text(encoding="utf-8"))
+        for number in range(told["steps"]):
+            file = Path(folder) / f"{number:06d}.npz"
+            yield recorded(file, told["version"]) if file.is_file() else None
+    if status:
+        raise ChildProcessError(
+            f"{script}: ended with status {status} in {installed.python()}; what it said is above"
+        )
+
+
+def recorded(file: Path, version: str) -> Recorded:
+    """What _siconos_steps.py wrote of a step."""
+    with np.load(file) as data:
+        known: dict[str, Any] = dict(data)
+    dimension, h = int(known["dimension"]), float(known["h"])
+    fields: dict[str, Origin]
+    problem: _core.GlobalProblem | _core.LocalProblem
+    contacts = None
+    if "H_data" in known:
+        H = columns(known, "H")
+        problem = _core.GlobalProblem(
+            spacedim=dimension,
+            M=columns(known, "M"),
+            H=H,
+            f=known["q"],
+            w=known["b"],
+            mu=known["mu"],
+        )
+        fields = dict.fromkeys(("M", "f", "H", "w", "mu"), "exact")
+        contacts = Contacts(
+            jacobian=H.T, mu=known["mu"], bodies=touching(H, known["bodies"], dimension)
+        )
+        velocity = known["v"]
+    else:
+        problem = _core.LocalProblem(
+            spacedim=dimension, W=columns(known, "W"), q=known["q"], mu=known["mu"]
+        )
+        fields = dict.fromkeys(("W", "q", "mu"), "exact")
+        velocity = known["u"]
+    return Recorded(
+        assembled=Assembled(problem, len(velocity)),
+        engine="Siconos",
+        version=version,
+        licence="Apache-2.0",
+        law="Coulomb and Newton's impact, Moreau-Jean",
+        time=float(known["end"]) - h,
+        h=h,
+        fields=fields,
+        guess=_core.Solution(r=known["r"]),
+        velocity=velocity,
+        contacts=contacts,
+        notes=("The velocity and the reaction are those that Siconos' solver returned.",),
+        more={"solve_cpu_s": float(known["solve_cpu_s"])},
+    )
+
+
+def columns(known: dict[str, Any], name: str) -> Any:
+    """A matrix of the file."""
+    parts = (known[f"{name}_{part}"] for part in ("data", "indices", "indptr"))
+    matrix = sp.csc_array(tuple(parts), shape=tuple(known[f"{name}_shape"]))
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def touching(H: Any, bodies: Any, dimension: int) -> Any:
+    """(nc x 2) the numbers of the systems that a contact moves; -1 first where it is one."""
+    pairs = np.full((H.shape[1] // dimension, 2), -1)
+    for c, pair in enumerate(pairs):
+        rows = H.indices[H.indptr[dimension * c] : H.indptr[dimension * (c + 1)]]
+        moved = np.unique(bodies[rows])
+        pair[2 - len(moved) :] = moved
+    return pairs

@@ -1,0 +1,155 @@
+"""Run by Siconos' own interpreter: a script, and the friction problems that it solves.
+
+    /usr/bin/python3 _siconos_steps.py FOLDER EVERY SCRIPT [ARGUMENT...]
+
+Knows nothing of fclib. FOLDER/STEP.npz has what a kept step with contacts solved, FOLDER/steps.json
+the number of steps and the version. The class of the friction problem that a script finds in
+`siconos.kernel` is one that writes; so are the classes by which `mechanics_run` traces.
+"""
+
+import json
+import runpy
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+del sys.path[0]  # the folder of this file, which has modules of the same names as packages
+
+import numpy as np  # noqa: E402
+import scipy.sparse  # noqa: E402
+import siconos  # noqa: E402
+import siconos.kernel as kernel  # noqa: E402
+import siconos.numerics as numerics  # noqa: E402
+
+NO_INDEX_SET = 999  # of a problem without one, as Siconos numbers it
+
+
+class Steps:
+    """The steps of the simulation so far."""
+
+    def __init__(self, folder: Path, every: int) -> None:
+        self.folder, self.every = folder, every
+        self.count = 0
+        self.time = -np.inf
+
+    def next(self, time: float) -> bool:
+        """Whether the problem at the end of a step is kept. Newton's iterations are one step."""
+        if time != self.time:
+            self.count += 1
+            self.time = time
+        return (self.count - 1) % self.every == 0
+
+    def write(self, arrays: Any) -> None:
+        """The last problem of a step is the one that stays."""
+        np.savez(self.folder / f"{self.count - 1:06d}.npz", **arrays)
+
+
+def columns(name: str, matrix: Any) -> Any:
+    """A matrix in compressed columns."""
+    matrix = scipy.sparse.csc_matrix(matrix)
+    return {
+        f"{name}_shape": matrix.shape,
+        f"{name}_data": matrix.data,
+        f"{name}_indices": matrix.indices,
+        f"{name}_indptr": matrix.indptr,
+    }
+
+
+def local(osns: Any) -> Any:
+    """W and q: siconos.kernel.FrictionContact."""
+    problem = osns.frictionContactProblemPtr()
+    m = problem.dimension * problem.numberOfContacts
+    W = problem.M
+    if osns.getMStorageType() == numerics.NM_SPARSE_BLOCK:
+        numerics.NM_clear_not_SBM(W)  # else that of a step before
+        W = numerics.NM_csc(W)
+    else:
+        W = np.array(W)[:m, :m]
+    return {**columns("W", W), "q": np.array(osns.q())[:m]}, problem
+
+
+def globally(osns: Any) -> Any:
+    """M, H, q and b: siconos.kernel.GlobalFrictionContact."""
+    problem = osns.globalFrictionContactProblemPtr()
+    m = problem.dimension * problem.numberOfContacts
+    systems = osns.simulation().nonSmoothDynamicalSystem().dynamicalSystemsVector()
+    arrays = {
+        **columns("M", problem.M),
+        **columns("H", problem.H),
+        "q": np.array(problem.q),
+        "b": np.array(problem.b)[:m],
+        "bodies": np.repeat([s.number() for s in systems], [s.dimension() for s in systems]),
+    }
+    return arrays, problem
+
+
+def writing(original: Any, told: Any, steps: Steps) -> Any:
+    """A class of friction problems that writes what it solves."""
+
+    class Shown(original):  # type: ignore[misc]
+        def __new__(cls, *arguments: Any, **options: Any) -> Any:
+            # the class itself must not be the name in siconos.kernel, else compute stays C++
+            return super().__new__(Hidden if cls is Shown else cls)
+
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments[:2])  # what follows is of a trace
+
+        def compute(self, now: float) -> int:
+            kept = steps.next(now)
+            if not self.preCompute(now) or self.indexSetLevel() == NO_INDEX_SET:
+                return 0
+            self.updateMu()
+            if not self.getSizeOutput():
+                return 0
+            arrays: Any = {}
+            if kept:
+                arrays, problem = told(self)
+                nc, dimension = problem.numberOfContacts, problem.dimension
+                simulation = self.simulation()
+                arrays |= {"mu": np.array(problem.mu)[:nc], "dimension": dimension}
+                arrays |= {"end": now, "h": simulation.timeStep()}
+            start = time.process_time()
+            info: int = self.solve()
+            spent = time.process_time() - start
+            if arrays:
+                m = dimension * nc
+                arrays |= {"r": np.array(self.z())[:m], "u": np.array(self.w())[:m]}
+                if hasattr(self, "globalVelocities"):
+                    arrays["v"] = np.array(self.globalVelocities())[: len(arrays["q"])]
+                steps.write(arrays | {"solve_cpu_s": spent})
+            self.postCompute()
+            return info
+
+    class Hidden(Shown):
+        pass
+
+    return Shown
+
+
+def main() -> None:
+    folder, every, script, *arguments = sys.argv[1:]
+    steps = Steps(Path(folder), int(every))
+    try:
+        import siconos.io.mechanics_run as runner
+    except ImportError:  # scripts may do without
+        runner = None
+    for name, trace, told in (
+        ("FrictionContact", "FCTrace", local),
+        ("GlobalFrictionContact", "GFCTrace", globally),
+    ):
+        writes = writing(getattr(kernel, name), told, steps)
+        setattr(kernel, name, writes)
+        if runner is not None:
+            setattr(runner, trace, writes)
+    sys.argv = [script, *arguments]
+    sys.path.insert(0, str(Path(script).parent))
+    try:
+        runpy.run_path(script, run_name="__main__")
+    finally:
+        count = {"steps": steps.count, "version": siconos.version}
+        (Path(folder) / "steps.json").write_text(json.dumps(count), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,19 +1,24 @@
 """Steps recorded from other engines: how exact they are, and `auto` beside the engine's reaction.
 
-    .venv/bin/python benchmarks/recorded_steps.py
+    PYTHON benchmarks/recorded_steps.py [--results recorded-steps]
 
-A pile of boxes in Drake and in PyBullet, three steps each; engines that are not installed are left
-out. CPU times: that of the engine is of its whole step, collisions and all; that of FCLIB is of the
-solve of the problem alone.
+A pile of boxes in each engine, three steps each. PYTHON has fclib, Drake and PyBullet; Siconos has
+an interpreter of its own (fclib.external.siconos). Engines that are not installed are left out, and
+said. CPU times: that of Drake and of PyBullet is of their whole step, collisions and all; that of
+Siconos and of FCLIB is of the solve of the problem alone.
 """
 
 from __future__ import annotations
 
-import contextlib
+import argparse
 import os
+import sys
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+
+import _results
 
 import fclib
 from fclib import recorders
@@ -22,6 +27,9 @@ STEPS = (50, 150, 300)
 TIMED = 10  # steps before, whose mean time is told
 BOXES = 6
 SIZE = 0.1  # [m] half an edge
+TOLERANCE = 1e-8
+REPEATS = 5  # of a solve, the least time counts
+SICONOS = Path(__file__).with_name("_siconos_boxes.py")
 
 
 def drakes() -> Iterator[tuple[Any, Any, float]]:
@@ -96,31 +104,75 @@ def bullets() -> Iterator[tuple[Any, Any, float]]:
     bullet.disconnect()
 
 
-def main() -> None:
-    """Print the table."""
-    print("| engine | law | contacts | free velocity | own error | its step, ms | FCLIB | ms |")
-    print("|---|---|---|---|---|---|---|---|")
-    for steps in (drakes, bullets):
-        with contextlib.suppress(ImportError):
+def siconoses() -> Iterator[tuple[Any, Any, float]]:
+    """Siconos' steps, in steps of 5 ms."""
+    every, last = min(STEPS), max(STEPS)
+    for recorded in recorders.siconos(SICONOS, arguments=[str(last + 1)], every=every):
+        if round(recorded.time / recorded.h) in STEPS:
+            yield recorded, "hard", recorded.more["solve_cpu_s"]
+
+
+def rows() -> Iterator[dict[str, Any]]:
+    """A line of the table for each step."""
+    for steps in (drakes, bullets, siconoses):
+        try:
             for recorded, law, took in steps():
-                problem = recorded.problem
-                own = fclib.merit(problem, recorded.guess).error
-                said = f"{own:.1e}"
-                if law == "sap":
-                    by_its_own = recorders.associated_error(problem, recorded.guess.r)
-                    result: Any = recorders.solve_associated(problem, tol=1e-8)
-                    reached = recorders.associated_error(problem, result.solution.r)
-                    said, name = f"{own:.0e}; by its law {by_its_own:.0e}", "`associated` "
-                else:
-                    result = fclib.solve(problem, tol=1e-8)
-                    reached, name = result.error, "`auto` "
-                print(
-                    f"| {recorded.engine} {recorded.version} | {law} | {problem.nc} |"
-                    f" {recorded.mismatch:.0e} m/s | {said} |"
-                    f" {1e3 * took:.2f} |"
-                    f" {name}{reached:.0e} | {1e3 * result.cpu_s:.2f} |",
-                    flush=True,
-                )
+                yield row(recorded, law, took)
+        except ImportError as error:
+            print(f"left out: {error}", file=sys.stderr)
+
+
+def row(recorded: Any, law: str, took: float) -> dict[str, Any]:
+    """A step: its exactness, and both sides' errors and times."""
+    problem = recorded.problem
+    own = fclib.merit(problem, recorded.guess).error
+    by_its_law = ""
+    times = []
+    for _ in range(REPEATS):
+        result: Any
+        if law == "sap":
+            result = recorders.solve_associated(problem, tol=TOLERANCE)
+        else:
+            result = fclib.solve(problem, tol=TOLERANCE)
+        times.append(result.cpu_s)
+    reached = result.error
+    if law == "sap":
+        by_its_law = f"{recorders.associated_error(problem, recorded.guess.r):.0e}"
+        reached = recorders.associated_error(problem, result.solution.r)
+    return {
+        "engine": f"{recorded.engine} {recorded.version}",
+        "law": law,
+        "contacts": problem.nc,
+        "velocity off [m/s]": f"{recorded.mismatch:.0e}",
+        "its error": f"{own:.0e}",
+        "its error, own law": by_its_law,
+        "its time [ms]": f"{1e3 * took:.2f}",
+        "FCLIB": "associated" if law == "sap" else "auto",
+        "FCLIB's error": f"{reached:.0e}",
+        "FCLIB's time [ms]": f"{1e3 * min(times):.2f}",
+    }
+
+
+def main() -> None:
+    """Print the table, and store it."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    _results.add_option(parser)
+    arguments = parser.parse_args()
+    table = list(rows())
+    if not table:
+        sys.exit("no engine is installed: pip install 'fclib[recorders]'")
+    for line in table:
+        print("  ".join(str(entry) for entry in line.values()), flush=True)
+    if arguments.results:
+        path = _results.store(
+            arguments.results,
+            table,
+            title="Steps of other engines",
+            note=f"A pile of {BOXES} boxes; FCLIB to {TOLERANCE:g}. CPU time of Drake's and"
+            " PyBullet's whole step, of Siconos' and FCLIB's solve alone.",
+            command="PYTHON benchmarks/recorded_steps.py --results recorded-steps",
+        )
+        print(path)
 
 
 if __name__ == "__main__":

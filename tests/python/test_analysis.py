@@ -312,6 +312,31 @@ def test_a_rolling_body_between_closing_walls() -> None:
     assert proof.y @ q[::5] < 0
 
 
+@pytest.mark.parametrize("speed", [-0.2, 0.0, 0.2])
+def test_contacts_without_degrees_of_freedom(speed: float, tmp_path: Path) -> None:
+    """Their velocity is w: there is a solution where it leaves none of them closing."""
+    problem = fclib.GlobalProblem(
+        spacedim=3,
+        M=sp.csc_array((0, 0)),
+        H=sp.csc_array((0, 6)),
+        f=np.zeros(0),
+        w=np.array([0.1, 0, 0, speed, 0, 0]),
+        mu=np.array([0.5, 0.5]),
+    )
+    found = analysis.analyze(problem)
+    assert "nothing can move" in found.units.trouble[0]
+    if speed < 0:
+        assert found.existence.verdict == "proven not to exist"
+        assert_no_solution(problem, found.existence.certificate)
+    else:
+        assert found.existence.verdict.startswith("exists")
+    assert found.slater.holds is (speed > 0)
+    fclib.write(tmp_path / "fixed.hdf5", problem)
+    done = run("analyze", tmp_path / "fixed.hdf5")
+    assert "Traceback" not in done.stderr
+    assert "2 contacts that nothing can move" in done.stdout + done.stderr
+
+
 def test_what_proves_nothing_is_no_proof() -> None:
     problem = squeezed(3, 0.4, 2).condense()
     assert isinstance(problem, fclib.LocalProblem)

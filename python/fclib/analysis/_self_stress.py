@@ -279,7 +279,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     # r and what joints do, then t of each contact: r_a - t_a e_N in K, 0 <= t_a <= 1
     size = B.shape[1] + nc
     program = Program(size)
-    scale = float(abs(B).max()) or 1.0
+    scale = float(abs(B.data).max(initial=0.0)) or 1.0
     program.equal(sp.hstack([B / scale, sp.csr_array((B.shape[0], nc))]), np.zeros(B.shape[0]))
     t = sp.csr_array((np.ones(nc), (np.arange(nc), B.shape[1] + np.arange(nc))), (nc, size))
     program.nonnegative(t, np.zeros(nc))

@@ -11,6 +11,7 @@ import json
 import runpy
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ import siconos  # noqa: E402
 import siconos.kernel as kernel  # noqa: E402
 import siconos.numerics as numerics  # noqa: E402
 
+warnings.filterwarnings("ignore", message=".*scipy.sparse.coo")  # of Siconos' own conversions
 NO_INDEX_SET = 999  # of a problem without one, as Siconos numbers it
 
 

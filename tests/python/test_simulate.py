@@ -929,6 +929,24 @@ def test_picture(tmp_path: Path) -> None:
     assert pictures["forces"] != pictures["bodies"]
 
 
+def test_arrows_of_a_crowd_do_not_hide_each_other() -> None:
+    module: Any = importlib.import_module("fclib.simulate.render")
+    mujoco = module.mujoco
+    x, y = np.meshgrid(np.arange(4) * 0.1, np.arange(3) * 0.1)
+    grid = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    # a contact of two points in one place has no distance of its own
+    assert module.spacing(np.concatenate([grid, grid[:2]])) == pytest.approx(0.1)
+    assert module.spacing(grid[:1]) == math.inf
+    sizes = {}
+    for name, points in (("crowd", grid), ("alone", grid[:1])):
+        scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), maxgeom=100)
+        module.draw_arrows(scene, points, np.tile([0.0, 0.0, 2.0], (len(points), 1)), 1.0)
+        assert scene.ngeom == len(points)
+        sizes[name] = np.array(scene.geoms[0].size)
+    assert sizes["crowd"][0] < 0.1 / 2 < sizes["alone"][0] * 2
+    assert sizes["crowd"][2] < sizes["alone"][2]
+
+
 def test_no_renderer_says_so_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = importlib.import_module("fclib.simulate.render")
     module.backend.cache_clear()

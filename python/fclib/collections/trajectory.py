@@ -330,6 +330,8 @@ def record(scene: Scene) -> dict[str, Any]:
     known = asdict(replace(scene, parameters=dict(scene.parameters), path=None))
     if not scene.includes:
         del known["includes"]
+    if scene.view is None:
+        del known["view"]
     return known
 
 

@@ -127,8 +127,9 @@ class Chain:
                 tile=0.1 * self.length,
                 velocity=velocities,
             ),
-            # the joint in the middle: the whole chain would be a hair
-            focus=(0.0, 0.0, -(self.links // 2 - 0.5) * pitch, 2.5 * self.width),
+            # a link in the middle with its two joints: the whole chain would be a hair
+            focus=(0.0, 0.0, -(self.links // 2) * pitch, 0.3 * pitch),
+            view=(125.0, -60.0),
         )
 
     def _ends(self, pitch: float) -> tuple[Vector, Vector]:

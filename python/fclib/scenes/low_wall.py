@@ -95,6 +95,8 @@ class LowWall:
                 tile=self.length,
                 rest=[*built.rest, *built.keyframe()],
             ),
+            # from behind: the ram would hide the wall
+            view=(-55.0, -14.0),
         )
 
     def _course(self, course: int) -> Iterator[tuple[float, float, float, float]]:

@@ -134,4 +134,6 @@ class LowWallFEM:
                 ),
             ),
         )
-        return Scene.of(self, seed, solids=solids, law="gap", theta=self.theta)
+        # from nearly the front, since it is long
+        view = (105.0, -12.0)
+        return Scene.of(self, seed, solids=solids, law="gap", theta=self.theta, view=view)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import math
 import os
 import struct
 import subprocess
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.deformable import DeformableModel
@@ -43,6 +45,9 @@ OPACITY: Final = 0.35  # of bodies where forces are drawn inside them
 ARROW: Final = np.array([0.82, 0.12, 0.10, 1.0], dtype=np.float32)
 ARROW_LENGTH: Final = 1.2  # of the largest force, in radii of the mean geometry
 ARROW_WIDTH: Final = 0.05  # of the largest force, in the same radii
+# both, in distances to the nearest other contact: arrows of a mesh would hide each other
+CROWDED_LENGTH: Final = 3.0
+CROWDED_WIDTH: Final = 0.08
 FAINT: Final = 1e-2  # forces below this share of the largest are not drawn
 
 _PROBE = """
@@ -105,7 +110,7 @@ def render(
         points = np.array(focus[:3]) + focus[3] * np.array(
             [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
         )
-    view = VIEW_OF_PLANE if model.scene.planar else VIEW
+    view = model.scene.view or (VIEW_OF_PLANE if model.scene.planar else VIEW)
     if size is None:
         extent = np.ptp(points @ axes_of(view).T, axis=0)
         size = LYING if extent[0] > extent[1] else UPRIGHT
@@ -242,9 +247,10 @@ def draw_arrows(scene: Any, points: Vector, forces: Vector, radius: float) -> No
     largest = sizes.max(initial=0.0)
     if largest == 0:
         return
-    lengths = ARROW_LENGTH * radius * sizes / largest
+    apart = spacing(points)
+    lengths = min(ARROW_LENGTH * radius, CROWDED_LENGTH * apart) * sizes / largest
     # thinner than in proportion a small arrow would not be seen
-    widths = ARROW_WIDTH * radius * np.sqrt(sizes / largest)
+    widths = min(ARROW_WIDTH * radius, CROWDED_WIDTH * apart) * np.sqrt(sizes / largest)
     for i in np.flatnonzero(sizes > FAINT * largest):
         if scene.ngeom >= scene.maxgeom:
             return
@@ -259,6 +265,15 @@ def draw_arrows(scene: Any, points: Vector, forces: Vector, radius: float) -> No
         arrow.emission = 0.4
         arrow.category = mujoco.mjtCatBit.mjCAT_DECOR
         scene.ngeom += 1
+
+
+def spacing(points: Vector) -> float:
+    """The median distance of a point (k x 3) to its nearest other; infinite where all are one."""
+    different = np.unique(points, axis=0)
+    if len(different) < 2:
+        return math.inf
+    nearest, _ = cKDTree(different).query(different, k=2)
+    return float(np.median(nearest[:, 1]))
 
 
 def average(pixels: npt.NDArray[np.uint8], factor: int) -> npt.NDArray[np.uint8]:

@@ -49,6 +49,8 @@ class Scene:
     friction: str = ""  # the law of friction, in words
     # what a picture shows: centre and radius [m]; None: all that moves
     focus: tuple[float, float, float, float] | None = None
+    # where it is seen from: azimuth and elevation [deg]; None: as all others
+    view: tuple[float, float] | None = None
     keyframe: str | None = None  # of the MJCF, where it starts; None: start, home or stand
     planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss

@@ -24,7 +24,7 @@ from fclib import _core, _registry
 from fclib._solve import MeritKind
 from fclib.bench import made, problems
 from fclib.bench.fingerprint import version_of
-from fclib.bench.job import Job, Limits, ProblemFacts, SolverChoice
+from fclib.bench.job import Along, Job, Limits, ProblemFacts, SolverChoice
 from fclib.bench.modules import load_modules
 from fclib.bench.store import Store
 
@@ -49,7 +49,8 @@ KNOWN = {
 }
 WHAT = {"files", "set", "simulate", "planted"}  # one of which a group of problems has
 KNOWN_OF_PROBLEMS = {"family", "form", "sample", "tolerances", *WHAT, *NUMBERS}
-KNOWN_OF_PROBLEMS |= {"optional", "published_mean"}
+KNOWN_OF_PROBLEMS |= {"optional", "published_mean", "sequence"}
+KNOWN_OF_SEQUENCE = {"start", "count", "stride"}
 SET = "set:"  # before the name of a set of the collection
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0, "d": 86400.0}
 KNOWN_OF_SOLVER = {"name", "options", "label", "optional"}
@@ -61,6 +62,25 @@ MADE = {
 
 class CampaignError(_core.Error, ValueError):
     """A campaign asks for what cannot be done, or what is not understood."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Which problems of a group, in their order, are the steps of a sequence."""
+
+    start: int = 0
+    count: int | None = None  # None: all
+    stride: int = 1
+
+    def name(self, of: str) -> str:
+        """What stores call the sequence: "rt444/Chain, from 100 by 2"."""
+        return f"{of}, from {self.start}" + (f" by {self.stride}" if self.stride > 1 else "")
+
+    @property
+    def slice(self) -> slice:
+        """The same of a list."""
+        end = None if self.count is None else self.start + self.count * self.stride
+        return slice(self.start, end, self.stride)
 
 
 @dataclass(frozen=True)
@@ -77,6 +97,7 @@ class Group:
     simulate: Mapping[str, Any] | None = None
     planted: Mapping[str, Any] | None = None
     optional: bool = False  # left out where there is no such file
+    sequence: Steps | None = None  # of which each step is solved from the one before, too
 
 
 @dataclass(frozen=True)
@@ -198,6 +219,7 @@ class Campaign:
             ImportError: a problem is to be simulated or of a set, and what that needs is not there.
         """
         found: list[tuple[ProblemFacts, Group]] = []
+        sequences: list[tuple[str, list[ProblemFacts], Group]] = []
         for group in self.groups:
             try:
                 paths = self._paths(group)
@@ -206,6 +228,7 @@ class Campaign:
                     raise
                 tell(f"left out: {error}")
                 continue
+            before = len(found)
             for path in problems.sample(paths, group.sample):
                 facts = store.known(path) if store else None
                 if facts is None:
@@ -213,25 +236,24 @@ class Campaign:
                     if store:
                         store.note(path, facts)
                 found.append((replace(facts, family=group.family or facts.family), group))
+            if group.sequence is not None:
+                steps = [facts for facts, _ in found[before:]]
+                of = group.set or steps[0].family
+                sequences.append((group.sequence.name(of), steps, group))
+                problems.check_names(steps[0].path, steps[0].kind)
         random_order = random.Random(self.seed)
         jobs: dict[str, Job] = {}
         for repeat in range(self.repeats):
             ours = [
-                Job(
-                    problem=facts,
-                    solver=choice,
-                    tol=tol,
-                    limits=group.limits,
-                    repeat=repeat,
-                    threads=self.threads,
-                    history=self.history,
-                    modules=self.modules,
-                    merit=self.merit,
-                )
+                self._job(facts, group, choice, tol, repeat)
                 for facts, group in found
                 for choice in self.solvers
                 for tol in group.tolerances
             ]
+            for name, steps, group in sequences:
+                for choice in self.solvers:
+                    for tol in group.tolerances:
+                        ours += self._chain(name, steps, group, choice, tol, repeat)
             random_order.shuffle(ours)
             if self.budget is not None:
                 ours = spread(ours)
@@ -239,9 +261,59 @@ class Campaign:
                 jobs.setdefault(job.key, job)  # one problem under two names is run once
         return list(jobs.values())
 
+    def _job(
+        self, facts: ProblemFacts, group: Group, choice: SolverChoice, tol: float, repeat: int
+    ) -> Job:
+        return Job(
+            problem=facts,
+            solver=choice,
+            tol=tol,
+            limits=group.limits,
+            repeat=repeat,
+            threads=self.threads,
+            history=self.history,
+            modules=self.modules,
+            merit=self.merit,
+            keep=group.sequence is not None,
+        )
+
+    def _chain(
+        self,
+        name: str,
+        steps: Sequence[ProblemFacts],
+        group: Group,
+        choice: SolverChoice,
+        tol: float,
+        repeat: int,
+    ) -> list[Job]:
+        """The warm runs of a solver along a sequence, each after the one of the step before."""
+        chain: list[Job] = []
+        for step, facts in enumerate(steps):
+            along = Along(name, step, chain[-1].key if chain else "")
+            chain.append(replace(self._job(facts, group, choice, tol, repeat), along=along))
+        return chain
+
     def _paths(self, group: Group) -> list[Path]:
+        paths = self._all_paths(group)
+        if group.sequence is None:
+            return paths
+        steps = group.sequence
+        if group.set:  # these were chosen where they were made
+            steps = replace(steps, start=0, stride=1)
+        chosen = paths[steps.slice]
+        if len(chosen) < 2:
+            raise _core.Error(
+                f"a sequence needs two problems or more, and {', '.join(group.files) or group.set}"
+                f" has {len(paths)}, of which it takes {len(chosen)}"
+            )
+        return chosen
+
+    def _all_paths(self, group: Group) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
-        if group.set:
+        if group.set and group.sequence is not None:
+            steps = group.sequence
+            paths += made.stored(group.set, group.form, steps.start, steps.count, steps.stride)
+        elif group.set:
             paths += problems.of_set(group.set, group.form)
         if group.simulate is not None:
             paths += made.simulated(
@@ -385,6 +457,9 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         raise CampaignError(f"{where[:-1]}: has neither files, set, simulate nor planted")
     if row.get("form") not in (None, "global", "local"):
         raise CampaignError(f"{where}form: {row['form']!r} is neither 'global' nor 'local'")
+    steps = None
+    if "sequence" in row:
+        steps = _steps(row, where)
     for kind, known in MADE.items():
         if kind in row:
             _only(row[kind], known, f"{where}{kind}.")
@@ -408,11 +483,27 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         files=tuple(_texts(row, "files")),
         set=str(row.get("set", "")).removeprefix(SET),
         form=row.get("form"),
-        sample=_count(row, "sample", 1) if "sample" in row else None,
+        sample=_count(row, "sample", 1, where) if "sample" in row and not steps else None,
+        sequence=steps,
         simulate=row.get("simulate"),
         planted=row.get("planted"),
         optional=bool(row.get("optional", False)),
     )
+
+
+def _steps(row: Mapping[str, Any], where: str) -> Steps:
+    """The sequence of a group of problems; a sample of it are its first steps."""
+    own = row["sequence"]
+    _only(own, KNOWN_OF_SEQUENCE, f"{where}sequence.")
+    if WHAT & set(row) not in ({"files"}, {"set"}):
+        raise CampaignError(f"{where[:-1]}: a sequence is of files, or of a set")
+    start = own.get("start", 0)
+    if not isinstance(start, int) or isinstance(start, bool) or start < 0:
+        raise CampaignError(f"{where}sequence.start: {start!r} is not a whole number, 0 or more")
+    counts = [_count(own, "count", 1, f"{where}sequence.")] if "count" in own else []
+    counts += [_count(row, "sample", 1, where)] if "sample" in row else []
+    stride = _count(own, "stride", 1, f"{where}sequence.")
+    return Steps(start, min(counts, default=None), stride)
 
 
 def _solvers(

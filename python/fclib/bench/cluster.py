@@ -25,7 +25,7 @@ from typing import Any
 
 from fclib import _core
 from fclib.bench import made
-from fclib.bench.job import Job, Record, Runner
+from fclib.bench.job import Job, ProblemFacts, Record, Runner
 from fclib.bench.pool import SupervisorClient
 
 AHEAD = 3  # jobs a thread of the cluster that are on their way at once
@@ -38,11 +38,19 @@ _idle: list[SupervisorClient] = []  # one supervisor for each thread that has be
 _lock = threading.Lock()
 
 
-def do(job: Job, data: bytes | None = None) -> Record:
-    """Do a job in this worker; data: the file of its problem, where it is not shared."""
+def do(job: Job, data: bytes | None = None, before: bytes | None = None) -> Record:
+    """Do a job in this worker.
+
+    Args:
+        job: as it was planned.
+        data: the file of its problem, where it is not shared.
+        before: likewise that of the problem that its guess is of.
+    """
     if data is not None:
-        path = _kept(job.problem.hash, data)
-        job = dataclasses.replace(job, problem=dataclasses.replace(job.problem, path=str(path)))
+        job = dataclasses.replace(job, problem=_moved(job.problem, data))
+    if before is not None and job.guess is not None:
+        moved = _moved(job.guess.problem, before)
+        job = dataclasses.replace(job, guess=dataclasses.replace(job.guess, problem=moved))
     with _lock:
         supervisor = _idle.pop() if _idle else SupervisorClient(job.threads, pin=False)
     try:
@@ -50,6 +58,11 @@ def do(job: Job, data: bytes | None = None) -> Record:
     finally:
         with _lock:
             _idle.append(supervisor)
+
+
+def _moved(problem: ProblemFacts, data: bytes) -> ProblemFacts:
+    """The problem, with its file in the cache folder."""
+    return dataclasses.replace(problem, path=str(_kept(problem.hash, data)))
 
 
 def _kept(name: str, data: bytes) -> Path:
@@ -90,20 +103,24 @@ def runner(client: Any, send: bool = False, tell: Callable[[str], None] = say) -
         sent: dict[str, Any] = {}
         number = 0
 
+        def file_of(problem: ProblemFacts | None) -> Any:
+            if problem is None or not send:
+                return None
+            if problem.hash not in sent:
+                data = Path(problem.path).read_bytes()
+                sent[problem.hash] = client.scatter(data, hash=False)
+            return sent[problem.hash]
+
         def submit() -> Any:
             nonlocal number
             job = next(jobs, None)
             if job is None:
                 return None
-            data = None
-            if send:
-                if job.problem.hash not in sent:
-                    data = Path(job.problem.path).read_bytes()
-                    sent[job.problem.hash] = client.scatter(data, hash=False)
-                data = sent[job.problem.hash]
+            before = job.guess.problem if job.guess else None
+            files = file_of(job.problem), file_of(before)
             number += 1
             name = f"fclib-{job.key}-{number}"
-            future = client.submit(do, job, data, key=name, pure=False, retries=RETRIES)
+            future = client.submit(do, job, *files, key=name, pure=False, retries=RETRIES)
             waiting[future] = job
             return future
 

@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from fclib._solve import MeritKind
 
 # how a run may end; the first group is said by the solver and confirmed by the merit
@@ -41,6 +43,7 @@ STATUSES: Mapping[str, str] = MappingProxyType(
 )
 # faults of the surroundings: no solver's. Such a run is tried again, and then counts as not run
 SURROUNDINGS = ("killed", "unreadable", "no_space", "lost")
+KEPT = ("u", "r", "l")  # of a solution that is stored
 # after these a worker is kept; after any other, who knows what the solver did to its process
 ORDERLY = frozenset(
     (
@@ -102,6 +105,34 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Along:
+    """The place of a run in a sequence of steps, each solved from the solution of one before."""
+
+    sequence: str
+    step: int  # 0, 1, ...; the first has nothing to start from
+    after: str  # the key of the same solver's run of the step before, empty at the first
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A solution of an earlier step, from which a run starts, contact by contact."""
+
+    problem: ProblemFacts  # that step's
+    step: int
+    r: bytes  # (m) float64
+    multipliers: bytes | None  # (p) float64
+
+    def order(self) -> dict[str, Any]:
+        """As a worker is told it, in JSON's types."""
+        vectors = {"r": self.r, "l": self.multipliers}
+        facts = {name: getattr(self.problem, name) for name in ("path", "kind", "hash")}
+        return facts | {
+            name: None if value is None else np.frombuffer(value).tolist()
+            for name, value in vectors.items()
+        }
+
+
+@dataclass(frozen=True)
 class Job:
     """One run to be done."""
 
@@ -114,6 +145,14 @@ class Job:
     history: bool = False
     modules: tuple[str, ...] = ()  # files of Python to be imported before, with users' solvers
     merit: MeritKind = "both"  # what the tolerance bounds
+    along: Along | None = None  # None: cold, from nothing
+    keep: bool = False  # whether the solution is stored
+    guess: Guess | None = None  # known when the run is begun, and follows from `along`
+
+    @property
+    def start(self) -> str:
+        """What the solver starts from: "cold" from nothing, "warm" from a step before."""
+        return "warm" if self.along else "cold"
 
     @property
     def key(self) -> str:
@@ -128,6 +167,7 @@ class Job:
             self.threads,
             self.repeat,
             *([self.merit] if self.merit != "natural" else []),  # once it was the only one
+            *([["after", self.along.after]] if self.along else []),
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
@@ -145,6 +185,8 @@ class Job:
             "history": self.history,
             "threads": self.threads,
             "modules": list(self.modules),
+            "keep": self.keep,
+            "guess": self.guess.order() if self.guess else None,
         }
 
 
@@ -165,6 +207,8 @@ class Record:
     certificate: str | None = None  # JSON, the proof that there is no solution
     stages: str | None = None  # JSON, of a solver that chains others
     history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage
+    guessed: bool = False  # whether it started from the guess of its job
+    solution: Mapping[str, bytes] | None = None  # u, r and l as float64, where it is to be stored
     measured: str = ""  # by what: "cgroup", "cgroup, PSS" or "processes"
     warm: bool = False  # whether the solver had been called before in this process
     pinned: bool = False  # whether the run had cores for itself

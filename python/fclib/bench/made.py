@@ -88,6 +88,57 @@ def simulated(
     return made(recipe, make)
 
 
+def stored(name: str, form: str | None, start: int, count: int | None, stride: int) -> list[Path]:
+    """Problems of a family of the collection, from its stored states, in the order of the steps.
+
+    Args:
+        name: SET/FAMILY.
+        form: "global" or "local", of problems that have both.
+        start: the first of them; 0 is the first that is stored.
+        count: how many; all where it is None.
+        stride: from one to the next.
+
+    Raises:
+        ImportError: MuJoCo is not there.
+        fclib.Error: there is no such family, or no states of it are stored.
+    """
+    from fclib import collections
+
+    try:
+        folders = collections.folders([name])
+    except KeyError as error:
+        raise _core.Error(f"set {name}: {error.args[0]}") from None
+    if len(folders) != 1:
+        raise _core.Error(
+            f"set {name}: a sequence is of one family, and this has {', '.join(folders)}"
+        )
+    plan = collections.plan_of(folders[0])
+    if plan.trajectory is None:
+        raise _core.Error(f"set {name}: no states are stored of it, which a sequence is made from")
+    path = plan.trajectory
+    recipe = {
+        "states": path.name,
+        "of": folders[0],
+        "form": form,
+        "steps": [start, count, stride],
+    }
+
+    def make(folder: Path) -> None:
+        try:
+            states = collections.read_trajectory(path)
+        except (OSError, ValueError) as error:
+            raise _core.Error(f"set {name}: {error}") from None
+        end = None if count is None else start + count * stride
+        for place in range(len(states))[start:end:stride]:
+            problem: Any = states.problem(place).problem
+            if form == "local":
+                problem = problem.condense()
+            own = f"{plan.scene.name}-{int(states.number[place]):05d}.hdf5"
+            _core.write(folder / own, problem)
+
+    return made(recipe, make)
+
+
 def planted(count: int, contacts: int, spacedim: int, seed: int) -> list[Path]:
     """Random local problems around a solution in which contacts are open, stick and slide in turn.
 

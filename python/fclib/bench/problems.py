@@ -59,6 +59,19 @@ def of_set(name: str, form: str | None = None) -> list[Path]:
         raise _core.Error(f"set {name}: {word}") from None
 
 
+def check_names(path: str, kind: str) -> None:
+    """Whether a problem names its contacts, by which guesses go from step to step.
+
+    Raises:
+        fclib.Error: it does not, or cannot be read.
+    """
+    if _core.read(path, kind).contacts is None:
+        raise _core.Error(
+            f"{path}: does not name its contacts (/contacts), and a sequence carries the reactions"
+            " of each contact to the next step by its name"
+        )
+
+
 def _glob(path: Path) -> Iterator[Path]:
     parts = path.parts
     fixed = next((k for k, part in enumerate(parts) if any(c in part for c in "*?[")), len(parts))

@@ -3,7 +3,9 @@
 An instance is a problem at a tolerance, under one limit. The cost of a solver on an instance is
 infinite where it failed, and the least of its repeats, where at least half of them solved it; their
 spread is kept. Where the solver does not take such problems there is no cost, and the instance does
-not count for it. What was not run for a cause from outside is not there. Sources:
+not count for it. What was not run for a cause from outside is not there. Runs that
+started from nothing (cold) and from the solution of a step before (warm) are never in one profile;
+`along` puts them beside each other. Sources:
 
 - performance profiles: Dolan & More, "Benchmarking optimization software with performance
   profiles" (2002): rho_s(tau) is the share of instances that s solves within tau times the cost of
@@ -30,7 +32,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +43,8 @@ from fclib.bench.job import ORDERLY, SURROUNDINGS
 from fclib.bench.store import Store
 
 Array: TypeAlias = npt.NDArray[np.float64]
+Start: TypeAlias = Literal["cold", "warm"]
+Key: TypeAlias = tuple[str, float, str]  # of an instance: the problem's hash, tolerance, sequence
 # what a run may cost, and the least that is told from nothing
 METRICS: Mapping[str, tuple[str, float]] = {
     "cpu_s": ("CPU time [s]", 1e-6),
@@ -54,6 +58,7 @@ PENALTY = 10.0  # times the limit, for a failure in a mean
 SHIFT = 1e-3  # [s]
 RESAMPLES = 2000
 BANDS = 400  # the same for the bands of curves
+LAST = 3  # drift is that of the last third of a sequence
 SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is marked
 MARK, LOADED = "~", "^"  # of such a figure, and of one with runs under load
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
@@ -169,6 +174,7 @@ def load(
     tolerances: Sequence[float] = (),
     machine: str | None = None,
     merit: MeritKind | None = None,
+    start: Start | None = "cold",
 ) -> list[dict[str, Any]]:
     """The rows of a store that a profile is of.
 
@@ -180,6 +186,8 @@ def load(
         tolerances: only these.
         machine: its node's name.
         merit: only runs whose tolerance bounds this.
+        start: only runs that started from nothing, or, "warm", the steps of sequences but the first
+            ones, which had no step before them; None for both, which no profile takes.
 
     Raises:
         StoreError: the file is no store.
@@ -187,6 +195,7 @@ def load(
     """
     with Store(store, create=False) as opened:
         rows = opened.results()
+    rows = [row for row in rows if row["start"] == "cold" or row["step"] > 0]
     _name_machines(rows)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
@@ -195,6 +204,7 @@ def load(
         ("tol", tolerances),
         ("node", [machine] if machine else ()),
         ("merit", [merit] if merit else ()),
+        ("start", [start] if start else ()),
     ]
     for column, values in wanted:
         if values:
@@ -260,19 +270,22 @@ def one_limit(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
     Of several such the largest: where a limit was raised, the runs before do not count.
     """
-    solvers: dict[tuple[Any, ...], dict[tuple[float, float], set[str]]] = defaultdict(
-        lambda: defaultdict(set)
-    )
+    solvers: dict[Key, dict[tuple[float, float], set[str]]] = defaultdict(lambda: defaultdict(set))
 
     def limit(row: Mapping[str, Any]) -> tuple[float, float]:
         return row["time_limit"] or 0.0, row.get("wall_limit") or 0.0
 
     for row in rows:
-        solvers[row["hash"], row["tol"]][limit(row)].add(row["solver"])
+        solvers[instance_of(row)][limit(row)].add(row["solver"])
     chosen = {
         key: max(own, key=lambda each: (len(own[each]), each)) for key, own in solvers.items()
     }
-    return [row for row in rows if limit(row) == chosen[row["hash"], row["tol"]]]
+    return [row for row in rows if limit(row) == chosen[instance_of(row)]]
+
+
+def instance_of(row: Mapping[str, Any]) -> Key:
+    """What rows of one instance share; a problem may be a step of several sequences."""
+    return row["hash"], row["tol"], row.get("sequence") or ""
 
 
 JUDGED = {
@@ -311,15 +324,15 @@ def gather(
     if metric not in METRICS:
         raise ProfileError(f"there is no metric {metric}; there is: {', '.join(METRICS)}")
     floor = METRICS[metric][1]
-    instances: dict[tuple[str, float], Instance] = {}
-    numbers: dict[tuple[str, float], int] = {}
+    instances: dict[Key, Instance] = {}
+    numbers: dict[Key, int] = {}
     solvers: dict[str, int] = {}
     lines, columns, spent, refused = [], [], [], []
     for row in one_limit([dict(row) for row in rows]):
         column = solvers.setdefault(row["solver"], len(solvers))
         if row["status"] in SURROUNDINGS:
             continue
-        key = row["hash"], row["tol"]
+        key = instance_of(row)
         if key not in instances:
             numbers[key] = len(instances)
             instances[key] = Instance(
@@ -356,10 +369,12 @@ def gather(
         spread.flat[cells] = own
     for place in refused:
         unsuitable[place] = bool(np.isnan(found[place]))
-    ordered = sorted(instances.values(), key=lambda i: (i.family, i.problem, -i.tol))
-    rank = [numbers[i.hash, i.tol] for i in ordered]
+    ordered = sorted(
+        instances, key=lambda k: (instances[k].family, instances[k].problem, -k[1], k[2])
+    )
+    rank = [numbers[key] for key in ordered]
     return Costs(
-        tuple(ordered),
+        tuple(instances[key] for key in ordered),
         tuple(solvers),
         found[rank],
         metric,
@@ -663,6 +678,75 @@ def work_precision(
     return found
 
 
+# ---- along sequences
+
+
+def along(store: str | Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row a sequence, tolerance and solver: its warm runs against its cold ones.
+
+    The steps count that were run in both ways, with the same settings. What failed counts with what
+    it took. `drift` is the largest difference of the two velocities u at the contacts, over the
+    largest velocity, in the last third of the steps that both solved; as problems are given, an
+    error of one step reaches the next one by the guess alone.
+
+    Args:
+        store: the file that the rows are of.
+        rows: as `load` gives them with start=None.
+    """
+
+    def same(row: Mapping[str, Any]) -> tuple[Any, ...]:
+        names = ("hash", "solver", "tol", "merit", "repeat", "time_limit", "wall_limit")
+        return tuple(row[name] for name in names)
+
+    cold = {same(row): row for row in rows if row["start"] == "cold"}
+    chains: dict[tuple[str, float, str], list[tuple[Any, Any]]] = defaultdict(list)
+    for row in sorted(rows, key=lambda row: (row["step"] or 0, row["repeat"])):
+        if row["start"] == "warm" and same(row) in cold:
+            chains[row["sequence"], -row["tol"], row["solver"]].append((row, cold[same(row)]))
+    found = []
+    with Store(store, create=False) as opened:
+        for (sequence, tol, solver), pairs in sorted(chains.items()):
+            spent = np.array([[_spent(row) for row in pair] for pair in pairs]).sum(axis=0)
+            counts = np.array([[row["iterations"] or 0 for row in pair] for pair in pairs])
+            solved = np.array([[row["solved"] for row in pair] for pair in pairs])
+            apart = [
+                gap
+                for one, other in pairs
+                if (gap := _apart(opened.solution(one["run"]), opened.solution(other["run"])))
+                is not None
+            ]
+            last = apart[-max(1, len(apart) // LAST) :]
+            found.append(
+                {
+                    "sequence": sequence,
+                    "tol": -tol,
+                    "solver": solver,
+                    "cold CPU / warm CPU": float(spent[1] / max(spent[0], 1e-9)),
+                    "iterations warm": int(counts[:, 0].sum()),
+                    "iterations cold": int(counts[:, 1].sum()),
+                    "solved warm": int(solved[:, 0].sum()),
+                    "solved cold": int(solved[:, 1].sum()),
+                    "of": len(pairs),
+                    "without a guess": sum(one["guess"] is None for one, _ in pairs),
+                    "drift": max(last, default=None),
+                }
+            )
+    return found
+
+
+def _spent(row: Mapping[str, Any]) -> float:
+    """[s] of CPU; the whole run's where the solver's own is not known."""
+    return float(row["cpu_s"] if row["cpu_s"] is not None else row["total_cpu_s"] or 0.0)
+
+
+def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float | None:
+    """How far two velocities are from each other, over the size of the second; None without."""
+    if "u" not in one or "u" not in other or one["u"].shape != other["u"].shape:
+        return None
+    size = float(np.abs(other["u"]).max(initial=1e-300))
+    return float(np.abs(one["u"] - other["u"]).max(initial=0.0)) / size
+
+
 # ---- from histories
 
 
@@ -773,6 +857,8 @@ def caption(costs: Costs, rows: Sequence[Mapping[str, Any]]) -> str:
         f"limit {span(one.limit for one in costs.instances)} s of CPU",
         f"{failed} of {count} runs failed",
     ]
+    if any(row.get("start") == "warm" for row in rows):
+        words.insert(1, "warm: each step from a solution of one before it")
     if refused := int(costs.unsuitable.sum()) if costs.unsuitable is not None else 0:
         words.append(f"{refused} left out as unsuitable")
     words += [f"{first.get('cpu') or '?'} ({first.get('node') or '?'})"]

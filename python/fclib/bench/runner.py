@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import os
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter, defaultdict, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from fclib import _core
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
-from fclib.bench.job import Job, Record, Runner
+from fclib.bench.job import Guess, Job, Record, Runner
 from fclib.bench.store import Store
 
 BEAT = 2.0  # [s] between two signs of life in the store
@@ -57,13 +57,24 @@ class Progress:
 class Queue(Iterator[Job]):
     """The jobs that are to be done, each until it is done or was tried often enough.
 
-    It may have another job after it had none, when one comes back.
+    It may have another job after it had none: when one comes back, or when the step of a sequence
+    is done that one waits for.
     """
 
-    def __init__(self, jobs: Sequence[Job], wanted: Callable[[Job], bool], retries: int) -> None:
+    def __init__(
+        self,
+        jobs: Sequence[Job],
+        begin: Callable[[Job], Job | None],
+        retries: int,
+        left: Callable[[Job, Record | None], None] = lambda *_: None,
+    ) -> None:
         self.jobs = deque(jobs)
-        self.wanted = wanted  # whether a job is still to be done
+        self.begin = begin  # a job as it is to be done; None where it is not, any more
         self.retries = retries
+        self.left = left  # is told of each that is not done, because the step before it was not
+        self.open = {job.key for job in jobs}  # not settled yet
+        self.held: dict[str, list[Job]] = defaultdict(list)  # by the run that they wait for
+        self.gone: dict[str, Record | None] = {}  # not done, and why; None: the budget is spent
         self.again: deque[tuple[float, Job]] = deque()  # with the time before which it is not tried
         self.attempts: Counter[str] = Counter()
         self.many = max(1.0, TOO_MANY * len(jobs))
@@ -73,8 +84,14 @@ class Queue(Iterator[Job]):
         """The next one; those that come back after all others, but not if they are too many."""
         while self.jobs and not (self.again and self.troubled):
             job = self.jobs.popleft()
-            if self.wanted(job):
-                return job
+            after = job.along.after if job.along else ""
+            if after in self.gone:
+                self.left(job, self.gone[after])
+                self.leave(job, self.gone[after])
+            elif after in self.open:
+                self.held[after].append(job)
+            elif (ready := self.begin(job)) is not None:
+                return ready
         if not self.again:
             raise StopIteration
         moment, job = self.again.popleft()
@@ -96,6 +113,25 @@ class Queue(Iterator[Job]):
         self.again.append((time.monotonic() + PAUSES[min(count, len(PAUSES)) - 1], job))
         return True
 
+    def settle(self, job: Job) -> None:
+        """A job is done: what waits for it comes next."""
+        self.open.discard(job.key)
+        self.jobs.extendleft(self.held.pop(job.key, ()))
+
+    def leave(self, job: Job, record: Record | None) -> None:
+        """A job is not done, nor are the steps after it."""
+        later = self.skip(job, record)
+        while later:
+            job = later.pop()
+            self.left(job, record)
+            later += self.skip(job, record)
+
+    def skip(self, job: Job, record: Record | None) -> list[Job]:
+        """Note that a job is not done; which jobs wait for it."""
+        self.open.discard(job.key)
+        self.gone[job.key] = record
+        return self.held.pop(job.key, [])
+
     def stop(self) -> None:
         """Have no more jobs."""
         self.jobs.clear()
@@ -106,6 +142,24 @@ def cost(record: Record) -> float:
     """[s] of a budget that a run takes: of CPU, or of waiting where that ended it."""
     waited = record.status == "wall_limit"
     return (record.wall_s if waited else record.total_cpu_s) or 0.0
+
+
+def with_guess(job: Job, by_key: Mapping[str, Job], store: Store) -> Job:
+    """A run of a sequence with the last solution that the solver found before; others as they are.
+
+    Args:
+        job: any.
+        by_key: the runs of its sequence.
+        store: with the solutions, so that a campaign that goes on has the same guess.
+    """
+    along = job.along
+    while along and along.after:
+        before = by_key[along.after]
+        assert before.along is not None
+        if found := store.solution_of(along.after):
+            return replace(job, guess=Guess(before.problem, before.along.step, *found))
+        along = before.along
+    return job
 
 
 def run_campaign(
@@ -158,17 +212,30 @@ def run_campaign(
         if runner is None:
             warn_of_load(jobs * campaign.threads, tell)
 
-        def wanted(job: Job) -> bool:
-            """Whether no other campaign has done it meanwhile, and it can be paid for."""
+        by_key = {job.key: job for job in plan if job.along}
+
+        def begin(job: Job) -> Job | None:
+            """A job, unless another campaign has done it meanwhile, or it cannot be paid for."""
             if opened.has(job.key):
                 progress.skipped += 1
-                return False
+                queue.settle(job)
+                return None
             if campaign.budget is not None and progress.spent >= campaign.budget:
                 progress.left_over += 1
-                return False
-            return True
+                queue.leave(job, None)
+                return None
+            return with_guess(job, by_key, opened)
 
-        queue = Queue(left, wanted, retries)
+        def leave(job: Job, record: Record | None) -> None:
+            """Note that a step is not done, because the one before it was not."""
+            if record is None:
+                progress.left_over += 1
+                return
+            progress.not_run[record.status] += 1
+            message = f"a step before it was not run: {record.message}"
+            opened.fault(job, replace(record, message=message), number)
+
+        queue = Queue(left, begin, retries, leave)
         beat = time.monotonic()
         run = runner or (lambda waiting: pool.run(waiting, jobs))
         try:
@@ -181,6 +248,7 @@ def run_campaign(
                             progress.not_run[record.status] += 1
                             progress.reason = f"{record.status}: {record.message}"
                             opened.fault(job, record, number)
+                            queue.leave(job, record)
                             if queue.failed >= queue.many:
                                 progress.stopped = (
                                     f"stopped: {queue.failed} of {len(left)} runs could not be"
@@ -188,10 +256,12 @@ def run_campaign(
                                 )
                                 queue.stop()
                                 break
-                    elif opened.add(job, record, number):
-                        progress.statuses[record.status] += 1
                     else:
-                        progress.skipped += 1
+                        if opened.add(job, record, number):
+                            progress.statuses[record.status] += 1
+                        else:
+                            progress.skipped += 1
+                        queue.settle(job)
                     show(progress)
                     if time.monotonic() - beat > BEAT:
                         opened.alive(number)

@@ -24,13 +24,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from fclib import _core
 from fclib._solve import MERITS
-from fclib.bench.job import Job, ProblemFacts, Record
+from fclib.bench.job import KEPT, Job, ProblemFacts, Record
 
 # of the schema; 1 had neither certificates nor `merit`, which was "natural"; 2 had no faults, but
-# runs that were killed or unreadable, and does not say how a run was measured
-VERSION = 3
+# runs that were killed or unreadable, and does not say how a run was measured; 3 had no sequences
+VERSION = 4
 APPLICATION = 0x46434C42  # "FCLB"
 PATIENCE = 60.0  # [s] to wait for another writer
 
@@ -61,6 +64,7 @@ CREATE TABLE runs (
     cpu_s REAL, said_cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
     {merits}, stages TEXT, measured TEXT, warm INTEGER, pinned INTEGER,
     load REAL, frequency_mhz REAL, started REAL,
+    start TEXT NOT NULL DEFAULT 'cold', sequence TEXT, step INTEGER, guess INTEGER, after TEXT,
     UNIQUE (key, machine)
 );
 CREATE TABLE faults (
@@ -76,6 +80,9 @@ CREATE INDEX history_by_run ON history (run);
 CREATE TABLE certificates (
     run INTEGER PRIMARY KEY REFERENCES runs, certificate TEXT NOT NULL
 );
+CREATE TABLE solutions (
+    run INTEGER PRIMARY KEY REFERENCES runs, u BLOB, r BLOB, l BLOB
+);
 CREATE TABLE files (
     path TEXT PRIMARY KEY, size INTEGER, modified INTEGER, problem INTEGER REFERENCES problems
 );
@@ -88,6 +95,7 @@ CREATE VIEW results AS SELECT
     runs.tol, runs.merit, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads,
     runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s,
     runs.said_cpu_s, runs.setup_s, runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits},
+    runs.start, runs.sequence, runs.step, runs.guess,
     runs.stages, runs.measured, runs.warm, runs.pinned, machines.node, machines.cpu,
     machines.cores, machines.hash AS machine, runs.load, runs.frequency_mhz, runs.started
 FROM runs
@@ -122,6 +130,14 @@ ADDED = {
         " SELECT key, campaign, problem, solver, tol, status, message, started FROM runs"
         " WHERE status IN ('killed', 'unreadable')",
         "DELETE FROM runs WHERE status IN ('killed', 'unreadable')",
+    ),
+    3: (
+        "ALTER TABLE runs ADD COLUMN start TEXT NOT NULL DEFAULT 'cold'",
+        *(
+            f"ALTER TABLE runs ADD COLUMN {column}"
+            for column in ("sequence TEXT", "step INTEGER", "guess INTEGER", "after TEXT")
+        ),
+        _statement("CREATE TABLE solutions"),
         "DROP VIEW IF EXISTS results",
         _statement("CREATE VIEW results"),
     ),
@@ -135,7 +151,9 @@ RUN = (
     *("status", "message", "solved", "iterations"),
     *("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
     *(*MERITS, "stages", "measured", "warm", "pinned", "load", "frequency_mhz", "started"),
+    *("start", "sequence", "step", "guess", "after"),
 )
+OF_A_RUN = ("history", "certificates", "solutions")  # tables with more of a run
 FAULT = ("key", "campaign", "problem", "solver", "tol", "status", "message", "started")
 
 
@@ -393,14 +411,25 @@ class Store:
         return float(sum(cost for key, cost in self.db.execute(query) if key in wanted))
 
     def forget(self, keys: Sequence[str], statuses: Sequence[str]) -> int:
-        """Remove the runs of some keys that ended in one of the statuses; how many."""
+        """Remove the runs of some keys that ended in one of the statuses; how many.
+
+        With a run of a sequence go those of the steps after it, which follow from it.
+        """
         marks = ", ".join("?" * len(statuses))
         query = f"SELECT id, key FROM runs WHERE status IN ({marks})"
         wanted = set(keys)
-        runs = [(run,) for run, key in self.db.execute(query, list(statuses)) if key in wanted]
+        found = [row for row in self.db.execute(query, list(statuses)) if row[1] in wanted]
+        runs: dict[int, None] = {}
         with self.transaction():
-            for table, column in (("history", "run"), ("certificates", "run"), ("runs", "id")):
-                self.db.executemany(f"DELETE FROM {table} WHERE {column} = ?", runs)
+            later = list(self.db.execute("SELECT id, key, after FROM runs WHERE after != ''"))
+            while found:
+                runs |= dict.fromkeys(run for run, _ in found)
+                gone = {key for _, key in found}
+                found = [(run, key) for run, key, after in later if after in gone]
+            rows = [(run,) for run in runs]
+            for table in OF_A_RUN:
+                self.db.executemany(f"DELETE FROM {table} WHERE run = ?", rows)
+            self.db.executemany("DELETE FROM runs WHERE id = ?", rows)
         return len(runs)
 
     def has(self, key: str) -> bool:
@@ -493,6 +522,10 @@ class Store:
                 record.load,
                 record.frequency,
                 record.started,
+                job.start,
+                *((job.along.sequence, job.along.step) if job.along else (None, None)),
+                job.guess.step if job.guess and record.guessed else None,
+                job.along.after if job.along else None,
             ]
             marks = ", ".join("?" * len(RUN))
             cursor = self.db.execute(
@@ -505,6 +538,9 @@ class Store:
             run = cursor.lastrowid
             if record.certificate:
                 self.db.execute("INSERT INTO certificates VALUES (?, ?)", (run, record.certificate))
+            if record.solution:
+                vectors = [record.solution.get(name) for name in KEPT]
+                self.db.execute("INSERT INTO solutions VALUES (?, ?, ?, ?)", (run, *vectors))
             if record.history:
                 self.db.executemany(
                     "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
@@ -565,6 +601,21 @@ class Store:
         query = "SELECT certificate FROM certificates WHERE run = ?"
         row = self.db.execute(query, (run,)).fetchone()
         return None if row is None else str(row[0])
+
+    def solution(self, run: int) -> dict[str, npt.NDArray[np.float64]]:
+        """The vectors u, r and l that a run of a sequence found; empty where it solved nothing."""
+        row = self.db.execute("SELECT u, r, l FROM solutions WHERE run = ?", (run,)).fetchone()
+        pairs = zip(KEPT, row or (), strict=bool(row))
+        return {name: np.frombuffer(value) for name, value in pairs if value is not None}
+
+    def solution_of(self, key: str) -> tuple[bytes, bytes | None] | None:
+        """The reactions and multipliers that the run of a key found; None where it found none."""
+        query = (
+            "SELECT r, l FROM solutions JOIN runs ON runs.id = solutions.run"
+            " WHERE runs.key = ? ORDER BY runs.id LIMIT 1"
+        )
+        found: tuple[bytes, bytes | None] | None = self.db.execute(query, (key,)).fetchone()
+        return found
 
     def texts(self) -> list[str]:
         """The campaigns that have written here, as their files have them."""
@@ -674,6 +725,9 @@ class Store:
                 new = cursor.lastrowid
                 if certificate := other.certificate(number):
                     self.db.execute("INSERT INTO certificates VALUES (?, ?)", (new, certificate))
+                query = "SELECT u, r, l FROM solutions WHERE run = ?"
+                if vectors := other.db.execute(query, (number,)).fetchone():
+                    self.db.execute("INSERT INTO solutions VALUES (?, ?, ?, ?)", (new, *vectors))
                 self.db.executemany(
                     "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
                     [(new, *report) for report in other.history(number)],

@@ -33,7 +33,7 @@ import numpy as np
 from fclib import _core
 from fclib._solve import MERITS
 from fclib.bench import machine, processes
-from fclib.bench.job import ORDERLY, STATUSES, Record
+from fclib.bench.job import KEPT, ORDERLY, STATUSES, Record
 from fclib.bench.meter import Meter
 from fclib.bench.worker import (
     CERTIFICATE,
@@ -325,6 +325,9 @@ class Supervisor:
             record.status, record.message = "lost", one_line(error)
         if vectors:
             self.judge(order, record, vectors)
+        if order["keep"] and record.solved:
+            known = {name: vectors[name] for name in KEPT if name in vectors}
+            record.solution = {name: value.tobytes() for name, value in known.items()}
         if record.status in ORDERLY and self.clean(order):
             self.clear()
         else:
@@ -467,7 +470,7 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
     if not right:
         raise WorkerEnded("garbage", "the worker sent what is no answer")
     record.status, record.message, record.stages = status, message, stages
-    record.warm = said.get("warm") is True
+    record.warm, record.guessed = (said.get(name) is True for name in ("warm", "guessed"))
     record.iterations = iterations
     record.cpu_s, record.setup_s = (None if t is None else float(t) for t in times)
     return list(names)

@@ -125,7 +125,10 @@ def answer(
             raise EOFError
 
     name = order["solver"]
+    guess = None
     try:
+        if known := order["guess"]:
+            guess = carry(known, problems.get(known), problems.get(order))
         problem = problems.get(order)
     except (_core.Error, OSError, MemoryError) as error:
         return {"status": "unreadable", "message": one_line(error)}, []
@@ -153,6 +156,7 @@ def answer(
             time_limit=order["limits"]["wall"],
             history=order["history"],
             merit=order["merit"],
+            guess=guess,
             **order["options"],
         )
         status, message = result.status, ""
@@ -164,6 +168,7 @@ def answer(
         "status": status,
         "message": message,
         "warm": name in warm,
+        "guessed": guess is not None,
         "reported": command.reported,
     }
     arrays: list[npt.NDArray[np.float64]] = []
@@ -192,6 +197,14 @@ def answer(
             "history": thinned(result.history) if result.history is not None else None,
         }
     return reply, arrays
+
+
+def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
+    """The guess of an order: what is known of a problem before, contact by contact."""
+    from fclib.collections.guesses import guess_of  # which few runs need
+
+    multipliers = None if known["l"] is None else np.array(known["l"], float)
+    return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)
 
 
 @functools.cache

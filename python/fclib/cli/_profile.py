@@ -29,6 +29,7 @@ def print_profile(
     campaign: str | None = None,
     machine: str | None = None,
     merit: MeritKind | None = None,
+    start: profiles.Start = "cold",
     penalty: float = profiles.PENALTY,
     shift: float = profiles.SHIFT,
     count_unsuitable: bool = False,
@@ -37,18 +38,27 @@ def print_profile(
     quiet: bool = False,
 ) -> None:
     """Print the tables of a store, and draw its pictures where a folder is given."""
-    rows = profiles.load(
-        store,
-        campaign=campaign,
-        families=family,
-        solvers=solver,
-        tolerances=tol,
-        machine=machine,
-        merit=merit,
-    )
+    chosen: dict[str, Any] = {
+        "families": family,
+        "solvers": solver,
+        "tolerances": tol,
+        "machine": machine,
+        "merit": merit,
+    }
+    rows = profiles.load(store, campaign=campaign, start=start, **chosen)
     costs = profiles.costs(rows, metric, count_unsuitable)
-    published = published_means(store)
+    published = published_means(store) if start == "cold" else {}
+    both: list[dict[str, Any]] = []
     with Store(store, create=False) as opened:
+        if opened.results("start = 'warm'"):
+            same = {"machine": rows[0]["node"], "merit": rows[0]["merit"]}
+            both = profiles.load(store, start=None, **chosen | same)
+        # the cold runs beside them may be of an earlier campaign
+        both = [
+            row
+            for row in both
+            if row["start"] == "cold" or not campaign or row["campaign"] == campaign
+        ]
         faults = [
             fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
         ]
@@ -63,6 +73,7 @@ def print_profile(
             entry for each in costs.tolerances for entry in profiles.accuracies(rows, each)
         ],
         "work-precision": profiles.work_precision(rows, metric, penalty, shift, count_unsuitable),
+        "along": profiles.along(store, both),
         "not run": profiles.failures(faults),
     }
     if not quiet and as_json:
@@ -113,6 +124,7 @@ def show(
         "profile": "Performance profile: solved within a multiple of the best",
         "statuses": "How the runs ended",
         "not run": "Not run, for causes outside of the solvers",
+        "along": "Along sequences: from a solution of a step before (warm), or from nothing (cold)",
         "shifts": "Means over that of the best, by the shift of the mean",
         "families": "The fastest solver of each problem, by family",
     }

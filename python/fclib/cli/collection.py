@@ -401,7 +401,7 @@ def status(
             count = 0
             for path in stores:
                 with Store(path, create=False) as store:
-                    count += standing.add(store.results(), digests)
+                    count += standing.add(store.results("start = 'cold'"), digests)
             err.print(f"{count} runs taken in", highlight=False)
         rows, basis = standing.standings(name)
     except KeyError as error:

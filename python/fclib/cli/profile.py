@@ -16,6 +16,13 @@ Metric = Enum("Metric", {name: name for name in profiles.METRICS}, type=str)  # 
 CPU_TIME = Metric("cpu_s")
 
 
+class Start(str, Enum):
+    """What runs start from: nothing, or the solution of a step before."""
+
+    cold = "cold"
+    warm = "warm"
+
+
 def command(
     store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
     metric: Annotated[Metric, typer.Option(help="What is compared.")] = CPU_TIME,
@@ -27,6 +34,9 @@ def command(
     merit: Annotated[
         MeritKind | None, typer.Option(help="Only the runs whose tolerance bounds this.")
     ] = None,
+    start: Annotated[
+        Start, typer.Option(help="Runs from nothing, or those along sequences.")
+    ] = Start.cold,
     penalty: Annotated[
         float, typer.Option(help="A failure counts as so many times the limit.", min=1.0)
     ] = profiles.PENALTY,
@@ -60,6 +70,7 @@ def command(
             campaign=campaign,
             machine=machine,
             merit=merit.value if merit else None,
+            start=start.value,
             penalty=penalty,
             shift=shift,
             count_unsuitable=count_unsuitable,

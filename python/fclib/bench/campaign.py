@@ -47,6 +47,7 @@ KNOWN = {
     "solvers",
     "problems",
 }
+DEFAULTS: Mapping[str, Any] = {"tolerances": [1e-8], "time_limit": 10.0, "memory": 4000.0}
 WHAT = {"files", "set", "simulate", "planted"}  # one of which a group of problems has
 KNOWN_OF_PROBLEMS = {"family", "form", "sample", "tolerances", *WHAT, *NUMBERS}
 KNOWN_OF_PROBLEMS |= {"optional", "published_mean", "sequence"}
@@ -193,7 +194,7 @@ class Campaign:
             repeats=_count(entries, "repeats", 1),
             threads=_count(entries, "threads", 1),
             seed=seed,
-            history=bool(entries.get("history", False)),
+            history=_yes(entries, "history"),
             modules=modules,
             merit=_merit(entries.get("merit", "both")),
             budget=_budget(entries["budget"]) if "budget" in entries else None,
@@ -302,10 +303,8 @@ class Campaign:
             steps = replace(steps, start=0, stride=1)
         chosen = paths[steps.slice]
         if len(chosen) < 2:
-            raise _core.Error(
-                f"a sequence needs two problems or more, and {', '.join(group.files) or group.set}"
-                f" has {len(paths)}, of which it takes {len(chosen)}"
-            )
+            name = group.sequence.name(", ".join(group.files) or group.set)
+            raise _core.Error(f"a sequence needs two problems or more: {name} has {len(chosen)}")
         return chosen
 
     def _all_paths(self, group: Group) -> list[Path]:
@@ -419,6 +418,14 @@ def _count(entries: Mapping[str, Any], name: str, default: int, where: str = "")
     return value
 
 
+def _yes(entries: Mapping[str, Any], name: str, where: str = "") -> bool:
+    """Whether an entry is true; false where it is left out."""
+    value = entries.get(name, False)
+    if not isinstance(value, bool):
+        raise CampaignError(f"{where}{name}: {value!r} is neither true nor false")
+    return value
+
+
 def _made(recipe: Mapping[str, Any], where: str) -> None:
     steps = recipe.get("steps", [])
     if not isinstance(steps, list) or not all(isinstance(k, int) and k >= 0 for k in steps):
@@ -468,18 +475,21 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
                 raise CampaignError(f"{where}{kind}: has no {absent[0]}")
             _made(row[kind], f"{where}{kind}.")
     values = {name: row.get(name, entries.get(name)) for name in ("tolerances", *NUMBERS)}
-    tolerances = values["tolerances"] or [1e-8]
+    values = {**DEFAULTS, **{name: value for name, value in values.items() if value is not None}}
+    tolerances = values["tolerances"]
     if not isinstance(tolerances, list):
         tolerances = [tolerances]
-    time = _positive(values["time_limit"] or 10.0, f"{where}time_limit")
+    if not tolerances:
+        raise CampaignError(f"{where}tolerances: the list is empty")
+    time = _positive(values["time_limit"], f"{where}time_limit")
     return Group(
         tolerances=tuple(_positive(x, f"{where}tolerances") for x in tolerances),
         limits=Limits(
             time=time,
-            wall=_positive(values["wall_limit"] or time, f"{where}wall_limit"),
-            memory=_positive(values["memory"] or 4000.0, f"{where}memory"),
+            wall=_positive(values.get("wall_limit", time), f"{where}wall_limit"),
+            memory=_positive(values["memory"], f"{where}memory"),
         ),
-        family=str(row.get("family", "")),
+        family=str(row.get("family", "planted" if "planted" in row else "")),
         files=tuple(_texts(row, "files")),
         set=str(row.get("set", "")).removeprefix(SET),
         form=row.get("form"),
@@ -487,7 +497,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
         sequence=steps,
         simulate=row.get("simulate"),
         planted=row.get("planted"),
-        optional=bool(row.get("optional", False)),
+        optional=_yes(row, "optional", where),
     )
 
 
@@ -522,11 +532,12 @@ def _solvers(
         name, options = str(entries["name"]), entries.get("options", {})
         if not isinstance(options, Mapping):
             raise CampaignError(f"{where}options: is no table, as in options = {{ name = value }}")
+        optional = _yes(entries, "optional", where)
         try:
             info = _registry.find_solver(name)
             info.check_options(options)
         except _core.OptionError as error:
-            if not entries.get("optional", False):
+            if not optional:
                 raise CampaignError(f"{where[:-1]}: {error}") from None
             missing.append(str(error))
             continue

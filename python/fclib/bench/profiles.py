@@ -195,6 +195,8 @@ def load(
     """
     with Store(store, create=False) as opened:
         rows = opened.results()
+    if not rows:
+        raise ProfileError(f"{store}: there are no runs")
     rows = [row for row in rows if row["start"] == "cold" or row["step"] > 0]
     _name_machines(rows)
     wanted: list[tuple[str, Sequence[Any]]] = [
@@ -215,8 +217,6 @@ def load(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
                     f" there is: {', '.join(known)}"
                 )
-    if not rows:
-        raise ProfileError(f"{store}: there are no runs")
     nodes = sorted({row["node"] or "?" for row in rows})
     if len(nodes) > 1:
         raise ProfileError(

@@ -115,7 +115,7 @@ def run(
         "budget": budget,
         "modules": module and [str(Path(path).resolve()) for path in module],
     }
-    flags = {name: value for name, value in flags.items() if value}
+    flags = {name: value for name, value in flags.items() if value not in (None, [])}
     try:
         if campaign is not None:
             if problems:

@@ -186,6 +186,7 @@ nb::dict state_of(const Result& result) {
   values["cpu_s"] = result.cpu_s;
   values["setup_s"] = result.setup_s;
   values["solver"] = result.solver;
+  values["message"] = result.message;
   const NoSolution& proof = result.certificate;
   values["certificate"] = std::tuple(proof.y, proof.z, proof.gain, proof.distance, proof.bound);
   values["stages"] = result.stages;
@@ -213,6 +214,7 @@ void set_state(Result& result, const nb::dict& values) {
   take(result.cpu_s, values, "cpu_s");
   take(result.setup_s, values, "setup_s");
   take(result.solver, values, "solver");
+  take(result.message, values, "message");
   std::tuple<Vector, Vector, double, double, double> proof;
   take(proof, values, "certificate");
   auto& [y, z, gain, distance, bound] = proof;
@@ -389,6 +391,7 @@ void bind_solvers(nb::module_& m) {
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
+      .def_ro("message", &Result::message, "what a user should know, in words; mostly nothing")
       .def_prop_ro(
           "certificate",
           [](nb::handle self) -> nb::object {

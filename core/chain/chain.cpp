@@ -3,15 +3,18 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <random>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "linalg/cpu_time.hpp"
+#include "linalg/memory.hpp"
 #include "methods/pivoting.hpp"
 #include "reduced/gauss_seidel.hpp"
 #include "reduced/no_solution.hpp"
@@ -53,6 +56,19 @@ class Tracker {
   [[nodiscard]] std::optional<Status> stopped() const { return stopped_; }
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
   [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
+
+  /// Factors that would take so many bytes are not made, where there are so many.
+  void without_factors(double bytes, double limit) {
+    if (bytes <= too_large_) return;
+    too_large_ = bytes;
+    char text[120];
+    std::snprintf(text, sizeof text,
+                  "factors of %.3g GB do not fit into %.3g GB of memory: methods that factorise "
+                  "were left out",
+                  bytes / 1e9, limit / 1e9);
+    message_ = text;
+  }
+  [[nodiscard]] const std::string& message() const { return message_; }
 
   /// There is no solution.
   void refuse() { stopped_ = Status::infeasible; }
@@ -123,6 +139,8 @@ class Tracker {
   }
 
   Monitor monitor_;
+  double too_large_ = 0;  // bytes of the largest factors that are not made
+  std::string message_;
   double others_ = 0;
   double told_ = std::numeric_limits<double>::max();  // the last error that was finite
   double others_cpu_ = 0;
@@ -135,17 +153,30 @@ class Tracker {
   int d_ = 0;
 };
 
+/// [bytes] Factors that always fit.
+constexpr double never_too_much = 256e6;
+/// Of the available memory, what factors may take: the rest of the solve takes some too.
+constexpr double spare_memory = 0.8;
+/// Steps of the other methods may cost as much as so many factorisations where none are made.
+constexpr double instead_of_factors = 100;
+
+template <class Stage>
+constexpr bool factorises =
+    !std::is_same_v<Stage, GaussSeidelStage> && !std::is_same_v<Stage, SweepOnStage> &&
+    !std::is_same_v<Stage, SpectralGradientStage> &&
+    !std::is_same_v<Stage, ConjugateGradientsStage>;
+
 template <class Cone>
 class Island {
  public:
   static constexpr int D = Cone::dim;
 
   /// `proves` says whether y (nc of the island) proves that there is no solution.
-  Island(const ReducedProblem& problem, const Table& table, int threads, Tracker& tracker,
+  Island(const ReducedProblem& problem, const Table& table, const Means& means, Tracker& tracker,
          double tolerance, bool guessed, std::function<bool(const Vector&)> proves)
       : problem_(problem),
         table_(table),
-        threads_(threads),
+        means_(means),
         tracker_(tracker),
         tolerance_(tolerance),
         guessed_(guessed),
@@ -166,7 +197,7 @@ class Island {
       if (done()) break;
       if (rule.when.on != on) continue;
       remember(rule);
-      if (applies(rule)) enter(rule);
+      if (applies(rule) && affordable(rule)) enter(rule);
     }
     r = best_;
     return error_;
@@ -200,6 +231,22 @@ class Island {
     if (when.jointed > 0 && !(jointed() > when.jointed)) return false;
     return when.bodies == Bodies::any ||
            (when.bodies == Bodies::fewer) == CoupledSystem::bodies_are_fewer(problem_);
+  }
+
+  /// Whether there is memory for what the method factorises.
+  [[nodiscard]] bool affordable(const StageRule& rule) {
+    return std::visit(
+        [&]<class Stage>(const Stage&) { return !factorises<Stage> || fits(system()); },
+        rule.method);
+  }
+
+  bool fits(const CoupledSystem& system) {
+    const double bytes = system.bytes();
+    if (means_.memory == 0 && bytes < never_too_much) return true;
+    const double limit = means_.memory > 0 ? means_.memory : spare_memory * available_memory();
+    if (bytes <= limit) return true;
+    tracker_.without_factors(bytes, limit);
+    return false;
   }
 
   /// The largest share of a contact's mobility that bilateral constraints take: rho has what it
@@ -262,7 +309,7 @@ class Island {
 
   CoupledSystem& system() {
     if (!system_) {
-      system_.emplace(problem_, CoupledSystem::Form::identity, threads_);
+      system_.emplace(problem_, CoupledSystem::Form::identity, means_.threads);
     }
     return *system_;
   }
@@ -307,8 +354,10 @@ class Island {
 
   /// Steps that a stage may make, by what they cost.
   double paid_for(const Patience& rules) {
-    const double factorisations =
-        rules.worth > 0 ? rules.worth : static_cast<double>(system().factorisations());
+    const double factorisations = !fits(system()) ? instead_of_factors
+                                  : rules.worth > 0
+                                      ? rules.worth
+                                      : static_cast<double>(system().factorisations());
     const double steps =
         factorisations * factorisation_cost(problem_, system()) / sweep_cost(problem_);
     return rules.worth > 0 && steps < 2.0 * static_cast<double>(rules.first_look) ? 0.0 : steps;
@@ -527,7 +576,8 @@ class Island {
   }
 
   void run(const NewtonStage& rules) {
-    SemismoothNewton<Cone> newton(problem_, rules.function, threads_);
+    SemismoothNewton<Cone> newton(problem_, rules.function, means_.threads);
+    if (!fits(newton.system())) return;
     if (rules.most_flops > 0 && newton.system().flops() > rules.most_flops * system().flops()) {
       return;
     }
@@ -578,7 +628,7 @@ class Island {
     for (Index a = 0; a < problem_.nc(); ++a) {
       size = std::hypot(size, unit[a] * problem_.q.template segment<D>(D * a).norm());
     }
-    SemismoothNewton<Cone> newton(problem_, ContactFunctionKind::natural_map, threads_);
+    SemismoothNewton<Cone> newton(problem_, ContactFunctionKind::natural_map, means_.threads);
     Dice dice;
     for (std::int64_t k = 0; k < rules.tries && !done(); ++k) {
       Vector start = Vector::Zero(problem_.m());
@@ -658,7 +708,7 @@ class Island {
 
   const ReducedProblem& problem_;
   const Table& table_;
-  int threads_;
+  const Means& means_;
   Tracker& tracker_;
   double tolerance_;
   bool guessed_;
@@ -707,7 +757,7 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
 
 /// The chain from r, on the whole and then on each island that is left; what it reaches ends in r.
 template <class Cone>
-void walk(const ReducedProblem& problem, const Table& table, int threads, Tracker& tracker,
+void walk(const ReducedProblem& problem, const Table& table, const Means& means, Tracker& tracker,
           bool guessed, Vector& r) {
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
@@ -718,7 +768,7 @@ void walk(const ReducedProblem& problem, const Table& table, int threads, Tracke
   const auto proves = [&](const Vector& y) {
     return problem.proves_no_solution != nullptr && (*problem.proves_no_solution)(y);
   };
-  whole.emplace(problem, table, threads, tracker, tolerance, guessed, proves);
+  whole.emplace(problem, table, means, tracker, tolerance, guessed, proves);
   whole->solve(r, On::whole);
   if (tracker.stopped()) return;
   const std::vector<Index> group = problem.W.components();
@@ -773,7 +823,7 @@ void walk(const ReducedProblem& problem, const Table& table, int threads, Tracke
       for (Eigen::Index j = 0; j < size; ++j) padded[contacts[static_cast<std::size_t>(j)]] = y[j];
       return proves(padded);
     };
-    const double error = Island<Cone>(part, table, threads, tracker, share, guessed, proves_island)
+    const double error = Island<Cone>(part, table, means, tracker, share, guessed, proves_island)
                              .solve(x, On::islands);
     sum += error * error;
     for (Eigen::Index j = 0; j < size; ++j)
@@ -790,16 +840,17 @@ double error_at(const ReducedProblem& problem, const Vector& r) {
 }
 
 template <class Cone>
-Outcome iterate(const ReducedProblem& problem, const Table& table, int threads,
+Outcome iterate(const ReducedProblem& problem, const Table& table, const Means& means,
                 const Settings& settings, Vector& r) {
   constexpr int D = Cone::dim;
   const Index nc = problem.nc();
   Tracker tracker(settings);
-  const double start = threads > 1 ? cpu_time() : 0.0;  // the clock takes 0.3 microseconds
+  const double start = means.threads > 1 ? cpu_time() : 0.0;  // the clock takes 0.3 microseconds
   const auto outcome = [&] {
     Outcome result{tracker.stopped().value_or(Status::stalled), tracker.iterations(),
                    std::move(tracker.stages())};
-    if (threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
+    result.message = tracker.message();
+    if (means.threads > 1) result.cpu_s = cpu_time() - start + tracker.others_cpu();
     return result;
   };
   bool separating = true;
@@ -816,10 +867,10 @@ Outcome iterate(const ReducedProblem& problem, const Table& table, int threads,
     r = zero;
     guessed = false;
   }
-  walk<Cone>(problem, table, threads, tracker, guessed, r);
+  walk<Cone>(problem, table, means, tracker, guessed, r);
   if (guessed && !tracker.stopped() && error_at<Cone>(problem, r) > tracker.tolerance()) {
     Vector cold = zero;
-    walk<Cone>(problem, table, threads, tracker, false, cold);
+    walk<Cone>(problem, table, means, tracker, false, cold);
     if (error_at<Cone>(problem, cold) < error_at<Cone>(problem, r)) r = cold;
   }
   return outcome();
@@ -827,10 +878,10 @@ Outcome iterate(const ReducedProblem& problem, const Table& table, int threads,
 
 }  // namespace
 
-Outcome run(const ReducedProblem& problem, const Table& table, int threads,
+Outcome run(const ReducedProblem& problem, const Table& table, const Means& means,
             const Settings& settings, Vector& r) {
-  return with_cone(
-      problem, [&]<class Cone>() { return iterate<Cone>(problem, table, threads, settings, r); });
+  return with_cone(problem,
+                   [&]<class Cone>() { return iterate<Cone>(problem, table, means, settings, r); });
 }
 
 }  // namespace fclib::chain

@@ -10,8 +10,15 @@
 
 namespace fclib::chain {
 
-/// From r; the best iterate ends in r.
-Outcome run(const ReducedProblem& problem, const Table& table, int threads,
+/// What a chain may take of the machine.
+struct Means {
+  int threads = 1;
+  double memory = 0;  ///< [bytes] of factors; 0: what is available
+};
+
+/// From r; the best iterate ends in r. Where the factors of a system would not fit into memory the
+/// methods that factorise are left out, and the message says so.
+Outcome run(const ReducedProblem& problem, const Table& table, const Means& means,
             const Settings& settings, Vector& r);
 
 }  // namespace fclib::chain

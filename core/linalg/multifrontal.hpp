@@ -30,6 +30,12 @@ class Multifrontal {
   /// Multiplications of one factorisation, and numbers that it keeps.
   [[nodiscard]] double flops() const { return symbolic_->flops; }
   [[nodiscard]] double memory() const { return symbolic_->memory; }
+  /// [bytes] What a factorisation takes at most beside its values, about: the last fronts at work
+  /// are three matrices of the size of the largest.
+  [[nodiscard]] double bytes() const {
+    const double largest = symbolic_->largest;
+    return sizeof(double) * (symbolic_->memory + 3 * largest * largest);
+  }
   [[nodiscard]] Index size() const { return symbolic_->size; }
 
   /// Factorises the matrix with these values (BlockPattern::values() of them). False where an entry

@@ -132,6 +132,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = std::move(outcome.stages);
+    result.message = std::move(outcome.message);
     // a word that nothing stands behind is not passed on
     if (result.status == Status::infeasible && !result.certificate.proven())
       result.status = Status::stalled;

@@ -31,6 +31,7 @@ struct Result {
   NoSolution certificate;     ///< the proof on the problem as it was given, where infeasible
   std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
   std::string solver;
+  std::string message;  ///< what a user should know, in words; mostly nothing
   std::optional<std::vector<HistoryPoint>> history;  ///< where the settings ask for it
 
   [[nodiscard]] bool converged() const { return status == Status::converged; }

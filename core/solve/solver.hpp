@@ -153,6 +153,7 @@ struct Outcome {
   std::int64_t iterations = 0;
   std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
   std::optional<double> cpu_s = {};  ///< [s] where it is not that of the calling thread
+  std::string message = {};          ///< what a user should know, in words; mostly nothing
 };
 
 /// The entry of a solver in the registry.

@@ -55,6 +55,7 @@ proximal point                  : proximal_point      from=best                 
 
 struct Options {
   std::int64_t threads = 1;
+  double memory_limit = 0;
   std::string chain = table;
 
   static constexpr auto fields() {
@@ -67,6 +68,12 @@ struct Options {
                                             "same for any number",
                                      .lowest = 1,
                                      .highest = 256},
+        OptionField<O, double>{.name = "memory_limit",
+                               .member = &O::memory_limit,
+                               .unit = "GB",
+                               .doc = "that the factors of a system may take, else it goes on "
+                                      "without factorisations; 0: what the machine has available",
+                               .lowest = 0},
         OptionField<O, std::string>{
             .name = "chain",
             .member = &O::chain,
@@ -80,11 +87,13 @@ Outcome solve(const ReducedProblem& problem, const OptionValues& values, const S
               Vector& r) {
   static const Options defaults;
   static const chain::Table own = chain::parse_table(table);
-  if (values.empty()) return chain::run(problem, own, 1, settings, r);
+  if (values.empty()) return chain::run(problem, own, {}, settings, r);
   const auto options = parse_options<Options>(values);
-  const auto threads = static_cast<int>(options.threads);
-  if (options.chain == defaults.chain) return chain::run(problem, own, threads, settings, r);
-  return chain::run(problem, chain::parse_table(options.chain), threads, settings, r);
+  constexpr double gigabyte = 1e9;
+  const chain::Means means{.threads = static_cast<int>(options.threads),
+                           .memory = gigabyte * options.memory_limit};
+  if (options.chain == defaults.chain) return chain::run(problem, own, means, settings, r);
+  return chain::run(problem, chain::parse_table(options.chain), means, settings, r);
 }
 
 }  // namespace

@@ -53,6 +53,8 @@ class CoupledSystem {
   [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
   /// Multiplications of one factorisation.
   [[nodiscard]] double flops() const { return lu_.flops(); }
+  /// [bytes] What a factorisation takes, about, before it is made.
+  [[nodiscard]] double bytes() const { return lu_.bytes(); }
   [[nodiscard]] bool on_bodies() const { return on_bodies_; }
   /// CPU time of factorisations on other threads than the caller's [s].
   [[nodiscard]] double others_cpu() const { return lu_.others_cpu(); }

@@ -81,6 +81,8 @@ def result_rows(result: _core.Result) -> list[tuple[str, str]]:
         ("iterations", str(result.iterations)),
         ("CPU time", f"{result.cpu_s:.2e} s, and {result.setup_s:.2e} s around it"),
     ]
+    if result.message:
+        rows.append(("message", result.message))
     if result.stages:
         rows.append(("stages", ", ".join(stage.name for stage in result.stages)))
     return rows

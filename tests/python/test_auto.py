@@ -5,6 +5,7 @@ Problems are made from bodies with a planted solution, so that each of them has 
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -466,3 +467,36 @@ def test_pivoting_is_exact_in_the_plane() -> None:
         problem = planted_local(seed, d=2, nc=6).problem
         chain = "pivoting : pivoting tries=1 polish=0"
         assert fclib.solve(problem, chain=chain).error < 1e-6
+
+
+def factorisations(result: fclib.Result) -> int:
+    return sum(stage.factorisations for stage in result.stages)
+
+
+def test_factors_that_do_not_fit_into_memory_are_not_made() -> None:
+    problem = bodies(11, nc=30, hyperstatic=True)
+    usual = fclib.solve(problem)
+    assert usual.converged
+    assert factorisations(usual) > 0
+    assert usual.message == ""
+    result = fclib.solve(problem, memory_limit=1e-6)
+    assert factorisations(result) == 0
+    assert "do not fit into 1e-06 GB" in result.message
+    assert_honest(problem, result, 1e-8)
+    assert pickle.loads(pickle.dumps(result)).message == result.message
+    page: Any = result
+    assert result.message in page._repr_html_()
+    enough = fclib.solve(problem, memory_limit=1)
+    assert enough.converged
+    assert enough.message == ""
+
+
+@pytest.mark.parametrize("seed", [0, 9, 15, 27])
+def test_sweeps_go_on_where_factors_do_not_fit(seed: int) -> None:
+    problem = bodies(seed, nc=30, hyperstatic=True)
+    assert factorisations(fclib.solve(problem)) > 0
+    result = fclib.solve(problem, memory_limit=1e-6)
+    assert result.converged
+    assert factorisations(result) == 0
+    fewer = [line for line in auto_chain() if ": sweep_on" not in line]
+    assert not fclib.solve(problem, memory_limit=1e-6, chain=fewer).converged

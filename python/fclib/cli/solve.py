@@ -101,6 +101,8 @@ def command(
             report.error(path, error if named else fclib.Error(f"{path}: {error}"))
         else:
             record = run.record | {"stages": stages}
+            if run.result.message:
+                record["message"] = run.result.message
             if run.result.certificate is not None:
                 from fclib import analysis  # which takes its time to import
 

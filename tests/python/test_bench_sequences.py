@@ -19,6 +19,7 @@ from fclib import bench, cli
 from fclib.bench import cluster, pool, profiles
 from fclib.bench.job import Guess, Job, Record
 from fclib.collections.guesses import guess_of
+from fclib.report.runs import Campaigns
 from helpers import planted_local
 
 NC = 5
@@ -396,6 +397,9 @@ def test_the_command_tells_them_apart(quiet: Path, tmp_path: Path) -> None:
     assert {row["of"] for row in tables()["summary"]} == {STEPS}
     assert {row["of"] for row in tables("--start", "warm")["summary"]} == {STEPS - 1}
     assert tables()["along"] == tables("--start", "warm")["along"]
+    with Campaigns([quiet]) as report:
+        assert {row["start"] for row in report.rows} == {"cold"}
+        assert [{"table": "along"} | row for row in report.overview()["along"]] == tables()["along"]
     alone = tmp_path / "cold.sqlite"
     with bench.Store(alone) as store:
         store.merge([quiet])

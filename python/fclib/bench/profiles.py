@@ -681,7 +681,9 @@ def work_precision(
 # ---- along sequences
 
 
-def along(store: str | Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def along(
+    store: str | Path, rows: Sequence[Mapping[str, Any]], campaign: str | None = None
+) -> list[dict[str, Any]]:
     """A row a sequence, tolerance and solver: its warm runs against its cold ones.
 
     The steps count that were run in both ways, with the same settings. What failed counts with what
@@ -692,6 +694,7 @@ def along(store: str | Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[str
     Args:
         store: the file that the rows are of.
         rows: as `load` gives them with start=None.
+        campaign: only its warm runs; the cold ones beside them may be of an earlier campaign.
     """
 
     def same(row: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -701,8 +704,12 @@ def along(store: str | Path, rows: Sequence[Mapping[str, Any]]) -> list[dict[str
     cold = {same(row): row for row in rows if row["start"] == "cold"}
     chains: dict[tuple[str, float, str], list[tuple[Any, Any]]] = defaultdict(list)
     for row in sorted(rows, key=lambda row: (row["step"] or 0, row["repeat"])):
-        if row["start"] == "warm" and same(row) in cold:
+        if row["start"] != "warm" or (campaign and row["campaign"] != campaign):
+            continue
+        if same(row) in cold:
             chains[row["sequence"], -row["tol"], row["solver"]].append((row, cold[same(row)]))
+    if not chains:
+        return []
     found = []
     with Store(store, create=False) as opened:
         for (sequence, tol, solver), pairs in sorted(chains.items()):

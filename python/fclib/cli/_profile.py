@@ -53,12 +53,6 @@ def print_profile(
         if opened.results("start = 'warm'"):
             same = {"machine": rows[0]["node"], "merit": rows[0]["merit"]}
             both = profiles.load(store, start=None, **chosen | same)
-        # the cold runs beside them may be of an earlier campaign
-        both = [
-            row
-            for row in both
-            if row["start"] == "cold" or not campaign or row["campaign"] == campaign
-        ]
         faults = [
             fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
         ]
@@ -73,7 +67,7 @@ def print_profile(
             entry for each in costs.tolerances for entry in profiles.accuracies(rows, each)
         ],
         "work-precision": profiles.work_precision(rows, metric, penalty, shift, count_unsuitable),
-        "along": profiles.along(store, both),
+        "along": profiles.along(store, both, campaign),
         "not run": profiles.failures(faults),
     }
     if not quiet and as_json:

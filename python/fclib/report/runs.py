@@ -62,7 +62,11 @@ class Campaigns:
         self._folder = tempfile.TemporaryDirectory(prefix="fclib-report-")
         try:
             self.store = self._merged(stores)
+            # from nothing; runs that start from a step before are in `along` alone
             self.rows = profiles.load(self.store, machine=machine, campaign=campaign, merit=merit)
+            node, judged = self.rows[0]["node"], self.rows[0]["merit"]
+            both = profiles.load(self.store, machine=node, merit=judged, start=None)
+            self.along = profiles.along(self.store, both, campaign)
         except BaseException:
             self._folder.cleanup()
             raise
@@ -116,6 +120,7 @@ class Campaigns:
         first = self.rows[0]
         return {
             "runs": len(self.rows),
+            "along": self.along,
             "solved": sum(bool(row["solved"]) for row in self.rows),
             "problems": len({row["hash"] for row in self.rows}),
             "node": first["node"],

@@ -101,6 +101,10 @@
       const change = (key) => (value) => { state[key] = key === "tol" ? Number(value) : value; keep({ [key]: value }); table.update(rows()); };
       page.append(h("div", { class: "controls" }, select("tolerance", tolerances(), state.tol, change("tol")),
         select("family", families(), state.family, change("family"))), table);
+      if (o.along.length) page.append(h("h2", {}, "Along sequences"), h("p", {}, "Each solver solved consecutive problems from its own solution of the step before (warm), and from nothing (cold). All else on these pages is of the cold runs."), Fclib.table({
+        caption: "Warm runs beside cold runs of the same steps", rows: o.along, page: 60,
+        columns: ["sequence", "solver", "tol", "cold CPU / warm CPU", "iterations warm", "iterations cold", "solved warm", "solved cold", "of", "drift"].map((key) => ({ key, label: key, head: key === "sequence" })),
+      }));
       page.append(h("h2", {}, "How the runs ended"), Fclib.table({
         caption: "Statuses of all runs", rows: Object.entries(o.statuses).map(([name, v]) => ({ name, ...v })),
         columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", value: (r) => r.count / o.runs, format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],

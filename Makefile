@@ -21,7 +21,7 @@ help:
 	@echo "make demo    set up, then simulate, store, solve and judge a falling stack of boxes"
 	@echo "make test    set up, then run all tests on all cores (JOBS=2: on two)"
 	@echo "make wasm    the core as a module for browsers, into $(BUILD)/wasm/fclib (needs Emscripten)"
-	@echo "make docs    set up, then build the documentation into $(BUILD)/site"
+	@echo "make docs    set up, then build the documentation into $(BUILD)/site (REPORT=ADDRESS: links to a report)"
 	@echo "make fuzz    feed the readers with damaged files for SECONDS=60 (needs clang)"
 	@echo "make asan    the C++ tests under the sanitizers of addresses and of undefined behaviour"
 	@echo "make tsan    the C++ tests under the sanitizer of threads"
@@ -65,7 +65,7 @@ wasm:
 	  awk '{ printf "build/wasm/fclib: fclib-core.wasm has %.2f MB, compressed\n", $$1 / 1e6 }'
 
 docs: setup $(VENV)/.docs-tools
-	$(BIN)/python scripts/site/build.py $(BUILD)/site
+	$(BIN)/python scripts/site/build.py $(BUILD)/site $(if $(REPORT),--report $(REPORT))
 
 fuzz:
 	@sh tests/fuzz/run.sh $(BUILD)/fuzz $(SECONDS)

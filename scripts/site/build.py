@@ -1,12 +1,15 @@
-"""Build the documentation: build.py OUT [--quick], a site that opens from a folder and any host.
+"""Build the documentation: build.py OUT [--quick] [--report ADDRESS], a site that opens from a
+folder and any host.
 
 Its sources are README.md, ARCHITECTURE.md and their like, docs/, and pages that follow from the
 code. All are brought into one folder, from which Sphinx makes the site; a warning is an error.
---quick draws no scene and runs no example.
+--quick draws no scene and runs no example. --report says where a site of `fclib report` is served:
+the pages of families and solvers then link to theirs in it.
 """
 
 from __future__ import annotations
 
+import argparse
 import re
 import shutil
 import sys
@@ -95,14 +98,14 @@ article .align-right { margin: 0 0 1em 1.5em; }
 """
 
 
-def pages(quick: bool) -> Iterator[tuple[str, str | bytes]]:
+def pages(quick: bool, report: str) -> Iterator[tuple[str, str | bytes]]:
     """Every page and picture that docs/ does not have, by its path."""
     for source, page in AS_THEY_ARE.items():
         yield page, (ROOT / source).read_text(encoding="utf-8")
     yield "_static/site.css", STYLE
     yield from figures()
-    yield from families.pages(draws=not quick)
-    yield from solvers.pages(ROOT)
+    yield from families.pages(draws=not quick, report=report)
+    yield from solvers.pages(ROOT, report)
     yield from commands.pages()
     yield from python_api.pages()
     yield from c_api.pages(ROOT)
@@ -121,10 +124,10 @@ def figures() -> Iterator[tuple[str, str | bytes]]:
     yield "_static/contact.js", script
 
 
-def gather(folder: Path, quick: bool) -> None:
+def gather(folder: Path, quick: bool, report: str) -> None:
     """Bring all sources into a folder."""
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
-    for name, content in pages(quick):
+    for name, content in pages(quick, report):
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
         if isinstance(content, bytes):
@@ -172,7 +175,7 @@ def with_links(text: str, up: str) -> str:
     return text
 
 
-def main(out: Path, quick: bool) -> int:
+def main(out: Path, quick: bool, report: str) -> int:
     """Build in the place of what an earlier build left; the exit status of Sphinx."""
     if (out / ".buildinfo").is_file():
         shutil.rmtree(out)
@@ -180,7 +183,7 @@ def main(out: Path, quick: bool) -> int:
         sys.exit(f"{out}: is a folder that holds something else than this site; name another one")
     with tempfile.TemporaryDirectory() as folder:
         sources = Path(folder) / "docs"
-        gather(sources, quick)
+        gather(sources, quick, report)
         options = ["-b", "html", "-W", "--keep-going", "-q", "-E", "-d", f"{folder}/doctrees"]
         options += ["-c", str(HERE), "-D", f"html_static_path={sources / '_static'}"]
         status = sphinx([*options, str(sources), str(out)])
@@ -190,6 +193,9 @@ def main(out: Path, quick: bool) -> int:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2 or sys.argv[2:] not in ([], ["--quick"]):
-        sys.exit("usage: build.py OUT [--quick]")
-    sys.exit(main(Path(sys.argv[1]), quick=len(sys.argv) > 2))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--report", default="", metavar="ADDRESS")
+    chosen = parser.parse_args()
+    sys.exit(main(chosen.out, chosen.quick, chosen.report.rstrip("/")))

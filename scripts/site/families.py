@@ -17,8 +17,11 @@ SIZE = (720, 540)  # of a picture [pixels]
 Kind = type[scenes.Described]
 
 
-def pages(draws: bool) -> Iterator[tuple[str, str | bytes]]:
-    """The pages, their index, and pictures where they are asked for and something can draw here."""
+def pages(draws: bool, report: str = "") -> Iterator[tuple[str, str | bytes]]:
+    """The pages, their index, and pictures where they are asked for and something can draw here.
+
+    `report` is the address of a report, for links to it.
+    """
     known = plan.families()
     order = {name: place for place, name in enumerate(KNOWN)}
     by_set = sorted(known, key=lambda name: (order.get(known[name].collection, 99), name))
@@ -28,11 +31,11 @@ def pages(draws: bool) -> Iterator[tuple[str, str | bytes]]:
         if picture is not None:
             drawn.add(name)
             yield f"families/{name}.png", picture
-        yield f"families/{name}.md", page(name, known[name], picture is not None)
-    yield "families/index.md", index({name: known[name] for name in by_set}, drawn)
+        yield f"families/{name}.md", page(name, known[name], picture is not None, report)
+    yield "families/index.md", index({name: known[name] for name in by_set}, drawn, report)
 
 
-def index(families: dict[str, Kind], drawn: set[str]) -> str:
+def index(families: dict[str, Kind], drawn: set[str], report: str) -> str:
     """The sets and the families, in tables, with a small picture where one is drawn."""
     lines = [
         "# Families",
@@ -40,6 +43,7 @@ def index(families: dict[str, Kind], drawn: set[str]) -> str:
         "All families, from their classes in `python/fclib/scenes/`. "
         "[The collection](../collection.md) says how they are built, and "
         "[a family of your own](../families-of-your-own.md) how one is added.",
+        *browsed(report, "#/catalogue", "All problems in the report: filter, see, take, cite them"),
         "",
         "| set | version | what |",
         "|---|---|---|",
@@ -47,20 +51,26 @@ def index(families: dict[str, Kind], drawn: set[str]) -> str:
     lines += [f"| {name} | {version} | {what} |" for name, (version, what) in KNOWN.items()]
     lines += ["", "| | set | family | problems | what |", "|---|---|---|---:|---|"]
     lines += [
-        f"| {f'![]({name}.png){{width=96px}}' if name in drawn else ''}"
+        f"| {f'![{name}]({name}.png){{width=96px}}' if name in drawn else ''}"
         f" | {kind.collection} | [{name}]({name}.md) | {kind.problems} | {kind.description} |"
         for name, kind in families.items()
     ]
     return "\n".join(lines) + "\n"
 
 
-def page(name: str, kind: Kind, drawn: bool) -> str:
+def browsed(report: str, place: str, text: str) -> list[str]:
+    """A paragraph that links to a place in the report, where one is served."""
+    return ["", f"[{text}]({report}/index.html{place})", ""] if report else []
+
+
+def page(name: str, kind: Kind, drawn: bool, report: str) -> str:
     """One family: what it is, its parameters, what is built of it."""
     planned = plan.Plan.of_family(name)
     simulated = name in scenes.families()
     lines = [f"# {name}", "", f"**{kind.title}.** {kind.description}", ""]
     if drawn:
         lines += [f"![The scene of {name} at its start]({name}.png){{width=480px}}", ""]
+    lines += browsed(report, f"#/family/{name}", "Its problems and runs in the report")
     number = f"the first {kind.problems} steps with contact" if simulated else f"{kind.problems}"
     lines += [inspect.getdoc(kind) or "", "", "| | |", "|---|---|"]
     lines += [

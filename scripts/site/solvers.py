@@ -24,8 +24,8 @@ ORDER = [
 ]
 
 
-def pages(root: Path) -> Iterator[tuple[str, str]]:
-    """The index and the families."""
+def pages(root: Path, report: str = "") -> Iterator[tuple[str, str]]:
+    """The index and the families; `report` is the address of a report, for links to it."""
     notes = opening_comments(root / "core" / "solvers")
     families: dict[str, list[fclib.SolverInfo]] = defaultdict(list)
     for solver in fclib.solvers():
@@ -33,7 +33,7 @@ def pages(root: Path) -> Iterator[tuple[str, str]]:
     order = sorted(families, key=lambda name: (ORDER.index(name) if name in ORDER else 99, name))
     yield "solvers/index.md", index({name: families[name] for name in order})
     for name in order:
-        yield f"solvers/{file_of(name)}", page(name, families[name], notes)
+        yield f"solvers/{file_of(name)}", page(name, families[name], notes, report)
 
 
 def file_of(family: str) -> str:
@@ -94,7 +94,7 @@ def index(families: dict[str, list[fclib.SolverInfo]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def page(family: str, members: list[fclib.SolverInfo], notes: dict[str, str]) -> str:
+def page(family: str, members: list[fclib.SolverInfo], notes: dict[str, str], report: str) -> str:
     """The solvers of a family in full, the built-in ones first."""
     lines = [f"# {family.capitalize()}", ""]
     for solver in sorted(members, key=lambda s: (s.origin != "fclib", s.name)):
@@ -104,6 +104,9 @@ def page(family: str, members: list[fclib.SolverInfo], notes: dict[str, str]) ->
         lines += ["| | |", "|---|---|", f"| from | {solver.origin} |"]
         if solver.citation:
             lines.append(f"| published | {solver.citation} |")
+        if report:
+            own = f"{report}/index.html#/solver/{solver.name}"
+            lines.append(f"| measured | [its runs in the report]({own}) |")
         lines += [f"| takes | {takes(solver)} |", f"| iterations | {solver.max_iterations:,} |", ""]
         if not solver.options:
             continue

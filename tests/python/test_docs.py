@@ -27,6 +27,7 @@ pytest.importorskip("matplotlib")
 
 pytestmark = pytest.mark.slow
 
+REPORT = "https://example.org/report"
 PHONE = {"width": 390, "height": 800}
 
 
@@ -39,7 +40,7 @@ def site(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     # a folder whose name must be escaped in an address
     folder = tmp_path_factory.mktemp("built") / "a site #1"
     done = subprocess.run(
-        [sys.executable, root / "scripts/site/build.py", folder, "--quick"],
+        [sys.executable, root / "scripts/site/build.py", folder, "--quick", "--report", REPORT],
         capture_output=True,
         text=True,
     )
@@ -108,6 +109,22 @@ def test_no_page_needs_another_host(site: Path, pages: dict[Path, Page]) -> None
 
 def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:
     assert not [(p.relative_to(site), page.alone) for p, page in pages.items() if page.alone]
+
+
+def test_families_and_solvers_link_to_the_report(pages: dict[Path, Page], site: Path) -> None:
+    """As `--report` asks; the report's own tests open such addresses."""
+    linked = {
+        path.relative_to(site).as_posix(): [
+            address.removeprefix(f"{REPORT}/index.html")
+            for address in page.targets
+            if address.startswith(REPORT)
+        ]
+        for path, page in pages.items()
+    }
+    for name in plan.families():
+        assert linked[f"families/{name}.html"] == [f"#/family/{name}"]
+    assert "#/catalogue" in linked["families/index.html"]
+    assert "#/solver/nsgs" in linked["solvers/splitting.html"]
 
 
 def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:

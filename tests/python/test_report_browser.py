@@ -39,6 +39,7 @@ PAGES = {
     "catalogue": "#/catalogue",
     "families": "#/families",
     "family": "#/family/small/BoxesStack",
+    "family by its name": "#/family/BoxesStack",
     "problem": "#/problem/small/BoxesStack/0011",
     "problem of a store": "#/problem/Alone/alone",
     "problem without runs": "#/problem/small/BoxesStack/0000",

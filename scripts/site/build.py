@@ -85,6 +85,7 @@ div.math { overflow-x: auto; margin: 1em 0; }
 div.math math { margin: 0.4em 0; }
 article img { max-width: 100%; height: auto; }
 article table { font-size: 0.85em; }
+article table img { max-width: none; }
 article .align-right { margin: 0 0 1em 1.5em; }
 .contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
 .contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }
@@ -94,7 +95,10 @@ article .align-right { margin: 0 0 1em 1.5em; }
 }
 .contact-sliders label { display: grid; font-size: 0.85em; }
 .contact-says { font-size: 0.85em; opacity: 0.85; }
-@media (max-width: 46em) { article .align-right { float: none; margin: 1em 0; } }
+@media (max-width: 46em) {
+  article .align-right { float: none; margin: 1em 0; }
+  article table:has(img) td:last-child { min-width: 14em; }
+}
 """
 
 

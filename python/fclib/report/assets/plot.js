@@ -18,7 +18,7 @@
     const solid = { ...axis, showbackground: false, showspikes: false };
     return { layout: {
       font: { family: "system-ui, sans-serif", size: 13, color: colour("text") }, colorway: [...Array(7)].map((_, k) => colour(`c${k}`)),
-      paper_bgcolor: colour("back"), plot_bgcolor: colour("back"), margin: { l: 62, r: 14, t: 12, b: 58 }, xaxis: axis, yaxis: axis,
+      paper_bgcolor: colour("back"), plot_bgcolor: colour("back"), margin: { l: 62, r: 14, t: 12, b: 58 }, xaxis: { ...axis, title: { standoff: 10 } }, yaxis: axis,
       scene: { xaxis: solid, yaxis: solid, zaxis: solid }, hoverlabel: { bgcolor: colour("back"), bordercolor: colour("line"), font: { color: colour("text"), size: 12.5 } },
       legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 12 }, itemwidth: 30 },
     } };

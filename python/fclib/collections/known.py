@@ -39,16 +39,17 @@ KNOWN: dict[str, tuple[str, str]] = {
     "impacts": ("1", "bodies that strike and bounce, restitution 0 to 1"),
     "existence": ("1", "without a solution, or with several, and known to be so"),
     "dynamics": ("1", "silo, rope, spinning bodies, friction that differs by contact"),
+    "robots": ("1", "a gripper that lifts, an arm that pushes a pile"),
     "rr9118": ("1", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("7", "all families that came after RT-0444"),
+    "extended": ("8", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("7", "of standard, what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
-    *("impacts", "existence", "dynamics", "rr9118"),
+    *("impacts", "existence", "dynamics", "robots", "rr9118"),
 )
 
 

@@ -80,7 +80,8 @@
   /* the panel; fclib is the module in its worker, figure a live picture or null */
   Fclib.whatIf = async (fclib, problem, solution, view, figure, solvers, say) => {
     const whole = "f" in problem, d = problem.spacedim, nc = problem.mu.length, sizes = await fclib.validate(problem);
-    const free = whole ? (await fclib.condense(problem)).q : problem.q;
+    // the velocities without reactions
+    const { u: free } = await fclib.contact_merits(problem, { r: new Float64Array(sizes.m), ...sizes.p ? { l: new Float64Array(sizes.p) } : {} });
     const most = free.reduce((all, x) => Math.max(all, Math.abs(x)), 0) || 1, rows = await forceRows(fclib, problem), shown = Fclib.shower(problem, view);
     const highest = problem.mu.reduce((all, x) => Math.max(all, x), 0);
     const { contacts, bodies, ...bare } = problem; // what is solved

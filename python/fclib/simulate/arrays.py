@@ -7,7 +7,6 @@ that problems are the same to the last bit.
 
 from __future__ import annotations
 
-import copy
 import functools
 from typing import Any, TypeAlias
 
@@ -35,14 +34,22 @@ def empty(shape: tuple[int, int]) -> Sparse:
 
 def by_columns(data: Vector, rows: Index, starts: Index, shape: tuple[int, int]) -> Sparse:
     """A matrix by columns of arrays that are known to fit, which are not copied."""
-    matrix = copy.copy(empty(shape))
+    matrix = sp.csc_array.__new__(sp.csc_array)
+    # faster than copy.copy, and than SciPy's own check of what is known to fit
+    matrix.__dict__.update(empty(shape).__dict__)
     matrix.data, matrix.indices, matrix.indptr = data, rows, starts
     return matrix
 
 
+def lengths_of(starts: Index) -> Index:
+    """The lengths (k) of rows or columns with these pointers (k + 1)."""
+    lengths: Index = starts[1:] - starts[:-1]  # np.diff takes four times as long
+    return lengths
+
+
 def columns_of(matrix: Sparse) -> npt.NDArray[np.intp]:
     """The column (nnz) of each entry."""
-    return np.repeat(np.arange(len(matrix.indptr) - 1), np.diff(matrix.indptr))
+    return np.repeat(np.arange(len(matrix.indptr) - 1), lengths_of(matrix.indptr))
 
 
 def times(matrix: Sparse, x: Vector) -> Vector:
@@ -68,7 +75,7 @@ def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
 
     Entries all lie in rows that have a number.
     """
-    lengths = np.append(np.diff(matrix.indptr), 0)[columns]
+    lengths = np.append(lengths_of(matrix.indptr), 0)[columns]
     starts = pointers(lengths)
     first = np.append(matrix.indptr[:-1], 0)[columns]
     entries = np.repeat(first - starts[:-1], lengths) + np.arange(starts[-1])

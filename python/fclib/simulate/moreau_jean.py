@@ -76,6 +76,7 @@ from fclib.simulate.arrays import (
     added,
     by_columns,
     columns_of,
+    lengths_of,
     pointers,
     take,
     times,
@@ -335,8 +336,8 @@ def with_dry_friction(
     own = np.arange(k, dtype=np.int32)
     # N is the auxiliary velocity, T1 the joint's
     lengths = np.zeros((k, d), dtype=np.int32)
-    lengths[:, 0], lengths[:, 1] = 1, np.diff(gradient.indptr)
-    starts = pointers(np.append(np.diff(H.indptr), lengths))
+    lengths[:, 0], lengths[:, 1] = 1, lengths_of(gradient.indptr)
+    starts = pointers(np.append(lengths_of(H.indptr), lengths))
     rows = np.insert(gradient.indices, gradient.indptr[:-1], n + own)
     values = np.insert(gradient.data, gradient.indptr[:-1], 1.0)
     first = gradient.indices[gradient.indptr[:-1]]

@@ -33,6 +33,7 @@ from fclib.simulate.arrays import (
     by_columns,
     columns_of,
     diagonal,
+    lengths_of,
     pointers,
     summed,
     take,
@@ -364,7 +365,7 @@ def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
     types = mujoco.mjtConstraint
     of_joints = d.efc_type == int(types.mjCNSTR_FRICTION_DOF)
     which = np.flatnonzero(of_joints | (d.efc_type == int(types.mjCNSTR_FRICTION_TENDON)))
-    which = which[np.diff(rows.indptr)[which] > 0]
+    which = which[lengths_of(rows.indptr)[which] > 0]
     gradient = take(rows, which)
     index = d.efc_id[which]
     joint = of_joints[which]
@@ -464,7 +465,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     data = source.data
     contact = data.contact
     # a body of a mocap, or one whose joints do not move the point, has rows without entries
-    entries = np.append(np.diff(rows.indptr), 0)
+    entries = np.append(lengths_of(rows.indptr), 0)
     first = contact.efc_address[:, None] + np.arange(3)
     moves = entries[np.where(first < rows.shape[1], first, -1)].any(axis=1)
     rigid = (contact.geom >= 0).reshape(-1, 2).all(axis=1)

@@ -409,6 +409,10 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
         store.db.execute("PRAGMA user_version = 99")
     with pytest.raises(bench.StoreError, match="version 99"):
         bench.Store(tmp_path / "new.sqlite")
+    with pytest.raises(bench.StoreError, match="is a folder"):
+        bench.Store(tmp_path)
+    with pytest.raises(bench.StoreError, match="there is no folder"):
+        bench.Store(tmp_path / "absent" / "new.sqlite")
     assert run_cli("--status", tmp_path / "absent.sqlite").returncode == 1
     assert not (tmp_path / "absent.sqlite").exists()
 

@@ -366,6 +366,20 @@ def test_a_problem_of_two_sequences_is_two_instances(smooth: Path, tmp_path: Pat
     assert len({instance.hash for instance in costs.instances}) == STEPS - 1
 
 
+def test_steps_at_rest_are_instances_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "rest").mkdir()
+    for k in range(4):
+        fclib.write(tmp_path / "rest" / f"{k:04d}.hdf5", step_of(0))
+    path = tmp_path / "rest.sqlite"
+    done = bench.run_campaign(campaign(tmp_path / "rest", solvers=["nsgs"]), path)
+    assert done.solved == 1 + 4  # one problem, cold; four steps, warm
+    costs = profiles.costs(profiles.load(path, start="warm"))
+    assert len(costs.instances) == 3
+    assert np.isnan(costs.spread).all()  # no repeats
+    (row,) = profiles.along(path, profiles.load(path, start=None))
+    assert (row["of"], row["solved cold"], row["iterations warm"]) == (3, 3, 0)
+
+
 def test_warm_beside_cold(quiet: Path, with_a_failure: Path) -> None:
     for path, steps, solved in ((quiet, STEPS - 1, STEPS - 1), (with_a_failure, STEPS - 1, 4)):
         rows = rows_of(path)

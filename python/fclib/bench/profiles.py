@@ -44,7 +44,8 @@ from fclib.bench.store import Store
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Start: TypeAlias = Literal["cold", "warm"]
-Key: TypeAlias = tuple[str, float, str]  # of an instance: the problem's hash, tolerance, sequence
+# of an instance: the problem's hash, tolerance, sequence and step
+Key: TypeAlias = tuple[str, float, str, int]
 # what a run may cost, and the least that is told from nothing
 METRICS: Mapping[str, tuple[str, float]] = {
     "cpu_s": ("CPU time [s]", 1e-6),
@@ -284,8 +285,8 @@ def one_limit(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 
 def instance_of(row: Mapping[str, Any]) -> Key:
-    """What rows of one instance share; a problem may be a step of several sequences."""
-    return row["hash"], row["tol"], row.get("sequence") or ""
+    """What rows of one instance share; at rest, several steps of a sequence are one problem."""
+    return row["hash"], row["tol"], row.get("sequence") or "", row.get("step") or 0
 
 
 JUDGED = {
@@ -370,7 +371,7 @@ def gather(
     for place in refused:
         unsuitable[place] = bool(np.isnan(found[place]))
     ordered = sorted(
-        instances, key=lambda k: (instances[k].family, instances[k].problem, -k[1], k[2])
+        instances, key=lambda k: (instances[k].family, instances[k].problem, -k[1], k[2:])
     )
     rank = [numbers[key] for key in ordered]
     return Costs(

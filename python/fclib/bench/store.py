@@ -222,6 +222,10 @@ class Store:
         self.path = Path(path)
         if not create and not self.path.exists():
             raise StoreError(f"{self.path}: there is no such store")
+        if self.path.is_dir():
+            raise StoreError(f"{self.path}: is a folder, and no store")
+        if not self.path.parent.is_dir():
+            raise StoreError(f"{self.path}: there is no folder {self.path.parent}")
         self._ids: dict[tuple[str, str], int] = {}
         self.read_only = self.path.exists() and not (
             os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)

@@ -27,10 +27,12 @@ class Coulomb {
   /// ||x_T||
   static Real tangential_norm(const Vec& x) {
     if constexpr (D == 2) {
-      return std::abs(x[1]);
+      using std::abs;  // or that of Real
+      return abs(x[1]);
     } else {
       // by components: vector loads of what was just stored by components stall
-      return std::sqrt(x[1] * x[1] + x[2] * x[2]);
+      using std::sqrt;  // or that of Real
+      return sqrt(x[1] * x[1] + x[2] * x[2]);
     }
   }
 

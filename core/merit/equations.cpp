@@ -12,6 +12,8 @@ namespace fclib {
 
 namespace {
 
+using std::abs, std::copysign, std::sqrt;  // or those of Real
+
 /// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer
 /// than v, u and l, which a solver has brought through conversions, and what is allowed to q is
 /// hidden from the natural map.
@@ -33,18 +35,16 @@ RealVector product_transposed(const Matrix& a, const RealVector& x) {
 /// |A| |x|: the sizes of what the product adds up.
 RealVector sizes(const Matrix& a, const RealVector& x) {
   RealVector y = RealVector::Zero(a.rows);
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    y[row] += std::abs(Real(value)) * std::abs(x[col]);
-  });
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { y[row] += abs(Real(value)) * abs(x[col]); });
   return y;
 }
 
 /// |A|^T |x|
 RealVector sizes_transposed(const Matrix& a, const RealVector& x) {
   RealVector y = RealVector::Zero(a.cols);
-  for_each_entry(a, [&](Index row, Index col, double value) {
-    y[col] += std::abs(Real(value)) * std::abs(x[row]);
-  });
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { y[col] += abs(Real(value)) * abs(x[row]); });
   return y;
 }
 
@@ -112,13 +112,13 @@ RealVector stopping(const RealVector& velocity, const RealVector& scale, Index d
 RealVector quotient(const RealVector& x, const RealVector& y) {
   RealVector result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
-    result[k] = y[k] != 0 ? std::abs(x[k] / y[k]) : Real(0);
+    result[k] = y[k] != 0 ? abs(x[k] / y[k]) : Real(0);
   }
   return result;
 }
 
 Real root_mean_square(const RealVector& x) {
-  return x.size() > 0 ? x.norm() / std::sqrt(Real(x.size())) : Real(0);
+  return x.size() > 0 ? x.norm() / sqrt(Real(x.size())) : Real(0);
 }
 
 RealVector diagonal(const Matrix& a) {
@@ -160,7 +160,7 @@ RealVector momentum_sizes(const Matrix& mass, const std::vector<Index>& part, co
   }
   RealVector result = sizes(mass, v);
   for (Eigen::Index k = 0; k < v.size(); ++k) {
-    result[k] += std::sqrt(inertia[k] * squares[part[static_cast<std::size_t>(k)]]);
+    result[k] += sqrt(inertia[k] * squares[part[static_cast<std::size_t>(k)]]);
   }
   return result;
 }
@@ -176,8 +176,8 @@ RealVector mean_of_contacts(const RealVector& x, Index d) {
 RealVector beyond(const RealVector& x, const RealVector& rounding) {
   RealVector result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
-    const Real left = std::abs(x[k]) - rounding[k];
-    result[k] = left > 0 ? std::copysign(left, x[k]) : Real(0);
+    const Real left = abs(x[k]) - rounding[k];
+    result[k] = left > 0 ? copysign(left, x[k]) : Real(0);
   }
   return result;
 }
@@ -187,7 +187,7 @@ Mismatch worst(std::string_view part, const Vector& stored, const RealVector& di
                const RealVector& left, const RealVector& scale) {
   Mismatch result{.part = part};
   for (Eigen::Index k = 0; k < left.size(); ++k) {
-    const Real size = std::abs(left[k]);
+    const Real size = abs(left[k]);
     const auto error = static_cast<double>(scale[k] > 0 ? size / scale[k] : size);
     if (k > 0 && !(error > result.error)) continue;
     result.index = static_cast<Index>(k);

@@ -12,6 +12,8 @@ namespace fclib {
 
 namespace {
 
+using std::abs;  // or that of Real
+
 void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
 
 /// The parts that depend on one contact at a time.
@@ -38,7 +40,7 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
     each.dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
     raise(result.cone, each.cone[contact]);
     raise(result.dual_cone, each.dual_cone[contact]);
-    raise(result.complementarity, std::abs(ra.dot(modified)));
+    raise(result.complementarity, abs(ra.dot(modified)));
     each.status.push_back(status_of(cone, ua, ra, rho));
     switch (each.status.back()) {
       case ContactStatus::open:

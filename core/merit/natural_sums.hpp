@@ -44,8 +44,9 @@ class NaturalSums {
   /// ||F|| over ||q||, or over what rounding leaves of q where that is larger; absolute without
   /// either.
   static double relative(Real squares, Real q_squares, Real rounding_squares) {
-    const Real scale = std::sqrt(std::max(q_squares, rounding_squares));
-    const Real norm = std::sqrt(squares);
+    using std::sqrt;  // or that of Real
+    const Real scale = sqrt(std::max(q_squares, rounding_squares));
+    const Real norm = sqrt(squares);
     return static_cast<double>(scale > 0 ? norm / scale : norm);
   }
 

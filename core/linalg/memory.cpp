@@ -4,6 +4,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <string_view>
 
 namespace fclib {
 
@@ -18,21 +19,27 @@ double number_in(const char* path) {
   return file >> value ? value : unknown;
 }
 
+/// The number behind a word at the beginning of a line; a unit behind it is passed over.
+double number_behind(const char* path, std::string_view word) {
+  std::ifstream file(path);
+  for (std::string key; file >> key;) {
+    if (double value = 0; key == word && file >> value) return value;
+    file.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  return unknown;
+}
+
 }  // namespace
 
 double available_memory() {
-  double available = unknown;
-  std::ifstream info("/proc/meminfo");
-  for (std::string key; info >> key;) {
-    if (double kilobytes = 0; key == "MemAvailable:" && info >> kilobytes) {
-      available = 1024 * kilobytes;
-    }
-    info.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-  }
+  constexpr double kilobyte = 1024;
+  const double available = kilobyte * number_behind("/proc/meminfo", "MemAvailable:");
   const double limit = number_in("/sys/fs/cgroup/memory.max");
   const double used = number_in("/sys/fs/cgroup/memory.current");
-  if (limit < unknown && used < unknown) available = std::min(available, limit - used);
-  return available;
+  // pages of files that the kernel gives back first
+  const double idle = number_behind("/sys/fs/cgroup/memory.stat", "inactive_file");
+  if (!(limit < unknown && used < unknown)) return available;
+  return std::min(available, limit - used + (idle < unknown ? idle : 0));
 }
 
 }  // namespace fclib

@@ -547,7 +547,7 @@ def test_a_file_that_changes_is_no_fault_of_the_solver(folder: Path, tmp_path: P
 def test_a_supervisor_that_is_killed_is_replaced(
     folder: Path, supervisor: SupervisorClient
 ) -> None:
-    supervisor.give(job(folder, "auto"))
+    supervisor.give(job(folder, "sleeps"))
     assert supervisor.process is not None
     supervisor.process.kill()
     _, record = supervisor.take()

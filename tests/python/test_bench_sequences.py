@@ -31,6 +31,7 @@ SAME = ("key", "start", "sequence", "step", "guess", "status", "iterations", "er
 def step_of(k: int, hopeless: bool = False) -> fclib.LocalProblem:
     """A step of a sequence in which the contacts change their places from step to step."""
     whole = planted_local(3, nc=NC).problem
+    assert isinstance(whole, fclib.LocalProblem)
     order = np.random.default_rng(k).permutation(NC)
     rows = (3 * order[:, None] + np.arange(3)).ravel()
     W = np.asarray(whole.W.todense() if hasattr(whole.W, "todense") else whole.W)
@@ -375,6 +376,7 @@ def test_steps_at_rest_are_instances_of_their_own(tmp_path: Path) -> None:
     assert done.solved == 1 + 4  # one problem, cold; four steps, warm
     costs = profiles.costs(profiles.load(path, start="warm"))
     assert len(costs.instances) == 3
+    assert costs.spread is not None
     assert np.isnan(costs.spread).all()  # no repeats
     (row,) = profiles.along(path, profiles.load(path, start=None))
     assert (row["of"], row["solved cold"], row["iterations warm"]) == (3, 3, 0)

@@ -28,6 +28,7 @@ from fclib.report.network import network_of
 from fclib.report.recipes import recipes
 from fclib.report.solids import MESH, record_of, solids_of
 from fclib.report.view import hulls_of
+from fclib.scenes.shared.family import Assembled
 from helpers_report import (
     LABELS,
     TOLERANCES,
@@ -445,6 +446,7 @@ def test_drawn_positions_of_assembled_families_are_those_of_their_equations(fami
     """
     plan = known.plan_of(family)
     assert plan.chosen is not None
+    assert isinstance(plan.scene, Assembled)
     problem: Any = plan.scene.problem(plan.chosen[0])
     network = network_of(problem)
     if problem.bodies is None:

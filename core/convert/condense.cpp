@@ -3,6 +3,8 @@
 #include <limits>
 #include <optional>
 
+#include "linalg/extended.hpp"
+
 namespace fclib {
 
 Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadline)
@@ -49,11 +51,10 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
 Solution Condensation::expand(const Solution& local) const {
   Solution result = local;
   // what joints and contacts add to a light body may be far larger than what is left of it
-  using Precise = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
-  Precise momentum = problem_.f.cast<long double>();
-  multiply_add(problem_.H, Precise(local.r.cast<long double>()), momentum);
+  RealVector momentum = problem_.f.cast<Real>();
+  multiply_add(problem_.H, RealVector(local.r.cast<Real>()), momentum);
   if (is_mixed(problem_)) {
-    multiply_add(problem_.G, Precise(local.l.cast<long double>()), momentum);
+    multiply_add(problem_.G, RealVector(local.l.cast<Real>()), momentum);
   }
   result.v = mass_.solve(Vector(momentum.cast<double>()));
   result.u = problem_.w;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "linalg/dependent_columns.hpp"
+#include "linalg/extended.hpp"
 
 namespace fclib {
 
@@ -309,9 +310,8 @@ void Elimination::hold(const GlobalProblem& bodies, const Condensation& condensa
   if (turn_.size() == 0) return;
   const auto triangle = turn_.triangularView<Eigen::Upper>();
   const auto correction = [&] {
-    using Precise = Eigen::Matrix<long double, Eigen::Dynamic, 1>;
-    Precise broken = bodies.b.cast<long double>();
-    multiply_transposed_add(bodies.G, Precise(solution.v.cast<long double>()), broken);
+    RealVector broken = bodies.b.cast<Real>();
+    multiply_transposed_add(bodies.G, RealVector(solution.v.cast<Real>()), broken);
     const Vector left = scale_.cwiseProduct(selected(Vector(broken.cast<double>()), kept_));
     return multipliers(triangle.transpose().solve(left));
   };

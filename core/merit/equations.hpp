@@ -10,20 +10,11 @@
 #include <string_view>
 #include <vector>
 
-#include "linalg/double_double.hpp"
+#include "linalg/extended.hpp"
 #include "linalg/factorization.hpp"
 #include "problem.hpp"
 
 namespace fclib {
-
-// A referee is more precise than what it judges: with r = 4e5 and q = 0.8, as in granular packings
-// under load, the rounding of W r alone is worth 1e-11 in double precision.
-#ifdef __wasm__
-using Real = DoubleDouble;  // long double is software there
-#else
-using Real = long double;
-#endif
-using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 
 /// A stored v, u or l beside the one that follows from the rest of the solution, at the component
 /// where they differ most.

@@ -11,7 +11,7 @@ JOBS ?= auto
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
-CXX_SOURCES := $(shell find core bindings browser include tests examples -name '*.[ch]pp' -o -name '*.[ch]')
+CXX_SOURCES := $(shell find core bindings browser include tests examples benchmarks -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
         collection-wheel campaigns deb release clean help
@@ -30,7 +30,7 @@ help:
 	@echo "make lint    check style and types (ruff, mypy, clang-format)"
 	@echo "make tidy    clang-tidy over the C++ sources, which takes minutes"
 	@echo "make format  put the sources into the style that lint checks"
-	@echo "make layers  fclib.torch and fclib.jax, tested in an environment of their own, which is large"
+	@echo "make layers  fclib.torch, fclib.jax and the recipes, tested in an environment of their own, which is large"
 	@echo "make man     man pages of the command line, into man/"
 	@echo "make sdist   the source distribution, into dist/"
 	@echo "make wheel   a wheel of it with an HDF5 of its own, installed and tried (HDF5_SOURCE=FOLDER:"

@@ -1,7 +1,8 @@
 // Times the factorisation of a matrix whose pattern is read from stdin, by each ordering.
 //
 // In: d, the nodes, the blocks; first (nodes + 1); row (blocks). Out, a line for each ordering:
-// CPU time of the plan [s], multiplications, numbers kept, least CPU time of a factorisation [s], error of a solve.
+// CPU time of the plan [s], multiplications, numbers kept, least CPU time of a factorisation [s],
+// error of a solve.
 
 #include <cmath>
 #include <cstdio>

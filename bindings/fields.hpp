@@ -164,7 +164,8 @@ void check_friction(const P& problem, const nb::dict& values) {
                         ", spacedim " + std::to_string(problem.spacedim),
                     name);
       }
-      detail::validate_vector(given, static_cast<Index>(given.size()), field, name);
+      detail::validate_vector(given, static_cast<Index>(given.size()), field.rows, field.range,
+                              name);
     }
   });
 }

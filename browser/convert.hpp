@@ -1,13 +1,15 @@
-// Problems and solutions as plain JavaScript objects, by their fields(): what bindings/fields.hpp
-// is for Python.
+// Problems and solutions from JavaScript and back, by their fields(): what bindings/fields.hpp is
+// for Python. To there they go as plain objects; from there as numbers in memory, where fclib.js
+// puts them, since a property that the core looks up takes as long as an iteration on a small
+// problem.
 #pragma once
 
 #include <emscripten/val.h>
 
-#include <cmath>
 #include <cstdint>
-#include <limits>
+#include <cstdlib>
 #include <memory>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -96,6 +98,112 @@ val problem_to_js(const P& problem) {
 
 // ---- from JavaScript
 
+/// What fclib.js has put into one block of memory: arrays, and behind them integers that say what
+/// they are. A call reads it before it does anything else; the next one writes over it.
+class Block {
+ public:
+  /// The address of so many bytes; 0 where there are none left.
+  static int reserve(double bytes) {
+    if (bytes > static_cast<double>(size_)) {
+      std::free(bytes_);
+      bytes_ = std::malloc(static_cast<std::size_t>(bytes));
+      size_ = bytes_ != nullptr ? static_cast<std::size_t>(bytes) : 0;
+    }
+    return reinterpret_cast<int>(bytes_);
+  }
+
+  /// `address` is that of the integers, of which the first is the size of the arrays [bytes].
+  explicit Block(int address) : next_(reinterpret_cast<const std::int32_t*>(address)) {
+    arrays_ = reinterpret_cast<const char*>(address) - integer();
+  }
+  Block(const Block&) = delete;
+  Block& operator=(const Block&) = delete;
+  ~Block() {
+    if (size_ <= small) return;
+    std::free(bytes_);
+    bytes_ = nullptr;
+    size_ = 0;
+  }
+
+  std::int32_t integer() { return *next_++; }
+
+  /// The numbers of an array; empty where it was left out.
+  template <class Number>
+  std::span<const Number> array() {
+    const std::int32_t offset = integer();
+    const auto size = static_cast<std::size_t>(integer());
+    return {reinterpret_cast<const Number*>(arrays_ + offset), size};
+  }
+
+ private:
+  static constexpr std::size_t small = 1 << 20;  // [bytes] that may be kept for the next call
+  inline static void* bytes_ = nullptr;
+  inline static std::size_t size_ = 0;
+
+  const std::int32_t* next_;
+  const char* arrays_;
+};
+
+inline Vector vector_from(Block& block) {
+  const auto values = block.array<double>();
+  return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
+}
+
+template <class Number>
+std::vector<Number> numbers_from(Block& block) {
+  const auto values = block.array<Number>();
+  return {values.begin(), values.end()};
+}
+
+inline Matrix matrix_from(Block& block) {
+  Matrix a;
+  if (block.integer() == 0) return a;
+  a.storage = static_cast<Storage>(block.integer());
+  a.rows = block.integer();
+  a.cols = block.integer();
+  a.p = numbers_from<Index>(block);
+  a.i = numbers_from<Index>(block);
+  a.x = numbers_from<double>(block);
+  return a;
+}
+
+/// Fills a struct of numbers, whose fields fclib.js has in the same order.
+template <class Struct>
+void fill(Struct& self, Block& block) {
+  for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+    if constexpr (std::is_same_v<Member, Matrix>) {
+      self.*field.member = matrix_from(block);
+    } else if constexpr (std::is_same_v<Member, Vector>) {
+      self.*field.member = vector_from(block);
+    } else {
+      static_assert(std::is_same_v<Member, Index>);
+      if (block.integer() != 0) self.*field.member = block.integer();
+    }
+  });
+}
+
+/// The problem of a block, not validated.
+inline Problem problem_from(Block& block) {
+  const std::int32_t kind = block.integer();
+  Problem result;
+  std::int32_t number = 0;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    if (number++ != kind) return;
+    P problem;
+    fill(problem, block);
+    result = std::move(problem);
+  });
+  return result;
+}
+
+inline Solution solution_from(Block& block) {
+  Solution solution;
+  fill(solution, block);
+  return solution;
+}
+
+// ---- what a problem only carries along, from its object
+
 [[noreturn]] inline void unfit(const std::string& where, const std::string& message) {
   throw Error(ErrorKind::problem, message, where);
 }
@@ -115,68 +223,14 @@ std::vector<Number> numbers_from(const val& array, const std::string& where) {
   return result;
 }
 
-inline Vector vector_from(const val& array, const std::string& where) {
-  const std::vector<double> values = numbers_from<double>(array, where);
-  return Eigen::Map<const Vector>(values.data(), static_cast<Eigen::Index>(values.size()));
-}
-
-inline Index integer_from(const val& value, const std::string& where) {
-  const double number = type_of(value) == "number" ? value.as<double>() : std::nan("");
-  if (!(std::abs(number) <= std::numeric_limits<Index>::max()) || number != std::trunc(number)) {
-    unfit(where, "is not an integer of 32 bits");
-  }
-  return static_cast<Index>(number);
-}
-
-inline std::vector<Index> indices_from(const val& array, const std::string& where) {
-  if (array.instanceof(val::global("Int32Array"))) return numbers_from<Index>(array, where);
-  const std::vector<double> values = numbers_from<double>(array, where);
-  std::vector<Index> result;
-  for (const double value : values) result.push_back(integer_from(val(value), where));
-  return result;
-}
-
-inline std::string text_from(const val& value, const std::string& where) {
-  if (type_of(value) != "string") unfit(where, "is not a text");
-  return value.as<std::string>();
-}
-
-inline Matrix matrix_from(const val& object, const std::string& where) {
-  if (type_of(object) != "object") unfit(where, "is not a matrix { storage, rows, cols, p, i, x }");
-  Matrix a;
-  const val storage = object["storage"];
-  if (is_missing(storage)) unfit(where + ".storage", "is missing");
-  a.storage = storage_of(text_from(storage, where + ".storage"));
-  a.rows = integer_from(object["rows"], where + ".rows");
-  a.cols = integer_from(object["cols"], where + ".cols");
-  if (a.storage != Storage::dense) {
-    a.p = indices_from(object["p"], where + ".p");
-    a.i = indices_from(object["i"], where + ".i");
-  }
-  a.x = numbers_from<double>(object["x"], where + ".x");
-  return a;
-}
-
-/// Fills a struct from an object's properties; others that it has are passed over.
-template <class Struct>
-void fill(Struct& self, const val& object) {
-  for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {
+/// Others that an object has are passed over.
+inline void fill(ProblemInfo& self, const val& object) {
+  for_each_field<ProblemInfo>([&](const Field<ProblemInfo, std::string>& field) {
     const std::string name(field.name);
     const val value = object[name];
-    constexpr bool array = std::is_same_v<Member, Matrix> || std::is_same_v<Member, Vector>;
-    if (is_missing(value)) {
-      if (array && field.presence == Presence::required) unfit(name, "is missing");
-      return;
-    }
-    if constexpr (std::is_same_v<Member, Matrix>) {
-      self.*field.member = matrix_from(value, name);
-    } else if constexpr (std::is_same_v<Member, Vector>) {
-      self.*field.member = vector_from(value, name);
-    } else if constexpr (std::is_same_v<Member, Index>) {
-      self.*field.member = integer_from(value, name);
-    } else {
-      self.*field.member = text_from(value, name);
-    }
+    if (is_missing(value)) return;
+    if (type_of(value) != "string") unfit(name, "is not a text");
+    self.*field.member = value.as<std::string>();
   });
 }
 
@@ -197,38 +251,16 @@ inline Geometry::Table table_from(const val& object, const std::string& where) {
   return table;
 }
 
-/// The problem of a plain object, not validated.
-inline Problem problem_from(const val& object) {
-  if (type_of(object) != "object" || object.isNull()) unfit("problem", "is not an object");
-  const val kind = object["kind"];
-  const std::string name = type_of(kind) == "string" ? kind.as<std::string>() : "";
-  Problem result;
-  bool found = false;
-  std::string known;
-  for_each_formulation([&]<class P>(std::type_identity<P>) {
-    known += (known.empty() ? "" : ", ") + std::string(P::kind);
-    if (name != P::kind) return;
-    found = true;
-    P problem;
-    fill(problem, object);
-    if (!is_missing(object["info"])) fill(problem.info, object["info"]);
-    auto geometry = std::make_shared<Geometry>();
-    Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
-      const val columns = object[std::string(table)];
-      if (!is_missing(columns)) (*geometry).*member = table_from(columns, std::string(table));
-    });
-    if (!geometry->contacts.empty() || !geometry->bodies.empty()) problem.geometry = geometry;
-    result = std::move(problem);
+/// The words and the geometry of a problem.
+template <class P>
+void carry(P& problem, const val& object) {
+  if (!is_missing(object["info"])) fill(problem.info, object["info"]);
+  auto geometry = std::make_shared<Geometry>();
+  Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
+    const val columns = object[std::string(table)];
+    if (!is_missing(columns)) (*geometry).*member = table_from(columns, std::string(table));
   });
-  if (!found) unfit("kind", "is '" + name + "', but must be one of: " + known);
-  return result;
-}
-
-inline Solution solution_from(const val& object) {
-  if (type_of(object) != "object" || object.isNull()) unfit("solution", "is not an object");
-  Solution solution;
-  fill(solution, object);
-  return solution;
+  if (!geometry->contacts.empty() || !geometry->bodies.empty()) problem.geometry = geometry;
 }
 
 }  // namespace fclib::browser

@@ -3,7 +3,6 @@
 
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace fclib {
 
@@ -21,32 +20,15 @@ enum class ErrorKind {
 /// the path, empty where there is none; what() joins them: "file: where: message".
 class Error : public std::runtime_error {
  public:
-  Error(ErrorKind kind, std::string message, std::string where = {}, std::string file = {})
-      : std::runtime_error(join(file, where, message)),
-        kind(kind),
-        message(std::move(message)),
-        where(std::move(where)),
-        file(std::move(file)) {}
+  Error(ErrorKind kind, std::string message, std::string where = {}, std::string file = {});
 
   /// The same error, seen from the file it was found in.
-  [[nodiscard]] Error in_file(const std::string& path) const {
-    return {kind, message, where, path};
-  }
+  [[nodiscard]] Error in_file(const std::string& path) const;
 
   ErrorKind kind;
   std::string message;
   std::string where;
   std::string file;
-
- private:
-  static std::string join(const std::string& file, const std::string& where,
-                          const std::string& message) {
-    std::string text;
-    for (const auto* part : {&file, &where}) {
-      if (!part->empty()) text += *part + ": ";
-    }
-    return text + message;
-  }
 };
 
 }  // namespace fclib

@@ -1,9 +1,7 @@
 // What holds for every formulation: the union of them, their names and their validation.
 #pragma once
 
-#include <cmath>
 #include <concepts>
-#include <limits>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -13,7 +11,7 @@
 #include "field.hpp"
 #include "formulations.hpp"  // generated from the files in problems/
 #include "friction.hpp"
-#include "number_text.hpp"
+#include "place.hpp"
 #include "solution.hpp"
 
 namespace fclib {
@@ -58,6 +56,17 @@ std::string field_path(const Field<Struct, Vector>& field) {
   return "vectors/" + std::string(field.name);
 }
 
+/// The place of a member in the group of P, ...
+template <class P>
+Place place_of(std::string_view member) {
+  return {"/fclib_", P::kind, "/", member};
+}
+/// ... and that of a field, as field_path() has it.
+template <class P, class Member>
+Place place_of(const Field<P, Member>& field) {
+  return {"/fclib_", P::kind, std::same_as<Member, Vector> ? "/vectors/" : "/", field.name};
+}
+
 /// The HDF5 group of a guess, the first of which is number 1.
 inline std::string guess_path(std::size_t number) { return "/guesses/" + std::to_string(number); }
 
@@ -65,9 +74,9 @@ inline std::string guess_path(std::size_t number) { return "/guesses/" + std::to
 /// divide.
 template <class P>
 Index contact_count(const P& problem) {
-  const std::string group = "/" + group_name<P>() + "/";
   if (problem.spacedim < 1) {
-    throw Error(ErrorKind::problem, "is " + std::to_string(problem.spacedim), group + "spacedim");
+    throw Error(ErrorKind::problem, "is " + std::to_string(problem.spacedim),
+                place_of<P>("spacedim"));
   }
   std::optional<Index> count;
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
@@ -78,7 +87,7 @@ Index contact_count(const P& problem) {
         throw Error(ErrorKind::problem,
                     "has " + std::to_string(m) + " columns, which is no multiple of spacedim = " +
                         std::to_string(problem.spacedim),
-                    group + std::string(field.name));
+                    place_of<P>(field));
       }
       count = m / problem.spacedim;
     }
@@ -114,75 +123,27 @@ Friction friction_of(const P& problem) {
 }
 
 namespace detail {
-
-inline void require_size(Index actual, Index expected, Dim dim, const std::string& where,
-                         const char* what) {
-  if (actual != expected) {
-    throw Error(ErrorKind::problem,
-                std::string("has ") + std::to_string(actual) + " " + what + ", expected " +
-                    std::string(name_of(dim)) + " = " + std::to_string(expected),
-                where);
-  }
-}
-
-template <class Struct>
-void validate_vector(const Vector& values, Index expected, const Field<Struct, Vector>& field,
-                     const std::string& where) {
-  require_size(static_cast<Index>(values.size()), expected, field.rows, where, "entries");
-  const auto entry = [&](Eigen::Index k) { return where + "[" + std::to_string(k) + "]"; };
-  for (Eigen::Index k = 0; k < values.size(); ++k) {
-    if (!std::isfinite(values[k])) {
-      throw Error(ErrorKind::problem, "the value is not a finite number", entry(k));
-    }
-    if (field.range == Range::nonnegative && values[k] < 0) {
-      throw Error(ErrorKind::problem, "is " + shortest(values[k]) + ", but must not be negative",
-                  entry(k));
-    }
-  }
-}
-
+/// Throws Error (problem) where two sizes differ.
+void require_size(Index actual, Index expected, Dim dim, const Place& where, const char* what);
+/// Throws Error (problem) where a vector is not as long as expected, or a value not in the range.
+void validate_vector(const Vector& values, Index expected, Dim dim, Range range,
+                     const Place& where);
 }  // namespace detail
 
 /// Throws Error (problem) at the first thing wrong with the data: a size that disagrees, an index
 /// out of range, a value that is not finite, a negative coefficient of friction.
 template <class P>
-void validate(const P& problem) {
-  const std::string group = "/" + group_name<P>() + "/";
-  const auto [planar, spatial] = P::dimensions;
-  if (problem.spacedim != planar && problem.spacedim != spatial) {
-    throw Error(ErrorKind::problem,
-                "is " + std::to_string(problem.spacedim) + ", but must be " +
-                    std::to_string(planar) + " or " + std::to_string(spatial),
-                group + "spacedim");
-  }
-  if (problem.mu.size() > std::numeric_limits<Index>::max() / problem.spacedim) {
-    throw Error(ErrorKind::problem, "has more contacts than can be numbered", group + "vectors/mu");
-  }
-  for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
-    const std::string where = group + field_path(field);
-    const Member& member = problem.*field.member;
-    if constexpr (std::same_as<Member, Matrix>) {
-      const bool absent = field.presence == Presence::mixed && !is_mixed(problem);
-      if (absent && member.empty()) return;
-      detail::require_size(member.rows, problem.size(field.rows), field.rows, where, "rows");
-      detail::require_size(member.cols, problem.size(field.cols), field.cols, where, "columns");
-      validate(member, where);
-    } else if constexpr (std::same_as<Member, Vector>) {
-      detail::validate_vector(member, problem.size(field.rows), field, where);
-    }
-  });
-}
+void validate(const P& problem);
 
 /// Throws Error (problem) where the members of a solution do not fit the problem. Members that may
 /// be absent (v and u, which follow from r) are accepted empty. `where` is its group in a file.
 template <class P>
-void validate(const Solution& solution, const P& problem, const std::string& where = "/solution") {
-  for_each_field<Solution>([&](const Field<Solution, Vector>& field) {
-    const Vector& values = solution.*field.member;
-    if (field.presence == Presence::optional && values.size() == 0) return;
-    detail::validate_vector(values, problem.size(field.rows), field,
-                            where + "/" + std::string(field.name));
-  });
-}
+void validate(const Solution& solution, const P& problem, const Place& where = "/solution");
+
+#define FCLIB_DECLARE(P)                   \
+  extern template void validate(const P&); \
+  extern template void validate(const Solution&, const P&, const Place&);
+FCLIB_FOR_EACH_FORMULATION(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
 
 }  // namespace fclib

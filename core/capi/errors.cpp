@@ -47,7 +47,7 @@ void report(const char* message) noexcept {
 
 void forget_error() noexcept { last_error.clear(); }
 
-void fail(const std::string& where, const std::string& message) {
+void fail(const Place& where, const std::string& message) {
   throw Error(ErrorKind::problem, message, where);
 }
 

@@ -6,6 +6,8 @@
 #include <new>
 #include <string>
 
+#include "place.hpp"
+
 namespace fclib::c {
 
 /// Keeps a message for fclib_last_error(), and calls the handler.
@@ -30,11 +32,11 @@ Result guarded(Result failure, const Body& body) noexcept {
 }
 
 /// Throws Error (problem).
-[[noreturn]] void fail(const std::string& where, const std::string& message);
+[[noreturn]] void fail(const Place& where, const std::string& message);
 
 /// What a pointer of the caller points to.
 template <class T>
-T& given(T* pointer, const char* name) {
+T& given(T* pointer, const Place& name) {
   if (pointer == nullptr) fail(name, "is NULL");
   return *pointer;
 }

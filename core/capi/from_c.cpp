@@ -1,5 +1,6 @@
 #include "capi/from_c.hpp"
 
+#include <optional>
 #include <vector>
 
 #include "capi/errors.hpp"
@@ -10,7 +11,7 @@ namespace fclib::c {
 namespace {
 
 template <class Number>
-std::vector<Number> numbers(const Number* values, std::size_t size, const std::string& where) {
+std::vector<Number> numbers(const Number* values, std::size_t size, const Place& where) {
   if (size == 0) return {};
   if (values == nullptr) fail(where, "is NULL, but has " + std::to_string(size) + " entries");
   return {values, values + size};
@@ -18,28 +19,28 @@ std::vector<Number> numbers(const Number* values, std::size_t size, const std::s
 
 std::string text(const char* value) { return value != nullptr ? std::string(value) : absent_text; }
 
-Matrix matrix(const fclib_matrix& c, const std::string& where) {
+Matrix matrix(const fclib_matrix& c, const Place& where) {
   Matrix a;
   a.rows = c.m;
   a.cols = c.n;
-  const std::size_t rows = size_of(c.m, where + "/m");
-  const std::size_t cols = size_of(c.n, where + "/n");
-  std::size_t entries = size_of(c.nzmax, where + "/nzmax");
+  const std::size_t rows = size_of(c.m, where / "m");
+  const std::size_t cols = size_of(c.n, where / "n");
+  std::size_t entries = size_of(c.nzmax, where / "nzmax");
   if (c.nz >= 0) {
     a.storage = Storage::triplet;
     entries = static_cast<std::size_t>(c.nz);
-    a.p = numbers(c.p, entries, where + "/p");
+    a.p = numbers(c.p, entries, where / "p");
   } else if (c.nz == nz_csc || c.nz == nz_csr) {
     a.storage = c.nz == nz_csc ? Storage::csc : Storage::csr;
-    a.p = numbers(c.p, (c.nz == nz_csc ? cols : rows) + 1, where + "/p");
+    a.p = numbers(c.p, (c.nz == nz_csc ? cols : rows) + 1, where / "p");
   } else if (c.nz == nz_dense) {
     a.storage = Storage::dense;
     entries = rows * cols;
   } else {
-    fail(where + "/nz", std::to_string(c.nz) + " is no storage");
+    fail(where / "nz", std::to_string(c.nz) + " is no storage");
   }
-  if (a.storage != Storage::dense) a.i = numbers(c.i, entries, where + "/i");
-  a.x = numbers(c.x, entries, where + "/x");
+  if (a.storage != Storage::dense) a.i = numbers(c.i, entries, where / "i");
+  a.x = numbers(c.x, entries, where / "x");
   if (c.info != nullptr) {
     a.info = MatrixInfo{.comment = text(c.info->comment),
                         .conditioning = c.info->conditioning,
@@ -51,12 +52,12 @@ Matrix matrix(const fclib_matrix& c, const std::string& where) {
 
 }  // namespace
 
-std::size_t size_of(int count, const std::string& where) {
+std::size_t size_of(int count, const Place& where) {
   if (count < 0) fail(where, "is " + std::to_string(count) + ", but must not be negative");
   return static_cast<std::size_t>(count);
 }
 
-Vector vector(const double* values, Index size, const std::string& where) {
+Vector vector(const double* values, Index size, const Place& where) {
   if (size == 0) return {};
   if (values == nullptr) fail(where, "is NULL, but has " + std::to_string(size) + " entries");
   return Eigen::Map<const Vector>(values, size);
@@ -65,34 +66,32 @@ Vector vector(const double* values, Index size, const std::string& where) {
 template <class C>
 CoreOf<C> problem_as_given(const C& c) {
   using P = CoreOf<C>;
-  const std::string group = "/" + group_name<P>() + "/";
   P problem;
   // the matrices say how long the vectors are
-  std::string there;
-  std::string missing;
+  std::optional<Place> there;
+  std::optional<Place> missing;
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
     if constexpr (std::is_same_v<Type, Index>) {
       problem.*field.member = c.*member;
     } else if constexpr (std::is_same_v<Type, Matrix>) {
-      const std::string where = group + field_path(field);
+      const Place where = place_of<P>(field);
       if (field.presence == Presence::mixed) {
         (c.*member != nullptr ? there : missing) = where;
         if (c.*member == nullptr) return;
       }
-      problem.*field.member = matrix(given(c.*member, where.c_str()), where);
+      problem.*field.member = matrix(given(c.*member, where), where);
     }
   });
-  if (!there.empty() && !missing.empty()) fail(missing, "is NULL, but " + there + " is not");
+  if (there && missing) fail(*missing, "is NULL, but " + std::string(*there) + " is not");
   const auto [planar, spatial] = P::dimensions;
   if (c.spacedim != planar && c.spacedim != spatial) {
-    fail(group + "spacedim", "is " + std::to_string(c.spacedim) + ", but must be " +
-                                 std::to_string(planar) + " or " + std::to_string(spatial));
+    fail(place_of<P>("spacedim"), "is " + std::to_string(c.spacedim) + ", but must be " +
+                                      std::to_string(planar) + " or " + std::to_string(spatial));
   }
   count_contacts(problem);
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
     if constexpr (std::is_same_v<Type, Vector>) {
-      problem.*field.member =
-          vector(c.*member, problem.size(field.rows), group + field_path(field));
+      problem.*field.member = vector(c.*member, problem.size(field.rows), place_of<P>(field));
     }
   });
   problem.info = {absent_group, absent_group, absent_group};
@@ -135,7 +134,7 @@ Solution solution_of(const fclib_solution& c, const P& problem, Parts parts) {
     const bool optional = parts == Parts::any || field.presence == Presence::optional;
     if (optional && c.*member == nullptr) return;
     solution.*field.member =
-        vector(c.*member, problem.size(field.rows), "/solution/" + std::string(field.name));
+        vector(c.*member, problem.size(field.rows), Place("/solution") / field.name);
   });
   return solution;
 }

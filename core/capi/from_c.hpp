@@ -7,9 +7,9 @@
 
 namespace fclib::c {
 
-std::size_t size_of(int count, const std::string& where);
+std::size_t size_of(int count, const Place& where);
 
-Vector vector(const double* values, Index size, const std::string& where);
+Vector vector(const double* values, Index size, const Place& where);
 
 /// The problem as it is, unchecked but for what its own sizes need.
 template <class C>

@@ -17,11 +17,11 @@
 // contact problems with Coulomb friction: formulations and numerical comparisons" (2018).
 #pragma once
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "contact/cones.hpp"
+#include "contact/inverse.hpp"
 
 namespace fclib {
 
@@ -259,7 +259,7 @@ struct FischerBurmeister {
       Mat arrow = arrow_of(0.5 * (high + floor), Vec(root));
       arrow.template block<1, T>(0, 1) = 0.5 * (high - floor) * direction.transpose();
       arrow.template block<T, 1>(1, 0) = 0.5 * (high - floor) * direction;
-      result = Mat::Identity() - arrow.inverse() * arrow_of(x[0], x);
+      result = Mat::Identity() - inverse<D>(arrow) * arrow_of(x[0], x);
     }
 
     static Mat arrow_of(double head, const Vec& x) {

@@ -15,10 +15,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
-
 #include "contact/alart_curnier.hpp"
 #include "contact/coulomb.hpp"
+#include "contact/inverse.hpp"
 #include "function_ref.hpp"
 
 namespace fclib {
@@ -40,7 +39,7 @@ bool damped_newton(
   ContactVector<D> phi = function(x, &jacobian);
   double norm = phi.norm();
   for (int k = 0; k < max_iterations && norm > accuracy * size; ++k) {
-    const ContactVector<D> step = -(jacobian.inverse() * phi);
+    const ContactVector<D> step = -(inverse<D>(jacobian) * phi);
     double length = 1;
     bool falls = false;
     for (int halving = 0; halving < max_halvings && !falls; ++halving, length *= 0.5) {
@@ -143,7 +142,7 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
       // smoothed by what is negligible beside Phi, so that the root has an inverse
       Vec smooth = squares;
       smooth[0] += 1e-8 * phi.squaredNorm() + 1e-30 * squares[0];
-      const Mat inverse = arrow(root(smooth)).inverse();
+      const Mat divided = inverse<D>(arrow(root(smooth)));
       Mat x_jacobian = Mat::Identity();
       x_jacobian(0, 0) = mu;
       Mat y_jacobian = scale * a;
@@ -152,8 +151,8 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
         y_jacobian.row(0) +=
             (y.template tail<T>() / sliding).transpose() * (scale * a.template bottomRows<T>());
       }
-      *jacobian = x_jacobian - inverse * product_x * x_jacobian + y_jacobian -
-                  inverse * product_y * y_jacobian;
+      *jacobian = x_jacobian - divided * product_x * x_jacobian + y_jacobian -
+                  divided * product_y * y_jacobian;
     }
     return phi;
   };

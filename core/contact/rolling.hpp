@@ -33,35 +33,12 @@ class Rolling {
   /// Of a group: ||r_group|| <= coefficient r_N.
   [[nodiscard]] Real coefficient(int group) const { return group == 0 ? mu_ : mu_r_; }
 
-  [[nodiscard]] Vec modified(const Vec& u) const {
-    Vec result = u;
-    result[0] += mu_ * tangential_norm(u) + mu_r_ * rolling_norm(u);
-    return result;
-  }
+  [[nodiscard]] Vec modified(const Vec& u) const;
 
   /// The normal part n of the projection is the root of the increasing function
   ///   n - x_N - mu max(0, ||x_T|| - mu n) - mu_r max(0, ||x_R|| - mu_r n),
   /// linear but for the values of n at which a limit ceases to bind.
-  [[nodiscard]] Vec project(const Vec& x) const {
-    const Real t = tangential_norm(x);
-    const Real r = rolling_norm(x);
-    if (x[0] >= 0 && t <= mu_ * x[0] && r <= mu_r_ * x[0]) return x;
-    if (x[0] + mu_ * t + mu_r_ * r <= 0) return Vec::Zero();
-    const Real free_t = t > 0 ? t / mu_ : Real(0);
-    const Real free_r = r > 0 ? r / mu_r_ : Real(0);
-    // the limit that binds longest, alone, or both
-    const bool sliding = free_t >= free_r;
-    const Real limit = sliding ? mu_ : mu_r_;
-    Real n = (x[0] + limit * (sliding ? t : r)) / (1 + limit * limit);
-    if (n < std::min(free_t, free_r)) {
-      n = (x[0] + mu_ * t + mu_r_ * r) / (1 + mu_ * mu_ + mu_r_ * mu_r_);
-    }
-    Vec result = x;
-    result[0] = n;
-    if (t > mu_ * n) result.template segment<T>(1) *= mu_ * n / t;
-    if (r > mu_r_ * n) result.template segment<T>(1 + T) *= mu_r_ * n / r;
-    return result;
-  }
+  [[nodiscard]] Vec project(const Vec& x) const;
 
  private:
   static Real tangential_norm(const Vec& x) { return x.template segment<T>(1).norm(); }
@@ -70,5 +47,38 @@ class Rolling {
   Real mu_;
   Real mu_r_;
 };
+
+template <int D, class Real>
+auto Rolling<D, Real>::modified(const Vec& u) const -> Vec {
+  Vec result = u;
+  result[0] += mu_ * tangential_norm(u) + mu_r_ * rolling_norm(u);
+  return result;
+}
+
+template <int D, class Real>
+auto Rolling<D, Real>::project(const Vec& x) const -> Vec {
+  const Real t = tangential_norm(x);
+  const Real r = rolling_norm(x);
+  if (x[0] >= 0 && t <= mu_ * x[0] && r <= mu_r_ * x[0]) return x;
+  if (x[0] + mu_ * t + mu_r_ * r <= 0) return Vec::Zero();
+  const Real free_t = t > 0 ? t / mu_ : Real(0);
+  const Real free_r = r > 0 ? r / mu_r_ : Real(0);
+  // the limit that binds longest, alone, or both
+  const bool sliding = free_t >= free_r;
+  const Real limit = sliding ? mu_ : mu_r_;
+  Real n = (x[0] + limit * (sliding ? t : r)) / (1 + limit * limit);
+  if (n < std::min(free_t, free_r)) {
+    n = (x[0] + mu_ * t + mu_r_ * r) / (1 + mu_ * mu_ + mu_r_ * mu_r_);
+  }
+  Vec result = x;
+  result[0] = n;
+  if (t > mu_ * n) result.template segment<T>(1) *= mu_ * n / t;
+  if (r > mu_r_ * n) result.template segment<T>(1 + T) *= mu_r_ * n / r;
+  return result;
+}
+
+// with other numbers they are compiled where they are used
+extern template class Rolling<3>;
+extern template class Rolling<5>;
 
 }  // namespace fclib

@@ -7,6 +7,7 @@
 
 #include "linalg/dependent_columns.hpp"
 #include "linalg/extended.hpp"
+#include "number_text.hpp"
 
 namespace fclib {
 

@@ -90,6 +90,31 @@ OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance)
   return result;
 }
 
+Eigen::MatrixXd kernel(const Eigen::MatrixXd& a) {
+  if (a.rows() == 0) return Eigen::MatrixXd::Identity(a.cols(), a.cols());
+  Vector size = a.colwise().norm().transpose();
+  for (double& value : size) value = value > 0 ? value : 1.0;
+  const Eigen::MatrixXd scaled = a * size.cwiseInverse().asDiagonal();
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(scaled);
+  qr.setThreshold(1e-10);
+  const Eigen::Index rank = qr.rank();
+  const Eigen::Index free = a.cols() - rank;
+  Eigen::MatrixXd basis(a.cols(), free);
+  if (free == 0) return basis;
+  const Eigen::MatrixXd r = qr.matrixQR().topRows(rank);
+  basis.topRows(rank) = -r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.rightCols(free));
+  basis.bottomRows(free).setIdentity();
+  return size.cwiseInverse().asDiagonal() * (qr.colsPermutation() * basis);
+}
+
+Vector least_solution(const Eigen::MatrixXd& a, const Vector& b) {
+  return a.completeOrthogonalDecomposition().solve(b);
+}
+
+Vector projected(const Eigen::MatrixXd& columns, const Vector& x) {
+  return columns * columns.colPivHouseholderQr().solve(x);
+}
+
 ColumnChoice independent_columns(const SparseColumns& a, double tolerance) {
   if (small_enough_for_dense(a)) return orthonormal_columns(a, tolerance).columns;
   SparseColumns scaled = a * inverse_lengths(a).asDiagonal();

@@ -32,4 +32,11 @@ struct OrthonormalColumns {
 bool small_enough_for_dense(const SparseColumns& a);
 OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance);
 
+/// A basis of the kernel, up to rounding.
+Eigen::MatrixXd kernel(const Eigen::MatrixXd& a);
+/// The least x with the least ||A x - b||.
+Vector least_solution(const Eigen::MatrixXd& a, const Vector& b);
+/// The nearest to x of what these columns span.
+Vector projected(const Eigen::MatrixXd& columns, const Vector& x);
+
 }  // namespace fclib

@@ -34,17 +34,21 @@ class DoubleDouble {
   friend constexpr DoubleDouble operator-(DoubleDouble a) { return {-a.high_, -a.low_}; }
 
   friend constexpr DoubleDouble operator+(DoubleDouble a, DoubleDouble b) {
-    const DoubleDouble s = two_sum(a.high_, b.high_);
-    const DoubleDouble t = two_sum(a.low_, b.low_);
-    const DoubleDouble v = quick_two_sum(s.high_, s.low_ + t.high_);
-    return quick_two_sum(v.high_, t.low_ + v.low_);
+    const double s = a.high_ + b.high_;
+    const double t = a.low_ + b.low_;
+    const double rest = rest_of_sum(a.high_, b.high_, s) + t;
+    const double v = s + rest;
+    const double low = rest_of_sum(a.low_, b.low_, t) + (rest - (v - s));
+    const double sum = v + low;
+    return checked(sum, low - (sum - v), s);
   }
   friend constexpr DoubleDouble operator-(DoubleDouble a, DoubleDouble b) { return a + -b; }
 
   friend constexpr DoubleDouble operator*(DoubleDouble a, DoubleDouble b) {
     const DoubleDouble p = two_product(a.high_, b.high_);
-    if (!finite(p.high_)) return p;
-    return quick_two_sum(p.high_, p.low_ + (a.high_ * b.low_ + a.low_ * b.high_));
+    const double low = p.low_ + (a.high_ * b.low_ + a.low_ * b.high_);
+    const double product = p.high_ + low;
+    return checked(product, low - (product - p.high_), p.high_);
   }
 
   friend constexpr DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
@@ -88,11 +92,16 @@ class DoubleDouble {
 
   static constexpr bool finite(double x) { return x - x == 0; }
 
-  static constexpr DoubleDouble two_sum(double a, double b) {
-    const double s = a + b;
-    if (!finite(s)) return {s, 0.0};
+  /// What s = a + b has lost.
+  static constexpr double rest_of_sum(double a, double b, double s) {
     const double part = s - a;
-    return {s, (a - (s - part)) + (b - part)};
+    return (a - (s - part)) + (b - part);
+  }
+  /// high + low; where that is no number or infinite it is `first`, which was before. One look at
+  /// the end, since sums of many terms take most of the time of a merit.
+  static constexpr DoubleDouble checked(double high, double low, double first) {
+    if (finite(low)) return {high, low};
+    return {finite(first) ? high : first, 0.0};
   }
   /// Where |a| is at least |b|, or a is 0.
   static constexpr DoubleDouble quick_two_sum(double a, double b) {

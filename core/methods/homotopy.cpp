@@ -1,9 +1,9 @@
 #include "methods/homotopy.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
 
@@ -148,16 +148,16 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
     const Vec forcing = t * (g + c_.template segment<D>(at));
     residual_.template segment<D>(at) -= forcing;
     derivative_.template segment<D>(at) = -(forcing + t * dg);
-    if (B.determinant() < 0) negative_ = !negative_;
-    Mat inverse = B.inverse();
+    if (determinant<D>(B) < 0) negative_ = !negative_;
+    Mat inverted = inverse<D>(B);
     for (int group = 0; group < Cone::groups; ++group) {
       if (!(cone.coefficient(group) > 0)) {
         const int k = 1 + T * group;
-        inverse.template middleRows<T>(k).setZero();
-        inverse.template middleCols<T>(k).setZero();
+        inverted.template middleRows<T>(k).setZero();
+        inverted.template middleCols<T>(k).setZero();
       }
     }
-    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = inverse / omega_;
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = inverted / omega_;
   }
 }
 

@@ -1,10 +1,10 @@
 #include "methods/interior_point.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
 
@@ -225,7 +225,7 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
     }
     s.D0 = d0;
     const Mat regular = Mat::Identity() + delta * d0;
-    s.regular = regular.inverse();
+    s.regular = inverse<D>(regular);
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = s.regular * d0 / omega_;
   }
 }

@@ -1,12 +1,13 @@
 #include "proof/no_solution.hpp"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <utility>
 #include <vector>
 
+#include "linalg/dependent_columns.hpp"
 #include "linalg/exact_sum.hpp"
 
 namespace fclib {
@@ -24,6 +25,7 @@ constexpr double least_gain = 1e-8;
 constexpr Index most_unknowns = 96;
 constexpr Index most_rows = 4096;
 constexpr int most_rays = 200;
+constexpr int most_parts = 8;
 constexpr double most_operations = 1e8;
 
 /// Calls cone(row, unknown, value) for the sums that must be in K*, zero(row, unknown, value) for
@@ -90,6 +92,54 @@ double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const
   return more * std::max(std::min(size, more * outside), 1e-300);
 }
 
+/// The parts of y that have no sum in common, the one that gains most first; none that gains
+/// nothing. Where rows of bodies are squeezed side by side, each row is a proof of its own.
+template <class P>
+std::vector<Vector> separate_parts(const P& problem, const Vector& y) {
+  const auto nc = static_cast<Index>(y.size());
+  std::vector<Index> above(static_cast<std::size_t>(nc));  // of a tree for each part
+  std::iota(above.begin(), above.end(), 0);
+  const auto root = [&](Index a) {
+    while (above[static_cast<std::size_t>(a)] != a) a = above[static_cast<std::size_t>(a)];
+    return a;
+  };
+  const Index shift = cone_rows(problem);
+  std::vector<Index> first(static_cast<std::size_t>(shift + zero_rows(problem)), -1);
+  const auto join = [&](Index row, Index a, double value) {
+    if (a >= nc || value == 0 || !(y[a] > 0)) return;
+    Index& other = first[static_cast<std::size_t>(row)];
+    if (other < 0) other = a;
+    // the smaller one above, which keeps the trees low
+    const auto [low, high] = std::minmax({root(a), root(other)});
+    above[static_cast<std::size_t>(high)] = low;
+    above[static_cast<std::size_t>(a)] = low;
+    other = low;
+  };
+  for_each_term(problem, join,
+                [&](Index row, Index a, double value) { join(shift + row, a, value); });
+  struct Part {
+    double gain = 0;
+    Vector y;
+  };
+  std::map<Index, Part> parts;
+  for (Index a = 0; a < nc; ++a) {
+    if (!(y[a] > 0)) continue;
+    Part& part = parts[root(a)];
+    if (part.y.size() == 0) part.y = Vector::Zero(nc);
+    part.y[a] = y[a];
+    part.gain -= y[a] * normal_constants(problem)[problem.spacedim * a];
+  }
+  std::vector<Part> gaining;
+  for (auto& [_, part] : parts) {
+    if (part.gain > 0) gaining.push_back(std::move(part));
+  }
+  std::stable_sort(gaining.begin(), gaining.end(),
+                   [](const Part& a, const Part& b) { return a.gain > b.gain; });
+  std::vector<Vector> found;
+  for (Part& part : gaining) found.push_back(std::move(part.y));
+  return found;
+}
+
 /// The columns of those unknowns, dense; rows without an entry are left out.
 template <class P>
 void columns(const P& problem, const std::vector<Index>& place, Index count, Dense& all,
@@ -122,23 +172,6 @@ void columns(const P& problem, const std::vector<Index>& place, Index count, Den
         all(at, column) += value;
         zeros(at, column) += value;
       });
-}
-
-/// A basis of the kernel, up to rounding.
-Dense kernel(const Dense& a) {
-  if (a.rows() == 0) return Dense::Identity(a.cols(), a.cols());
-  Vector size = a.colwise().norm().transpose();
-  for (double& value : size) value = value > 0 ? value : 1.0;
-  Eigen::ColPivHouseholderQR<Dense> qr(a * size.cwiseInverse().asDiagonal());
-  qr.setThreshold(1e-10);
-  const Eigen::Index rank = qr.rank();
-  const Eigen::Index free = a.cols() - rank;
-  Dense basis(a.cols(), free);
-  if (free == 0) return basis;
-  const Dense r = qr.matrixQR().topRows(rank);
-  basis.topRows(rank) = -r.leftCols(rank).triangularView<Eigen::Upper>().solve(r.rightCols(free));
-  basis.bottomRows(free).setIdentity();
-  return size.cwiseInverse().asDiagonal() * (qr.colsPermutation() * basis);
 }
 
 /// The least denominator of a fraction that is x but for rounding, by its continued fraction; 0
@@ -195,7 +228,7 @@ class Search {
     if (p > 0) {
       // y as it is, with the z that keeps the constraints
       const Vector rest = -zeros_.leftCols(count) * x.head(count);
-      x.tail(p) = zeros_.rightCols(p).completeOrthogonalDecomposition().solve(rest);
+      x.tail(p) = least_solution(zeros_.rightCols(p), rest);
       if (tried(x)) return best_;
     }
     std::vector<Index> active(contacts_.size());
@@ -242,7 +275,7 @@ class Search {
     x.tail(p) = from.tail(p);
     const Dense basis = kernel(part);
     if (basis.cols() == 0) return false;
-    x = basis * basis.colPivHouseholderQr().solve(x);
+    x = projected(basis, x);
     const auto whole = [&](const Vector& own) {
       Vector result = Vector::Zero(unknowns_);
       for (Eigen::Index k = 0; k < count; ++k) result[active[static_cast<std::size_t>(k)]] = own[k];
@@ -295,6 +328,20 @@ class Search {
   NoSolution best_;
   int visited_ = 0;
 };
+
+/// A proof near y, or near one of its parts.
+template <class P>
+NoSolution search(const P& problem, const Vector& y) {
+  NoSolution best = Search<P>(problem, y).run();
+  // bilateral constraints may link all of them
+  if (best.proven() || problem.size(Dim::p) > 0) return best;
+  int tries = 0;
+  for (const Vector& part : separate_parts(problem, y)) {
+    if (++tries > most_parts || best.proven()) break;
+    best = Search<P>(problem, part).run();
+  }
+  return best;
+}
 
 /// The sums of a proof and its gain, exactly; whether y, z have the right form and a gain.
 template <class P>
@@ -388,13 +435,13 @@ NoSolution check_no_solution(const GlobalProblem& problem, const Vector& y, cons
 }
 
 NoSolution prove_no_solution(const LocalProblem& problem, const Vector& y) {
-  return Search<LocalProblem>(problem, y).run();
+  return search(problem, y);
 }
 NoSolution prove_no_solution(const LocalRollingProblem& problem, const Vector& y) {
-  return Search<LocalRollingProblem>(problem, y).run();
+  return search(problem, y);
 }
 NoSolution prove_no_solution(const GlobalProblem& problem, const Vector& y) {
-  return Search<GlobalProblem>(problem, y).run();
+  return search(problem, y);
 }
 
 }  // namespace fclib

@@ -1,9 +1,8 @@
 // How far r is from the solution of the convex problem of a fixed shift.
 #pragma once
 
-#include <cmath>
-
-#include "reduced/reduced_problem.hpp"
+#include "contact/cones.hpp"
+#include "reduced/convex_sets.hpp"
 
 namespace fclib {
 
@@ -11,17 +10,14 @@ namespace fclib {
 /// scale; u = W r + q.
 template <class Set>
 double convex_residual(const ReducedProblem& problem, const Set& set, const Vector& shift,
-                       const Vector& r, const Vector& u) {
-  constexpr int D = Set::Cone::dim;
-  using Vec = typename Set::Cone::Vec;
-  double sum = 0;
-  for (Index a = 0; a < problem.nc(); ++a) {
-    const Vec now = r.template segment<D>(D * a);
-    Vec slope = u.template segment<D>(D * a);
-    slope[0] += shift[a];
-    sum += (now - set.project(a, now - slope, now)).squaredNorm();
-  }
-  return std::sqrt(sum) / problem.scale;
-}
+                       const Vector& r, const Vector& u);
+
+#define FCLIB_DECLARE_SET(Set)                                                                  \
+  extern template double convex_residual<Set>(const ReducedProblem&, const Set&, const Vector&, \
+                                              const Vector&, const Vector&);
+#define FCLIB_DECLARE(Cone) FCLIB_DECLARE_SET(Cones<Cone>) FCLIB_DECLARE_SET(Cylinders<Cone>)
+FCLIB_FOR_EACH_CONE(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
+#undef FCLIB_DECLARE_SET
 
 }  // namespace fclib

@@ -18,6 +18,10 @@
 
 namespace fclib {
 
+/// The largest row sum of the symmetric part: at least the largest eigenvalue. For N = 1, 2, 3, 5.
+template <int N>
+double curvature_bound(const ContactMatrix<N>& a);
+
 /// What `minimise` needs of a diagonal block: bounds of its curvature.
 template <class Cone>
 struct ContactCurvature {
@@ -25,19 +29,13 @@ struct ContactCurvature {
   double whole = 0;                           // of the block
   std::array<double, Cone::groups> groups{};  // of each tangential group
 
-  explicit ContactCurvature(const ContactMatrix<Cone::dim>& a) : block(a), whole(largest(a)) {
+  explicit ContactCurvature(const ContactMatrix<Cone::dim>& a)
+      : block(a), whole(curvature_bound<Cone::dim>(a)) {
     for (int g = 0; g < Cone::groups; ++g) {
       const int at = 1 + g * Cone::group_size;
-      groups[static_cast<std::size_t>(g)] =
-          largest(a.template block<Cone::group_size, Cone::group_size>(at, at));
+      groups[static_cast<std::size_t>(g)] = curvature_bound<Cone::group_size>(
+          a.template block<Cone::group_size, Cone::group_size>(at, at));
     }
-  }
-
- private:
-  /// The largest row sum of the symmetric part: at least the largest eigenvalue.
-  template <class Block>
-  static double largest(const Block& a) {
-    return (0.5 * (a + a.transpose())).cwiseAbs().rowwise().sum().maxCoeff();
   }
 };
 

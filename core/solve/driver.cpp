@@ -311,11 +311,11 @@ Result solve_any(const P& problem, const Solver& solver, const Settings& setting
 
 const Solver& find_solver(std::string_view name) {
   if (name.starts_with(plugin_prefix)) return load_plugin(name);
-  std::string known;
   for (const Solver* solver : solvers()) {
     if (solver->name == name) return *solver;
-    known += (known.empty() ? "" : ", ") + solver->name;
   }
+  std::string known;
+  for (const Solver* solver : solvers()) known += (known.empty() ? "" : ", ") + solver->name;
   throw Error(ErrorKind::option, "unknown; there is: " + known,
               "solver '" + std::string(name) + "'");
 }

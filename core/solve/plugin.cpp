@@ -126,7 +126,8 @@ OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
                   .type = text_of(told.type),
                   .default_value = text_of(told.value),
                   .unit = text_of(told.unit),
-                  .doc = text_of(told.doc)};
+                  .doc = text_of(told.doc),
+                  .choices = {}};
   if (told.lowest != 0 || told.highest != 0) {
     info.lowest = told.lowest;
     info.highest = told.highest;

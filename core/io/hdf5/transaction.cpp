@@ -81,7 +81,7 @@ class MemoryFile {
 
  private:
   static Handle core_driver(Image& image) {
-    constexpr std::size_t increment = std::size_t{1} << 20;
+    constexpr std::size_t increment = std::size_t{1} << 16;
     Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
     check(H5Pset_fapl_core(access.id(), increment, false), "");
     image.catch_from(access.id());
@@ -142,8 +142,10 @@ void change_file(const std::string& path, Start start, int compression,
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
     if (existing) const Handle checked = open_file(path);  // says best what is wrong with it
     MemoryFile file = existing ? MemoryFile(read_file(path)) : MemoryFile();
-    const MemoryFile scratch("scratch");
-    const Target root{{file.id(), "/"}, compression, scratch.id()};
+    // only what is packed cheaply is tried
+    std::optional<MemoryFile> scratch;
+    if (compression == compress_cheaply) scratch.emplace("scratch");
+    const Target root{{file.id(), "/"}, compression, scratch ? scratch->id() : hid_t{-1}};
     if (!existing) {
       write_text_attribute(root, "format", format_version);
       write_text_attribute(root, "generator", "fclib " + std::string(version));

@@ -4,6 +4,7 @@
 #include "io/replace_file.hpp"
 #include "io/siconos/layout.hpp"
 #include "io/siconos/siconos.hpp"
+#include "number_text.hpp"
 #include "version.hpp"
 
 namespace fclib {

@@ -4,8 +4,6 @@
  */
 #include "checks.h"
 
-#include <pthread.h>
-
 /* one contact of a ball on a plane, sliding */
 static int columns[] = {0, 1, 2, 3, 4, 5}, rows[] = {0, 1, 2, 3, 4};
 static double one[] = {1, 1, 1, 1, 1};
@@ -303,40 +301,6 @@ static void certificates(void) {
   CHECK(result.status == FCLIB_CONVERGED && result.certificate_bound == 0 && y[0] == 1);
 }
 
-/* each thread with its own file, its own solves, and its own last error */
-static void* work(void* number) {
-  struct fclib_local a = local();
-  double mine[3];
-  struct fclib_solution s = {NULL, NULL, mine, NULL};
-  struct fclib_solve_result result;
-  char name[32];
-  snprintf(name, sizeof name, "thread%d", *(int*)number);
-  for (int k = 0; k < 20; k++) {
-    remove(path_of(name));
-    CHECK(fclib_write_local(&a, path_of(name)));
-    CHECK(!fclib_write_local(&a, path_of(name)));
-    SAYS(name);
-    struct fclib_local* back = fclib_read_local(path_of(name));
-    CHECK(back && !*fclib_last_error() && back->q[1] == 2);
-    CHECK(fclib_solve_local(back, k % 2 ? "auto" : "nsgs", NULL, &s, &result));
-    CHECK(result.status == FCLIB_CONVERGED && fabs(mine[1] + 0.5) < 1e-8);
-    fclib_delete_local(back);
-    free(back);
-  }
-  return NULL;
-}
-
-static void threads(void) {
-  enum { count = 8 };
-  pthread_t all[count];
-  int numbers[count];
-  for (int k = 0; k < count; k++) {
-    numbers[k] = k;
-    CHECK(!pthread_create(&all[k], NULL, work, &numbers[k]));
-  }
-  for (int k = 0; k < count; k++) pthread_join(all[k], NULL);
-}
-
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   snprintf(folder, sizeof folder, "%s", argv[1]);
@@ -349,6 +313,5 @@ int main(int argc, char** argv) {
   rolling();
   solving();
   certificates();
-  threads();
   return 0;
 }

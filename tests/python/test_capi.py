@@ -57,7 +57,9 @@ def valgrind(*command: object) -> None:
     tool = shutil.which("valgrind")
     if tool is None:
         pytest.skip("there is no valgrind")
-    options = ["--quiet", "--leak-check=full", "--error-exitcode=99"]
+    options = ["--quiet", "--error-exitcode=99"]
+    if not str(command[0]).startswith("--tool"):
+        options.append("--leak-check=full")
     done = subprocess.run(
         [tool, *options, *map(str, command)], capture_output=True, text=True, timeout=300
     )
@@ -67,6 +69,26 @@ def valgrind(*command: object) -> None:
 @pytest.mark.slow
 def test_the_library_is_clean_under_valgrind(checks: Path, tmp_path: Path) -> None:
     valgrind(checks, tmp_path)
+
+
+@pytest.fixture(scope="session")
+def threads(programs: Path) -> Path:
+    return compile_program(CAPI / "threads.c", programs / "threads")
+
+
+def test_threads_do_not_disturb_each_other(threads: Path, tmp_path: Path) -> None:
+    done = subprocess.run([threads, tmp_path], capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+@pytest.mark.slow
+def test_threads_are_clean_under_helgrind(threads: Path, tmp_path: Path) -> None:
+    if next(library_folder().rglob("*.gcno"), None):
+        pytest.skip("the counters of a build for coverage race, as they may")
+    # few rounds, for it runs the threads by turns and remembers each access
+    helgrind = f"--suppressions={CAPI / 'helgrind.txt'}"
+    # two rounds alone come first, one of each solver, so that what is made at its first use is there
+    valgrind("--tool=helgrind", helgrind, threads, tmp_path, 2, 2)
 
 
 def test_only_the_interface_is_exported() -> None:

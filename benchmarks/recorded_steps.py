@@ -2,10 +2,10 @@
 
     PYTHON benchmarks/recorded_steps.py [--results recorded-steps]
 
-A pile of boxes in each engine, three steps each. PYTHON has fclib, Drake and PyBullet; Siconos has
-an interpreter of its own (fclib.external.siconos). Engines that are not installed are left out, and
-said. CPU times: that of Drake and of PyBullet is of their whole step, collisions and all; that of
-Siconos and of FCLIB is of the solve of the problem alone.
+A pile of boxes in each engine, three steps each. PYTHON has fclib, Drake, Newton and PyBullet;
+Siconos has an interpreter of its own (fclib.external.siconos). Engines that are not installed are
+left out, and said. CPU times: that of Drake and of PyBullet is of their whole step, collisions and
+all; that of Newton, of Siconos and of FCLIB is of the solve of the problem alone.
 """
 
 from __future__ import annotations
@@ -104,6 +104,45 @@ def bullets() -> Iterator[tuple[Any, Any, float]]:
     bullet.disconnect()
 
 
+def newtons() -> Iterator[tuple[Any, Any, float]]:
+    """Newton's steps by Kamino, as it is by default but for its own collisions."""
+    import newton
+    import warp
+
+    builder = newton.ModelBuilder()
+    newton.solvers.SolverKamino.register_custom_attributes(builder)
+    kind = newton.ModelBuilder.ShapeConfig
+    builder.add_ground_plane(cfg=kind(mu=0.5))
+    for i in range(BOXES):
+        turn = warp.quat_from_axis_angle(warp.vec3(0, 0, 1), 0.1 * i)
+        place = warp.vec3(0.02 * i, 0, 0.105 + 0.21 * i)
+        body = builder.add_body(xform=warp.transform(place, turn))
+        material = kind(mu=0.5, density=(1.0 + i) / (2 * SIZE) ** 3)
+        builder.add_shape_box(body, hx=SIZE, hy=SIZE, hz=SIZE, cfg=material)
+    model = builder.finalize(device="cpu")
+    solver = newton.solvers.SolverKamino(
+        model, newton.solvers.SolverKamino.Config(use_collision_detector=True)
+    )
+    # the solve of the problem alone
+    own = solver._solver_kamino.solver_fd
+    solve = own.solve
+    took = 0.0
+
+    def timed(**options: Any) -> None:
+        nonlocal took
+        start = time.process_time()
+        solve(**options)
+        took = time.process_time() - start
+
+    own.solve = timed
+    states = [model.state(), model.state()]
+    for step in range(max(STEPS) + 1):
+        solver.step(*states, None, None, 2e-3)
+        states.reverse()
+        if step in STEPS:
+            yield recorders.newton(solver), "hard", took
+
+
 def siconoses() -> Iterator[tuple[Any, Any, float]]:
     """Siconos' steps, in steps of 5 ms."""
     every, last = min(STEPS), max(STEPS)
@@ -114,7 +153,7 @@ def siconoses() -> Iterator[tuple[Any, Any, float]]:
 
 def rows() -> Iterator[dict[str, Any]]:
     """A line of the table for each step."""
-    for steps in (drakes, bullets, siconoses):
+    for steps in (drakes, bullets, newtons, siconoses):
         try:
             for recorded, law, took in steps():
                 yield row(recorded, law, took)
@@ -169,7 +208,7 @@ def main() -> None:
             table,
             title="Steps of other engines",
             note=f"A pile of {BOXES} boxes; FCLIB to {TOLERANCE:g}. CPU time of Drake's and"
-            " PyBullet's whole step, of Siconos' and FCLIB's solve alone.",
+            " PyBullet's whole step, of Newton's, Siconos' and FCLIB's solve alone.",
             command="PYTHON benchmarks/recorded_steps.py --results recorded-steps",
         )
         print(path)

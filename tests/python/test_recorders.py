@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +20,7 @@ import fclib
 from fclib import recorders
 from fclib.cli import app
 from fclib.external import siconos
+from fclib.recorders import _newton
 from helpers import dense
 
 H = 1e-3
@@ -123,6 +127,109 @@ def test_wrong_data_are_named(change: dict[str, Any], message: str) -> None:
     }
     with pytest.raises(ValueError, match=message):
         recorders.assemble(**known | change)
+
+
+# ---- Newton's data, which need no Newton
+
+
+def test_kaminos_rows_become_those_of_a_problem() -> None:
+    """Two rows of joints that yield, three rigid ones of rank two, and some of the others.
+
+    The velocity is that of Kamino's own equation with Kamino's rows.
+    """
+    rng = np.random.default_rng(1)
+    n, d = 8, 2 + 3 + 1 + 2 + 6
+    root, J, w = rng.normal(size=(n, n)), rng.normal(size=(d, n)), rng.normal(size=d)
+    J[4], w[4], w[5] = J[2] - 2 * J[3], w[2] - 2 * w[3], 0
+    M, v_free, reaction = root @ root.T + np.eye(n), rng.normal(size=n), rng.normal(size=d)
+    inverse_mass = np.array([0.5, 4.0])
+    # J v + w + lambda / m = 0 of the rows that yield
+    soft = J[:2] @ np.linalg.solve(M, J[:2].T) + np.diag(inverse_mass)
+    pushed = v_free + np.linalg.solve(M, J[2:].T @ reaction[2:])
+    reaction[:2] = -np.linalg.solve(soft, J[:2] @ pushed + w[:2])
+    step = _newton.Step(
+        time=0.5,
+        h=H,
+        M=M,
+        v_free=v_free,
+        velocity=v_free + np.linalg.solve(M, J.T @ reaction),
+        J=J,
+        w=w,
+        reaction=reaction,
+        yielding=2,
+        rigid=3,
+        dry=1,
+        limits=2,
+        inverse_mass=inverse_mass,
+        bound=np.array([0.3]),
+        mu=np.array([0.5, 0.7]),
+        bodies=np.array([[-1, 0], [0, 1]]),
+    )
+    recorded = _newton.recorded(step, "1.8.0")
+    problem = recorded.problem
+    assert (problem.n, problem.nc, problem.p) == (n + 1, 5, 2)
+    assert recorded.assembled.violated < 1e-12
+    assert recorded.mismatch is not None
+    assert recorded.mismatch < 1e-12
+    # contacts T1, T2, N become N, T1, T2; then limits, then dry friction
+    columns = dense(problem.H)[:n].T
+    own = J[8:].reshape(2, 3, n)[:, [2, 0, 1]].reshape(6, n)
+    np.testing.assert_array_equal(columns[:6], own)
+    np.testing.assert_array_equal(columns[[6, 9, 13]], J[[6, 7, 5]])
+    np.testing.assert_array_equal(columns[[7, 8, 10, 11, 12, 14]], 0)
+    np.testing.assert_array_equal(problem.w[:10:3], w[[10, 13, 6, 7]])
+    np.testing.assert_array_equal(problem.mu, [0.5, 0.7, 0, 0, 1])
+    guess: Any = recorded.guess
+    r = guess.r.reshape(5, 3)
+    np.testing.assert_array_equal(r[:2], reaction[8:].reshape(2, 3)[:, [2, 0, 1]])
+    np.testing.assert_array_equal(r[2:4, 0], reaction[6:8])
+    np.testing.assert_allclose(r[4], [0.3, reaction[5], 0])
+    assert described(recorded)["bodies"] == [[-1, 0], [0, 1]]
+    # contacts that yield in N, by the third of their rows; limits that do are refused
+    soft = np.zeros(d)
+    soft[10] = 0.2
+    yields = _newton.recorded(dataclasses.replace(step, compliance=soft), "1.8.0").problem
+    assert yields.n == n + 2
+    assert dense(yields.M)[n, n] == pytest.approx(1 / 0.2)
+    np.testing.assert_array_equal(dense(yields.H)[n], np.eye(15)[0])
+    soft[6] = 0.1
+    with pytest.raises(ValueError, match="limit_compliance"):
+        _newton.recorded(dataclasses.replace(step, compliance=soft), "1.8.0")
+
+
+def test_kaminos_jacobian_is_read_from_an_array_and_from_blocks() -> None:
+    def held(values: Any) -> Any:
+        return SimpleNamespace(numpy=lambda: np.asarray(values))
+
+    J = np.arange(36.0).reshape(3, 12)
+    J[0, 6:] = 0
+    flat = np.concatenate((np.full(5, -1.0), J.ravel()))
+    data = SimpleNamespace(J_cts_offsets=held([0, 5]), J_cts_data=held(flat))
+    np.testing.assert_array_equal(_newton.jacobian(SimpleNamespace(data=data), 1, 3, 12), J)
+    spots = [(2, 6), (0, 0), (1, 0), (1, 6), (2, 0)]
+    blocks = SimpleNamespace(
+        nzb_start=held([0, 1]),
+        num_nzb=held([1, 5]),
+        nzb_coords=held([(0, 0), *spots, (0, 0)]),
+        nzb_values=held([np.ones(6), *(J[i, k : k + 6] for i, k in spots), np.ones(6)]),
+    )
+    sparse = SimpleNamespace(_J_cts=SimpleNamespace(bsm=blocks))
+    np.testing.assert_array_equal(_newton.jacobian(sparse, 1, 3, 12), J)
+
+
+def test_another_version_of_newton_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "newton", ModuleType("newton"))
+    monkeypatch.setattr(metadata, "version", lambda _: "1.9.2")
+    script = tmp_path / "falls.py"
+    script.write_text("", encoding="utf-8")
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["record", "newton", str(script), "--out", str(out)])
+    assert done.exit_code == 1
+    said = " ".join(done.output.split())
+    assert "newton 1.9.2 is installed" in said
+    assert "newton==1.8.*" in said
 
 
 # ---- engines, where they are installed
@@ -281,6 +388,314 @@ def test_pinocchio_gives_mass_jacobian_and_free_velocity() -> None:
     np.testing.assert_allclose(np.hypot(r[:, 1], r[:, 2]), 0.6 * r[:, 0], rtol=1e-6)
 
 
+def newtons_solver(build: Any, **options: Any) -> tuple[Any, Any]:
+    """A solver of Kamino's for what `build` adds to a builder, and a function that steps it."""
+    newton = pytest.importorskip("newton", reason="Newton is not installed")
+    try:
+        _newton.pinned()
+    except ImportError as error:
+        pytest.skip(str(error))
+    kind = newton.solvers.SolverKamino
+    builder = newton.ModelBuilder()
+    kind.register_custom_attributes(builder)
+    build(newton, builder)
+    model = builder.finalize(device="cpu")
+    solver = kind(model, kind.Config(use_collision_detector=True, **options))
+    states = [model.state(), model.state()]
+
+    def step(count: int) -> None:
+        for _ in range(count):
+            solver.step(*states, None, None, 2e-3)
+            states.reverse()
+
+    return solver, step
+
+
+def free_velocity_off(solver: Any, step: Any) -> float:
+    """How far u without reactions is from Newton's, relative to its size where that is above 1."""
+    data = solver._solver_kamino.problem_fd.data
+    count = int(data.dim.numpy()[0])
+    own = (data.v_f.numpy()[:count] / data.P.numpy()[:count]).astype(float)
+    return float(np.abs(step.J @ step.v_free + step.w - own).max() / max(1.0, np.abs(own).max()))
+
+
+def boxes_of_newton(restitution: float) -> Any:
+    """Two boxes, one on the other, that fall and slide on a plane."""
+
+    def boxes(newton: Any, builder: Any) -> None:
+        material = newton.ModelBuilder.ShapeConfig(mu=0.5, restitution=restitution)
+        builder.add_ground_plane(cfg=material)
+        for i in range(2):
+            body = builder.add_body(xform=((0.03 * i, 0, 0.1005 + 0.201 * i), (0, 0, 0, 1)))
+            builder.add_shape_box(body, hx=0.1, hy=0.1, hz=0.1, cfg=material)
+            builder.body_qd[body] = (0.5, 0, -0.3, 0, 0, 0.4 * i)
+
+    return boxes
+
+
+@pytest.mark.parametrize(
+    ("method", "restitution"), [("padmm", 0.0), ("padmm", 0.4), ("dvi", 0.0), ("dvi", 0.4)]
+)
+def test_newtons_own_problem_is_recorded(method: str, restitution: float) -> None:
+    solver, step = newtons_solver(boxes_of_newton(restitution), dynamics_solver=method)
+    touched = set()
+    # the first of them is an impact
+    for count in (1, 10, 20):
+        step(count)
+        before = np.asarray(recorders.newton(solver).velocity)
+        step(1)
+        recorded = recorders.newton(solver)
+        problem, kamino = recorded.problem, solver._solver_kamino
+        assert (problem.n, problem.p) == (12, 0)
+        assert problem.nc >= 8
+        read = _newton.read(kamino, solver._contacts_kamino, 0)
+        assert free_velocity_off(solver, read) < 1e-6
+        # Newton's impact: the normal velocity before the step, times the coefficient
+        bias = kamino.problem_fd.data.v_b.numpy()[2 : 3 * problem.nc : 3]
+        impact = restitution * (read.J[2::3] @ before)
+        off = np.abs(np.asarray(problem.w)[::3] - bias - impact)
+        assert off.max() < 1e-6 * max(1.0, np.abs(bias).max())
+        assert recorded.mismatch is not None
+        assert recorded.mismatch < 1e-5
+        result: Any = fclib.solve(problem, tol=1e-8)
+        assert result.converged
+        origin = described(recorded)
+        assert origin["fields"]["H"] == "exact"
+        touched |= {tuple(pair) for pair in origin["bodies"]}
+        contacts: Any = recorded.contacts
+        # rows of the second body are those of the frame; N points towards it
+        moved = np.reshape(contacts.jacobian, (-1, 3, 12))
+        for k, (_, after) in enumerate(contacts.bodies):
+            block = moved[k][[2, 0, 1], 6 * after : 6 * after + 3]
+            np.testing.assert_allclose(block, contacts.frame[k], atol=1e-6)
+    assert touched >= {(-1, 0), (0, 1)}
+    assert recorded.time == pytest.approx(33 * 2e-3, abs=1e-5)
+
+
+def test_newtons_belt_moves_what_lies_on_it() -> None:
+    """A kinematic body is no unknown: its velocity is in w, and drags the box."""
+
+    def belt(newton: Any, builder: Any) -> None:
+        body = builder.add_body(xform=((0, 0, 0), (0, 0, 0, 1)), is_kinematic=True)
+        builder.add_shape_box(body, hx=1, hy=1, hz=0.1)
+        builder.body_qd[body] = (0.3, 0, 0, 0, 0, 0)
+        body = builder.add_body(xform=((0, 0, 0.2), (0, 0, 0, 1)))
+        builder.add_shape_box(body, hx=0.1, hy=0.1, hz=0.1)
+
+    solver, step = newtons_solver(belt)
+    step(2)
+    recorded = recorders.newton(solver)
+    problem = recorded.problem
+    assert problem.n == 6
+    read = _newton.read(solver._solver_kamino, solver._contacts_kamino, 0)
+    assert free_velocity_off(solver, read) < 1e-6
+    assert recorded.mismatch is not None
+    assert recorded.mismatch < 1e-5
+    result: Any = fclib.solve(problem, tol=1e-8)
+    assert result.converged
+    assert 0.01 < result.solution.v[0] < 0.3
+    assert recorded.velocity[0] == pytest.approx(result.solution.v[0], abs=1e-3)
+
+
+def test_newtons_reaction_is_coulombs() -> None:
+    """A box rests: its weight is carried, and Kamino's reaction is as exact as single precision."""
+
+    def box(newton: Any, builder: Any) -> None:
+        builder.add_ground_plane()
+        body = builder.add_body(xform=((0, 0, 0.1), (0, 0, 0, 1)))
+        builder.add_shape_box(body, hx=0.1, hy=0.1, hz=0.1)
+
+    solver, step = newtons_solver(box)
+    step(30)
+    recorded = recorders.newton(solver)
+    guess: Any = recorded.guess
+    weight = 8.0 * 9.81 * 2e-3
+    assert guess.r[::3].sum() == pytest.approx(weight, rel=1e-3)
+    assert fclib.merit(recorded.problem, guess).error < 1e-3
+    solution: Any = fclib.solve(recorded.problem, tol=1e-10).solution
+    assert solution.r[::3].sum() == pytest.approx(weight, rel=1e-3)
+
+
+def test_newtons_loops_lose_their_redundant_rows() -> None:
+    """A leaning four-bar falls, with armature and dry friction in its joints."""
+    lean, length = 0.5, 0.4
+    x, z = length * math.sin(lean), length * math.cos(lean)
+    turn = (0, math.sin(lean / 2), 0, math.cos(lean / 2))
+    upright = (0, 0, 0, 1)
+
+    def bars(newton: Any, builder: Any) -> None:
+        places = [((x / 2, 0, z / 2), turn), ((x + 0.2, 0, z), upright)]
+        places.append(((x / 2 + 0.4, 0, z / 2), turn))
+        links = [builder.add_link(xform=place) for place in places]
+        for k, link in enumerate(links):
+            # the rods of a parallelogram
+            half = (0.2, 0.02, 0.02) if k == 1 else (0.02, 0.02, 0.2)
+            builder.add_shape_box(link, hx=half[0], hy=half[1], hz=half[2])
+
+        def hinge(parent: int, child: int, before: Any, after: Any) -> int:
+            joint: int = builder.add_joint_revolute(
+                parent,
+                child,
+                parent_xform=before,
+                child_xform=after,
+                axis=(0, 1, 0),
+                armature=0.01,
+                friction=0.5,
+            )
+            return joint
+
+        back = (0, -turn[1], 0, turn[3])
+        low, high = (0, 0, -0.2), (0, 0, 0.2)
+        joints = [
+            hinge(-1, links[0], ((0, 0, 0), upright), (low, back)),
+            hinge(links[0], links[1], (high, back), ((-0.2, 0, 0), upright)),
+            hinge(links[1], links[2], ((0.2, 0, 0), upright), (high, back)),
+        ]
+        builder.add_articulation(joints)
+        hinge(-1, links[2], ((0.4, 0, 0), upright), (low, back))
+        builder.shape_collision_filter_pairs.extend([(0, 1), (1, 2), (0, 2)])
+
+    solver, step = newtons_solver(bars)
+    for _ in range(3):
+        step(10)
+        recorded = recorders.newton(solver)
+        problem = recorded.problem
+        # four dry frictions; 20 rows of rank 17
+        assert (problem.nc, problem.p, len(recorded.assembled.redundant)) == (4, 17, 3)
+        assert recorded.assembled.violated < 1e-3
+        assert recorded.mismatch is not None
+        assert recorded.mismatch < 1e-4
+        result: Any = fclib.solve(problem, tol=1e-8)
+        assert result.converged
+        np.testing.assert_allclose(result.solution.v[:18], recorded.velocity, atol=1e-3)
+    # it moves
+    assert np.abs(recorded.velocity).max() > 0.05
+
+
+def pendulum_of_newton(**joint: Any) -> Any:
+    """A pendulum that swings, next to a box that rests."""
+
+    def pendulum(newton: Any, builder: Any) -> None:
+        upright = (0, 0, 0, 1)
+        rod = builder.add_link(xform=((0, 0, 0.5), upright))
+        builder.add_shape_box(rod, hx=0.02, hy=0.02, hz=0.2)
+        hinge = builder.add_joint_revolute(
+            -1,
+            rod,
+            parent_xform=((0, 0, 0.7), upright),
+            child_xform=((0, 0, 0.2), upright),
+            axis=(0, 1, 0),
+            **joint,
+        )
+        builder.add_articulation([hinge])
+        builder.body_qd[rod] = (-0.2, 0, 0, 0, 1, 0)
+        box = builder.add_body(xform=((0, 0.5, 0.0999), upright))
+        builder.add_shape_box(box, hx=0.1, hy=0.1, hz=0.1)
+        builder.add_ground_plane()
+
+    return pendulum
+
+
+@pytest.mark.parametrize(
+    ("joint", "rows"),
+    [
+        ({"limit_lower": -0.5, "limit_upper": 0.005}, (0, 1)),
+        ({"damping": 0.3}, (1, 0)),
+        ({"target_ke": 50.0, "target_kd": 2.0, "actuator_mode": 3}, (1, 0)),
+    ],
+)
+def test_newtons_limits_dampers_and_drives(joint: dict[str, Any], rows: tuple[int, int]) -> None:
+    solver, step = newtons_solver(pendulum_of_newton(**joint))
+    step(20)
+    recorded = recorders.newton(solver)
+    problem = recorded.problem
+    read = _newton.read(solver._solver_kamino, solver._contacts_kamino, 0)
+    assert (read.yielding, read.limits) == rows
+    assert (problem.p, problem.nc) == (5, 4 + rows[1])
+    assert free_velocity_off(solver, read) < 1e-6
+    assert recorded.mismatch is not None
+    assert recorded.mismatch < 1e-5
+    result: Any = fclib.solve(problem, tol=1e-8)
+    assert result.converged
+    np.testing.assert_allclose(result.solution.v, recorded.velocity, atol=1e-4)
+
+
+def test_each_of_newtons_worlds_is_recorded() -> None:
+    def worlds(newton: Any, builder: Any) -> None:
+        for speed in (0.0, 0.5):
+            one = newton.ModelBuilder()
+            newton.solvers.SolverKamino.register_custom_attributes(one)
+            pendulum_of_newton()(newton, one)
+            one.body_qd[1] = (speed, 0, 0, 0, 0, 0)
+            builder.add_world(one)
+
+    solver, step = newtons_solver(worlds)
+    step(5)
+    first, second = (recorders.newton(solver, world) for world in (0, 1))
+    for recorded in (first, second):
+        assert (recorded.problem.p, recorded.problem.nc) == (5, 4)
+        assert recorded.mismatch is not None
+        assert recorded.mismatch < 1e-5
+    # the box of the second slides
+    assert abs(first.velocity[6]) < 1e-3
+    assert second.velocity[6] == pytest.approx(0.5 - 5 * 9.81 * 2e-3, abs=1e-2)
+
+
+def test_what_newton_cannot_give_is_named() -> None:
+    solver, step = newtons_solver(boxes_of_newton(0.0))
+    step(1)
+    with pytest.raises(ValueError, match="no world 1: the model has 1"):
+        recorders.newton(solver, 1)
+    with pytest.raises(TypeError, match="SolverKamino"):
+        recorders.newton(object())
+    solver, step = newtons_solver(boxes_of_newton(0.0), dynamics_solver="lox")
+    step(1)
+    with pytest.raises(ValueError, match='"lox" has no dual problem'):
+        recorders.newton(solver)
+    drive = {"target_ke": 50.0, "target_kd": 2.0, "actuator_mode": 3, "effort_limit": 0.1}
+    solver, step = newtons_solver(pendulum_of_newton(**drive))
+    step(1)
+    with pytest.raises(ValueError, match="effort_limit"):
+        recorders.newton(solver)
+
+
+NEWTON = """
+import sys
+import newton
+builder = newton.ModelBuilder()
+newton.solvers.SolverKamino.register_custom_attributes(builder)
+builder.add_ground_plane()
+ball = builder.add_body(xform=((0, 0, 0.1), (0, 0, 0, 1)))
+builder.add_shape_sphere(ball, radius=0.1)
+model = builder.finalize(device="cpu")
+solver = newton.solvers.SolverKamino(model)
+before, after = model.state(), model.state()
+pipeline = newton.CollisionPipeline(model)
+contacts = pipeline.contacts()
+for _ in range(int(sys.argv[1])):
+    pipeline.collide(before, contacts)
+    solver.step(before, after, None, contacts, 2e-3)
+    before, after = after, before
+"""
+
+
+def test_a_script_of_newton_is_recorded(tmp_path: Path) -> None:
+    pytest.importorskip("newton", reason="Newton is not installed")
+    script = tmp_path / "rests.py"
+    script.write_text(NEWTON, encoding="utf-8")
+    out = tmp_path / "out"
+    common = ["record", "newton", str(script), "11", "--every", "5", "--out", str(out)]
+    done = CliRunner().invoke(app, common)
+    assert done.exit_code == 0, done.output
+    assert "3 of 11 steps" in done.output
+    files = sorted(out.glob("*.hdf5"))
+    assert [path.stem for path in files] == [f"newton-{k:06d}" for k in (0, 5, 10)]
+    problem: Any = fclib.read(files[-1])
+    assert problem.nc == 1
+    (guess,) = fclib.read_guesses(files[-1])
+    assert fclib.merit(problem, guess).error < 1e-3
+
+
 SCRIPT = """
 import sys
 import pybullet
@@ -437,7 +852,7 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
     for arguments, message in (
         (
             ["nothing", "x.py"],
-            "no engine 'nothing' is recorded; there is: drake, pybullet, siconos",
+            "no engine 'nothing' is recorded; there is: drake, newton, pybullet, siconos",
         ),
         (["drake", str(tmp_path / "none.py")], "no such script"),
     ):

@@ -88,13 +88,17 @@ class Recorded:
                 return None
             u = problem.W @ self.guess.r + problem.q
             return float(np.abs(u - np.asarray(self.velocity)).max(initial=0.0))
-        untold = self.guess is None and problem.m
-        if untold or self.velocity is None or problem.p:
+        untold = (problem.m and self.guess is None) or (
+            problem.p and (self.guess is None or self.guess.l is None)
+        )
+        if untold or self.velocity is None:
             return None
         import scipy.sparse as sp
         import scipy.sparse.linalg as spl
 
         pushed = problem.f if self.guess is None else problem.H @ self.guess.r + problem.f
+        if self.guess is not None and problem.p:
+            pushed = pushed + problem.G @ self.guess.l
         v = spl.spsolve(sp.csc_array(problem.M), pushed)
         found = np.atleast_1d(v)[: self.assembled.dofs]
         return float(np.abs(found - np.asarray(self.velocity)).max(initial=0.0))

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final
 
-from fclib.recorders import _drake, _pybullet, _siconos
+from fclib.recorders import _drake, _newton, _pybullet, _siconos
 from fclib.recorders._recorded import Recording
 
 
@@ -74,6 +74,24 @@ def _steps_of_drake(recording: Recording) -> Iterator[None]:
         kind.AdvanceTo = original
 
 
+@contextmanager
+def _steps_of_newton(recording: Recording) -> Iterator[None]:
+    _newton.pinned()
+    kind: Any = importlib.import_module("newton").solvers.SolverKamino
+    original = kind.step
+
+    def step(self: Any, *arguments: Any, **options: Any) -> Any:
+        result = original(self, *arguments, **options)
+        recording.add(_newton.newton(self) if recording.wanted else None)
+        return result
+
+    kind.step = step
+    try:
+        yield
+    finally:
+        kind.step = original
+
+
 def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], None]:
     """Run a script while an engine's own functions tell of its steps."""
 
@@ -92,6 +110,7 @@ def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], N
 
 ENGINES: Final[dict[str, Callable[[Recording, Path, Sequence[str]], None]]] = {
     "drake": _in_this_process(_steps_of_drake),
+    "newton": _in_this_process(_steps_of_newton),
     "pybullet": _in_this_process(_steps_of_pybullet),
     "siconos": _siconos.record,
 }

@@ -4,9 +4,10 @@
     .venv/bin/python benchmarks/published_campaigns.py rt444 --tables      # from the store alone
 
 The store is build/campaigns/NAME.sqlite; the same command goes on with it. The tables are
-docs/results/campaign-NAME.csv (solvers) and campaign-NAME-families.csv; `make campaigns` packs
-stores and tables. A budget bounds the time of the runs, and each run ends at --time-limit; what
-that leaves out is said in the note of the tables.
+docs/results/campaign-NAME.csv (solvers) and campaign-NAME-families.csv, or with --solved the one
+of who solves what, campaign-NAME-solved.csv; `make campaigns` packs stores and tables. A budget
+bounds the time of the runs, and each run ends at --time-limit; what that leaves out is said in the
+note of the tables.
 """
 
 from __future__ import annotations
@@ -39,6 +40,7 @@ def main() -> None:
     parser.add_argument("--repeats", help="instead of the campaign's own")
     parser.add_argument("--jobs", default="1")
     parser.add_argument("--tables", action="store_true", help="run nothing")
+    parser.add_argument("--solved", action="store_true", help="the table of who solved what alone")
     arguments = parser.parse_args()
     store = STORES / f"{arguments.name}.sqlite"
     if not arguments.tables:
@@ -49,7 +51,34 @@ def main() -> None:
             if (value := getattr(arguments, option)) is not None:
                 command += [f"--{option.replace('_', '-')}", value]
         subprocess.run(command, check=True)
-    write(arguments.name, store)
+    (write_solved if arguments.solved else write)(arguments.name, store)
+
+
+def write_solved(name: str, store: Path) -> None:
+    """How many problems of each family each solver solves, and which ones not all of them do."""
+    every = profiles.load(store)
+    rows = [row for row in every if row["status"] != "unsuitable"]
+    solvers = sorted({row["solver_name"] for row in rows})
+    table = []
+    for family in sorted({row["family"] for row in rows}):
+        own = [row for row in rows if row["family"] == family]
+        sizes = [row["nc"] for row in own]
+        cells: dict[str, Any] = {"family": family, "contacts": f"{min(sizes)} to {max(sizes)}"}
+        for solver in solvers:
+            runs = [row for row in own if row["solver_name"] == solver]
+            solved = sum(row["solved"] for row in runs)
+            cells[solver] = f"{solved} of {len(runs)}" if runs else "takes none"
+        missed: dict[str, list[str]] = {}
+        for row in own:
+            if not row["solved"]:
+                missed.setdefault(str(row["problem"]), []).append(row["solver_name"])
+        cells["not solved"] = "; ".join(
+            f"{problem}: {', '.join(sorted(names))}" for problem, names in sorted(missed.items())
+        )
+        table.append(cells)
+    note = profiles.caption(profiles.costs(every), every) + "."
+    title = f"Campaign {name}: who solves what"
+    _results.store(f"campaign-{name}-solved", table, title=title, note=note)
 
 
 def write(name: str, store: Path) -> None:

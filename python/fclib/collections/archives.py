@@ -13,6 +13,8 @@ import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from fclib.collections import catalog, trajectory
 from fclib.collections.known import folders
@@ -105,7 +107,7 @@ def get(
 
     Args:
         names: sets, families, families in a set (SET/FAMILY), or scenes that are published there.
-        url: where `registry.txt` lies.
+        url: where `registry.txt` lies: an address, or a folder.
         folder: the collection's folder; the archives are kept in its `.archives`.
         progress: called with the archive's name, the bytes there are, and how many there will be.
 
@@ -175,7 +177,14 @@ def wanted_of(name: str, published: Sequence[str]) -> list[str]:
 
 
 def download(url: str, target: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Fetch a file, or the rest of it where a part is there. FetchError."""
+    """Fetch a file, or the rest of it where a part is there; copy that of a folder. FetchError."""
+    if url.startswith("file://") or "://" not in url:
+        path = Path(url2pathname(urlsplit(url).path) if "://" in url else url)
+        try:
+            shutil.copyfile(path, target)
+        except OSError as error:
+            raise FetchError(f"{path}: cannot be fetched: {error.strerror}") from None
+        return
     requests = importlib.import_module("requests")
     reason: object = None
     for _ in range(TRIES):

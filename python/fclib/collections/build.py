@@ -406,7 +406,8 @@ def known_of(
         whole = analysis.analyze(problem, tol=plan.tol)
         row |= {name: whole.record.get(name) for name in catalog.ANALYSIS}
         return whole.words, whole.matrix_info
-    found = analysis.brief(problem, local, row["error"], plan.tol)
+    refuted = row["status"] == "infeasible"
+    found = analysis.brief(problem, local, row["error"], plan.tol, refuted=refuted)
     row |= {name: found.record.get(name) for name in catalog.ANALYSIS}
     return found.words, found.matrix_info
 

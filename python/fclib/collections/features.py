@@ -2,6 +2,9 @@
 
 The behaviour is that of solvers of different kinds, each given few iterations: what a step of
 Newton's method or a sweep costs is another matter, and another machine gives the same figures.
+
+SciPy and the analysis are imported where they are used: the command line names this module whenever
+it shows the commands of `fclib collection`.
 """
 
 from __future__ import annotations
@@ -11,12 +14,8 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from fclib import _core, _solve, scenes
-from fclib.analysis._data import Data, columns
-from fclib.analysis._spectrum import spectrum
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +40,8 @@ class Matrix:
 
     def __init__(self, problem: Any) -> None:
         """Of a problem of any form."""
+        from fclib.analysis._data import columns
+
         local = problem.condense() if problem.kind.startswith("global") else problem
         self.problem = problem
         self.local = local
@@ -50,13 +51,15 @@ class Matrix:
 
     def near(self, other: Matrix, bound: float = NEAR) -> bool:
         """Whether W and q of both differ by less than `bound` of their norms, and mu does not."""
+        from scipy.sparse.linalg import norm
+
         if self.W.shape != other.W.shape or self.problem.kind != other.problem.kind:
             return False
         if not np.array_equal(self.mu, other.mu):
             return False
         if np.linalg.norm(self.q - other.q) > bound * np.linalg.norm(self.q):
             return False
-        return bool(sp.linalg.norm(self.W - other.W) <= bound * sp.linalg.norm(self.W))
+        return bool(norm(self.W - other.W) <= bound * norm(self.W))
 
 
 def thinned(matrices: Iterable[tuple[int, Matrix]]) -> list[tuple[int, Matrix]]:
@@ -75,14 +78,17 @@ def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
         matrix: of the problem.
         source: the scene that it is of, or the family.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     problem, W = matrix.problem, matrix.W
     d, nc = problem.spacedim, problem.nc
     m = d * nc
     rolling = problem.kind.endswith("rolling")
     trace = W.diagonal().reshape(nc, d).sum(axis=1)
     positive = trace[trace > 0]
-    blocks = sp.coo_array(W)
-    pairs = sp.coo_array(
+    blocks = coo_array(W)
+    pairs = coo_array(
         (np.ones(blocks.nnz), (blocks.row // d, blocks.col // d)), shape=(nc, nc)
     ).tocsr()
     _, label = connected_components(pairs, directed=False)
@@ -118,6 +124,9 @@ def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
 
 def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
     """Rank and conditioning of W, without its bilateral constraints; None where m is large."""
+    from fclib.analysis._data import Data
+    from fclib.analysis._spectrum import spectrum
+
     if m > DENSE:
         return None, None
     try:

@@ -21,7 +21,7 @@ from typing import Any
 
 from fclib import scenes
 from fclib.collections import published, trajectory
-from fclib.collections.plan import Plan, families, source
+from fclib.collections.plan import Plan, evenly, families, source
 
 DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
 SHIPPED = ("tiny",)  # whose problems are there without a build
@@ -37,19 +37,20 @@ KNOWN: dict[str, tuple[str, str]] = {
     "planar": ("5", "bodies in a plane"),
     "local": ("2", "problems of one contact"),
     "impacts": ("1", "bodies that strike and bounce, restitution 0 to 1"),
-    "existence": ("1", "without a solution, or with several, and known to be so"),
+    "existence": ("2", "without a solution, or with several, and known to be so"),
     "dynamics": ("1", "silo, rope, spinning bodies, friction that differs by contact"),
     "robots": ("1", "a gripper that lifts, an arm that pushes a pile"),
+    "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
     "rr9118": ("1", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("8", "all families that came after RT-0444"),
+    "extended": ("9", "all families that came after RT-0444"),
     "standard": ("1", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("7", "of standard, what most solvers fail on; chosen by the bench"),
     "tiny": ("5", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
-    *("impacts", "existence", "dynamics", "robots", "rr9118"),
+    *("impacts", "existence", "dynamics", "robots", "machines", "rr9118"),
 )
 
 
@@ -87,6 +88,12 @@ def version_of(folder: str) -> str:
     """Of SET/FAMILY: the newest that is stored; the set's where none is."""
     stored = published.versions(folder)
     return stored[-1] if stored else version(folder.split("/")[0])
+
+
+def problems_of(folder: str) -> int:
+    """How many problems SET/FAMILY has: those that are stored, or as many as its family says."""
+    stored = published.digests(folder, version_of(folder))
+    return len(stored) or families()[folder.partition("/")[2]].problems
 
 
 def sets() -> dict[str, list[str]]:
@@ -197,8 +204,20 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
             own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
             return replace(plan, scene=frozen, trajectory=stored, **own)
         if frozen.seed == plan.scene.seed:
-            return replace(plan, scene=frozen, trajectory=stored)
+            return stored_part(replace(plan, scene=frozen, trajectory=stored))
     return plan
+
+
+def stored_part(plan: Plan) -> Plan:
+    """A plan of those of its problems that its trajectory has, where that keeps some alone."""
+    if plan.chosen is not None or plan.trajectory is None:
+        return plan
+    there = [n for n in trajectory.read_digests(plan.trajectory) if n < plan.total]
+    # all, or too few of a scene that was simulated to its end: the build says so
+    if not there or len(there) == there[-1] + 1:
+        return plan
+    kept = tuple(there[place] for place in evenly(len(there), plan.count))
+    return replace(plan, chosen=kept, problems=kept[-1] + 1, count=None)
 
 
 def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
@@ -236,7 +255,7 @@ def from_folder(plan: Plan, folder: str | Path) -> Plan:
         words = ", ".join(path.name for path in found) or "none"
         raise FileNotFoundError(f"{folder}: needs one trajectory of {plan.name}, and has {words}")
     scene, origin = trajectory.read_origin(found[0])
-    return replace(plan, scene=scene, version=origin["version"], trajectory=found[0])
+    return stored_part(replace(plan, scene=scene, version=origin["version"], trajectory=found[0]))
 
 
 def origin_of(row: Mapping[str, Any]) -> str:

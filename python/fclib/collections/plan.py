@@ -129,9 +129,7 @@ class Plan:
         """The numbers kept by the rule `every`, or chosen."""
         if self.chosen is not None:
             return np.array(self.chosen, dtype=np.int64)
-        count = self.total if self.count is None else min(self.count, self.total)
-        numbers = np.rint(np.linspace(0, self.total - 1, count)).astype(np.int64)
-        return np.unique(numbers)
+        return evenly(self.total, self.count)
 
     def only(self, numbers: Sequence[int]) -> Plan:
         """The plan of some of its problems alone. ValueError where it has one of them not."""
@@ -172,6 +170,12 @@ class Plan:
         if self.trajectory is None:
             return {"simulation": self.simulation.record()}
         return {"trajectory": hashlib.sha256(self.trajectory.read_bytes()).hexdigest()}
+
+
+def evenly(total: int, count: int | None) -> npt.NDArray[np.int64]:
+    """Of 0, ..., total - 1 so many at equal distances, the first and the last among them."""
+    count = total if count is None else min(count, total)
+    return np.unique(np.rint(np.linspace(0, total - 1, count)).astype(np.int64))
 
 
 def origin(scene: Source) -> dict[str, Any]:

@@ -47,6 +47,7 @@ class PrimitiveSoup:
     mu: float = parameter(0.7, "1", "coefficient of friction")
     restitution: float = parameter(0.0, "1", "0: the law of gaps is inelastic")
     width: float = parameter(8.5, "m", "inner edge of the box, a square")
+    gyroscopic: bool = parameter(False, "1", "whether M has the derivative of gyroscopic terms")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.0125, "s", "time step h")
 

@@ -37,6 +37,7 @@ class RollingSpheres:
     density: float = parameter(2500.0, "kg/m^3", "mass density")
     mu: float = parameter(0.5, "1", "coefficient of friction")
     mu_r: float = parameter(0.015, "m", "coefficient of rolling friction")
+    mixed: float = parameter(0.0, "1", "deviation of ln(mu) and of ln(mu_r), drawn for each sphere")
     restitution: float = parameter(0.0, "1", "Newton's coefficient of restitution, in [0, 1]")
     per_layer: int = parameter(9, "1", "spheres of a layer of the column, a square number")
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
@@ -46,7 +47,7 @@ class RollingSpheres:
         mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
-            non_negative=("mu", "mu_r", "spread"),
+            non_negative=("mu", "mu_r", "mixed", "spread"),
             at_least={"spheres": 1, "per_layer": 1},
         )
         if not self.spread < 1:
@@ -55,11 +56,13 @@ class RollingSpheres:
             raise ValueError(f"RollingSpheres: per_layer must be a square, not {self.per_layer}")
 
     def scene(self, seed: int = 0) -> Scene:
-        """The scene; the seed draws the radii and the offsets."""
+        """The scene; the seed draws the radii, the offsets and the coefficients."""
         random = np.random.Generator(np.random.PCG64(seed))
         # one row a sphere, drawn at once: more spheres begin like fewer
         draws = random.uniform(size=(self.spheres, 3))
         radii = self.radius * (1 - self.spread * draws[:, 0])
+        # after all others, so that these stay; a contact has the larger of its two
+        factors = np.exp(self.mixed * random.standard_normal(size=(self.spheres, 2)))
         side = math.isqrt(self.per_layer)
         # offsets of a fifth of the radius leave no overlap
         pitch = 2.4 * self.radius
@@ -69,10 +72,11 @@ class RollingSpheres:
             place = np.array([cell % side, cell // side]) - 0.5 * (side - 1)
             x, y = pitch * place + 0.2 * self.radius * (2 * draws[i, 1:] - 1)
             z = self.radius + layer * pitch
+            mu, mu_r = (factors[i] * (self.mu, self.mu_r)).tolist()
             bodies.append(
                 f'<body name="sphere{i}" pos="{mjcf.numbers(x, y, z)}"><freejoint/>'
                 f'<geom type="sphere" size="{radius!r}" density="{self.density!r}"'
-                f' friction="{self.mu!r} 0 {self.mu_r!r}" condim="6" material="solid"'
+                f' friction="{mu!r} 0 {mu_r!r}" condim="6" material="solid"'
                 f' rgba="{mjcf.shade(i, self.spheres)}"/></body>'
             )
         return Scene.of(

@@ -308,9 +308,11 @@ export async function read_hdf5(fclib, bytes, kind = "") {
     const problem = read_problem(structs, root, kind_to_read(structs, root, kind));
     fclib.validate(problem);
     let solution = null;
-    if (root.has("solution")) solution = read_solution(structs, root, "solution");
+    // of several problems these are the first one's, which is the global one
+    const own = problem.kind === Object.keys(structs.problems).find((one) => root.has(`fclib_${one}`));
+    if (own && root.has("solution")) solution = read_solution(structs, root, "solution");
     const guesses = [];
-    if (root.has("guesses")) {
+    if (own && root.has("guesses")) {
       const group = root.open("guesses");
       const number = group.number("number_of_guesses", true);
       if (number < 0) fail(group.child("number_of_guesses"), "is negative");

@@ -3,8 +3,10 @@
 
 #include <emscripten/bind.h>
 
+#include <algorithm>
 #include <new>
 #include <string>
+#include <utility>
 
 #include "convert.hpp"
 #include "convert/condense.hpp"
@@ -33,12 +35,12 @@ val failure(const char* kind, const std::string& message, const std::string& whe
   return result;
 }
 
+/// What went wrong; undefined where nothing did.
 template <class F>
-val guarded(const F& run) {
+val failure_of(const F& run) {
   try {
-    val result = val::object();
-    result.set("value", run());
-    return result;
+    run();
+    return val::undefined();
   } catch (const Error& error) {
     return failure(kinds[static_cast<int>(error.kind)], error.what(), error.where);
   } catch (const std::bad_alloc&) {
@@ -48,12 +50,37 @@ val guarded(const F& run) {
   }
 }
 
-/// Calls visit(problem) with the problem of an object.
+template <class F>
+val guarded(const F& run) {
+  val result = val::object();
+  val failed = failure_of([&] { result.set("value", run()); });
+  return failed.isUndefined() ? result : failed;
+}
+
+/// Calls visit(problem, block) with the problem of a block, which may have more.
 template <class Visitor>
-val with_problem(const val& object, const Visitor& visit) {
+val with_problem(int address, const Visitor& visit) {
   return guarded([&] {
-    const Problem problem = problem_from(object);
-    return std::visit([&](const auto& p) { return visit(p); }, problem);
+    Block block(address);
+    const Problem problem = problem_from(block);
+    return std::visit([&](const auto& p) { return visit(p, block); }, problem);
+  });
+}
+
+/// Calls convert(problem) with the problem of a block and of its object, valid; its result goes
+/// back.
+template <class Conversion>
+val converted(int address, const val& object, const Conversion& convert) {
+  return guarded([&] {
+    Block block(address);
+    Problem problem = problem_from(block);
+    return std::visit(
+        [&](auto& p) {
+          carry(p, object);
+          validate(p);
+          return problem_to_js(convert(p));
+        },
+        problem);
   });
 }
 
@@ -148,20 +175,34 @@ val describe_structs() {
     one.set("fields", describe_fields<P>());
     problems.set(std::string(P::kind), one);
   });
+  val statuses = val::array();
+  for (int k = 0; k <= static_cast<int>(Status::infeasible); ++k) {
+    statuses.call<void>("push", to_js(fclib::name_of(static_cast<Status>(k))));
+  }
+  val storages = val::array();
+  for (const auto storage : {Storage::triplet, Storage::csc, Storage::csr, Storage::dense}) {
+    storages.set(static_cast<int>(storage), to_js(fclib::name_of(storage)));
+  }
   val result = val::object();
   result.set("version", std::string(version));
   result.set("problems", problems);
   result.set("solution", describe_fields<Solution>());
+  result.set("statuses", statuses);
+  result.set("storages", storages);
   result.set("merit", describe_fields<Merit>());
   result.set("info", describe_fields<ProblemInfo>());
   result.set("matrix_info", describe_fields<MatrixInfo>());
   return result;
 }
 
+val number_of_storage(const std::string& name) {
+  return guarded([&] { return val(static_cast<int>(storage_of(name))); });
+}
+
 // ---- problems
 
-val validate_problem(const val& object) {
-  return with_problem(object, [](const auto& p) {
+val validate_problem(int address) {
+  return with_problem(address, [](const auto& p, Block&) {
     validate(p);
     val sizes = val::object();
     sizes.set("formulation", formulation(p));
@@ -173,9 +214,9 @@ val validate_problem(const val& object) {
   });
 }
 
-val validate_solution(const val& object, const val& solution, const std::string& where) {
-  return with_problem(object, [&](const auto& p) {
-    validate(solution_from(solution), p, where);
+val validate_solution(int address, const std::string& where) {
+  return with_problem(address, [&](const auto& p, Block& block) {
+    validate(solution_from(block), p, where);
     return val::undefined();
   });
 }
@@ -186,38 +227,36 @@ val read_siconos_text(const std::string& text, const std::string& kind) {
   });
 }
 
-val condense_problem(const val& object) {
-  return with_problem(object, []<class P>(const P& p) -> val {
-    validate(p);
+val condense_problem(int address, const val& object) {
+  return converted(address, object, []<class P>(const P& p) {
     if constexpr (requires { condense(p); }) {
-      return problem_to_js(condense(p));
+      return condense(p);
     } else {
       throw Error(ErrorKind::unsuitable, "a " + std::string(P::kind) + " problem is condensed");
+      return p;
     }
   });
 }
 
-val eliminate_problem(const val& object) {
-  return with_problem(object, []<class P>(const P& p) -> val {
-    validate(p);
+val eliminate_problem(int address, const val& object) {
+  return converted(address, object, []<class P>(const P& p) {
     if constexpr (requires { eliminate(p); }) {
-      return problem_to_js(eliminate(p));
+      return eliminate(p);
     } else {
       throw Error(ErrorKind::unsuitable,
                   "a " + std::string(P::kind) + " problem must be condensed first");
+      return p;
     }
   });
 }
 
-val store_problem(const val& object, const std::string& storage) {
-  return with_problem(object, [&](const auto& p) {
-    validate(p);
-    return problem_to_js(with_storage(p, storage_of(storage)));
-  });
+val store_problem(int address, const val& object, const std::string& storage) {
+  return converted(address, object,
+                   [&](const auto& p) { return with_storage(p, storage_of(storage)); });
 }
 
-val islands_of(const val& object) {
-  return with_problem(object, [](const auto& p) {
+val islands_of(int address) {
+  return with_problem(address, [](const auto& p, Block&) {
     validate(p);
     const Islands found = islands(p);
     val result = val::object();
@@ -231,19 +270,20 @@ val islands_of(const val& object) {
 
 // ---- merits
 
-val merit_of(const val& object, const val& solution) {
-  return with_problem(object,
-                      [&](const auto& p) { return members_of(merit(p, solution_from(solution))); });
+val merit_of(int address) {
+  return with_problem(address, [&](const auto& p, Block& block) {
+    return members_of(merit(p, solution_from(block)));
+  });
 }
 
-val merit_1_of(const val& object, const val& solution) {
-  return with_problem(object,
-                      [&](const auto& p) { return val(merit_1(p, solution_from(solution))); });
+val merit_1_of(int address) {
+  return with_problem(
+      address, [&](const auto& p, Block& block) { return val(merit_1(p, solution_from(block))); });
 }
 
-val contact_merits_of(const val& object, const val& solution) {
-  return with_problem(object, [&](const auto& p) {
-    const ContactMerits merits = contact_merits(p, solution_from(solution));
+val contact_merits_of(int address) {
+  return with_problem(address, [&](const auto& p, Block& block) {
+    const ContactMerits merits = contact_merits(p, solution_from(block));
     val result = val::object();
     result.set("status", list_of(merits.status,
                                  [](ContactStatus one) { return val(std::string(name_of(one))); }));
@@ -275,35 +315,31 @@ val proof_to_js(const NoSolution& proof) {
   return result;
 }
 
-val check_certificate(const val& object, const val& y, const val& z) {
-  return with_problem(object, [&](const auto& p) {
+void require_size(const Vector& values, Index size, const char* name, const char* dim) {
+  if (values.size() == size) return;
+  throw Error(ErrorKind::problem,
+              "has " + std::to_string(values.size()) + " entries, expected " + dim + " = " +
+                  std::to_string(size),
+              name);
+}
+
+val check_certificate(int address) {
+  return with_problem(address, [](const auto& p, Block& block) {
     validate(p);
-    const Vector own = vector_from(y, "y");
-    const Vector other = is_missing(z) ? Vector() : vector_from(z, "z");
-    const auto require = [](const Vector& values, Index size, const char* name, const char* dim) {
-      if (values.size() == size) return;
-      throw Error(ErrorKind::problem,
-                  "has " + std::to_string(values.size()) + " entries, expected " + dim + " = " +
-                      std::to_string(size),
-                  name);
-    };
-    require(own, p.size(Dim::nc), "y", "nc");
-    require(other, p.size(Dim::p), "z", "p");
-    return proof_to_js(check_no_solution(p, own, other));
+    const Vector y = vector_from(block);
+    const Vector z = vector_from(block);
+    require_size(y, p.size(Dim::nc), "y", "nc");
+    if (z.size() > 0) require_size(z, p.size(Dim::p), "z", "p");
+    return proof_to_js(check_no_solution(p, y, z));
   });
 }
 
-val prove(const val& object, const val& y) {
-  return with_problem(object, [&](const auto& p) {
+val prove(int address) {
+  return with_problem(address, [](const auto& p, Block& block) {
     validate(p);
-    const Vector own = vector_from(y, "y");
-    if (own.size() != p.size(Dim::nc)) {
-      throw Error(ErrorKind::problem,
-                  "has " + std::to_string(own.size()) +
-                      " entries, expected nc = " + std::to_string(p.size(Dim::nc)),
-                  "y");
-    }
-    return proof_to_js(prove_no_solution(p, own));
+    const Vector y = vector_from(block);
+    require_size(y, p.size(Dim::nc), "y", "nc");
+    return proof_to_js(prove_no_solution(p, y));
   });
 }
 
@@ -344,30 +380,68 @@ val history_to_js(const std::vector<HistoryPoint>& points) {
   });
 }
 
-val result_to_js(const Result& result) {
-  val object = val::object();
-  object.set("solver", result.solver);
-  object.set("status", to_js(fclib::name_of(result.status)));
-  object.set("converged", result.converged());
-  object.set("iterations", to_js(result.iterations));
-  object.set("error", result.error);
-  object.set("cpu_s", result.cpu_s);
-  object.set("setup_s", result.setup_s);
-  object.set("solution", members_of(result.solution));
-  object.set("certificate", proof_to_js(result.certificate));
-  object.set("stages", list_of(result.stages, [](const Stage& stage) {
-               val one = val::object();
-               one.set("name", stage.kind.name);
-               one.set("families", stage.kind.families);
-               one.set("calls", to_js(stage.calls));
-               one.set("solved", to_js(stage.solved));
-               one.set("iterations", to_js(stage.iterations));
-               one.set("factorisations", to_js(stage.factorisations));
-               one.set("time", stage.time);
-               return one;
-             }));
-  if (result.history) object.set("history", history_to_js(*result.history));
-  return object;
+/// The last result, until fclib.js has taken it: each call takes microseconds, as many solves do.
+struct Answer {
+  Result result;
+  std::vector<double> numbers;
+  val failure = val::undefined();
+};
+Answer& answer() {
+  static Answer last;
+  return last;
+}
+
+/// The stages that any result had; its numbers refer to them.
+std::vector<StageKind>& known_stages() {
+  static std::vector<StageKind> known;
+  return known;
+}
+
+double number_of(const StageKind& kind) {
+  std::vector<StageKind>& known = known_stages();
+  const auto found = std::find_if(known.begin(), known.end(), [&](const StageKind& one) {
+    return one.name == kind.name && one.families == kind.families;
+  });
+  const auto number = std::distance(known.begin(), found);
+  if (found == known.end()) known.push_back(kind);
+  return static_cast<double>(number);
+}
+
+val known_stage(int number) {
+  const StageKind& kind = known_stages()[static_cast<std::size_t>(number)];
+  val one = val::object();
+  one.set("name", kind.name);
+  one.set("families", kind.families);
+  return one;
+}
+
+/// The address of the last result's numbers, in the order in which fclib.js takes them.
+int to_numbers(Result&& own) {
+  // no structured binding: Clang 14 captures none
+  Result& result = answer().result;
+  std::vector<double>& numbers = answer().numbers;
+  result = std::move(own);
+  numbers = {static_cast<double>(result.status),
+             static_cast<double>(result.iterations),
+             result.error,
+             result.cpu_s,
+             result.setup_s,
+             result.certificate.proven() ? 1.0 : 0.0};
+  for_each_field<Solution>([&](const Field<Solution, Vector>& field) {
+    const Vector& values = result.solution.*field.member;
+    numbers.push_back(reinterpret_cast<int>(values.data()));
+    numbers.push_back(static_cast<double>(values.size()));
+  });
+  numbers.push_back(static_cast<double>(result.stages.size()));
+  for (const Stage& stage : result.stages) {
+    for (const double one :
+         {number_of(stage.kind), static_cast<double>(stage.calls),
+          static_cast<double>(stage.solved), static_cast<double>(stage.iterations),
+          static_cast<double>(stage.factorisations), stage.time}) {
+      numbers.push_back(one);
+    }
+  }
+  return reinterpret_cast<int>(numbers.data());
 }
 
 /// Another clock, for tests of what looks at it.
@@ -376,19 +450,24 @@ Clock clock_from(const val& clock) {
   return [clock] { return clock().as<double>(); };
 }
 
-/// `settings` has all of them, as fclib.js has filled them in; `report` is a function or undefined.
-val solve_problem(const val& object, const val& settings, const val& report) {
-  return with_problem(object, [&](const auto& p) {
-    Settings own{
-        .tolerance = settings["tol"].as<double>(),
-        .merit =
-            settings["merit"].as<std::string>() == "natural" ? MeritKind::natural : MeritKind::both,
-        .max_iterations = static_cast<std::int64_t>(settings["max_iterations"].as<double>()),
-        .time_limit = settings["time_limit"].as<double>(),
-        .clock = clock_from(settings["clock"]),
-        .history = settings["history"].as<bool>()};
+/// The address of the result's numbers; 0 where there is a `failure` instead. The block has a
+/// guess; `options`, `clock` and `report` may be undefined.
+int solve_problem(int address, const std::string& solver, double tolerance, bool natural,
+                  double max_iterations, double time_limit, bool history, const val& options,
+                  const val& clock, const val& report) {
+  int numbers = 0;
+  answer().failure = failure_of([&] {
+    Block block(address);
+    const Problem problem = problem_from(block);
+    const Solution guess{.r = vector_from(block)};
+    Settings settings{.tolerance = tolerance,
+                      .merit = natural ? MeritKind::natural : MeritKind::both,
+                      .max_iterations = static_cast<std::int64_t>(max_iterations),
+                      .time_limit = time_limit,
+                      .clock = clock_from(clock),
+                      .history = history};
     if (!report.isUndefined()) {
-      own.callback = [&](const Progress& progress) {
+      settings.callback = [&](const Progress& progress) {
         const Vector* r = progress.r;
         return report(to_js(progress.iteration), progress.error, progress.time,
                       std::string(progress.stage),
@@ -397,12 +476,20 @@ val solve_problem(const val& object, const val& settings, const val& report) {
             .template as<bool>();
       };
     }
-    const val guess = settings["guess"];
-    return result_to_js(solve(p, settings["solver"].as<std::string>(), own,
-                              options_from(settings["options"]),
-                              is_missing(guess) ? Solution{} : solution_from(guess)));
+    std::visit(
+        [&](const auto& p) {
+          numbers = to_numbers(solve(p, solver, settings, options_from(options), guess));
+        },
+        problem);
   });
+  return numbers;
 }
+
+val failure_of_solve() { return std::exchange(answer().failure, val::undefined()); }
+
+val certificate_of_solve() { return proof_to_js(answer().result.certificate); }
+
+val history_of_solve() { return history_to_js(*answer().result.history); }
 
 /// A copy of numbers where the core has them.
 val numbers_at(int address, int size) {
@@ -428,6 +515,12 @@ EMSCRIPTEN_BINDINGS(fclib) {
   function("check_certificate", check_certificate);
   function("prove_no_solution", prove);
   function("solve", solve_problem);
+  function("failure", failure_of_solve);
+  function("certificate", certificate_of_solve);
+  function("history", history_of_solve);
+  function("stage", known_stage);
+  function("storage_of", number_of_storage);
+  function("reserve", Block::reserve);
   function("numbers_at", numbers_at);
 }
 

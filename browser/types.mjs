@@ -255,6 +255,8 @@ export interface Structs {
   merit: FieldInfo[];
   info: FieldInfo[];
   matrix_info: FieldInfo[];
+  statuses: string[];
+  storages: string[];
 }
 
 export declare class FclibError extends Error {

@@ -1,14 +1,25 @@
-"""The pictures of families in docs/images, from stored states.
+"""All pictures of docs/images, from stored states and stored runs.
 
     python scripts/docs_images.py [NAME...] [--out docs/images]
 
-Each shows a stored state of a family, some with the contact forces of its solution. It needs OpenGL
-(see `fclib.simulate.render`). `fclib report` and a browser make those of the report, by hand.
+    bridge, walker, ...    a stored state of a family, some with the contact forces of its solution
+    stack                  the last step of `make demo`
+    families-GROUP         small pictures of all families of a group of sets
+    report-...             pages of a report of the stored runs, by Chromium
+    contact-...            figures of docs/contact-problem.md, by scripts/site/contact_pictures.py
+
+The first two need OpenGL (see `fclib.simulate.render`), the third Pillow, the fourth what `fclib
+report` needs, the last one the module for browsers.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,10 +27,15 @@ from typing import Any
 import numpy as np
 
 import fclib
-from fclib import scenes, simulate
-from fclib.collections import known, trajectory
+from fclib import collections, demo, scenes, simulate
+from fclib.bench import Job, Limits, Record, SolverChoice, Store
+from fclib.bench.problems import look
+from fclib.collections import families, known, standing, trajectory
+from fclib.report import Campaigns, build_site, drawn, picture, view_of, write_view
+from fclib.report.solids import solids_of
 
 ROOT = Path(__file__).resolve().parents[1]
+IMAGES = ROOT / "docs" / "images"
 
 
 @dataclass(frozen=True)
@@ -33,11 +49,54 @@ class Shot:
 
 
 SHOTS = {
-    "cubes-h8": Shot("CubesH8", -1, (480, 600), forces=True),
+    "bridge": Shot("Bridge", 4, (800, 500)),
+    "aqueduct": Shot("Aqueduct", -1, (800, 500)),
     "low-wall": Shot("LowWall", -1, (660, 400)),
+    "cubes-h8": Shot("CubesH8", -1, (480, 600), forces=True),
     "low-wall-fem": Shot("LowWallFEM", -1, (840, 360), forces=True),
     "closed-chains": Shot("ClosedChains", -1, (480, 640)),
+    "quadruped": Shot("Quadruped", 2, (800, 500)),
+    "walker": Shot("Walker", 1, (420, 560), forces=True),
 }
+# the sets whose families are on one sheet
+GROUPS = {
+    "families-rt444": ("rt444",),
+    "families-masonry": ("masonry",),
+    "families-deformable": ("deformable",),
+    "families-mixed": ("mixed",),
+    "families-robots": ("robots",),
+    "families-machines": ("machines",),
+    "families-grains": ("granular", "rolling", "planar"),
+    "families-dynamics": ("impacts", "existence", "dynamics"),
+    "families-ladder": ("ladder", "local"),
+}
+# not on them: without stored states, and they look like another one of their group
+LIKE = {"CubesH8x20": "CubesH8", "ChuteLocalProblems": "LocalProblems"}
+TILE, CAPTION, COLUMNS = (240, 180), 24, 4
+SHADES = 128  # of a sheet
+LANDED = 60  # steps after which what is simulated for a sheet has something to show
+BOXES, STEPS = 6, 50  # of the demo
+# pages of the report: address, what is taken of it, the window
+PAGES = {
+    "report-overview": ("index.html", "", (1100, 1000)),
+    "report-pair": ("index.html#/profiles", "main .plot >> nth=-1", (1100, 900)),
+    "report-network": ("network.html", ".scene .plot", (1100, 900)),
+}
+SHOWN = "standard/Arch/0064"  # its forces are of its reference solution
+
+
+def names() -> list[str]:
+    """All pictures, in the order in which they are made."""
+    return [*SHOTS, "stack", *GROUPS, *PAGES, *figures()]
+
+
+def figures() -> list[str]:
+    """Those of the figures of a page that are solved in the reader's browser."""
+    text = (ROOT / "docs" / "contact-problem.md").read_text(encoding="utf-8")
+    return [f"contact-{name}" for name in re.findall(r'data-figure="(\w+)"', text)]
+
+
+# ---- states, by OpenGL
 
 
 def shoot(shot: Shot, path: Path) -> None:
@@ -77,17 +136,164 @@ def shoot(shot: Shot, path: Path) -> None:
     simulate.render(step, path, size=shot.size)
 
 
-def main() -> None:
+def stack(path: Path) -> None:
+    """The picture that `make demo` draws."""
+    with tempfile.TemporaryDirectory() as folder:
+        for _ in demo.simulate(Path(folder), BOXES, STEPS, path):
+            pass
+
+
+# ---- families
+
+
+def problem_of(name: str) -> Any:
+    """A problem of a family: of its stored states the middle one, else one that is made now."""
+    if name in scenes.assemblies():
+        family: Any = scenes.assemblies()[name]()
+        return family.problem(family.problems // 2, 0)
+    for own in (f"standard/{name}", f"{families()[name].collection}/{name}"):
+        try:
+            plan = known.plan_of(own)
+        except KeyError:
+            continue
+        if plan.trajectory is not None:
+            states = trajectory.read(plan.trajectory)
+            return states.problem(len(states.number) // 2).problem
+    *_, last = simulate.simulate(scenes.get(name)().scene(0), steps=LANDED)
+    contacts, bodies = simulate.geometry_of(last.model, last.contacts)
+    return last.problem.replace(contacts=contacts, bodies=bodies)
+
+
+def of_group(sets: tuple[str, ...]) -> list[str]:
+    """The families of sets, in their order."""
+    known_ones = [(name, kind) for name, kind in families().items() if name not in LIKE]
+    return [name for own in sets for name, kind in known_ones if kind.collection == own]
+
+
+def sheet(sets: tuple[str, ...], path: Path) -> None:
+    """Small pictures of all families of some sets, with their names."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    own = of_group(sets)
+    columns = min(COLUMNS, len(own))
+    wide, tall = TILE[0], TILE[1] + CAPTION
+    whole = Image.new("RGB", (columns * wide, -(-len(own) // columns) * tall), "white")
+    pen, font = ImageDraw.Draw(whole), ImageFont.load_default(size=15)
+    with tempfile.TemporaryDirectory() as folder:
+        for k, name in enumerate(own):
+            file = Path(folder) / "one.png"
+            problem = problem_of(name)
+            bodies, contacts = problem.bodies, problem.contacts
+            if bodies is None or contacts is None or not len(bodies.shape_kind):
+                picture.draw_matrix(drawn.matrix_of(problem), file, TILE)
+            else:
+                near = contacts.point[(contacts.shape >= 0).all(axis=1)]
+                picture.draw(solids_of(bodies, contacts), file, TILE, near=near)
+            tile = Image.open(file)
+            x, y = (k % columns) * wide, (k // columns) * tall
+            whole.paste(tile, (x, y), tile)
+            pen.text((x + wide / 2, y + TILE[1] + 4), name, "black", font, anchor="ma")
+    whole.quantize(SHADES).save(path, optimize=True)
+
+
+# ---- the report
+
+
+def stored_runs(folder: Path, store: Path) -> None:
+    """A store of the runs that lie beside the collection's states, of the problems in a folder."""
+    files = {}
+    for row in collections.read_catalog(folder).to_pylist():
+        files[row["digest"][: standing.DIGITS]] = folder / (row["global_file"] or row["local_file"])
+    facts = {digest: look(path) for digest, path in files.items()}
+    methods = {info.name: info.family for info in fclib.solvers()}
+    rows = [run for run in standing.runs() if run.limit is not None and run.digest in facts]
+    # of several versions of a solver the last one
+    last = {(run.digest, run.solver): run for run in sorted(rows, key=standing.when)}
+    with Store(store) as target:
+        for run in last.values():
+            # without the hash of a solver's code: what was built twice would count as two
+            version, method = run.version.partition("-")[0], methods.get(run.solver, "")
+            choice = SolverChoice(run.solver, {}, version, method, "fclib")
+            seconds = run.limit or 0.0
+            limits = Limits(time=seconds, wall=3 * seconds, memory=4000.0)
+            record = Record(
+                status=run.status,
+                cpu_s=run.cpu,
+                total_cpu_s=run.cpu,
+                merits=None if run.error is None else {"error": run.error},
+                machine={"node": "stored runs"},
+            )
+            target.add(Job(facts[run.digest], choice, standing.TOLERANCE, limits, 0, 1), record)
+
+
+def report(folder: Path) -> Path:
+    """A report of all stored runs; its folder."""
+    plans = [known.plan_of(name) for name in known.sets()["standard"]]
+    bare = [replace(p, references=p.name == SHOWN.rpartition("/")[0]) for p in plans]
+    collections.build(bare, folder / "collection", pictures=False)
+    stored_runs(folder / "collection", folder / "runs.sqlite")
+    site = folder / "site"
+    with Campaigns([folder / "runs.sqlite"]) as runs:
+        build_site(runs, site, folder / "collection", views=0)
+    file = folder / "collection" / f"{SHOWN}-global.hdf5"
+    write_view(view_of(fclib.read(file), fclib.read_solution(file)), site / "network.html")
+    return site
+
+
+def pages(wanted: list[str], site: Path, out: Path) -> None:
+    """Write pictures of pages of a report."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=chromium_path())
+        for name in wanted:
+            place, part, (width, height) = PAGES[name]
+            page = chromium.new_page(viewport={"width": width, "height": height})
+            page.goto(f"{site.as_uri()}/{place}")
+            plot = page.locator(part or "main .plot >> nth=0")
+            plot.scroll_into_view_if_needed()
+            plot.and_(page.locator("[data-drawn]")).wait_for()
+            page.wait_for_timeout(1500)  # pictures in space are drawn after they are said to be
+            if part:
+                plot.screenshot(path=out / f"{name}.png")
+            else:
+                page.evaluate("scrollTo(0, 0)")
+                page.screenshot(path=out / f"{name}.png")
+            page.close()
+        chromium.close()
+
+
+def chromium_path() -> str | None:
+    """Of the system, where there is one; else Playwright's own."""
+    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+
+
+def main() -> int:
     """Make all pictures, or some."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(SHOTS))
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images")
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(names()))
+    parser.add_argument("--out", type=Path, default=IMAGES)
     options = parser.parse_args()
-    for name in options.names or SHOTS:
-        if name not in SHOTS:
-            parser.error(f"there is no picture {name}; there are {', '.join(SHOTS)}")
-        shoot(SHOTS[name], options.out / f"{name}.png")
+    wanted = options.names or names()
+    for name in wanted:
+        if name not in names():
+            parser.error(f"there is no picture {name}; there are {', '.join(names())}")
+    for name in wanted:
+        path = options.out / f"{name}.png"
+        if name in SHOTS:
+            shoot(SHOTS[name], path)
+        elif name == "stack":
+            stack(path)
+        elif name in GROUPS:
+            sheet(GROUPS[name], path)
+    if own := [name for name in wanted if name in PAGES]:
+        with tempfile.TemporaryDirectory() as folder:
+            pages(own, report(Path(folder)), options.out)
+    if set(wanted) & set(figures()):
+        script = ROOT / "scripts" / "site" / "contact_pictures.py"
+        return subprocess.run([sys.executable, script, options.out], check=False).returncode
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

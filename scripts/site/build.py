@@ -202,4 +202,6 @@ if __name__ == "__main__":
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--report", default="", metavar="ADDRESS")
     chosen = parser.parse_args()
+    if chosen.report and "://" not in chosen.report:
+        parser.error(f"--report {chosen.report}: is no address, such as https://host/report")
     sys.exit(main(chosen.out, chosen.quick, chosen.report.rstrip("/")))

@@ -1,9 +1,9 @@
 """Pictures of the figures of docs/contact-problem.md, as they stand before a slider is moved.
 
-    .venv/bin/python scripts/site/contact_pictures.py
+    .venv/bin/python scripts/site/contact_pictures.py [FOLDER]
 
-Writes docs/images/contact-NAME.png, by Chromium, from the module that `make wasm` has built: what a
-site without the module shows, and every reader of the Markdown.
+Writes contact-NAME.png into docs/images, or that folder, by Chromium, from the module that
+`make wasm` has built: what a site without the module shows, and every reader of the Markdown.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class _Quiet(SimpleHTTPRequestHandler):
 
 def main() -> int:
     """Draw all figures of the page; 1 where there is no module."""
+    out = Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else build.ROOT / "docs" / "images"
     names = re.findall(r'data-figure="(\w+)"', PAGE.read_text(encoding="utf-8"))
     figures = dict(build.figures())
     if len(figures) == 1:
@@ -61,11 +62,9 @@ def main() -> int:
             for one in names:
                 place = opened.locator(f"div[data-figure={one}][data-alive]")
                 place.wait_for()
-                target = build.ROOT / "docs" / "images" / f"contact-{one}.png"
+                target = out / f"contact-{one}.png"
                 place.locator(".contact-pictures").screenshot(path=target)
-                print(
-                    f"{target.relative_to(build.ROOT)}: {place.get_by_role('status').inner_text()}"
-                )
+                print(f"{target.name}: {place.get_by_role('status').inner_text()}")
             browser.close()
             server.shutdown()
     return 0

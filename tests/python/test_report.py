@@ -381,33 +381,47 @@ def test_contacts_across_a_periodic_boundary_are_near_both_bodies() -> None:
     assert network_of(silent).shifts is None
 
 
-def stored_families() -> list[str]:
-    """Families of which states are stored, as the set `standard` has them."""
-    return [own.partition("/")[2] for own in known.sets()["standard"] if plan_of(own)]
+def families(assembled: bool) -> list[str]:
+    """SET/FAMILY of all families, each once: of `standard`, and of `extended` what that has not."""
+    found: dict[str, str] = {}
+    for own in (*known.sets()["standard"], *known.sets()["extended"]):
+        found.setdefault(own.partition("/")[2], own)
+    return [own for own in found.values() if isinstance(scene_of(own), Assembled) == assembled]
 
 
-def plan_of(own: str) -> Any:
-    plan = known.plan_of(own)
-    return plan if plan.trajectory is not None else None
+def scene_of(own: str) -> Any:
+    return known.plan_of(own).scene
 
 
-@pytest.mark.parametrize("family", stored_families())
-def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
-    """Of each family, to 1e-6 of its smallest body, by MuJoCo's own places of its geometries."""
+def a_problem(own: str) -> tuple[Any, Any, Any]:
+    """A problem of a family from its stored states, else the first of its simulation that has a
+    contact; its model, in this state; the state's positions.
+    """
+    from fclib import simulate
     from fclib.collections import trajectory
 
-    plan = plan_of(f"standard/{family}")
-    assert plan is not None
-    states = trajectory.read(plan.trajectory)
-    part = states.problem(0)
-    bodies = part.problem.bodies
+    plan = known.plan_of(own)
+    if plan.trajectory is not None:
+        states = trajectory.read(plan.trajectory)
+        return states.problem(0).problem, states.model, states.position[0]
+    assert not isinstance(plan.scene, Assembled)
+    step = next(s for s in simulate.simulate(plan.scene, 1000, tol=1e-4) if s.problem.nc)
+    contacts, bodies = simulate.geometry_of(step.model, step.contacts)
+    problem = step.problem.replace(contacts=contacts, bodies=bodies)
+    return problem, step.model, step.position
+
+
+@pytest.mark.parametrize("family", families(assembled=False))
+def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
+    """Of each family, to 1e-6 of its smallest body, by MuJoCo's own places of its geometries."""
+    problem, model, position = a_problem(family)
+    bodies = problem.bodies
     assert bodies is not None
-    drawn = solids_of(bodies, part.problem.contacts)
+    drawn = solids_of(bodies, problem.contacts)
     record = record_of(drawn)
     bound = 1e-6 * drawn.size
-    network = network_of(part.problem)
+    network = network_of(problem)
     assert network.source == "file"
-    model = states.model
     if not hasattr(model, "model"):
         # elastic: each vertex is a node, where it is now
         nodes = model.places()
@@ -419,7 +433,7 @@ def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
     import mujoco
 
     data = mujoco.MjData(model.model)
-    data.qpos[:] = states.position[0, : model.model.nq]
+    data.qpos[:] = position[: model.model.nq]
     mujoco.mj_kinematics(model.model, data)
     places, turns = data.geom_xpos, data.geom_xmat.reshape(-1, 3, 3)
     found = 0
@@ -435,9 +449,7 @@ def test_drawn_positions_are_those_of_the_simulation(family: str) -> None:
     assert found == len(drawn.kind)
 
 
-@pytest.mark.parametrize(
-    "family", [own for own in known.sets()["standard"] if plan_of(own) is None]
-)
+@pytest.mark.parametrize("family", families(assembled=True))
 def test_drawn_positions_of_assembled_families_are_those_of_their_equations(family: str) -> None:
     """The moments in H are those of the levers that are drawn, to 1e-6 of the smallest body.
 
@@ -445,9 +457,8 @@ def test_drawn_positions_of_assembled_families_are_those_of_their_equations(fami
     moments, and leave their sizes.
     """
     plan = known.plan_of(family)
-    assert plan.chosen is not None
     assert isinstance(plan.scene, Assembled)
-    problem: Any = plan.scene.problem(plan.chosen[0])
+    problem: Any = plan.scene.problem((plan.chosen or (0,))[0])
     network = network_of(problem)
     if problem.bodies is None:
         # nothing is said of places, and nobody is told one

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import os
 import re
 import shutil
 import signal
@@ -11,6 +12,7 @@ import sys
 import threading
 import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +23,12 @@ from typer.testing import CliRunner
 import browser_module
 import fclib
 import golden_work
+from fclib.bench import Store, supervisor
+from fclib.bench.job import Job, Limits, Record, SolverChoice
+from fclib.bench.problems import look
 from fclib.cli import app
-from fclib.report import ReportError, browser, build_site, serving
+from fclib.collections import catalog
+from fclib.report import Campaigns, ReportError, browser, build_site, serving
 from fclib.report.solids import solids_of
 from fclib.report.view import view_of
 from helpers import planted_global, planted_local
@@ -45,12 +51,18 @@ def catalogue(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def site(catalogue: Path) -> Path:
-    folder = catalogue.parent / "a site #1"
+def module() -> Path:
     try:
-        module = browser.find(browser_module.FOLDER)
+        folder = browser.find(browser_module.FOLDER)
     except ReportError as error:
         pytest.skip(str(error))
+    assert folder is not None
+    return folder
+
+
+@pytest.fixture(scope="module")
+def site(catalogue: Path, module: Path) -> Path:
+    folder = catalogue.parent / "a site #1"
     build_site(None, folder, catalogue, with_files=True, views=0, module=module)
     return folder
 
@@ -98,37 +110,60 @@ def test_a_site_is_served_until_an_interrupt(site: Path) -> None:
     assert types == {"wasm": "application/wasm", "mjs": "text/javascript", "js": "text/javascript"}
 
 
-@pytest.fixture
-def page(site: Path) -> Iterator[Any]:
-    """The tower's page at an address of this machine, and in `wrong` what it must not do."""
+@contextmanager
+def opened(address: str, width: int = 390) -> Iterator[Any]:
+    """A page of this machine in Chromium: no error on its console, no request to another host."""
     api = pytest.importorskip("playwright.sync_api")
     found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-    with serving.server(site) as server, api.sync_playwright() as playwright:
-        threading.Thread(target=server.serve_forever, daemon=True).start()
-        address = f"http://127.0.0.1:{server.server_port}/"
+    host = re.match(r"http://127\.0\.0\.1:\d+/", address)
+    assert host is not None
+    with api.sync_playwright() as playwright:
         try:
             chromium = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
         except api.Error:
-            server.shutdown()
             pytest.skip("there is no Chromium: apt install chromium")
-        opened = chromium.new_page(viewport={"width": 390, "height": 800})
-        opened.set_default_timeout(20_000)
+        page = chromium.new_page(viewport={"width": width, "height": 800})
+        page.set_default_timeout(20_000)
         wrong: list[str] = []
-        opened.on("console", lambda message: wrong.append(message.text))
-        opened.on("pageerror", lambda error: wrong.append(str(error)))
-        opened.on(
+        # Chromium warns of the speed of its own drawing, where a page has WebGL
+        page.on(
+            "console",
+            lambda message: (
+                None
+                if message.type == "warning"
+                else wrong.append(f"{message.text} ({message.location['url']})")
+            ),
+        )
+        page.on("pageerror", lambda error: wrong.append(str(error)))
+        page.on(
             "request",
             lambda request: (
                 None
-                if request.url.startswith((address, "data:", "file:"))
+                if request.url.startswith((host[0], "data:", "file:"))
                 else wrong.append(request.url)
             ),
         )
-        opened.goto(address + TOWER)
-        yield opened
+        page.goto(address)
+        yield page
         chromium.close()
-        server.shutdown()
         assert not wrong
+
+
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    with serving.server(folder) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}/"
+        finally:
+            server.shutdown()
+
+
+@pytest.fixture
+def page(site: Path) -> Iterator[Any]:
+    """The tower's page, as wide as a phone."""
+    with served(site) as address, opened(address + TOWER) as page:
+        yield page
 
 
 @pytest.mark.slow
@@ -240,7 +275,7 @@ def move(page: Any, slider: str, values: list[float]) -> None:
 
 def counts(page: Any) -> dict[str, int]:
     """The contacts of each status that the panel tells, once it has followed."""
-    page.wait_for_function("document.querySelector('.what-if').ariaBusy === 'false'")
+    page.wait_for_function("document.querySelector('.what-if')?.ariaBusy === 'false'")
     said = page.locator(".what-if [role=status]").inner_text()
     return {name: int(count) for count, name in re.findall(r"(\d+) (open|stick|slide)", said)}
 
@@ -283,11 +318,30 @@ def test_a_tower_slides_where_friction_is_taken_from_it(page: Any) -> None:
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
 
 
+def drop(page: Any, path: Path) -> None:
+    """Drag a file over the page and drop it, as a person does."""
+    files = page.evaluate_handle(
+        """([name, data]) => {
+          const bytes = Uint8Array.from(atob(data), (one) => one.charCodeAt(0));
+          const files = new DataTransfer();
+          files.items.add(new File([bytes], name));
+          return files;
+        }""",
+        [path.name, base64.b64encode(path.read_bytes()).decode()],
+    )
+    place = page.locator(".drop")
+    place.dispatch_event("dragover", {"dataTransfer": files})
+    assert "over" in str(place.get_attribute("class"))
+    place.dispatch_event("drop", {"dataTransfer": files})
+
+
 @pytest.mark.slow
 def test_a_file_of_ones_own_is_read_drawn_and_solved(page: Any, tmp_path: Path) -> None:
     page.get_by_role("link", name="Your file").click()
     page.get_by_role("heading", name="Your own file").wait_for()
     chooser = page.locator("input[type=file]")
+    start = page.get_by_role("button", name="Start")
+    formulations = set()
     for path in sorted(golden_work.TINY.glob("*/*.hdf5")):
         problem: Any = fclib.read(path)
         chooser.set_input_files(path)
@@ -296,11 +350,25 @@ def test_a_file_of_ones_own_is_read_drawn_and_solved(page: Any, tmp_path: Path) 
         words = dict(re.findall(r"(.+)\n(.+)", facts.inner_text()))
         assert words["formulation"] == problem.formulation
         assert int(words["contacts"]) == problem.nc
-    assert page.locator("figure.live canvas").count() == 1
+        formulations.add(problem.formulation)
+        assert page.locator("figure.live canvas").count() == 1
+        # each is judged, solved and changed
+        page.get_by_role("button", name="Check it here").click()
+        merits = page.locator("table", has_text="The solution of the file").locator("tbody tr")
+        merits.first.wait_for()
+        page.get_by_role("button", name="Solve it here").click()
+        start.click()
+        page.get_by_text(re.compile("^auto: converged after")).wait_for()
+        page.get_by_role("button", name="What if").click()
+        page.locator(".what-if").wait_for()
+        assert sum(counts(page).values()) == problem.nc
+    assert len(formulations) == 10
 
-    page.get_by_role("button", name="Solve it here").click()
-    page.get_by_role("button", name="Start").click()
-    page.get_by_text(re.compile("^auto: converged after")).wait_for()
+    # one that is dropped on the page
+    path = golden_work.TINY / "KaplasTower" / "0030-local.hdf5"
+    drop(page, path)
+    page.locator("dl.facts", has_text=path.name).wait_for()
+    assert "over" not in str(page.locator(".drop").get_attribute("class"))
 
     # a text of Siconos, a file of several problems, and what is none
     local, whole = planted_local(3), planted_global(3)
@@ -367,3 +435,132 @@ def test_a_file_is_drawn_where_python_draws_it(page: Any, tmp_path: Path) -> Non
         assert (found["period"] or []) == solids.period.tolist()
     assert {0, 1, 2, 3, 5, 6} <= kinds
     assert len(problems["PeriodicBox"].bodies.period) == 2
+
+
+def between_walls() -> Any:
+    """A ball between two walls that close: what it needs is against what each of them gives."""
+    frame = np.eye(3)
+    H = np.hstack([frame, frame @ np.diag([-1.0, -1.0, 1.0])])
+    w = np.array([-1.0, 0, 0, -1.0, 0, 0])
+    return fclib.GlobalProblem(spacedim=3, M=np.eye(3), f=np.zeros(3), H=H, w=w, mu=np.full(2, 0.5))
+
+
+@pytest.mark.slow
+def test_a_stored_certificate_is_checked_on_its_page(
+    catalogue: Path, module: Path, tmp_path: Path
+) -> None:
+    """Where a store has the proof of one of a catalogue's problems."""
+    from pyarrow import parquet
+
+    problem = between_walls()
+    folder = tmp_path / "collection"
+    shutil.copytree(catalogue, folder)
+    family = folder / "tiny" / "KaplasTower"
+    fclib.write(family / "0030-global.hdf5", problem)
+    fclib.write(family / "0030-local.hdf5", problem.condense())
+    for table in (folder / "catalog.parquet", family / "catalog.parquet"):
+        rows = parquet.read_table(table)
+        (row,) = rows.to_pylist()
+        for form, own in (("global", problem), ("local", problem.condense())):
+            row[f"{form}_sha256"] = catalog.sha256(family / f"0030-{form}.hdf5")
+            row["digest"] = fclib.digest(own) if form == "global" else row["digest"]
+        parquet.write_table(type(rows).from_pylist([row], rows.schema), table)
+    result = fclib.solve(problem, "auto")
+    assert result.status == "infeasible"
+    record = Record(status="infeasible", cpu_s=1.0, total_cpu_s=1.0, wall_s=1.0, memory=1.0)
+    record.machine = {"node": "here", "cpu": "Abacus"}
+    supervisor.prove(problem, record, result.certificate, result.certificate_z)
+    assert record.certificate is not None
+    with Store(tmp_path / "runs.sqlite") as store:
+        number = store.begin("made", "", 1, 0, "here")
+        choice = SolverChoice("auto", {}, "auto", "chain", "fclib", "1")
+        limits = Limits(time=10.0, wall=20.0, memory=1000.0)
+        facts = look(family / "0030-global.hdf5")
+        store.add(Job(facts, choice, 1e-8, limits, 0, 1), record, number)
+    site = tmp_path / "site"
+    with Campaigns([tmp_path / "runs.sqlite"]) as campaigns:
+        build_site(campaigns, site, folder, with_files=True, views=0, module=module)
+    (run,) = read_data(site, "problems/0")
+    assert result.certificate is not None
+    assert run["certificate"]["y"] == {"0": result.certificate[0], "1": result.certificate[1]}
+
+    with served(site) as address, opened(address + TOWER) as page:
+        page.get_by_text("the global form has no solution. It was checked").wait_for()
+        page.get_by_role("button", name="Check the certificate").click()
+        rows = page.locator("table", has_text="The stored certificate").locator("tbody tr")
+        rows.first.wait_for()
+        words = [str(row).split("\t") for row in rows.all_inner_texts()]
+        assert words[0][:4] == ["proves", *["that there is no solution"] * 2, "the same"]
+        assert [words[1][0], words[1][3]] == ["gain", "equal to 1e-12"]
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+        # one that has been changed is found out
+        page.evaluate("Fclib.values['problems/0'][0].certificate.y[1] *= 1.5")
+        page.get_by_role("button", name="Check the certificate").click()
+        page.get_by_role("cell", name="nothing").wait_for()
+        assert rows.first.inner_text().split("\t")[3] == "differs"
+
+        # what is solved there is proven there
+        page.get_by_role("button", name="Solve it here").click()
+        page.get_by_role("button", name="Start").click()
+        page.get_by_text("the certificate proves that there is no solution").wait_for()
+
+
+@pytest.mark.slow
+def test_a_view_that_is_served_checks_and_solves(site: Path, tmp_path: Path) -> None:
+    """One problem of a file that has two: its own solution, options, sliders."""
+    file = tmp_path / "a tower#1.hdf5"
+    shutil.copy(golden_work.TINY / "KaplasTower" / "0030-global.hdf5", file)
+    words = [sys.executable, "-m", "fclib", "view", str(file), "--serve"]
+    words += ["--browser", str(browser_module.FOLDER)]
+    silent = {**os.environ, "BROWSER": "true"}
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=silent) as process:
+        assert process.stdout is not None
+        found = re.match(r"(http://127\.0\.0\.1:\d+/) ", process.stdout.readline())
+        assert found is not None
+        try:
+            with opened(found[1]) as page:
+                page.get_by_text(
+                    "127.0.0.1, where this page is served, is this machine alone"
+                ).wait_for()
+                page.get_by_role("button", name="Check it here").click()
+                checked = page.locator("table", has_text="compared").locator("tbody tr")
+                checked.first.wait_for()
+                told = [str(row).split("\t")[3].strip() for row in checked.all_inner_texts()]
+                assert told == ["equal to 1e-12"] * 12
+                page.get_by_role("button", name="Solve it here").click()
+                page.get_by_role("button", name="Start").click()
+                page.get_by_text(re.compile("^auto: converged after")).wait_for()
+                page.get_by_role("button", name="What if").click()
+                assert counts(page)["stick"] == 144
+                assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        finally:
+            process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 0
+
+    # the page as a file says how to get there
+    out = tmp_path / "page.html"
+    words = ["view", str(file), "--out", str(out), "--browser", str(browser_module.FOLDER)]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
+    (tmp_path / "none").mkdir()
+    with served(tmp_path) as address, opened(address + "none/") as page:
+        page.goto(out.as_uri())
+        page.get_by_text(f"fclib view '{file}' --serve").wait_for()
+        assert page.get_by_role("button", name="Check it here").count() == 0
+
+
+def test_a_view_is_not_served_without_the_module(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(browser, "BUILT", tmp_path / "none")
+    file = tmp_path / "problem.hdf5"
+    fclib.write(file, planted_local(1).problem)
+    done = CliRunner().invoke(app, ["view", str(file), "--serve"])
+    assert done.exit_code == 1
+    assert "there is no module for browsers" in done.output
+    done = CliRunner().invoke(app, ["view", str(file), "--out", str(tmp_path / "page.html")])
+    assert done.exit_code == 0, done.output
+    assert "--serve" not in (tmp_path / "page.html").read_text()
+    done = CliRunner().invoke(app, ["view", str(file), "--out", "page.html", "--serve"])
+    assert done.exit_code == 2

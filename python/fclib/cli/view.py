@@ -22,26 +22,51 @@ def command(
     target: Annotated[
         Path | None, typer.Option("--out", help="Write the page here, and open nothing.")
     ] = None,
+    serve: Annotated[
+        bool,
+        typer.Option("--serve", help="Serve the page to this machine alone, until Ctrl-C."),
+    ] = False,
+    module: Annotated[
+        Path | None,
+        typer.Option("--browser", help="Folder of `make wasm`, for a page that checks and solves."),
+    ] = None,
 ) -> None:
     """Show the network of contacts of a problem in the browser.
 
-    Bodies, contact points, normals and reactions, to turn and to zoom.
+    Bodies, contact points, normals and reactions, to turn and to zoom. Served, the page also checks
+    the stored solution, solves the problem and changes it.
     """
-    from fclib.report import view
+    if serve and target is not None:
+        raise typer.BadParameter("--serve serves the page, and --out writes it")
+    from fclib.report import ReportError, browser, serving, view
 
     try:
+        built = browser.find(module)
+        if serve and built is None:
+            raise ReportError("there is no module for browsers (make wasm, --browser DIR)")
         contents = contents_of(file)
         kind = kind or contents.owner
         problem = fclib.read(file, kind)
         # a stored solution is of one of the file's problems
         own = contents.solution and kind == contents.owner
         record = view.view_of(problem, fclib.read_solution(file) if own else None)
+        panel = serving.panel_of(file, problem.kind, own, built) if built else None
+        if serve:
+            assert panel is not None
+            assert built is not None
+            serving.serve_view(record, panel, file, built, _opened)
+            return
         path = target
         if path is None:
             path = Path(tempfile.mkdtemp(prefix="fclib-view-")) / f"{file.stem}.html"
-        view.write_view(record, path, title=file.name)
+        view.write_view(record, path, file.name, panel)
     except fclib.Error as error:
         fail(str(error))
     out.print(str(path), highlight=False)
     if target is None and not webbrowser.open(path.resolve().as_uri()):
         err.print("There is no browser here; open the page in one.", highlight=False)
+
+
+def _opened(address: str) -> None:
+    out.print(f"{address} (Ctrl-C ends it)", highlight=False)
+    webbrowser.open(address)

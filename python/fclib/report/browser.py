@@ -39,10 +39,15 @@ def find(folder: Path | None) -> Path | None:
     return None if missing else folder or BUILT
 
 
+def size(module: Path) -> int:
+    """What a page loads of it, in bytes."""
+    return sum((module / name).stat().st_size for name in FILES)
+
+
 def copy(module: Path, site: Path) -> int:
     """Put the module into a site, and return its size."""
     for name in FILES:
         target = site / PLACE / name
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(module / name, target)
-    return sum((site / PLACE / name).stat().st_size for name in FILES)
+    return size(module)

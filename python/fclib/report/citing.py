@@ -1,7 +1,8 @@
 """How to cite: BibTeX of the collection, families and problems, and of solvers and their papers.
 
 references.bib has the papers, each by its first author and its year, as solvers name them:
-"Alart & Curnier 1991; Acary, Bremond & Huber 2018" is alart1991 and acary2018.
+"Alart & Curnier 1991; Acary, Bremond & Huber 2018" is alart1991 and acary2018. An entry has a DOI
+where a second source gives it for that paper: a page without a link is better than a wrong one.
 """
 
 from __future__ import annotations

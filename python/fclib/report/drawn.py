@@ -1,7 +1,7 @@
 """What the site draws of each problem: its view, its thumbnail, and the steps of its sequence.
 
     data/views/12.js               patterns, spectrum, bodies and contacts of row 12
-    thumbs/12.webp                 its bodies
+    thumbs/12.webp                 its bodies, or its matrix where the file has none
     data/sequences/SET/FAMILY.js   poses of the bodies, step after step
 
 Each file is read once. Large data are compressed: a browser unpacks them without a library.
@@ -33,6 +33,7 @@ PACKED = 4000  # characters from which data are compressed
 STEPS = 120  # of a sequence at most
 POSES = 24_000  # of a sequence, over all of its steps, at most
 FEWEST = 3  # steps of a sequence
+CONDENSED = 200  # contacts up to which W is made for a small picture
 MANY = 200  # problems from which on processes share the work
 
 
@@ -85,12 +86,13 @@ def draw(folder: Path, task: Task) -> Drawn:
         return Drawn(task.place)  # a file that went away or was damaged; its runs stay
     size = put(folder, f"views/{task.place}", record) if record is not None and task.view else 0
     bodies, contacts = problem.bodies, problem.contacts
-    if bodies is None or contacts is None or not len(bodies.shape_kind):
-        return Drawn(task.place, task.view, bytes=size)
-    solids = solids_of(bodies, contacts)
     thumb = folder / "thumbs" / f"{task.place}.webp"
     thumb.parent.mkdir(exist_ok=True)
-    picture.draw(solids, thumb)
+    if bodies is None or contacts is None or not len(bodies.shape_kind):
+        picture.draw_matrix(matrix_of(problem), thumb)
+        return Drawn(task.place, task.view, thumb=True, bytes=size + thumb.stat().st_size)
+    solids = solids_of(bodies, contacts)
+    picture.draw(solids, thumb, near=contacts.point[(contacts.shape >= 0).all(axis=1)])
     if task.picture is not None and record is not None:
         task.picture.parent.mkdir(parents=True, exist_ok=True)
         points, forces = record["network"]["points"], record.get("forces")
@@ -114,6 +116,13 @@ def draw(folder: Path, task: Task) -> Drawn:
         # an elastic body is more than a pose
         poses=None if solids.strain else poses.astype(np.float32),
     )
+
+
+def matrix_of(problem: Any) -> Any:
+    """What is drawn of a problem without bodies: W, or H where W would take long."""
+    if not hasattr(problem, "H"):
+        return problem.W
+    return problem.condense().W if problem.nc <= CONDENSED else problem.H
 
 
 def scene_of(solids: Solids) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -231,7 +233,18 @@ class Campaigns:
         found["form"] = row["formulation"]
         if row["run"] in reported:
             found["history"] = _thinned(store.history(row["run"]), row["cpu_s"])
-        return dict(rounded(found, DIGITS))
+        found = dict(rounded(found, DIGITS))
+        if stored := store.certificate(row["run"]):
+            found["certificate"] = _proof(json.loads(stored))
+        return found
+
+
+def _proof(record: Mapping[str, Any]) -> dict[str, Any]:
+    """A certificate for a page: what a solver found are doubles, and they keep all their digits."""
+    numbers = {
+        name: {key: float(Fraction(value)) for key, value in record[name].items()} for name in "yz"
+    }
+    return {**numbers, "gain": record["gain"], "bound": record["bound"]}
 
 
 def _thinned(

@@ -1,14 +1,22 @@
-"""A site at an address of this machine: a browser loads modules from there, not from a folder."""
+"""Pages at an address of this machine: a browser loads modules from there, not from a folder."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import shlex
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
+from urllib.parse import quote
 
+from fclib.collections.catalog import sha256
+from fclib.report import browser, taking
 from fclib.report.error import ReportError
-from fclib.report.site import MARK
+from fclib.report.site import MARK, described_merits
+from fclib.report.view import write_view
 
 HOST = "127.0.0.1"  # nobody else reaches it
 
@@ -21,6 +29,14 @@ class _Handler(SimpleHTTPRequestHandler):
         ".wasm": "application/wasm",
     }
 
+    def do_GET(self) -> None:
+        """A file; and nothing, without an error, for the icon that browsers ask each server for."""
+        if self.path == "/favicon.ico":
+            self.send_response(204)
+            self.end_headers()
+        else:
+            super().do_GET()
+
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing of what is asked for."""
 
@@ -30,16 +46,14 @@ class _Handler(SimpleHTTPRequestHandler):
         super().end_headers()
 
 
-def server(site: Path, port: int = 0) -> ThreadingHTTPServer:
-    """A server of a site, not yet running, at a port or at any that is free.
+def server(folder: Path, port: int = 0) -> ThreadingHTTPServer:
+    """A server of a folder, not yet running, at a port or at any that is free.
 
     Raises:
-        ReportError: the folder is no site, or the port is not to be had.
+        ReportError: the port is not to be had.
     """
-    if not (site / MARK).is_file():
-        raise ReportError(f"{site}: is no site that fclib report has made")
     try:
-        return ThreadingHTTPServer((HOST, port), partial(_Handler, directory=str(site)))
+        return ThreadingHTTPServer((HOST, port), partial(_Handler, directory=str(folder)))
     except OSError as error:
         raise ReportError(f"{HOST}:{port}: {error.strerror}") from None
 
@@ -50,9 +64,59 @@ def serve(site: Path, say: Callable[[str], None]) -> None:
     Raises:
         ReportError: the folder is no site.
     """
-    with server(site) as running:
+    if not (site / MARK).is_file():
+        raise ReportError(f"{site}: is no site that fclib report has made")
+    _until_interrupted(site, say)
+
+
+def _until_interrupted(folder: Path, say: Callable[[str], None]) -> None:
+    with server(folder) as running:
         say(f"http://{HOST}:{running.server_port}/")
         try:
             running.serve_forever()
         except KeyboardInterrupt:
             return
+
+
+# ---- the page of one problem
+
+
+def panel_of(file: Path, kind: str, solved: bool, module: Path | None) -> dict[str, Any]:
+    """What the page of a file needs to check and solve its problem.
+
+    Args:
+        file: an FCLIB file.
+        kind: of the problem in it.
+        solved: whether the stored solution is of this problem.
+        module: folder of the module, None where there is none.
+    """
+    own: dict[str, Any] = {"what": kind, "path": file.name, "kind": kind, "sha256": sha256(file)}
+    own |= {"href": f"files/{quote(file.name)}", "merit": taking.merit_of(file) if solved else None}
+    return {
+        "merits": described_merits(),
+        "module": browser.size(module) if module else 0,
+        "serve": f"fclib view {shlex.quote(str(file))} --serve",
+        "files": [own],
+    }
+
+
+def serve_view(
+    record: Mapping[str, Any],
+    panel: Mapping[str, Any],
+    file: Path,
+    module: Path,
+    say: Callable[[str], None],
+) -> None:
+    """Serve the page of a file on this machine until it is interrupted; `say` is told the address.
+
+    Raises:
+        ReportError: a library is not installed.
+    """
+    with tempfile.TemporaryDirectory(prefix="fclib-view-") as name:
+        folder = Path(name)
+        with_reader = {**panel, "libraries": [browser.READER]}
+        write_view(record, folder / "index.html", file.name, with_reader)
+        browser.copy(module, folder)
+        (folder / "files").mkdir()
+        shutil.copyfile(file, folder / "files" / file.name)
+        _until_interrupted(folder, say)

@@ -330,7 +330,7 @@ class _Writer:
             "docs": self.docs,
             "metrics": {name: label for name, (label, _) in METRICS.items()},
             "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
-            "merits": [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS],
+            "merits": described_merits(),
             "charges": {"penalty": PENALTY, "shift": SHIFT},
             "tolerances": [],
             "headlines": [],
@@ -518,6 +518,11 @@ class _Writer:
             found.append(record)
         # pictures first
         return sorted(found, key=lambda one: "scene" not in one and "thumb" not in one)
+
+
+def described_merits() -> list[list[str | None]]:
+    """The names of all merits, and what they are."""
+    return [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS]
 
 
 def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:

@@ -23,7 +23,8 @@ DIGITS = 5  # of positions and reactions in a picture
 CELLS = 128  # of a pattern, along its longer side
 CONDENSED = 2000  # contacts up to which W is made of a global problem, for its pattern
 SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
-SCRIPTS = ("table.js", "plot.js", "scene.js", "profiles.js", "view.js")
+SCRIPTS = ("table.js", "plot.js", "scene.js", "profiles.js")
+PANEL = ("live.js", "whatif.js", "compute.js")  # what checks and solves
 STATUS = ("open", "stick", "slide")
 END = re.compile("</script", re.IGNORECASE)
 
@@ -232,8 +233,20 @@ def asset(name: str) -> str:
     return (ASSETS / name).read_text(encoding="utf-8")
 
 
-def write_view(record: Mapping[str, Any], path: Path, title: str = "") -> None:
+def write_view(
+    record: Mapping[str, Any],
+    path: Path,
+    title: str = "",
+    compute: Mapping[str, Any] | None = None,
+) -> None:
     """Write a page that holds all it needs; it is whole, or the old one.
+
+    Args:
+        record: of `view_of`.
+        path: of the page.
+        title: name of the problem's file.
+        compute: what `serving.served` says of the file and the module, for a panel that checks and
+            solves the problem.
 
     Raises:
         ReportError: a library is not installed.
@@ -245,8 +258,11 @@ def write_view(record: Mapping[str, Any], path: Path, title: str = "") -> None:
         known.append(library.record | {"text": library.notices})
         for name, text in library.files.items():
             (scripts if name.endswith(".js") else styles).append(text)
-    scripts += [asset(name) for name in SCRIPTS]
-    scripts.append(f"Fclib.view({as_json(dict(record, file=title, libraries=known))});")
+    chosen = (*SCRIPTS, *(PANEL if compute else ()), "view.js")
+    scripts += [asset(name) for name in chosen]
+    known += (compute or {}).get("libraries", [])
+    shown = dict(record, file=title, libraries=known, compute=compute)
+    scripts.append(f"Fclib.view({as_json(shown)});")
     # an end of a script in a string of it would be one of the element
     elements = ["<script>\n" + END.sub(r"<\\/script", text) + "\n</script>" for text in scripts]
     page = asset("view.html")

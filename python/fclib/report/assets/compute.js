@@ -10,6 +10,8 @@
   const MOST = 1000; // points of the curve
   const EDGE = 1e-6; // of a cone: what is so near to it, relative, is at it
 
+  const HERE = ["127.0.0.1", "localhost"];
+
   let worker = null;
   const core = Fclib.core = async () => {
     const { FclibWorker } = await import(new URL(MODULE, document.baseURI).href);
@@ -27,7 +29,7 @@
       const sum = [...new Uint8Array(await crypto.subtle.digest("SHA-256", bytes))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
       if (sum !== file.sha256) throw new Error(`${file.href} is another file than when the site was made: its SHA-256 is ${sum}`);
     }
-    return (await core()).read(bytes);
+    return (await core()).read(bytes, file.kind);
   };
 
   /* the difference of two values, in words; what is not finite is stored as null */
@@ -36,11 +38,12 @@
     const apart = Math.abs(stored - here);
     return apart <= SAME * Math.max(1, Math.abs(stored)) ? "equal to 1e-12" : `differs by ${number(apart)}`;
   };
+  const comparison = { key: "same", label: "compared", cell: (r) => h("span", { class: r.same.startsWith("differs") || r.same.startsWith("one") ? "bad" : "good" }, r.same) };
   const meritTable = (stored, here) => Fclib.table({
     caption: stored ? "The stored solution: stored merits, and those recomputed here" : "The solution of the file: its merits, computed here", page: 60,
     rows: Fclib.values.site.merits.filter(([name]) => name in (stored || here)).map(([name, doc]) => ({ name, doc, here: here[name], ...stored ? { stored: stored[name], same: compared(stored[name], here[name]) } : {} })),
     columns: [{ key: "name", label: "part", head: true }, ...stored ? [{ key: "stored", label: "stored", type: "number" }] : [], { key: "here", label: "here", type: "number" },
-      ...stored ? [{ key: "same", label: "compared", cell: (r) => h("span", { class: r.same.startsWith("differs") || r.same.startsWith("one") ? "bad" : "good" }, r.same) }] : [], { key: "doc", label: "what it is", wrap: true }],
+      ...stored ? [comparison] : [], { key: "doc", label: "what it is", wrap: true }],
   });
 
   /* the error over time, as it falls */
@@ -153,12 +156,26 @@
   };
 
   /* what a certificate proves, once it has been checked */
-  const proof = (found) => !found ? "the certificate proves nothing" : found.bound === Infinity ? "the certificate proves that there is no solution" : `the certificate proves that there is no solution of a norm below ${number(found.bound)}`;
+  const statement = (bound) => bound === Infinity ? "that there is no solution" : `that there is no solution of a norm below ${number(bound)}`;
+  const proof = (found) => `the certificate proves ${found ? statement(found.bound) : "nothing"}`;
+  const proofTable = (own, here) => {
+    const stored = { ...own, bound: own.bound ?? Infinity }, parts = [["gain", "how fast the contacts of the certificate close, each by its number in it: a proof has more than 0"], ["bound", "what it proves is of reactions of a smaller norm"]];
+    const [said, found] = [statement(stored.bound), here ? statement(here.bound) : "nothing"];
+    return Fclib.table({
+      caption: "The stored certificate: what it proved when it was stored, and what it proves here", page: 60,
+      rows: [{ name: "proves", doc: "", stored: said, here: found, same: said === found ? "the same" : "differs" },
+        ...parts.filter(([name]) => Number.isFinite(stored[name])).map(([name, doc]) => ({ name, doc, stored: stored[name], here: here && here[name], same: here ? compared(stored[name], here[name]) : "differs" }))],
+      columns: [{ key: "name", label: "part", head: true }, { key: "stored", label: "stored", type: "text", wrap: true }, { key: "here", label: "here", type: "text", wrap: true }, comparison, { key: "doc", label: "what it is", wrap: true }],
+    });
+  };
+  /* by number, as it is stored, to an array */
+  const spread = (numbers, size) => { const all = new Float64Array(size); for (const [k, value] of Object.entries(numbers)) all[k] = value; return all; };
 
   /* check, solve and change a problem: buttons, and what they bring
-     source(): {read() -> {problem, solution}, merit: as stored, view: as drawn, name}; it is asked at each press */
-  Fclib.panel = (source, more) => {
-    const said = h("p", { class: "small", role: "status" }), merits = h("div", {}), seen = h("div", {}), solved = h("div", {}), changed = h("div", {});
+     source(): {read() -> {problem, solution}, merit: as stored, view: as drawn, name}; it is asked at each press
+     proven: {read(), proof: as stored}, where a run has proven that there is no solution */
+  Fclib.panel = (source, more, proven) => {
+    const said = h("p", { class: "small", role: "status" }), merits = h("div", {}), proofs = h("div", {}), seen = h("div", {}), solved = h("div", {}), changed = h("div", {});
     let figure = null;
     const attempt = async (button, text, act) => {
       button.disabled = true;
@@ -177,6 +194,10 @@
       const here = await (await core()).merit(problem, solution);
       if (own.current()) merits.replaceChildren(meritTable(own.merit, here));
     }) }, "Check it here");
+    const certificate = proven && h("button", { type: "button", onclick: () => attempt(certificate, "The file is read and the certificate checked.", async () => {
+      const { problem } = await proven.read(), fclib = await core(), { nc, p } = await fclib.validate(problem), { y, z } = proven.proof;
+      proofs.replaceChildren(proofTable(proven.proof, await fclib.check_certificate(problem, spread(y, nc), spread(z, p))));
+    }) }, "Check the certificate");
     const prepared = async () => {
       const own = source(), { problem, solution } = await own.read(), fclib = await core(), solvers = await fclib.solvers_for(problem);
       if (!own.current()) return null;
@@ -194,17 +215,18 @@
       if (found) changed.replaceChildren(await Fclib.whatIf(found.fclib, found.problem, found.solution, found.own.view, found.picture, found.solvers, say));
     }) }, "What if");
     const clear = () => { figure = null; for (const box of [merits, seen, solved, changed]) box.replaceChildren(); };
-    return { clear, show: () => live(source()), elements: [h("div", { class: "controls" }, more, check, solve, change), said, merits, changed, seen, solved] };
+    return { clear, show: () => live(source()), elements: [h("div", { class: "controls" }, more, check, certificate, solve, change), said, merits, proofs, changed, seen, solved] };
   };
 
   /* what a page says that was opened from a folder of files */
   Fclib.servedBy = (words) => {
     const folder = decodeURIComponent(location.pathname).replace(/\/[^/]*$/, "");
-    return [h("p", {}, `${words} This serves the site to this machine alone:`), copyable(`fclib report --serve --out '${folder.replaceAll("'", "'\\''")}'`, "the command that serves the site")];
+    const { serve = `fclib report --serve --out '${folder.replaceAll("'", "'\\''")}'` } = Fclib.values.site;
+    return [h("p", {}, `${words} This serves it at an address of this machine, 127.0.0.1, which nobody else reaches:`), copyable(serve, "the command that serves the page")];
   };
 
   /* the panel of a problem whose files the site has, where it has the module too */
-  Fclib.computeIt = (record, view, name) => {
+  Fclib.computeIt = (record, view, name, runs) => {
     const files = (record.files || []).filter((one) => one.path.endsWith(".hdf5") && (one.href || "").startsWith("files/"));
     const bytes = Fclib.values.site.module;
     if (!files.length || !bytes) return [];
@@ -222,7 +244,9 @@
       file = files[Number(e.target.value)];
       own.clear();
     } }, files.map((one, k) => h("option", { value: k }, one.what)))) : null;
-    const own = Fclib.panel(source, form);
-    return [head, h("p", { class: "small" }, `By the core itself, in this browser: nothing is sent. ${number(bytes / 1e6)} MB are loaded for it, once.`), ...own.elements];
+    // of a global problem or of its local form, as the run was
+    const run = (runs || []).find((one) => one.certificate), told = run && files.find(({ path }) => path.endsWith(run.form.startsWith("G") ? "-global.hdf5" : "-local.hdf5"));
+    const own = Fclib.panel(source, form, told && { read: () => contents(told), proof: run.certificate });
+    return [head, h("p", { class: "small" }, `By the core itself, in this browser: nothing is sent${HERE.includes(location.hostname) ? `, and ${location.hostname}, where this page is served, is this machine alone` : ""}. ${number(bytes / 1e6)} MB are loaded for it, once.`), run && h("p", { class: "small" }, `By the certificate of ${run.solver}, the ${run.form.startsWith("G") ? "global" : "local"} form has no solution${run.certificate.bound === null ? "" : ` of a norm below ${number(run.certificate.bound)}`}. It was checked in rational arithmetic when it was stored.`), ...own.elements].filter(Boolean);
   };
 })();

@@ -373,7 +373,7 @@
         columns: [{ key: 0, label: "part", head: true }, { key: "value", label: "value", type: "number", value: ([name]) => view.merit[name] }, { key: 1, label: "what it is", wrap: true }],
       }));
     } else page.append(h("p", { class: "soft" }, "This site has no picture of this problem: ", h("code", {}, "fclib view FILE"), " draws it."));
-    page.append(...Fclib.computeIt(record, view, id));
+    page.append(...Fclib.computeIt(record, view, id, runs));
     if (runs) {
       const several = new Set(runs.map((r) => r.form)).size > 1;
       page.append(h("h2", {}, "Runs"), Fclib.table({

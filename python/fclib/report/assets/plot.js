@@ -6,7 +6,7 @@
   const BANDED = 6; // curves with a band: more hide each other
   const FEWEST = 1000; // values of x up to which each is drawn
   Fclib.stroke = (k) => ({ color: colour(`c${k % 7}`), dash: DASHES[Math.floor(k / 7) % DASHES.length] });
-  Fclib.swatch = (k) => h("span", { class: "swatch", "aria-hidden": true, style: `border-top: 3px ${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]} var(--c${k % 7})` });
+  Fclib.swatch = (k) => h("span", { class: "swatch", "aria-hidden": true, "data-symbol": "●■◆✚✖▲▼★⬢⬟"[k % 10], style: `color: var(--c${k % 7}); border-top: 3px ${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]}` });
   // the buttons of a chart and of a picture in space: these and no others, none that sends data; none for fingers
   Fclib.BUTTONS = { plane: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], space: [["orbitRotation", "pan3d"], ["resetCameraDefault3d"]] };
   Fclib.isTouched = () => matchMedia("(pointer: coarse)").matches;
@@ -100,14 +100,15 @@
       keys: { ArrowLeft: read(-stride), ArrowRight: read(stride), Escape: (box) => { Plotly.Fx.unhover(box); box.say(""); } },
       draw: () => ({
         data: [...curves.map((s, k) => ({
-          type: "scatter", mode: options.ends && series.length === 1 ? "lines+markers" : "lines", name: s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
+          type: "scatter", mode: options.ends || series.length > 1 ? "lines+markers" : "lines", name: s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
+          ...series.length > 1 ? { marker: { symbol: Fclib.SYMBOLS[(s.style ?? k) % Fclib.SYMBOLS.length], size: 8, maxdisplayed: 9 } } : {},
           hovertemplate: few ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}` : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
         })), ...curves.filter((s) => s.band).slice(0, BANDED).flatMap((s, k) => s.band.map((y, side) => ({
           type: "scatter", mode: "lines", x, y: x.map((v) => Fclib.at({ x: s.x, y }, v)), line: { width: 0, shape: "hv" }, hoverinfo: "skip", showlegend: false,
           ...side ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` } : {},
         })))],
         layout: {
-          hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1, legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction" },
+          hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1, legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction", traceorder: "normal" },
           xaxis: { type: xlog ? "log" : "linear", range: log([low, high], xlog), title: { text: options.xlabel }, unifiedhovertitle: { text: `${options.xname} = %{x:.3~g}` } },
           yaxis: { type: ylog ? "log" : "linear", range: log(options.yrange, ylog), title: { text: options.ylabel }, tickformat: options.ypercent ? ".0%" : undefined },
         },

@@ -59,7 +59,7 @@
     const body = (b) => b < 0 ? "the ground" : names[b] || `body ${b}`;
     const says = points.map((_, k) => `contact ${k}${pairs.length && (bodies.length || names.length) ? `: ${body(pairs[k][0])} and ${body(pairs[k][1])}` : ""}<br>μ = ${number(view.mu[k])}` +
       (solved ? `, ${STATUS[view.status[k]]}<br>r_N = ${number(view.reactions[k][0])}, ‖r_T‖ = ${number(length(view.reactions[k].slice(1)))}` : ""));
-    const dot = Math.min(4.5, Math.max(2.2, 60 / Math.sqrt(points.length)));
+    const dot = (Fclib.isNarrow() ? 0.6 : 1) * Math.min(4.5, Math.max(2.2, 60 / Math.sqrt(points.length)));
     // the force on that body which it carries: upwards, here as in all pictures
     const arrows = (chosen) => chosen.filter((k) => sizes[k] > 0).map((k) => {
       const up = view.forces[k][2] < 0 ? -1 : 1;
@@ -82,7 +82,7 @@
         for (const f of list) { triangles.push(f.map((v) => v + first)); if (painted) facecolor.push(tint(solids.body[k])); }
       }
       return { type: "mesh3d", ...axes(vertices), i: triangles.map((f) => f[0]), j: triangles.map((f) => f[1]), k: triangles.map((f) => f[2]), hoverinfo: "skip", flatshading: true,
-        lighting: { ambient: 0.65, diffuse: 0.7, specular: 0.05 }, ...intensity.length && !poses ? { intensity, colorscale: "Viridis", colorbar: { title: { text: `displacement [${unit}]`, side: "right" }, thickness: 12, len: 0.6 } } : painted ? { facecolor } : {}, ...more };
+        lighting: { ambient: 0.65, diffuse: 0.7, specular: 0.05 }, ...intensity.length && !poses ? { intensity, colorscale: "Viridis", colorbar: { title: { text: `displacement [${unit}]`, side: Fclib.isNarrow() ? "top" : "right" }, thickness: 12, len: 0.6, ...Fclib.isNarrow() ? { orientation: "h", y: 0, yanchor: "bottom" } : {} } } : painted ? { facecolor } : {}, ...more };
     };
     const strained = moving.filter((k) => solids.strain && solids.strain[solids.kind[k]]), rigid = moving.filter((k) => !strained.includes(k));
     const hulls = () => {
@@ -146,7 +146,7 @@
       const [from, to] = reach(poses ? [...bounds, ...poses.reach] : bounds), spans = from.map((x, k) => to[k] - x + 2 * pad), span = Math.max(...spans);
       return { from, to, ratios: spans.map((x) => Math.max(0.02, x / span)) };
     };
-    const { from, to, ratios } = window3d(), far = Math.max((Fclib.isNarrow() ? 1.6 : 1.1) * length(ratios), 1.6 * ratios[2]);
+    const { from, to, ratios } = window3d(), far = Math.max((Fclib.isNarrow() ? 1.4 : 1.1) * length(ratios), 1.6 * ratios[2]);
     const eye = (turn, tilt, distance) => ({ x: distance * Math.cos(tilt) * Math.sin(turn), y: -distance * Math.cos(tilt) * Math.cos(turn), z: distance * Math.sin(tilt) });
     const start = { eye: eye(0.6, placed ? 0.3 : 0.4, far), center: { x: 0, y: 0, z: -0.05 }, up: { x: 0, y: 0, z: 1 } };
     const look = (box, camera) => Plotly.relayout(box, { "scene.camera": camera });
@@ -189,7 +189,7 @@
     const count = solids ? new Set(moving.map((k) => solids.body[k])).size : bodies.length;
     const figure = Fclib.plot({
       name: `contacts-${name}`, title: `${placed ? "Bodies and contacts" : "Contact network"}: ${count} bodies, ${points.length} contacts`, says: flat ? "Plus and minus zoom, 0 resets." : "Arrows turn, plus and minus zoom, 0 resets.", keys, above: [above, steps].filter(Boolean),
-      height: Math.round(Math.min(0.7 * innerHeight, 560)), space: !flat, picture: true,
+      height: Math.round(Math.min(0.7 * innerHeight, 560, Fclib.isNarrow() ? innerWidth : Infinity)), space: !flat, picture: true,
       draw: () => {
        const shot = window3d();
        return {

@@ -88,7 +88,7 @@ def solve(
         raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
-    values = {name: _plain(name, value) for name, value in options.items()}
+    values = {name: _plain(name, value) for name, value in options.items()} if options else {}
     return _core.solve(
         problem,
         find_solver(solver),

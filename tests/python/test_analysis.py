@@ -28,6 +28,7 @@ from helpers import (
     planted_rolling,
     project,
 )
+from helpers_cli import run
 
 some = hypothesis.settings(deadline=None, max_examples=20, derandomize=True)
 
@@ -51,11 +52,6 @@ def few_contacts() -> list[Any]:
             if group["vectors/mu"].size <= 150:
                 small.append(pytest.param(path, id=f"{path.parent.name}/{path.stem}"))
     return small or [None]
-
-
-def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fclib", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
 
 
 def assert_no_solution(problem: fclib.Problem, proof: analysis.Certificate | None) -> None:

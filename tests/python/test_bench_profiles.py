@@ -7,7 +7,6 @@ import dataclasses
 import json
 import math
 import subprocess
-import sys
 import warnings
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +18,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from typer.testing import CliRunner
 
+import helpers_cli
 from fclib import bench
 from fclib._solve import MERITS
 from fclib.bench import campaign, profiles
@@ -92,8 +92,7 @@ def store(tmp_path: Path) -> Path:
 
 
 def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fclib", "profile", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
+    return helpers_cli.run("profile", *arguments)
 
 
 # ---- by hand

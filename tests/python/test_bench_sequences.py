@@ -24,6 +24,7 @@ from helpers import planted_local
 
 NC = 5
 STEPS = 6
+LIMIT = 60.0  # [s], which the limit of iterations comes before on any machine
 HOPELESS = 3  # the step that has no solution, in `broken`
 SAME = ("key", "start", "sequence", "step", "guess", "status", "iterations", "error", "solver")
 
@@ -75,7 +76,7 @@ def entries(folder: Path, **changes: Any) -> dict[str, Any]:
         "name": "along",
         "solvers": ["nsgs", {"name": "nsgs", "options": {"relaxation": 1.2}}],
         "tolerances": [1e-6],
-        "time_limit": 2.0,
+        "time_limit": LIMIT,
         "problems": [group],
     }
     return known | changes
@@ -124,7 +125,7 @@ def by_hand(folder: Path) -> Iterator[tuple[int | None, fclib.Result]]:
     for k in range(STEPS):
         problem = fclib.read(folder / f"{k:04d}.hdf5")
         guess = guess_of(known[1], known[2], problem) if known else None
-        result = fclib.solve(problem, "nsgs", 1e-6, guess=guess, time_limit=2.0)
+        result = fclib.solve(problem, "nsgs", 1e-6, guess=guess, time_limit=LIMIT)
         yield (known[0] if known else None), result
         if result.status == "converged":
             known = k, problem, result.solution
@@ -190,7 +191,10 @@ def test_a_step_is_another_run_where_the_steps_before_are_others(smooth: Path) -
         ({"sequence": {"stride": True}}, "sequence.stride: True"),
         ({"sequence": {"begin": 1}}, "sequence.begin: is not known here; there is: count"),
         ({"sequence": 3}, "sequence: is no table"),
-        ({"sequence": {}, "planted": {"count": 2, "contacts": 3}}, "of files, or of a set"),
+        (
+            {"sequence": {}, "planted": {"count": 2, "contacts": 3}},
+            "of files, a set or a simulation",
+        ),
     ],
 )
 def test_what_is_no_sequence_is_said(smooth: Path, group: dict[str, Any], words: str) -> None:
@@ -380,6 +384,21 @@ def test_steps_at_rest_are_instances_of_their_own(tmp_path: Path) -> None:
     assert np.isnan(costs.spread).all()  # no repeats
     (row,) = profiles.along(path, profiles.load(path, start=None))
     assert (row["of"], row["solved cold"], row["iterations warm"]) == (3, 3, 0)
+
+
+def test_the_steps_of_a_simulation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
+    monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))
+    group = {"simulate": {"family": "Chain", "steps": [0, 40, 41, 43]}, "sequence": {"start": 1}}
+    path = tmp_path / "store.sqlite"
+    own = campaign(tmp_path, problems=[group], solvers=["nsgs"], tolerances=[1e-4])
+    assert bench.run_campaign(own, path).solved == 6
+    warm = chain(rows_of(path))
+    assert [Path(row["problem"]).stem[-3:] for row in warm] == ["040", "041", "043"]
+    assert [row["guess"] for row in warm] == [None, 0, 1]
+    assert {row["sequence"] for row in warm} == {"Chain, from 1"}
+    with pytest.raises(bench.CampaignError, match="of files, a set or a simulation"):
+        campaign(tmp_path, problems=[group | {"set": "tiny"}])
 
 
 def test_warm_beside_cold(quiet: Path, with_a_failure: Path) -> None:

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 import fclib
 from fclib import cli
 from helpers import judge, planted_global, planted_local
+from helpers_cli import run
 
 SOLVE_KEYS = [
     "problem",
@@ -33,9 +34,10 @@ SOLVE_KEYS = [
 ]
 
 
-def run(
+def start(
     *arguments: object, module: bool = True, env: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
+    """A command as a shell starts it."""
     script = Path(sys.executable).with_name("fclib")
     program = [sys.executable, "-m", "fclib"] if module else [str(script)]
     command = [*program, *map(str, arguments)]
@@ -194,10 +196,12 @@ def test_solve_keeps_its_tolerance_and_its_options(files: list[Path]) -> None:
 def test_solve_writes_what_it_found(files: list[Path]) -> None:
     for path in files:
         problem = fclib.read(path)
-        start = fclib.Solution(r=np.zeros(problem.m), l=np.zeros(problem.p) if problem.p else None)
-        fclib.write(path, problem, start)
-    assert run("check", *files).returncode == 1
-    assert run("solve", *files).returncode == 0
+        nothing = fclib.Solution(
+            r=np.zeros(problem.m), l=np.zeros(problem.p) if problem.p else None
+        )
+        fclib.write(path, problem, nothing)
+    assert start("check", *files).returncode == 1
+    assert start("solve", *files).returncode == 0
     assert run("check", *files).returncode == 1, "without --write nothing is written"
     assert run("solve", "--write", *files).returncode == 0
     assert run("check", *files).returncode == 0
@@ -300,7 +304,7 @@ def test_solvers_shows_one_in_full() -> None:
 
 def test_solvers_names_what_is_absent() -> None:
     nowhere = os.environ | {"FCLIB_SICONOS_PYTHON": "/nowhere/python"}
-    table = run("solvers", env=nowhere)
+    table = start("solvers", env=nowhere)
     assert table.returncode == 0
     assert "Not here: siconos:" in table.stdout
     assert "FCLIB_SICONOS_PYTHON" in table.stdout
@@ -312,7 +316,7 @@ def test_solvers_names_what_is_absent() -> None:
 @pytest.mark.parametrize("command", ["info", "solve", "check"])
 def test_a_bad_file_does_not_stop_the_others(command: str, files: list[Path], bad: Path) -> None:
     missing = bad.with_name("missing.hdf5")
-    result = run(command, "--json", files[0], bad, files[1], missing, files[2])
+    result = start(command, "--json", files[0], bad, files[1], missing, files[2])
     assert result.returncode == 1
     lines = result.stderr.splitlines()
     assert len(lines) == 2
@@ -364,7 +368,7 @@ def test_a_usage_error_is_2_and_no_traceback(arguments: list[str], files: list[P
 
 def test_version_and_help() -> None:
     for module in (True, False):
-        result = run("--version", module=module)
+        result = start("--version", module=module)
         assert result.returncode == 0
         assert result.stdout == f"fclib {fclib.__version__}\n"
     for command in ([], ["info"], ["solve"], ["check"], ["convert"], ["solvers"], ["demo"]):
@@ -372,6 +376,24 @@ def test_version_and_help() -> None:
             result = run(*command, flag)
             assert result.returncode == 0
             assert "Usage" in result.stdout
+
+
+def test_a_command_imports_what_it_needs_alone(files: list[Path]) -> None:
+    """What `fclib info` does not use would take most of the time that it runs."""
+    code = (
+        "import sys; from fclib.cli import app; app(sys.argv[1:], standalone_mode=False);"
+        "print(*sys.modules, file=sys.stderr)"
+    )
+    for arguments, absent in (
+        (["info", str(files[0])], ["mujoco", "fclib.bench", "fclib.collections"]),
+        (["--help"], ["scipy.linalg", "mujoco", "pyarrow", "matplotlib", "fclib.analysis"]),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *arguments], capture_output=True, text=True, check=True
+        )
+        loaded = done.stderr.split()
+        assert "fclib.cli" in loaded
+        assert not set(absent) & set(loaded)
 
 
 def every_command(path: tuple[str, ...] = (), command: Any = None) -> Iterator[Any]:
@@ -414,7 +436,7 @@ def test_brackets_and_colons_of_a_path_are_printed_as_they_are(tmp_path: Path) -
 
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:
     for command in ("info", "solve", "check"):
-        result = run(command, *files)
+        result = start(command, *files)
         assert result.stderr == ""
         assert "\x1b" not in result.stdout
 

@@ -305,6 +305,18 @@ def test_files_say_what_is_cheaply_known(built: Path, tmp_path: Path) -> None:
     assert not set(catalog.ANALYSIS) & set(alone.column_names)
 
 
+def test_a_file_says_that_its_problem_has_no_solution(tmp_path: Path) -> None:
+    collections.build([Plan.of_family("Squeezed").only([2, 3])], tmp_path, pictures=False)
+    words = {
+        path.name: read(path).info.math_info for path in tmp_path.glob("existence/Squeezed/*.hdf5")
+    }
+    assert len(words) == 4
+    for name, text in words.items():
+        assert ("Existence: proven not to exist" in text) == name.startswith("0002"), text
+    row = collections.read_catalog(tmp_path).to_pylist()[0]
+    assert (row["number"], row["existence"]) == (2, "proven not to exist")
+
+
 def test_what_is_cheaply_known_is_what_the_analysis_finds(built: Path) -> None:
     pytest.importorskip("clarabel")
     from fclib import analysis

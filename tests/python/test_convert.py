@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fclib
+import helpers_cli
 from helpers import Array, dense, judge, planted_global, planted_local
 
 STORAGES = ("csr", "csc", "triplet", "dense")
@@ -23,8 +24,7 @@ VECTORS = ("q", "mu", "s", "f", "w", "b", "mu_r")
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fclib", "convert", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
+    return helpers_cli.run("convert", *arguments)
 
 
 def converted(*arguments: object) -> dict[str, Any]:
@@ -249,8 +249,7 @@ def test_a_chain_from_a_text_to_a_solution(tmp_path: Path) -> None:
     assert fclib.read(file).info.title == "a"
     assert converted(file, local, "--form", "local")["becomes"] == "3DFC"
 
-    solve = [sys.executable, "-m", "fclib", "solve", "--write", str(local)]
-    assert subprocess.run(solve, capture_output=True).returncode == 0
+    assert helpers_cli.run("solve", "--write", local).returncode == 0
     solution = fclib.read_solution(local)
     assert solution is not None
     assert judge(case.problem, fclib.Solution(r=solution.r)).error <= 1e-7

@@ -26,6 +26,15 @@ def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str, str]:
+    """Where a demo has written, and what it said."""
+    folder = tmp_path_factory.mktemp("demo")
+    done = run(folder)
+    assert done.returncode == 0, done.stderr
+    return folder, done.stdout, done.stderr
+
+
 def test_the_demo_stores_solves_and_judges_every_step(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "demo"
     done = run(folder, "--json")
@@ -50,26 +59,26 @@ def test_the_demo_stores_solves_and_judges_every_step(tmp_path: Path) -> None:
         assert {record["nc"] for record in own} == {problem.nc}
 
 
-def test_the_two_forms_of_a_step_are_one_problem(tmp_path: Path) -> None:
-    assert run(tmp_path).returncode == 0
+def test_the_two_forms_of_a_step_are_one_problem(shown: tuple[Path, str, str]) -> None:
+    folder = shown[0]
     for step in (0, STEPS - 1):
-        whole = fclib.read(tmp_path / f"stack-{step:03d}-global.hdf5")
-        local = fclib.read(tmp_path / f"stack-{step:03d}-local.hdf5")
+        whole = fclib.read(folder / f"stack-{step:03d}-global.hdf5")
+        local = fclib.read(folder / f"stack-{step:03d}-local.hdf5")
         assert isinstance(whole, fclib.GlobalProblem)
         assert isinstance(local, fclib.LocalProblem)
-        solution = fclib.read_solution(tmp_path / f"stack-{step:03d}-global.hdf5")
+        solution = fclib.read_solution(folder / f"stack-{step:03d}-global.hdf5")
         assert solution is not None
         assert fclib.merit(local, fclib.Solution(r=solution.r)).error <= 1e-8
         assert whole.n == 12
         assert "seed" in whole.info.description
 
 
-def test_the_table_is_for_people(tmp_path: Path) -> None:
-    done = run(tmp_path)
+def test_the_table_is_for_people(shown: tuple[Path, str, str]) -> None:
+    _, table, said = shown
     for word in ("problem", "iterations", "cpu_s", "error", "converged", "runs.csv"):
-        assert word in done.stdout
-    assert "\x1b" not in done.stdout
-    assert "simulating" not in done.stderr  # no progress bar into a pipe
+        assert word in table
+    assert "\x1b" not in table
+    assert "simulating" not in said  # no progress bar into a pipe
 
 
 def test_a_folder_that_cannot_be_made_is_one_line(tmp_path: Path) -> None:

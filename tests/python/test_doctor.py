@@ -12,7 +12,8 @@ import pytest
 import typer
 
 import fclib
-from fclib import _core, cli, doctor
+from fclib import _core, doctor
+from fclib.cli.doctor import command
 
 
 def run(
@@ -169,7 +170,7 @@ def test_the_table_is_for_people(
     ]
     monkeypatch.setattr(doctor, "examine", lambda: found)
     with pytest.raises(typer.Exit) as stop:
-        cli.doctor.command()
+        command()
     assert stop.value.exit_code == 1
     text = capsys.readouterr().out
     assert '-> pip install "scs>=3"' in text
@@ -177,6 +178,6 @@ def test_the_table_is_for_people(
     assert "1 broken: do what its arrow says" in text
     monkeypatch.setattr(doctor, "examine", lambda: [found[0], found[2]])
     with pytest.raises(typer.Exit) as stop:
-        cli.doctor.command()
+        command()
     assert stop.value.exit_code == 0
     assert "Nothing is broken; 1 optional, not here." in capsys.readouterr().out

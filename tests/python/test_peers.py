@@ -8,7 +8,7 @@ import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+import browser_module
 import fclib
 from fclib import scenes
 from helpers import dense, judge, planted_global, planted_local
@@ -379,6 +380,30 @@ def test_we_read_what_libfclib_writes_without_contacts(peer: Peer, tmp_path: Pat
         problem = fclib.read(path)
         assert (problem.kind, problem.nc, problem.m) == (kind, 0, 0)
         assert fclib.solve(problem).converged
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[browser_module.Module]:
+    if missing := browser_module.missing():
+        pytest.skip(missing)
+    if not (browser_module.FOLDER / "hdf5_hl.js").is_file():
+        pytest.skip("the module reads no HDF5: there was no npm")
+    with browser_module.Module() as module:
+        yield module
+
+
+def test_the_module_for_browsers_reads_what_libfclib_writes(
+    peer: Peer, browser: browser_module.Module, tmp_path: Path
+) -> None:
+    for kind, storage, d, p in itertools.product(
+        ["local", "global"], ["csr", "csc", "triplet"], [2, 3], [0, 2]
+    ):
+        path = tmp_path / f"{kind}-{storage}-{d}-{p}.hdf5"
+        peer("make", path, kind, storage, d, 3, 10, p)
+        found = browser("read", path.read_bytes())
+        for name, ours in (("problem", fclib.read(path)), ("solution", fclib.read_solution(path))):
+            seen = browser_module.encoded(found[name])
+            assert seen == browser_module.encoded(ours), (kind, storage, d, p, name)
 
 
 # ---- Siconos: the same file, read by another library and solved by another solver

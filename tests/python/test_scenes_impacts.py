@@ -96,6 +96,17 @@ def test_squeezed_spheres_have_no_solution_and_the_proof_says_why(side: int) -> 
     assert fclib.solve(family.of_size(side, -1.0)).converged
 
 
+def test_of_many_rows_one_is_the_proof() -> None:
+    family: Any = scenes.assemblies()["Squeezed"]()
+    # 64 rows at once are too many contacts to bring to where all sums vanish exactly
+    problem = family.of_size(8, 1e-4)
+    result = fclib.solve(problem, chain="proof: no_solution limit=60", time_limit=100.0)
+    assert str(result.status) == "infeasible"
+    parting = family.of_size(8, -1e-4)
+    result = fclib.solve(parting, chain="proof: no_solution limit=60", time_limit=100.0)
+    assert str(result.status) != "infeasible"
+
+
 def test_problems_have_as_many_solutions_as_their_analysis_says() -> None:
     family: Any = scenes.assemblies()["ManySolutions"]()
     for number in range(family.problems):
@@ -188,3 +199,31 @@ def test_friction_is_drawn_by_contact() -> None:
     assert set(np.asarray(even.mu)) == {0.5}
     assert 0.8 < np.log(np.asarray(drawn.mu)).std() < 1.2
     assert set(np.asarray(mixed.mu)) == {0.02, 1.2}
+
+
+def test_coefficients_of_rolling_spheres_are_drawn_too() -> None:
+    """Each sphere has its own, a contact the larger of two; without a spread all are alike."""
+    smaller: dict[str, Any] = {"spheres": 12, "per_layer": 4}
+    alike: Any = last_of(scenes.get("RollingSpheres")(**smaller).scene(seed=1), 60).problem
+    assert (set(np.asarray(alike.mu)), set(np.asarray(alike.mu_r))) == ({0.5}, {0.015})
+    last = last_of(scenes.get("RollingSpheres")(**smaller, mixed=1.0).scene(seed=1), 60)
+    assert last.result.converged
+    problem: Any = last.problem
+    for values, least in ((problem.mu, 0.5), (problem.mu_r, 0.015)):
+        drawn = np.asarray(values)
+        assert len(set(drawn)) > 3
+        # the floor keeps the coefficient itself
+        assert drawn.max() > 2 * least
+
+
+def test_primitives_that_tumble_have_an_asymmetric_matrix() -> None:
+    smaller: dict[str, Any] = {"bodies": 12, "width": 4.3, "gyroscopic": True}
+    worst = 0.0
+    for step in simulate(scenes.get("PrimitiveSoup")(**smaller).scene(seed=0), 110):
+        assert step.result.converged
+        if step.problem.nc:
+            M: Any = step.problem.M
+            H: Any = step.problem.H
+            W = H.T @ np.linalg.solve(M.toarray(), H.toarray())
+            worst = max(worst, np.abs(W - W.T).max() / np.abs(W).max())
+    assert 1e-3 < worst < 0.1

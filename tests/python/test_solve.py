@@ -490,3 +490,27 @@ def test_threads_solve_at_once_and_right() -> None:
         thread.join()
     for r, right in zip(found, expected, strict=True):
         np.testing.assert_array_equal(r, right)
+
+
+def test_the_child_of_a_fork_counts_its_own_time() -> None:
+    code = """
+import os, time
+import numpy as np
+import fclib
+
+rng = np.random.default_rng(0)
+A = rng.standard_normal((300, 300))
+problem = fclib.LocalProblem(
+    spacedim=3, W=A @ A.T, q=rng.standard_normal(300), mu=np.full(100, 0.5)
+)
+while time.thread_time() < 1:
+    fclib.solve(problem, solver="nsgs", max_iterations=50)
+child = os.fork()
+if child == 0:
+    start = time.thread_time()
+    result = fclib.solve(problem, solver="nsgs", tol=1e-300, max_iterations=2000)
+    os._exit(not result.cpu_s > 0.5 * (time.thread_time() - start))
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    done = subprocess.run([sys.executable, "-c", code], timeout=120, check=False)
+    assert done.returncode == 0

@@ -384,6 +384,7 @@ STORED = sorted(
     path.relative_to(published.IN_PLACE / published.FOLDER).as_posix()
     for path in published.IN_PLACE.rglob(f"*{trajectory.SUFFIX}")
 )
+STORED.sort(key=lambda name: name.partition("/")[2])  # those of a family follow each other
 there = pytest.mark.skipif(not STORED, reason="collection/ is not here: a source distribution")
 LIMIT = 25e6  # bytes, of all that is stored in the repository
 # of RT-0444, page by page: degrees of freedom, contacts; and the smallest thickness of a body
@@ -393,11 +394,46 @@ RANGES: dict[str, Any] = {
     "Chain": ((48, 60), (8, 28), lambda p: p["thickness"]),
     "KaplasTower": ((72, 864), (48, 1104), lambda p: p["thickness"]),
 }
+# penetration of stored states, of the diameter of the smallest body
+DEEPEST = 0.02
+# where fast grains strike, the law of the velocity leaves more: docs/family-groups.md
+DEEPER = {
+    "Chute": 0.1,
+    "DiscFlow": 0.1,
+    "Humanoid": 0.025,
+    "PrimitiveSoup": 0.04,
+    "RollingChute": 0.1,
+    "RollingDiscs": 0.08,
+    "RollingSoup": 0.07,
+    "RollingSpheres": 0.2,
+    "Silo": 0.06,
+    "Spheres": 0.09,
+    "SpheresInABox": 0.06,
+    "SpinningBodies": 0.03,
+    "standard/Chute1000": 0.4,
+    "standard/Chute4000": 0.4,
+}
 
 
 def stored(name: str) -> tuple[Path, Any]:
     path = published.IN_PLACE / published.FOLDER / name
     return path, trajectory.read(path)
+
+
+MODELS: list[Any] = []  # of the family that was tested last
+
+
+def share_model(states: Any) -> None:
+    """Several sets have one scene: its model, which takes seconds to make, is made once."""
+    if states.scene.solids is not None:
+        return
+    if MODELS and MODELS[0].scene.name != states.scene.name:
+        MODELS.clear()
+    equal = [model for model in MODELS if model.scene == states.scene]
+    if equal:
+        vars(states)["model"] = equal[0]  # where a cached property keeps its value
+    else:
+        MODELS.append(states.model)
 
 
 @there
@@ -416,6 +452,7 @@ def test_published_trajectories_are_few_megabytes() -> None:
 @pytest.mark.parametrize("name", STORED or ["none"])
 def test_published_trajectory_is_what_its_name_says(name: str) -> None:
     path, states = stored(name)
+    share_model(states)
     folder, _, version = name.removesuffix(trajectory.SUFFIX).rpartition("-")
     assert f"{states.origin['collection']}/{states.scene.name}" == folder
     assert states.origin["version"] == version
@@ -452,6 +489,23 @@ def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
 
 
 @there
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [one for one in STORED if not one.startswith("hard/")] or ["none"])
+def test_bodies_of_stored_states_are_not_deep_in_each_other(name: str) -> None:
+    _, states = stored(name)
+    folder = name.rpartition("-")[0]
+    size = states.model.smallest_size
+    if size is None:
+        pytest.skip("elastic blocks have no size")
+    bound = DEEPER.get(folder, DEEPER.get(states.scene.name, DEEPEST))
+    for place in np.unique(np.linspace(0, len(states) - 1, 10).astype(int)).tolist():
+        contacts = states.problem(place).contacts
+        # a joint's limit has no bodies that touch
+        gap = contacts.gap[contacts.pair[:, 0] >= 0]
+        assert gap.min(initial=0.0) > -bound * 2 * size
+
+
+@there
 def test_a_column_at_rest_has_all_its_contacts() -> None:
     """Contacts neither come nor go at the end: four for each box."""
     path = published.path_of("rt444/BoxesStack", known.version_of("rt444/BoxesStack"))
@@ -485,6 +539,21 @@ def test_simulate_and_build_by_commands(tmp_path: Path) -> None:
     assert nothing.exit_code == 1
     assert "needs one trajectory of tiny/KaplasTower, and has none" in nothing.output
     assert invoke("collection", "simulate", "Wall", "--out", own).exit_code == 1
+
+
+def test_a_trajectory_may_keep_some_problems_alone(tmp_path: Path) -> None:
+    """Those at equal distances are stored, and a build takes them, or some of them."""
+    own = tmp_path / "own"
+    done = invoke("collection", "simulate", "RockingBlock", "--count", 4, "--out", own)
+    assert done.exit_code == 0, done.output
+    whole = collections.fresh_plan("impacts/RockingBlock")
+    built = ("collection", "build", "RockingBlock", "--from", own, "--no-pictures")
+    for count, kept in (((), 4), (("--count", 2), 2)):
+        out = tmp_path / f"built{kept}"
+        done = invoke(*built, *count, "--no-references", "--out", out)
+        assert done.exit_code == 0, done.output
+        numbers = [row["number"] for row in collections.read_catalog(out).to_pylist()]
+        assert (numbers[0], numbers[-1], len(numbers)) == (0, whole.total - 1, kept)
 
 
 def test_build_simulates_only_where_it_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -22,7 +22,7 @@ from fclib.analysis._analyze import (
     uniqueness,
 )
 from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
-from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, slater
+from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, PROVEN_NOT, slater
 from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
 
 SIDE = 1000  # of a block that is treated densely
@@ -45,7 +45,14 @@ class Brief:
     left_out: tuple[str, ...] = ()
 
 
-def brief(problem: _solve.Problem, local: Local, error: float | None, tol: float) -> Brief:
+def brief(
+    problem: _solve.Problem,
+    local: Local,
+    error: float | None,
+    tol: float,
+    *,
+    refuted: bool = False,
+) -> Brief:
     """What is known of a problem, its local form at hand.
 
     Args:
@@ -53,6 +60,7 @@ def brief(problem: _solve.Problem, local: Local, error: float | None, tol: float
         local: its local form, or itself.
         error: of the solution at hand; None without one.
         tol: up to which it is a solution.
+        refuted: whether a solver has proved that there is none.
     """
     data = Data(problem, local)
     matrices = data.matrices
@@ -80,6 +88,8 @@ def brief(problem: _solve.Problem, local: Local, error: float | None, tol: float
     elif error is not None and error <= tol:
         existence = EXISTS_AT_HAND
         reason = f"solved to an error of {error:.0e} relative to ||q||, which is no proof"
+    elif refuted:
+        existence, reason = PROVEN_NOT, "a proof by Farkas' lemma, checked on the data"
     words = [f"Existence: {existence}: {reason}."] if existence else []
     if unique.verdict == "unique":
         words.append(f"Velocity: unique: {unique.reason}.")

@@ -505,8 +505,8 @@ def _steps(row: Mapping[str, Any], where: str) -> Steps:
     """The sequence of a group of problems; a sample of it are its first steps."""
     own = row["sequence"]
     _only(own, KNOWN_OF_SEQUENCE, f"{where}sequence.")
-    if WHAT & set(row) not in ({"files"}, {"set"}):
-        raise CampaignError(f"{where[:-1]}: a sequence is of files, or of a set")
+    if WHAT & set(row) not in ({"files"}, {"set"}, {"simulate"}):
+        raise CampaignError(f"{where[:-1]}: a sequence is of files, a set or a simulation alone")
     start = own.get("start", 0)
     if not isinstance(start, int) or isinstance(start, bool) or start < 0:
         raise CampaignError(f"{where}sequence.start: {start!r} is not a whole number, 0 or more")

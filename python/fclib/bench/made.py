@@ -54,7 +54,9 @@ def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
 def simulated(
     family: str, parameters: Mapping[str, Any], steps: Sequence[int], seed: int
 ) -> list[Path]:
-    """The local problems of some steps of a scene; steps without contact are left out.
+    """The local problems of some steps of a scene, with the names of their contacts.
+
+    Steps without contact are left out.
 
     Raises:
         ImportError: MuJoCo is not there.
@@ -66,6 +68,7 @@ def simulated(
         "parameters": dict(parameters),
         "steps": sorted(wanted),
         "seed": seed,
+        "geometry": True,
     }
 
     def make(folder: Path) -> None:
@@ -82,7 +85,11 @@ def simulated(
             raise _core.OptionError(f"simulate {family}: {error.args[0]}") from None
         for step in simulate.simulate(scene, max(wanted) + 1):
             if step.index in wanted and step.problem.nc:
-                local = step.problem.condense().replace(info=step.problem.info)
+                # the model is in the state of the step until the next one is asked for
+                contacts, bodies = simulate.geometry_of(step.model, step.contacts)
+                local = step.problem.condense().replace(
+                    info=step.problem.info, contacts=contacts, bodies=bodies
+                )
                 _core.write(folder / f"{family}-{seed}-{step.index:05d}.hdf5", local)
 
     return made(recipe, make)

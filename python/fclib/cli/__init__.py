@@ -17,34 +17,67 @@ _profile.py    the profile of `profile` and `demo`
 
 from __future__ import annotations
 
+import importlib
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 import fclib
-from fclib.cli import (
-    analyze,
-    bench,
-    check,
-    collection,
-    convert,
-    demo,
-    doctor,
-    info,
-    profile,
-    record,
-    report,
-    simulate,
-    solve,
-    solvers,
-    view,
-)
 from fclib.cli._output import fail, print_version
+
+COMMANDS = (
+    "info",
+    "check",
+    "solve",
+    "convert",
+    "analyze",
+    "solvers",
+    "simulate",
+    "record",
+    "demo",
+    "profile",
+    "report",
+    "view",
+    "doctor",
+    "collection",
+    "bench",
+)
+
+
+class Imported(Mapping[str, Any]):
+    """The commands by name, each imported when it is asked for: most need little of fclib."""
+
+    def __init__(self) -> None:
+        self.known: dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in COMMANDS:
+            raise KeyError(name)
+        if name not in self.known:
+            module = importlib.import_module(f"fclib.cli.{name}")
+            one = typer.Typer(rich_markup_mode=None)
+            if hasattr(module, "app"):
+                one.add_typer(module.app, name=name)
+            else:
+                one.command(name)(module.command)
+            self.known[name] = typer.main.get_group(one).commands[name]
+        return self.known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
 
 
 class Commands(TyperGroup):
     """The commands, with a help that fits a screen: what shells ask for is left out of it."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands: Any = Imported()
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The options, those of completion hidden."""
@@ -64,24 +97,6 @@ app = typer.Typer(
     rich_markup_mode=None,  # plain help, in which a command is a line, and all of them a screen
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (
-    info,
-    check,
-    solve,
-    convert,
-    analyze,
-    solvers,
-    simulate,
-    record,
-    demo,
-    profile,
-    report,
-    view,
-    doctor,
-):
-    app.command(module.__name__.rpartition(".")[2])(module.command)
-app.add_typer(collection.app, name="collection")
-app.add_typer(bench.app, name="bench")
 app.callback(invoke_without_command=True)(print_version)
 
 

@@ -32,7 +32,8 @@ from fclib.cli._output import Json, Report, err, fail, make_table, out, progress
 from fclib.cli._progress import many_bars
 from fclib.collections import standing
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices
+from fclib.collections.known import KNOWN, choices, problems_of
+from fclib.collections.plan import evenly
 
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
@@ -76,8 +77,7 @@ def list_families(
     if of_sets:
         for name, folders in collections.sets().items():
             chosen = len(choices(name))
-            known = collections.families()
-            total = sum(known[folder.partition("/")[2]].problems for folder in folders)
+            total = sum(map(problems_of, folders))
             report.add(
                 {
                     "set": name,
@@ -95,7 +95,7 @@ def list_families(
             {
                 "family": name,
                 "set": family.collection,
-                "problems": family.problems,
+                "problems": problems_of(f"{family.collection}/{name}"),
                 "title": family.title,
                 "application": family.application,
             }
@@ -125,7 +125,7 @@ def show(
     record: dict[str, Any] = {
         "family": name,
         "set": family.collection,
-        "problems": family.problems,
+        "problems": problems_of(f"{family.collection}/{name.rpartition('/')[2]}"),
         "title": family.title,
         "description": family.description,
         "application": family.application,
@@ -172,7 +172,7 @@ def show_set(name: str, as_json: bool) -> None:
     for folder in collections.sets()[name]:
         family = folder.partition("/")[2]
         numbers = sorted(choice.number for choice in chosen if choice.family == family)
-        count = len(numbers) if chosen else collections.families()[family].problems
+        count = len(numbers) if chosen else problems_of(folder)
         record: dict[str, Any] = {
             "folder": folder,
             "version": collections.version(name),
@@ -273,6 +273,10 @@ def simulate(
     solver: Annotated[str, typer.Option(help="Solves each step.")] = "auto",
     tol: Annotated[float, typer.Option(help="Of each step, relative.", min=0.0)] = 1e-12,
     seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
+    count: Annotated[
+        int | None,
+        typer.Option(help="States kept of a family, at equal distances; else all.", min=2),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Make new trajectories of families, for fclib collection build --from; goes on after a kill.
@@ -289,7 +293,7 @@ def simulate(
             )
             for own in collections.folders(names)
         ]
-        plans = [plan for plan in plans if simulated(plan)]
+        plans = [thinned(plan, count) for plan in plans if simulated(plan)]
         if not plans:
             fail(f"{', '.join(names)}: assembled directly, there is nothing to simulate")
         with many_bars() as bars:
@@ -315,6 +319,15 @@ def simulate(
     if not as_json:
         out.print(make_table(report.records))
         out.print(f"fclib collection build {' '.join(names)} --from {folder} takes them")
+
+
+def thinned(plan: collections.Plan, count: int | None) -> collections.Plan:
+    """A plan that keeps so many of its problems."""
+    if count is None:
+        return plan
+    numbers = plan.numbers()
+    kept = numbers[evenly(len(numbers), count)]
+    return replace(plan, chosen=tuple(kept.tolist()))
 
 
 @app.command()
@@ -589,7 +602,9 @@ def publish(
 
 @app.command()
 def get(
-    url: Annotated[str, typer.Option("--from", help="Where registry.txt lies.")],
+    url: Annotated[
+        str, typer.Option("--from", help="Where registry.txt lies: an address or a folder.")
+    ],
     names: Annotated[
         list[str] | None, typer.Argument(help="Sets or families; of a problem its family comes.")
     ] = None,

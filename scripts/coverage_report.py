@@ -64,7 +64,9 @@ def count(build: Path, tests: Sequence[str]) -> None:
         "FCLIB_BUILD": str(build),
         "COVERAGE_FILE": str(build / "python-lines"),
     }
-    run(sys.executable, "-m", "coverage", "run", "-m", "pytest", *tests, **data)
+    # on all cores, as make test does
+    cores = ["-n", "auto", "--dist", "loadfile"]
+    run(sys.executable, "-m", "coverage", "run", "-m", "pytest", *cores, *tests, **data)
     run(sys.executable, "-m", "coverage", "combine", "--quiet", **data)
 
 

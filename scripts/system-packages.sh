@@ -36,6 +36,12 @@ fi
 if [ "${1-}" = test ] && ! { command -v emcmake && command -v node; } >/dev/null 2>&1; then
   optional="$optional emscripten"
 fi
+# what the C library is compared with: libfclib 3.1, its own recorded interface, and no lost memory
+if [ "${1-}" = test ]; then
+  ls /usr/include/fclib.h >/dev/null 2>&1 || optional="$optional libfclib-dev"
+  command -v abidiff >/dev/null 2>&1 || optional="$optional abigail-tools"
+  command -v valgrind >/dev/null 2>&1 || optional="$optional valgrind"
+fi
 
 if [ -z "$missing$optional" ]; then
   echo "== system packages: all there"

@@ -1,9 +1,11 @@
 #!/bin/sh
-# Tests fclib.torch and fclib.jax in an environment of its own, on top of the one that is there.
+# Tests fclib.torch and fclib.jax, and the recipes of docs/recipes.md, in an environment of its own on
+# top of the one that is there.
 #
 #   scripts/try_layers.sh build/layers [torch] [jax]
 #
-# Without names both are tried. They are large: nothing else of the project needs them.
+# Without names both are tried. They are large, torch with what it has for GPUs above all: nothing else
+# of the project needs them. PIP_EXTRA_INDEX_URL=https://download.pytorch.org/whl/cpu takes one without.
 set -eu
 there=${1:?"usage: scripts/try_layers.sh FOLDER [torch] [jax]"}
 shift
@@ -20,4 +22,5 @@ for package in "$@"; do
   "$there/bin/python" -c "import $package, fclib.$package; print('$package', $package.__version__)"
   "$there/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_layer.py -k "$package"
 done
-"$there/bin/python" -m pytest -q -p no:cacheprovider tests/python/test_docs_code.py -k recipes
+"$there/bin/python" -m pip install --quiet cvxpy
+"$there/bin/python" -m pytest -q -rs -p no:cacheprovider tests/python/test_docs_code.py -k recipes

@@ -87,7 +87,7 @@ def test_threads_are_clean_under_helgrind(threads: Path, tmp_path: Path) -> None
         pytest.skip("the counters of a build for coverage race, as they may")
     # few rounds, for it runs the threads by turns and remembers each access
     helgrind = f"--suppressions={CAPI / 'helgrind.txt'}"
-    # two rounds alone come first, one of each solver, so that what is made at its first use is there
+    # two rounds alone come first, one of each solver: what is made at its first use is there then
     valgrind("--tool=helgrind", helgrind, threads, tmp_path, 2, 2)
 
 

@@ -52,10 +52,8 @@ Solution Condensation::expand(const Solution& local) const {
   Solution result = local;
   // what joints and contacts add to a light body may be far larger than what is left of it
   RealVector momentum = problem_.f.cast<Real>();
-  multiply_add(problem_.H, RealVector(local.r.cast<Real>()), momentum);
-  if (is_mixed(problem_)) {
-    multiply_add(problem_.G, RealVector(local.l.cast<Real>()), momentum);
-  }
+  multiply_add(problem_.H, local.r, momentum);
+  if (is_mixed(problem_)) multiply_add(problem_.G, local.l, momentum);
   result.v = mass_.solve(Vector(momentum.cast<double>()));
   result.u = problem_.w;
   multiply_transposed_add(problem_.H, result.v, result.u);

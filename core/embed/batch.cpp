@@ -73,7 +73,8 @@ double judge(const One& one) {
       if (one.u != nullptr) one.u[at] = static_cast<double>(sum);
     }
     const Real rho = scale > 0 ? 1 / scale : Real(1);
-    sums.add(Coulomb<D, Real>(one.mu[a]), u, r, q.squaredNorm(), Real(0), rho);
+    const Coulomb<D, Real> cone(one.mu[a]);
+    sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }
   const double natural = sums.natural();
   const double scaled = sums.scaled_natural();

@@ -123,7 +123,8 @@ double Workspace::judge(const LocalView& problem) {
       u_[at] = static_cast<double>(u[k]);
     }
     const Real rho = trace_[a] > 0 ? 1 / trace_[a] : Real(1);
-    sums.add(Coulomb<D, Real>(problem.mu[a]), u, r, q.squaredNorm(), Real(0), rho);
+    const Coulomb<D, Real> cone(problem.mu[a]);
+    sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }
   const double natural = sums.natural();
   const double scaled = sums.scaled_natural();

@@ -51,6 +51,9 @@ class DoubleDouble {
     return checked(product, low - (product - p.high_), p.high_);
   }
 
+  /// a b of two doubles, exact.
+  static constexpr DoubleDouble product(double a, double b) { return two_product(a, b); }
+
   friend constexpr DoubleDouble operator/(DoubleDouble a, DoubleDouble b) {
     const double q = a.high_ / b.high_;
     if (!finite(q) || !finite(b.high_)) return {q, 0.0};

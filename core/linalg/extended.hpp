@@ -16,6 +16,17 @@ using Real = DoubleDouble;  // long double is software there
 #else
 using Real = long double;
 #endif
+
+/// a b, which needs the precision of both.
+inline Real full_product(double a, double b) {
+#ifdef __wasm__
+  return DoubleDouble::product(a, b);
+#else
+  return Real(a) * Real(b);
+#endif
+}
+inline Real full_product(double a, Real b) { return Real(a) * b; }
+
 using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 
 }  // namespace fclib

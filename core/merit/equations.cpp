@@ -20,31 +20,39 @@ using std::abs, std::copysign, std::sqrt;  // or those of Real
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
 constexpr Real rounding_unit_of_q = 4 * Real(std::numeric_limits<double>::epsilon());
 
-RealVector product(const Matrix& a, const RealVector& x) {
+template <class X>
+RealVector product(const Matrix& a, const X& x) {
   RealVector y = RealVector::Zero(a.rows);
-  multiply_add(a, x, y);
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { y[row] += full_product(value, x[col]); });
   return y;
 }
 
-RealVector product_transposed(const Matrix& a, const RealVector& x) {
+template <class X>
+RealVector product_transposed(const Matrix& a, const X& x) {
   RealVector y = RealVector::Zero(a.cols);
-  multiply_transposed_add(a, x, y);
+  for_each_entry(
+      a, [&](Index row, Index col, double value) { y[col] += full_product(value, x[row]); });
   return y;
 }
 
 /// |A| |x|: the sizes of what the product adds up.
-RealVector sizes(const Matrix& a, const RealVector& x) {
+template <class X>
+RealVector sizes(const Matrix& a, const X& x) {
   RealVector y = RealVector::Zero(a.rows);
-  for_each_entry(
-      a, [&](Index row, Index col, double value) { y[row] += abs(Real(value)) * abs(x[col]); });
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[row] += full_product(abs(value), abs(x[col]));
+  });
   return y;
 }
 
 /// |A|^T |x|
-RealVector sizes_transposed(const Matrix& a, const RealVector& x) {
+template <class X>
+RealVector sizes_transposed(const Matrix& a, const X& x) {
   RealVector y = RealVector::Zero(a.cols);
-  for_each_entry(
-      a, [&](Index row, Index col, double value) { y[col] += abs(Real(value)) * abs(x[row]); });
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    y[col] += full_product(abs(value), abs(x[row]));
+  });
   return y;
 }
 
@@ -246,7 +254,7 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
 Equations equations(const LocalProblem& problem, const Solution& solution, const OwnSizes& own) {
   const Index d = problem.spacedim;
   Equations result;
-  const RealVector r = solution.r.cast<Real>();
+  const Vector& r = solution.r;
   result.q = problem.q.cast<Real>();
   result.rounding = own.rounding;
   result.scale = own.scale;
@@ -256,7 +264,7 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   const RealVector stop =
       is_mixed(problem) || solution.u.size() > 0 ? stopping(own.q, own.scale, d) : RealVector();
   if (is_mixed(problem)) {
-    const RealVector l = solution.l.cast<Real>();
+    const Vector& l = solution.l;
     const RealVector s = problem.s.cast<Real>();
     result.u += product(problem.V, l);
     // V^T r + R lambda + s = 0
@@ -272,7 +280,7 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   if (solution.u.size() > 0) {
     const RealVector difference = solution.u.cast<Real>() - result.u;
     RealVector terms = sizes(problem.W, r) + result.q.cwiseAbs();
-    if (is_mixed(problem)) terms += sizes(problem.V, solution.l.cast<Real>());
+    if (is_mixed(problem)) terms += sizes(problem.V, solution.l);
     const RealVector velocity =
         largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
     const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
@@ -290,7 +298,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   Equations result;
   const RealVector f = problem.f.cast<Real>();
   const RealVector w = problem.w.cast<Real>();
-  const RealVector r = solution.r.cast<Real>();
+  const Vector& r = solution.r;
   const RealVector& free = own.free;
   result.q = product_transposed(problem.H, free) + w;
   result.rounding = own.rounding;
@@ -300,7 +308,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   RealVector momentum = product(problem.H, r) + f;
   RealVector terms = sizes(problem.H, r) + f.cwiseAbs();
   if (mixed) {
-    const RealVector l = solution.l.cast<Real>();
+    const Vector& l = solution.l;
     momentum += product(problem.G, l);
     terms += sizes(problem.G, l);
   }

@@ -16,15 +16,16 @@ using std::abs;  // or that of Real
 
 void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
 
-/// The parts that depend on one contact at a time.
+/// The parts that depend on one contact at a time; but for the errors only where `each` is there.
 template <class Cone>
 void judge_contacts(const Friction& friction, const RealVector& r, const Equations& equations,
-                    Merit& result, ContactMerits& each) {
+                    Merit& result, ContactMerits* each) {
   constexpr int D = Cone::dim;
   NaturalSums<Cone> sums;
-  each.u = equations.u.cast<double>();
-  for (Vector* figures : {&each.natural, &each.cone, &each.dual_cone}) {
-    figures->resize(friction.mu.size());
+  if (each != nullptr) {
+    for (Vector* figures : {&each->natural, &each->cone, &each->dual_cone}) {
+      figures->resize(friction.mu.size());
+    }
   }
   for (Eigen::Index contact = 0; contact < friction.mu.size(); ++contact) {
     const Cone cone(friction, contact);
@@ -34,15 +35,16 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
     const Real q_square = equations.q.segment<D>(D * contact).squaredNorm();
     const Real rounding = equations.rounding.segment<D>(D * contact).norm();
     const Real rho = equations.scale[contact] > 0 ? 1 / equations.scale[contact] : Real(1);
-    const Real norm = sums.add(cone, ua, ra, q_square, rounding, rho);
-    each.natural[contact] = static_cast<double>(norm);
-    each.cone[contact] = static_cast<double>(cone_violation(cone, ra));
-    each.dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
-    raise(result.cone, each.cone[contact]);
-    raise(result.dual_cone, each.dual_cone[contact]);
+    const Real norm = sums.add(cone, modified, ra, q_square, rounding, rho);
+    if (each == nullptr) continue;
+    each->natural[contact] = static_cast<double>(norm);
+    each->cone[contact] = static_cast<double>(cone_violation(cone, ra));
+    each->dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
+    raise(result.cone, each->cone[contact]);
+    raise(result.dual_cone, each->dual_cone[contact]);
     raise(result.complementarity, abs(ra.dot(modified)));
-    each.status.push_back(status_of(cone, ua, ra, rho));
-    switch (each.status.back()) {
+    each->status.push_back(status_of(cone, ua, ra, rho));
+    switch (each->status.back()) {
       case ContactStatus::open:
         ++result.open;
         break;
@@ -58,8 +60,9 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
   result.scaled_natural = sums.scaled_natural();
 }
 
+/// Without `each` the errors alone.
 Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
-            const Equations& equations, ContactMerits& each) {
+            const Equations& equations, ContactMerits* each) {
   Merit result;
   for (const Mismatch& mismatch : equations.mismatches) {
     double& member = mismatch.part == "v"   ? result.dynamics
@@ -97,7 +100,8 @@ Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& eac
   validate(solution, problem);
   const Equations found = equations_of(problem, solution);
   each.mismatches = found.mismatches;
-  return judge(problem.spacedim, friction_of(problem), solution, found, each);
+  each.u = found.u.cast<double>();
+  return judge(problem.spacedim, friction_of(problem), solution, found, &each);
 }
 
 template <class P>
@@ -107,12 +111,11 @@ Merit judge_valid(const P& problem, const Solution& solution) {
 }
 
 /// The solution gets the u that follows.
-Merit judge_and_complete(Index spacedim, const Friction& friction, const Equations& found,
-                         Solution& solution) {
-  ContactMerits each;
-  const Merit result = judge(spacedim, friction, solution, found, each);
-  solution.u = std::move(each.u);
-  return result;
+double judge_and_complete(Index spacedim, const Friction& friction, const Equations& found,
+                          MeritKind kind, Solution& solution) {
+  const double error = judge(spacedim, friction, solution, found, nullptr).error_by(kind);
+  solution.u = found.u.cast<double>();
+  return error;
 }
 
 template <class P>
@@ -137,18 +140,19 @@ Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
   return judge_valid(problem, solution);
 }
 
-Merit judge_and_complete(const LocalProblem& problem, const Friction& friction, const OwnSizes& own,
-                         Solution& solution) {
+double judge_and_complete(const LocalProblem& problem, const Friction& friction,
+                          const OwnSizes& own, MeritKind kind, Solution& solution) {
   solution.u.resize(0);
-  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, own),
+  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, own), kind,
                             solution);
 }
 
-Merit judge_and_complete(const GlobalProblem& problem, const Friction& friction,
-                         const Factorization& mass, const OwnSizes& own, Solution& solution) {
+double judge_and_complete(const GlobalProblem& problem, const Friction& friction,
+                          const Factorization& mass, const OwnSizes& own, MeritKind kind,
+                          Solution& solution) {
   solution.u.resize(0);
   return judge_and_complete(problem.spacedim, friction, equations(problem, solution, mass, own),
-                            solution);
+                            kind, solution);
 }
 
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {

@@ -116,12 +116,13 @@ Merit merit(const LocalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
 
-/// The same for a problem and a solution that are valid, in a loop: what depends on the problem
-/// alone is given. u is not judged: it becomes the one that follows.
-Merit judge_and_complete(const LocalProblem& problem, const Friction& friction, const OwnSizes& own,
-                         Solution& solution);
-Merit judge_and_complete(const GlobalProblem& problem, const Friction& friction,
-                         const Factorization& mass, const OwnSizes& own, Solution& solution);
+/// The error that a tolerance bounds, of a problem and a solution that are valid, in a loop: what
+/// depends on the problem alone is given. u is not judged: it becomes the one that follows.
+double judge_and_complete(const LocalProblem& problem, const Friction& friction,
+                          const OwnSizes& own, MeritKind kind, Solution& solution);
+double judge_and_complete(const GlobalProblem& problem, const Friction& friction,
+                          const Factorization& mass, const OwnSizes& own, MeritKind kind,
+                          Solution& solution);
 
 /// As merit(), and throws as it does.
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);

@@ -16,16 +16,20 @@ class NaturalSums {
   using Vec = typename Cone::Vec;
   using Real = typename Vec::Scalar;
 
-  /// Adds a contact with velocity u and reaction r, ||q^a||^2, what rounding leaves of q^a, and
-  /// rho = d / tr(W_aa). The norm of its natural map.
-  Real add(const Cone& cone, const Vec& u, const Vec& r, Real q_square, Real rounding, Real rho) {
-    const Real norm = natural_map(cone, u, r).norm();
+  /// Adds a contact with modified velocity u^ and reaction r, ||q^a||^2, what rounding leaves of
+  /// q^a, and rho = d / tr(W_aa). The norm of its natural map.
+  Real add(const Cone& cone, const Vec& modified, const Vec& r, Real q_square, Real rounding,
+           Real rho) {
+    const OfModified known{cone};
+    const Real norm = natural_map(known, modified, r).norm();
     squares_ += square_beyond(norm, rounding);
     q_squares_ += q_square;
-    rounding_squares_ += rounding * rounding;
-    scaled_squares_ += square_beyond(natural_map(cone, u, r, rho).norm(), rho * rounding);
+    scaled_squares_ += square_beyond(natural_map(known, modified, r, rho).norm(), rho * rounding);
     scaled_q_ += rho * rho * q_square;
-    scaled_rounding_ += rho * rho * rounding * rounding;
+    if (rounding != 0) {
+      rounding_squares_ += rounding * rounding;
+      scaled_rounding_ += rho * rho * rounding * rounding;
+    }
     return norm;
   }
 
@@ -35,6 +39,15 @@ class NaturalSums {
   }
 
  private:
+  /// The cone, to which velocities come modified: two maps share the one u^.
+  struct OfModified {
+    using Vec = typename Cone::Vec;
+    const Cone& cone;
+
+    [[nodiscard]] const Vec& modified(const Vec& u) const { return u; }
+    [[nodiscard]] Vec project(const Vec& x) const { return cone.project(x); }
+  };
+
   /// The natural map of a contact beyond what the rounding of its q explains.
   static Real square_beyond(Real norm, Real rounding) {
     const Real left = norm - rounding;

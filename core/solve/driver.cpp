@@ -246,7 +246,7 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
   const OwnSizes own = own_sizes(problem);
   const Measure measure(problem, own, kind);
   const auto judge = [&](Solution& solution) {
-    return judge_and_complete(problem, friction, own, solution).error_by(kind);
+    return judge_and_complete(problem, friction, own, kind, solution);
   };
   if (!is_mixed(problem)) return run(problem, friction, measure, request, guess, judge, prove);
   const Elimination elimination(problem, &request.deadline);
@@ -270,7 +270,7 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   if (!condensation.finished()) return out_of_time(problem, condensation, request, guess);
   const OwnSizes own = own_sizes(problem, condensation.mass(), &local);
   const auto judge_complete = [&](Solution& solution) {
-    return judge_and_complete(problem, friction, condensation.mass(), own, solution).error_by(kind);
+    return judge_and_complete(problem, friction, condensation.mass(), own, kind, solution);
   };
   const auto judge = [&](Solution& solution) {
     solution = condensation.expand(solution);

@@ -197,17 +197,19 @@ TEST(Merit, what_is_known_of_the_problem_changes_nothing) {
     const Factorization mass(to_eigen(problem.M), "M");
     const LocalProblem condensed = condense(static_cast<const GlobalProblem&>(problem));
     for (const LocalProblem* known : {static_cast<const LocalProblem*>(nullptr), &condensed}) {
-      const Merit given = judge_and_complete(problem, friction_of(problem), mass,
-                                             own_sizes(problem, mass, known), solution);
-      EXPECT_EQ(own.error, given.error);
-      EXPECT_NEAR(own.scaled_natural, given.scaled_natural, 1e-12 * own.scaled_natural);
+      const auto given = [&](MeritKind kind) {
+        return judge_and_complete(problem, friction_of(problem), mass,
+                                  own_sizes(problem, mass, known), kind, solution);
+      };
+      EXPECT_NEAR(own.error, given(MeritKind::both), 1e-12 * own.error);
+      EXPECT_EQ(own.error_by(MeritKind::natural), given(MeritKind::natural));
       EXPECT_EQ(each.u, solution.u);
     }
     // it is this one that is used: with twice the mass the solution is another one
     const Factorization heavy(SparseColumns(2 * to_eigen(problem.M)), "M");
-    const Merit other = judge_and_complete(problem, friction_of(problem), heavy,
-                                           own_sizes(problem, heavy), solution);
-    EXPECT_NE(other.error, own.error);
+    const double other = judge_and_complete(problem, friction_of(problem), heavy,
+                                            own_sizes(problem, heavy), MeritKind::both, solution);
+    EXPECT_NE(other, own.error);
   };
   expect_same(plain);
   expect_same(rolling);

@@ -16,13 +16,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from typer.testing import CliRunner
 
 import browser_module
 import fclib
 import golden_work
+from capi_library import HEADERS, ROOT, compiler, library_folder
 from fclib.bench import Store, supervisor
 from fclib.bench.job import Job, Limits, Record, SolverChoice
 from fclib.bench.problems import look
@@ -390,6 +393,102 @@ def test_a_file_of_ones_own_is_read_drawn_and_solved(page: Any, tmp_path: Path) 
     page.get_by_role("button", name="Check it here").click()
     page.locator("table", has_text="of the file: its merits").locator("tbody tr").first.wait_for()
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+
+def write_as_3_1(path: Path, problem: Any, solution: fclib.Solution) -> None:
+    """What libfclib 3.1 writes: the first format of HDF5, nothing packed."""
+    with h5py.File(path, "w", libver="earliest") as file:
+        group = file.create_group(f"fclib_{problem.kind}")
+        group["spacedim"] = np.array([problem.spacedim], "i4")
+        group["info/title"] = np.bytes_(b"of 3.1")
+        for name, member in problem.__getstate__().items():
+            if sp.issparse(member):
+                a = browser_module.matrix(member)
+                nnz = len(a["x"])
+                nz = {"csc": -1, "csr": -2}.get(a["storage"], nnz)
+                for key, number in {"nzmax": nnz, "m": a["rows"], "n": a["cols"], "nz": nz}.items():
+                    group[f"{name}/{key}"] = np.array([number], "i4")
+                for key, numbers in {"p": a["p"], "i": a["i"]}.items():
+                    group[f"{name}/{key}"] = numbers.astype("i4")
+                group[f"{name}/x"] = a["x"]
+            elif isinstance(member, np.ndarray):
+                group[f"vectors/{name}"] = member
+        file["guesses/number_of_guesses"] = np.array([1], "i4")
+        for name in ("v", "u", "r", "l"):
+            values = getattr(solution, name)
+            if values is not None:
+                file[f"solution/{name}"] = file[f"guesses/1/{name}"] = values
+
+
+def written_by_3_1(path: Path, folder: Path) -> list[Path]:
+    """The same by Debian's libfclib, where it is installed."""
+    header = Path("/usr/include/fclib.h")
+    if not header.is_file() or "FCLIB_VERSION_MAJOR" in header.read_text():
+        return []
+    theirs = next(Path("/usr/lib").rglob("libfclib.so.0"))
+    source = ROOT / "benchmarks" / "files_against_libfclib.c"
+    program, written = folder / "copy", folder / f"{path.stem} by 3.1.hdf5"
+    build = [compiler("C"), f"-I{HEADERS}", "-o", str(program), str(source), "-ldl"]
+    subprocess.run(build, check=True)
+    ours = library_folder() / "libfclib.so.0"
+    subprocess.run([program, "copy", theirs, ours, path, written, folder / "ours.hdf5"], check=True)
+    return [written]
+
+
+@pytest.mark.slow
+def test_files_of_libfclib_3_1_and_texts_are_seen_and_solved(page: Any, tmp_path: Path) -> None:
+    files: list[Path] = []
+    for made in (planted_local(5, nc=4), planted_global(5, nc=4, p=1)):
+        own = tmp_path / f"{made.problem.kind}.hdf5"
+        write_as_3_1(own, made.problem, made.solution)
+        files += [own, *written_by_3_1(own, tmp_path)]
+    text = tmp_path / "text.dat"
+    fclib.write_siconos(text, planted_global(6, nc=3).problem)
+
+    page.get_by_role("link", name="Your file").click()
+    page.get_by_role("heading", name="Your own file").wait_for()
+    for path in (*files, text):
+        problem: Any = fclib.read_siconos(path) if path == text else fclib.read(path)
+        drop(page, path)
+        facts = page.locator("dl.facts", has_text=path.name)
+        facts.wait_for()
+        words = dict(re.findall(r"(.+)\n(.+)", facts.inner_text()))
+        assert words["formulation"] == problem.formulation
+        assert int(words["contacts"]) == problem.nc
+        assert int(words["islands"]) == problem.islands().count
+        if path != text:
+            assert words["title"] == "of 3.1"
+            assert words["guesses"] == "1"
+            assert float(words["error of its solution"]) < 1e-12
+            page.get_by_role("button", name="Check it here").click()
+            page.locator("table", has_text="The solution of the file").wait_for()
+        assert page.locator("figure.live canvas").count() == 1
+        page.get_by_role("button", name="Solve it here").click()
+        page.get_by_role("button", name="Start").click()
+        page.get_by_text(re.compile("^auto: converged after")).wait_for()
+
+    # damaged: cut short, without a part, with one that is wrong
+    bad = tmp_path / "bad.hdf5"
+
+    def lose(file: Any) -> None:
+        del file["fclib_local/vectors/mu"]
+
+    def spoil(file: Any) -> None:
+        file["fclib_local/W/p"][1] = 1000
+
+    for path in files[: len(files) // 2]:
+        for damage in (None, lose, spoil):
+            shutil.copy(path, bad)
+            if damage is None:
+                bad.write_bytes(path.read_bytes()[:-700])
+            else:
+                with h5py.File(bad, "a") as file:
+                    damage(file)
+            with pytest.raises(fclib.Error) as native:
+                fclib.read(bad)
+            drop(page, bad)
+            page.get_by_text(str(native.value).replace(str(bad), bad.name), exact=True).wait_for()
+            assert page.locator("dl.facts").count() == 0
 
 
 @pytest.mark.slow

@@ -120,7 +120,7 @@ void write_int_attribute(const std::string& path, const std::string& name, Index
   change_file(path, Start::existing, options.compression, [&](const Target& root) {
     const std::string problem = "fclib_" + owner_of(kinds_of(root), "local");
     const Handle parent = open_group(root, problem);
-    const Group group{parent.id(), root.child(problem)};
+    const Target group{{parent.id(), root.child(problem)}, root.style};
     const Handle handle =
         group.has("info") ? open_group(group, "info") : create_group(group, "info");
     const Group info{handle.id(), group.child("info")};

@@ -1,5 +1,8 @@
 #include "io/hdf5/transaction.hpp"
 
+#include <sys/mman.h>
+
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -20,6 +23,22 @@ namespace fs = std::filesystem;
 /// gets a level for each entry, and HDF5 fails, or ends its process, beyond 255.
 constexpr unsigned index_rank = 2;
 
+/// Memory from malloc of this size that goes on from `memory`; a large one in large pages, where
+/// the system has them: to touch it for the first time is most of what a large write takes.
+void* grown(void* memory, std::size_t size) {
+  void* const result = std::realloc(memory, size);
+#ifdef MADV_HUGEPAGE
+  constexpr std::size_t page = std::size_t{1} << 21;
+  if (result != nullptr && size >= 2 * page) {
+    const auto begin = reinterpret_cast<std::uintptr_t>(result);
+    const std::uintptr_t first = (begin + page - 1) / page * page;
+    const std::uintptr_t last = (begin + size) / page * page;
+    ::madvise(static_cast<char*>(result) + (first - begin), last - first, MADV_HUGEPAGE);
+  }
+#endif
+  return result;
+}
+
 /// What HDF5 leaves of a file in memory when it closes it: the file, and room beyond its end.
 class Image {
  public:
@@ -34,10 +53,10 @@ class Image {
   void catch_from(hid_t access) {
     H5FD_file_image_callbacks_t callbacks{};
     callbacks.image_malloc = [](std::size_t size, H5FD_file_image_op_t, void*) {
-      return std::malloc(size);
+      return grown(nullptr, size);
     };
     callbacks.image_realloc = [](void* memory, std::size_t size, H5FD_file_image_op_t, void*) {
-      return std::realloc(memory, size);
+      return grown(memory, size);
     };
     callbacks.image_free = [](void* memory, H5FD_file_image_op_t operation, void* self) -> herr_t {
       if (operation == H5FD_FILE_IMAGE_OP_FILE_CLOSE) {
@@ -119,6 +138,15 @@ class MemoryFile {
   std::optional<Handle> file_;
 };
 
+MemoryFile copy_of(const std::string& path) {
+  try {
+    return MemoryFile(read_file(path));
+  } catch (const Error&) {
+    const Handle file = open_file(path);  // says best what is wrong with it
+    throw;
+  }
+}
+
 void require_level(int compression) {
   if (compression < compress_cheaply || compression > 9) {
     throw Error(ErrorKind::option,
@@ -140,12 +168,13 @@ void change_file(const std::string& path, Start start, int compression,
     finish_rewrite(path);
     const bool existing =
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
-    if (existing) const Handle checked = open_file(path);  // says best what is wrong with it
-    MemoryFile file = existing ? MemoryFile(read_file(path)) : MemoryFile();
-    // only what is packed cheaply is tried
+    MemoryFile file = existing ? copy_of(path) : MemoryFile();
     std::optional<MemoryFile> scratch;
-    if (compression == compress_cheaply) scratch.emplace("scratch");
-    const Target root{{file.id(), "/"}, compression, scratch ? scratch->id() : hid_t{-1}};
+    const Style style(compression, [&] {
+      if (!scratch) scratch.emplace("scratch");
+      return scratch->id();
+    });
+    const Target root{{file.id(), "/"}, &style};
     if (!existing) {
       write_text_attribute(root, "format", format_version);
       write_text_attribute(root, "generator", "fclib " + std::string(version));

@@ -16,7 +16,7 @@ using namespace hdf5;
 namespace {
 
 /// A text that its file did not have stays away.
-void write_text_if_there(const Group& group, const std::string& name, const std::string& text) {
+void write_text_if_there(const Target& group, const std::string& name, const std::string& text) {
   if (text != absent_text && text != absent_group) write_text(group, name, text);
 }
 
@@ -70,8 +70,11 @@ void write_fields(const Target& root, const P& problem, const WriteOptions& opti
       Storage storage = a.storage;
       if (storage == Storage::dense && !options.dense) storage = Storage::csr;
       if (P::triplets_on_disk) storage = Storage::triplet;
-      const bool convert = storage != a.storage && !as_given;
-      write_matrix(group, name, convert ? converted(a, storage) : a);
+      if (storage == a.storage || as_given) {
+        write_matrix(group, name, a);
+      } else {
+        write_matrix(group, name, converted(a, storage));
+      }
     } else if constexpr (std::is_same_v<Member, Vector>) {
       write_numbers(vectors.target(), name, problem.*field.member);
     } else {
@@ -207,7 +210,7 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
     const Index there = options.append ? contents_of(root).guesses : 0;
     if (there > 0) {
       const Handle group = open_group(root, "guesses");
-      const Target target{{group.id(), root.child("guesses")}, root.compression, root.scratch};
+      const Target target{{group.id(), root.child("guesses")}, root.style};
       make_room(target, "number_of_guesses", true);
       write_from(target, guesses_list, static_cast<std::size_t>(there) + 1, guesses);
       return;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 namespace fclib::hdf5 {
@@ -50,22 +51,28 @@ Handle dataset_properties() {
   return properties;
 }
 
+/// The properties of a dataset in chunks.
+Handle packed(const Array& array, Filter filter, int compression) {
+  Handle layout = dataset_properties();
+  const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
+  H5Pset_chunk(layout.id(), 1, &chunk);
+  if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
+  H5Pset_deflate(layout.id(), compression < 0 ? 1U : static_cast<unsigned>(compression));
+  return layout;
+}
+
 Handle create_array(hid_t group, const std::string& name, const Array& array, Filter filter,
-                    int compression) {
+                    const Style& style) {
   const hsize_t extent = array.size;
   const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
-  const Handle layout = dataset_properties();
-  if (filter != Filter::none) {
-    const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
-    H5Pset_chunk(layout.id(), 1, &chunk);
-    if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
-    H5Pset_deflate(layout.id(), compression < 0 ? 1U : static_cast<unsigned>(compression));
-  } else if (array.bytes() <= compact_bytes) {
-    H5Pset_layout(layout.id(), H5D_COMPACT);
-  }
-  Handle dataset(H5Dcreate2(group, name.c_str(), array.stored, space.id(), H5P_DEFAULT, layout.id(),
-                            H5P_DEFAULT),
-                 H5Dclose);
+  const Handle own =
+      filter != Filter::none ? packed(array, filter, style.compression) : Handle(-1, H5Pclose);
+  const hid_t layout = own.ok()                         ? own.id()
+                       : array.bytes() <= compact_bytes ? style.compact.id()
+                                                        : style.plain.id();
+  Handle dataset(
+      H5Dcreate2(group, name.c_str(), array.stored, space.id(), H5P_DEFAULT, layout, H5P_DEFAULT),
+      H5Dclose);
   if (!dataset.ok()) fail(name, "cannot be created");
   if (array.size > 0) {
     check(H5Dwrite(dataset.id(), array.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data), name);
@@ -135,9 +142,11 @@ Filter likely_filter(const Array& array) {
 
 /// The filter of an array; where only what packs at once is packed, found by a trial.
 Filter best_filter(const Target& group, const Array& array) {
-  if (array.size < chunked_from || group.compression == 0) return Filter::none;
-  if (group.compression > 0) return likely_filter(array);
+  const Style& style = *group.style;
+  if (array.size < chunked_from || style.compression == 0) return Filter::none;
+  if (style.compression > 0) return likely_filter(array);
   if (array.size < 8 * sample_entries) return Filter::none;  // not worth a trial
+  const hid_t scratch = style.scratch();
   Array sample = array;
   sample.size = sample_entries;
   Filter best = Filter::none;
@@ -145,11 +154,11 @@ Filter best_filter(const Target& group, const Array& array) {
   for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
     std::size_t size = index_bytes;
     {
-      const Handle trial = create_array(group.scratch, "trial", sample, filter, group.compression);
+      const Handle trial = create_array(scratch, "trial", sample, filter, style);
       check(H5Dflush(trial.id()), "");
       size += H5Dget_storage_size(trial.id());
     }
-    check(H5Ldelete(group.scratch, "trial", H5P_DEFAULT), "");
+    check(H5Ldelete(scratch, "trial", H5P_DEFAULT), "");
     if (size < least) {
       best = filter;
       least = size;
@@ -159,7 +168,7 @@ Filter best_filter(const Target& group, const Array& array) {
 }
 
 void write_array(const Target& group, const std::string& name, const Array& array) {
-  create_array(group.id, name, array, best_filter(group, array), group.compression);
+  create_array(group.id, name, array, best_filter(group, array), *group.style);
 }
 
 Handle text_type(const std::string& text) {
@@ -168,7 +177,26 @@ Handle text_type(const std::string& text) {
   return type;
 }
 
+Handle group_properties() {
+  Handle properties(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
+  keep_small(properties.id());
+  return properties;
+}
+
+Handle compact_properties() {
+  Handle properties = dataset_properties();
+  H5Pset_layout(properties.id(), H5D_COMPACT);
+  return properties;
+}
+
 }  // namespace
+
+Style::Style(int level, std::function<hid_t()> scratch_of)
+    : compression(level),
+      scratch(std::move(scratch_of)),
+      group(group_properties()),
+      plain(dataset_properties()),
+      compact(compact_properties()) {}
 
 void keep_small(hid_t properties) {
   check(H5Pset_link_phase_change(properties, compact_links, compact_links), "");
@@ -176,11 +204,10 @@ void keep_small(hid_t properties) {
   check(H5Pset_obj_track_times(properties, false), "");  // the same problem gives the same bytes
 }
 
-Handle create_group(const Group& parent, const std::string& name) {
-  const Handle properties(H5Pcreate(H5P_GROUP_CREATE), H5Pclose);
-  keep_small(properties.id());
-  Handle group(H5Gcreate2(parent.id, name.c_str(), H5P_DEFAULT, properties.id(), H5P_DEFAULT),
-               H5Gclose);
+Handle create_group(const Target& parent, const std::string& name) {
+  Handle group(
+      H5Gcreate2(parent.id, name.c_str(), H5P_DEFAULT, parent.style->group.id(), H5P_DEFAULT),
+      H5Gclose);
   if (!group.ok()) fail(parent.child(name), "cannot be created");
   return group;
 }
@@ -195,11 +222,11 @@ void write_numbers(const Target& group, const std::string& name, const std::int3
   write_array(group, name, {H5T_STD_I32LE, H5T_NATIVE_INT32, values, size});
 }
 
-void write_text(const Group& group, const std::string& name, const std::string& text) {
+void write_text(const Target& group, const std::string& name, const std::string& text) {
   const Handle type = text_type(text);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle layout = dataset_properties();
-  if (text.size() < compact_bytes) H5Pset_layout(layout.id(), H5D_COMPACT);
+  const Style& style = *group.style;
+  const Handle& layout = text.size() < compact_bytes ? style.compact : style.plain;
   const Handle dataset(H5Dcreate2(group.id, name.c_str(), type.id(), space.id(), H5P_DEFAULT,
                                   layout.id(), H5P_DEFAULT),
                        H5Dclose);

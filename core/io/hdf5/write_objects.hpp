@@ -2,29 +2,42 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "io/hdf5/handles.hpp"
 
 namespace fclib::hdf5 {
 
+/// How a whole file is written. The properties are made once: HDF5 takes longer to make them than
+/// to write a number.
+struct Style {
+  /// `scratch` gives a group of another file, to try things in; it is asked for where it is needed.
+  Style(int compression, std::function<hid_t()> scratch);
+
+  int compression;
+  std::function<hid_t()> scratch;
+  Handle group;
+  Handle plain;    ///< a dataset in one piece
+  Handle compact;  ///< a dataset in its own header
+};
+
 /// A group to write into, and how.
 struct Target : Group {
-  int compression = 0;
-  hid_t scratch = -1;  ///< a group of another file, to try things in
+  const Style* style = nullptr;
 };
 
 /// What makes small groups small, for the properties of a group or of a file.
 void keep_small(hid_t properties);
 
-Handle create_group(const Group& parent, const std::string& name);
+Handle create_group(const Target& parent, const std::string& name);
 
 /// A new group inside another, written alike.
 class NewGroup {
  public:
   NewGroup(const Target& parent, const std::string& name)
       : handle_(create_group(parent, name)),
-        target_{{handle_.id(), parent.child(name)}, parent.compression, parent.scratch} {}
+        target_{{handle_.id(), parent.child(name)}, parent.style} {}
   [[nodiscard]] const Target& target() const { return target_; }
 
  private:
@@ -48,7 +61,7 @@ void write_number(const Target& group, const std::string& name, Number value) {
   write_numbers(group, name, &value, 1);
 }
 
-void write_text(const Group& group, const std::string& name, const std::string& text);
+void write_text(const Target& group, const std::string& name, const std::string& text);
 
 void write_text_attribute(const Group& group, const char* name, const std::string& text);
 

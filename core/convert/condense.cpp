@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "linalg/extended.hpp"
 
@@ -21,27 +22,29 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
   local_.q = problem.w;
   multiply_transposed_add(problem.H, free_velocity, local_.q);
 
-  const SparseColumns h = to_eigen(problem.H);
-  const SparseColumns g = is_mixed(problem) ? to_eigen(problem.G) : SparseColumns(h.rows(), 0);
+  SparseColumns both = to_eigen(problem.H);  // [H G]
+  const Eigen::Index m = both.cols();
+  const Eigen::Index p = is_mixed(problem) ? problem.G.cols : 0;
+  if (p > 0) {
+    const SparseColumns h = std::move(both);
+    both = SparseColumns(h.rows(), m + p);
+    both.reserve(h.nonZeros() + static_cast<Eigen::Index>(problem.G.nnz()));
+    both.leftCols(m) = h;
+    both.rightCols(p) = to_eigen(problem.G);
+  }
   const auto store = [](const SparseColumns& a) {
     return converted(Matrix::from_eigen(a), Storage::csr);
   };
-  const Eigen::Index m = h.cols();
-  const Eigen::Index p = g.cols();
-  SparseColumns both(h.rows(), m + p);  // [H G]
-  both.reserve(h.nonZeros() + g.nonZeros());
-  both.leftCols(m) = h;
-  both.rightCols(p) = g;
   const std::optional<SparseColumns> product = mass_.gram(both, *deadline);
   if (!product) return;
   const SparseColumns& gram = *product;
-  local_.W = store(SparseColumns(SparseColumns(gram.leftCols(m)).topRows(m)));
-  if (is_mixed(problem)) {
+  if (!is_mixed(problem)) {
+    local_.W = store(gram);
+  } else {
+    local_.W = store(SparseColumns(SparseColumns(gram.leftCols(m)).topRows(m)));
     const SparseColumns right = gram.rightCols(p);
     local_.V = store(SparseColumns(right.topRows(m)));
     local_.R = store(SparseColumns(right.bottomRows(p)));
-  }
-  if (is_mixed(problem)) {
     local_.s = problem.b;
     multiply_transposed_add(problem.G, free_velocity, local_.s);
   }

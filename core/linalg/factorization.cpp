@@ -24,6 +24,24 @@ constexpr Index columns_at_once = 64;
 
 const Deadline never(std::numeric_limits<double>::infinity());
 
+/// The symmetric matrix of which this is the lower triangle.
+SparseColumns mirrored(const SparseColumns& lower) {
+  const SparseColumns upper = lower.transpose();
+  SparseColumns result(lower.rows(), lower.cols());
+  result.reserve(2 * lower.nonZeros());
+  for (Eigen::Index col = 0; col < lower.cols(); ++col) {
+    result.startVec(col);
+    for (SparseColumns::InnerIterator entry(upper, col); entry; ++entry) {
+      if (entry.row() < col) result.insertBack(entry.row(), col) = entry.value();
+    }
+    for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
+      result.insertBack(entry.row(), col) = entry.value();
+    }
+  }
+  result.finalize();
+  return result;
+}
+
 /// A B, column by column; nothing where the deadline passes.
 std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns& b,
                                      const Deadline& deadline) {
@@ -41,6 +59,46 @@ std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns
   }
   result.finalize();
   return result;
+}
+
+/// A^T A, in which each sum is taken once: column by column what lies on and below the diagonal,
+/// and its mirror image. Nothing where the deadline passes.
+std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& deadline) {
+  const SparseColumns rows = a.transpose();
+  const auto m = static_cast<Index>(a.cols());
+  // the entries of a row of A from the present column on
+  std::vector<Index> next(rows.outerIndexPtr(), rows.outerIndexPtr() + rows.cols());
+  std::vector<double> sum(m, -0.0);  // what nothing is changed by, signed zeros included
+  std::vector<Index> last(m, -1);
+  std::vector<Index> found;
+  SparseColumns lower(m, m);
+  lower.reserve(rows.nonZeros());
+  for (Index col = 0; col < m; ++col) {
+    if (col % columns_at_once == 0 && deadline.passed()) return std::nullopt;
+    found.clear();
+    for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+      const auto k = static_cast<std::size_t>(entry.row());
+      const Index first = next[k]++;
+      const Index* row = rows.innerIndexPtr() + first;
+      const double* value = rows.valuePtr() + first;
+      const Index count = rows.outerIndexPtr()[k + 1] - first;
+      for (Index at = 0; at < count; ++at) {
+        sum[row[at]] += value[at] * entry.value();
+        if (last[row[at]] != col) {
+          last[row[at]] = col;
+          found.push_back(row[at]);
+        }
+      }
+    }
+    std::sort(found.begin(), found.end());
+    lower.startVec(col);
+    for (const Index row : found) {
+      lower.insertBack(row, col) = sum[row];
+      sum[row] = -0.0;
+    }
+  }
+  lower.finalize();
+  return mirrored(lower);
 }
 
 bool is_symmetric(const SparseColumns& a) {
@@ -123,9 +181,10 @@ SparseColumns Factorization::gram(const SparseColumns& b) const { return *gram(b
 std::optional<SparseColumns> Factorization::gram(const SparseColumns& b,
                                                  const Deadline& deadline) const {
   if (supernodal_) return supernodal_->gram(b, deadline);
-  const auto right = lu_ ? std::optional(solve(b)) : half_solve(b, deadline);
-  if (!right) return std::nullopt;
-  return product(SparseColumns((lu_ ? b : *right).transpose()), *right, deadline);
+  if (lu_) return product(SparseColumns(b.transpose()), solve(b), deadline);
+  const std::optional<SparseColumns> half = half_solve(b, deadline);
+  if (!half) return std::nullopt;
+  return square(*half, deadline);
 }
 
 Vector Factorization::gram_diagonal(const SparseColumns& b) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "error.hpp"
 
@@ -87,8 +88,46 @@ bool is_canonical(const Matrix& a) {
   return true;
 }
 
+namespace {
+
+/// By rows what is canonical and by columns, or the reverse.
+Matrix turned(const Matrix& a) {
+  const bool by_columns = a.storage == Storage::csc;
+  const Index majors = by_columns ? a.cols : a.rows;
+  const Index minors = by_columns ? a.rows : a.cols;
+  Matrix result;
+  result.storage = by_columns ? Storage::csr : Storage::csc;
+  result.rows = a.rows;
+  result.cols = a.cols;
+  result.info = a.info;
+  result.p.assign(static_cast<std::size_t>(minors) + 1, 0);
+  result.i.resize(a.nnz());
+  result.x.resize(a.nnz());
+  for (const Index minor : a.i) ++result.p[static_cast<std::size_t>(minor) + 1];
+  std::partial_sum(result.p.begin(), result.p.end(), result.p.begin());
+  std::vector<Index> next(result.p.begin(), result.p.end() - 1);
+  for (Index major = 0; major < majors; ++major) {
+    for (Index k = a.p[major]; k < a.p[major + 1]; ++k) {
+      const Index at = next[a.i[k]]++;
+      result.i[at] = major;
+      result.x[at] = a.x[k];
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
 SparseColumns to_eigen(const Matrix& a) {
   SparseColumns result(a.rows, a.cols);
+  if (a.storage == Storage::csc && is_canonical(a)) {
+    result.resizeNonZeros(static_cast<Eigen::Index>(a.nnz()));
+    std::ranges::copy(a.p, result.outerIndexPtr());
+    std::ranges::copy(a.i, result.innerIndexPtr());
+    std::ranges::copy(a.x, result.valuePtr());
+    return result;
+  }
+  if (a.storage == Storage::csr && is_canonical(a)) return to_eigen(turned(a));
   std::vector<Eigen::Triplet<double, Index>> entries;
   entries.reserve(a.nnz());
   for_each_entry(
@@ -98,20 +137,25 @@ SparseColumns to_eigen(const Matrix& a) {
 }
 
 Matrix Matrix::from_eigen(const SparseColumns& a) {
-  SparseColumns compressed = a;
-  compressed.makeCompressed();
+  if (!a.isCompressed()) {
+    SparseColumns compressed = a;
+    compressed.makeCompressed();
+    return from_eigen(compressed);
+  }
   Matrix result;
   result.storage = Storage::csc;
   result.rows = static_cast<Index>(a.rows());
   result.cols = static_cast<Index>(a.cols());
-  result.p.assign(compressed.outerIndexPtr(), compressed.outerIndexPtr() + a.cols() + 1);
-  result.i.assign(compressed.innerIndexPtr(), compressed.innerIndexPtr() + compressed.nonZeros());
-  result.x.assign(compressed.valuePtr(), compressed.valuePtr() + compressed.nonZeros());
+  result.p.assign(a.outerIndexPtr(), a.outerIndexPtr() + a.cols() + 1);
+  result.i.assign(a.innerIndexPtr(), a.innerIndexPtr() + a.nonZeros());
+  result.x.assign(a.valuePtr(), a.valuePtr() + a.nonZeros());
   return result;
 }
 
 Matrix converted(const Matrix& a, Storage storage) {
   if (a.storage == storage) return a;
+  const auto compressed = [](Storage one) { return one == Storage::csc || one == Storage::csr; };
+  if (compressed(a.storage) && compressed(storage) && is_canonical(a)) return turned(a);
   Matrix result;
   switch (storage) {
     case Storage::csc:

@@ -97,12 +97,19 @@ def without_zeros(data: Vector, rows: Index, columns: Index, shape: tuple[int, i
 
 def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
     """A + factor B, without zeros."""
-    if not other.nnz:
+    if not len(other.data):
         return matrix
     n = matrix.shape[0]
-    places = np.concatenate(
-        (columns_of(matrix) * n + matrix.indices, columns_of(other) * n + other.indices)
-    )
+    columns, others = columns_of(matrix), columns_of(other)
+    if len(others) <= n and (other.indices == others).all():
+        at = np.flatnonzero(matrix.indices == columns)
+        if len(at) == n:
+            # a diagonal onto one that is there
+            sums = matrix.data.copy()
+            sums[at[others]] += factor * other.data
+            if sums.all():
+                return by_columns(sums, matrix.indices, matrix.indptr, matrix.shape)
+    places = np.concatenate((columns * n + matrix.indices, others * n + other.indices))
     values = np.concatenate((matrix.data, factor * other.data))
     return summed(values, places, matrix.shape)
 

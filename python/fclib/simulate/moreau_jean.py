@@ -236,8 +236,10 @@ class MoreauJean:
         if self.law == "velocity":
             before = transposed_times(H, v)[0::d]
             active = closing(contacts.pair, contacts.gap + 0.5 * h * before, self.activation)
-            contacts, H = contacts[active], take(H, block_columns(active, d))
-            w_n = self.restitution * before[active]
+            if len(active) < len(contacts):
+                contacts, H = contacts[active], take(H, block_columns(active, d))
+                before = before[active]
+            w_n = self.restitution * before
         else:
             middle = contacts.gap
             if self.theta < 1:
@@ -338,8 +340,13 @@ def with_dry_friction(
     lengths = np.zeros((k, d), dtype=np.int32)
     lengths[:, 0], lengths[:, 1] = 1, lengths_of(gradient.indptr)
     starts = pointers(np.append(lengths_of(H.indptr), lengths))
-    rows = np.insert(gradient.indices, gradient.indptr[:-1], n + own)
-    values = np.insert(gradient.data, gradient.indptr[:-1], 1.0)
+    rows = np.empty(len(gradient.data) + k, dtype=np.int32)
+    values = np.empty(len(rows))
+    of_joint = np.ones(len(rows), dtype=bool)
+    at = gradient.indptr[:-1] + own
+    of_joint[at] = False
+    rows[at], rows[of_joint] = n + own, gradient.indices
+    values[at], values[of_joint] = 1.0, gradient.data
     first = gradient.indices[gradient.indptr[:-1]]
     return (
         by_columns(
@@ -399,6 +406,8 @@ def linked(
     # contacts touch trees; inertia and bilateral rows pass it on
     touched = np.zeros(trees, dtype=bool)
     touched[tree[H.indices]] = True
+    if not p and touched.all():
+        return np.arange(n), np.arange(0)
     first, second = tree[M.indices], tree[columns_of(M)]
     between = np.flatnonzero(first != second)
     first, second = first[between], second[between]

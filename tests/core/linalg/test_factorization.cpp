@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "error.hpp"
 #include "random_data.hpp"
 
@@ -22,6 +24,22 @@ TEST(Factorization, solves_symmetric_and_other_systems) {
     EXPECT_LT((Eigen::MatrixXd(a * factorization.solve(many)) - Eigen::MatrixXd(many)).norm(),
               1e-12);
   }
+}
+
+TEST(Factorization, gram_keeps_stored_zeros_and_their_signs) {
+  // with A = 1 the half is B itself: (-0) (-1) = 0 and (-0) 1 = -0 are entries of B^T B
+  SparseColumns one(1, 1);
+  one.insert(0, 0) = 1;
+  SparseColumns b(1, 3);
+  b.insert(0, 0) = -0.0;
+  b.insert(0, 1) = -1;
+  b.insert(0, 2) = 1;
+  const SparseColumns gram = Factorization(one, "A").gram(b);
+  ASSERT_EQ(gram.nonZeros(), 9);
+  EXPECT_FALSE(std::signbit(gram.coeff(1, 0)));
+  EXPECT_TRUE(std::signbit(gram.coeff(2, 0)));
+  EXPECT_TRUE(std::signbit(gram.coeff(0, 2)));
+  EXPECT_EQ(gram.coeff(1, 2), -1);
 }
 
 TEST(Factorization, gram_is_symmetric_and_keeps_bodies_apart) {

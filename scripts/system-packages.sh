@@ -28,9 +28,9 @@ ls /usr/include/metis.h /usr/local/include/metis.h 2>/dev/null | grep -q . || op
 
 # draws the picture of the demo, which goes without where it is not; ldconfig is not on every PATH
 if ! { PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional="$optional libosmesa6"; fi
-# shows the report's pages to the tests
-if [ "${1-}" = test ] && ! { command -v chromium || command -v chromium-browser; } >/dev/null 2>&1; then
-  optional="$optional chromium"
+# shows the report's pages to the tests, at a quarter of what the whole browser takes
+if [ "${1-}" = test ] && ! command -v chromium-headless-shell >/dev/null 2>&1; then
+  optional="$optional chromium-headless-shell"
 fi
 # makes the module for browsers, and Node runs it (make wasm)
 if [ "${1-}" = test ] && ! { command -v emcmake && command -v node; } >/dev/null 2>&1; then
@@ -69,7 +69,12 @@ echo "== installing them by apt"
 $sudo apt-get update -qq
 had=
 for package in $optional; do # what this system has not is left out
-  if apt-cache show "$package" >/dev/null 2>&1; then had="$had $package"; fi
+  if apt-cache show "$package" >/dev/null 2>&1; then
+    had="$had $package"
+  elif [ "$package" = chromium-headless-shell ] &&
+    ! { command -v chromium || command -v chromium-browser; } >/dev/null 2>&1; then
+    had="$had chromium"
+  fi
 done
 optional=$had
 [ -n "$missing$optional" ] || exit 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import functools
-import shutil
 import threading
 from collections.abc import Iterator
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -16,8 +15,8 @@ import pytest
 import browser_module
 import fclib
 import golden_work
+from helpers_browser import chromium
 
-api = pytest.importorskip("playwright.sync_api")
 pytestmark = [
     pytest.mark.skipif(bool(browser_module.missing()), reason=browser_module.missing()),
     pytest.mark.slow,
@@ -64,12 +63,7 @@ def address() -> Iterator[str]:
 def page(address: str) -> Iterator[Any]:
     if not (browser_module.FOLDER / "hdf5_hl.js").is_file():
         pytest.skip("the module reads no HDF5: there was no npm")
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-    with api.sync_playwright() as playwright:
-        try:
-            browser = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
-        except api.Error:
-            pytest.skip("there is no Chromium: apt install chromium")
+    with chromium() as browser:
         opened = browser.new_page()
         opened.wrong = []
         opened.on("console", lambda message: opened.wrong.append(message.text))
@@ -87,7 +81,6 @@ def page(address: str) -> Iterator[Any]:
         )
         opened.goto(f"{address}/")
         yield opened
-        browser.close()
 
 
 def ask(page: Any, path: Path, settings: dict[str, Any], stop: bool) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import re
-import shutil
 import subprocess
 import sys
 import threading
@@ -20,6 +19,7 @@ import pytest
 
 import fclib
 from fclib.collections import plan
+from helpers_browser import chromium
 
 pytest.importorskip("sphinx", reason="the documentation's tools are not installed: make docs")
 pytest.importorskip("mujoco")
@@ -161,18 +161,8 @@ def test_all_that_is_generated_is_there(site: Path, root: Path) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        found = [None, *filter(None, map(shutil.which, ("chromium", "chromium-browser")))]
-        for path in found:
-            try:
-                opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-            except api.Error:
-                continue
-            yield opened
-            opened.close()
-            return
-        pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")
+    with chromium() as opened:
+        yield opened
 
 
 def test_pages_in_a_browser(site: Path, browser: Any) -> None:

@@ -6,7 +6,6 @@ import hashlib
 import http.server
 import importlib.util
 import io
-import shutil
 import sys
 import threading
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ import pytest
 import fclib
 from fclib.bench import profiles
 from fclib.report import Campaigns, build_site, view_of, write_view
+from helpers_browser import chromium
 from helpers_report import LABELS, make_collection, make_store, periodic_step, read_data
 
 pytest.importorskip("mujoco")
@@ -26,7 +26,6 @@ pytest.importorskip("pyarrow")
 pytest.importorskip("plotly")
 image = pytest.importorskip("matplotlib.image")
 pytest.importorskip("itables")
-api = pytest.importorskip("playwright.sync_api")
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution
@@ -52,17 +51,8 @@ PAGES = {
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with api.sync_playwright() as playwright:
-        found = [None, *filter(None, map(shutil.which, ("chromium", "chromium-browser")))]
-        for path in found:
-            try:
-                opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-            except api.Error:
-                continue
-            yield opened
-            opened.close()
-            return
-        pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")
+    with chromium() as opened:
+        yield opened
 
 
 @pytest.fixture(scope="module")

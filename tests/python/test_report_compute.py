@@ -35,6 +35,7 @@ from fclib.report import Campaigns, ReportError, browser, build_site, serving
 from fclib.report.solids import solids_of
 from fclib.report.view import view_of
 from helpers import planted_global, planted_local
+from helpers_browser import chromium
 from helpers_report import read_data
 
 pytest.importorskip("pyarrow")
@@ -116,16 +117,10 @@ def test_a_site_is_served_until_an_interrupt(site: Path) -> None:
 @contextmanager
 def opened(address: str, width: int = 390) -> Iterator[Any]:
     """A page of this machine in Chromium: no error on its console, no request to another host."""
-    api = pytest.importorskip("playwright.sync_api")
-    found = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
     host = re.match(r"http://127\.0\.0\.1:\d+/", address)
     assert host is not None
-    with api.sync_playwright() as playwright:
-        try:
-            chromium = playwright.chromium.launch(executable_path=found, args=["--no-sandbox"])
-        except api.Error:
-            pytest.skip("there is no Chromium: apt install chromium")
-        page = chromium.new_page(viewport={"width": width, "height": 800})
+    with chromium() as window:
+        page = window.new_page(viewport={"width": width, "height": 800})
         page.set_default_timeout(20_000)
         wrong: list[str] = []
         # Chromium warns of the speed of its own drawing, where a page has WebGL
@@ -148,7 +143,7 @@ def opened(address: str, width: int = 390) -> Iterator[Any]:
         )
         page.goto(address)
         yield page
-        chromium.close()
+        window.close()
         assert not wrong
 
 

@@ -1,0 +1,27 @@
+"""Chromium for tests of pages: without windows where there is such a one."""
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+# the shell draws pages alone: a page costs it a quarter of what it costs the whole browser
+NAMES = ("chromium-headless-shell", "chromium", "chromium-browser")
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """The first Chromium that starts: Playwright's own, or one of the system. Skips without one."""
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        for path in (None, *filter(None, map(shutil.which, NAMES))):
+            try:
+                opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+            except api.Error:
+                continue
+            yield opened
+            opened.close()
+            return
+        pytest.skip("there is no Chromium: apt install chromium, or playwright install chromium")

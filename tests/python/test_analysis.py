@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 import fclib
 from fclib import analysis
 from fclib.analysis import _existence, _spectrum
+from fclib.analysis._brief import brief
 from fclib.analysis._data import Data
 from helpers import (
     dense,
@@ -493,6 +494,31 @@ def test_without_friction_the_velocity_is_unique() -> None:
     problem = fclib.GlobalProblem(M=np.eye(3), H=H, f=[-1, 0, 0], w=np.zeros(6), mu=[0, 0])
     found = analysis.analyze(problem).uniqueness
     assert (found.verdict, found.reactions) == ("unique", False)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e-15, 1e-17, 1e-30])
+def test_heavy_bodies_are_no_rounding_of_light_ones(size: float) -> None:
+    # frictionless, the first contact alone; of the others r = 0 and r = 1 / size are solutions
+    normal = np.array([[1, 0, 0], [0, size, -2 * size], [0, -2 * size, size]])
+    W = np.kron(normal, np.diag([1.0, 0.0])) + np.kron(np.diag(np.diag(normal)), [[0, 0], [0, 1]])
+    problem = local_problem(W, [1.0, 0, 1, 0, 1, 0], np.zeros(3))
+    for r in (0.0, 1 / size):
+        solution = fclib.Solution(r=np.array([0.0, 0, r, 0, r, 0]))
+        assert fclib.merit(problem, solution).error <= 1e-15
+    found = analysis.analyze(problem)
+    assert found.definiteness.word == "indefinite"
+    assert found.uniqueness.verdict == "not unique"
+    assert found.existence.verdict == "exists by enumeration"
+    assert found.isolated_solutions == 2
+    said = brief(problem, problem, None, 1e-8)
+    assert said.record["definiteness"] == "indefinite"
+    assert said.record["uniqueness"] is None
+    # and what is asymmetric is so beside a part that is not
+    skew = np.diag([1.0, size])
+    skew = np.block([[skew, np.zeros((2, 2))], [np.zeros((2, 2)), size * np.eye(2)]])
+    skew[1, 3], skew[3, 1] = 0.5 * size, -0.5 * size
+    reason = analysis.analyze(local_problem(skew, [1.0, 0, 1, 0], [0.01, 0.01])).uniqueness.reason
+    assert "contraction" not in reason
 
 
 def test_units_far_from_one_are_said() -> None:

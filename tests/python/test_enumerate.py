@@ -417,6 +417,27 @@ def test_what_rests_on_the_last_digits_is_not_claimed() -> None:
     assert found.velocity_unique is not True
 
 
+@pytest.mark.parametrize("size", [2.0**-100, 1.0, 2.0**100])
+def test_units_decide_nothing(size: float) -> None:
+    # it slides, and no doubles of r are on the border of the cone: in newtons of its own rounding
+    # that is a wrong velocity
+    W, q = np.array([[3.0, 1.0], [1.0, 2.0]]), [-1.0, -3.0]
+    found = analysis.enumerate_solutions(local_problem(size * W, q, [0.3]))
+    assert found.verdict == "exists"
+    assert len(found.isolated) == 1
+    assert found.velocity_unique is True
+
+
+def test_a_solution_that_doubles_do_not_hold_is_no_proof_of_none() -> None:
+    # the only solution has reactions of 1e330
+    far = local_problem(1e-200 * np.eye(2), [-1e130, 0.0], [0.5])
+    found = analysis.enumerate_solutions(far)
+    assert len(found.solutions) == 1
+    assert not found.sound
+    assert found.verdict == "undecided"
+    assert analysis.analyze(far).existence.verdict != analysis.PROVEN_NOT
+
+
 @pytest.mark.parametrize("size", [1e-300, 1e-200, 1.0, 1e200, 1e300])
 @pytest.mark.parametrize("mu", [1e-300, 0.5, 1e300])
 def test_numbers_at_the_ends_of_doubles(size: float, mu: float) -> None:

@@ -102,6 +102,22 @@ def test_a_velocity_that_is_not_inside_proves_nothing() -> None:
     assert self_stress(broken, slater(data, True, False)).verdict != "solvable"
 
 
+def test_a_part_that_is_next_to_nothing_may_have_other_solutions() -> None:
+    # heavy bodies beside a light one, of a W that is indefinite: both r solve it
+    heavy = np.array([[9, -2, 1, -2], [-2, 3, -1, 6], [1, -1, 3, 6], [-2, 6, 6, 5.0]])
+    W = np.eye(6)
+    W[2:, 2:] = 2.0**-51 * heavy
+    q = np.array([-3, 1, 2.0**-8, -(2.0**-9), 2.0**-9, -(2.0**-10)])
+    problem = fclib.LocalProblem(spacedim=2, W=W, q=q, mu=[0.5, 1.0, 1.0])
+    states = analysis.enumerate_solutions(problem)
+    sizes = sorted(float(np.linalg.norm(np.array(one.r, float))) for one in states.isolated)
+    assert len(sizes) == 2
+    data = Data.of(problem)
+    found = self_stress(data, slater(data, True, False))
+    assert found.verdict == "solvable"
+    assert sizes[0] <= found.bound < found.far <= sizes[1]
+
+
 def test_bounds_hold_in_exact_arithmetic() -> None:
     rng = np.random.default_rng(4)
     for size in (1, 2, 5, 40):

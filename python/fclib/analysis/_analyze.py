@@ -12,7 +12,17 @@ from scipy.sparse.csgraph import connected_components
 
 from fclib import _core, _digest, _solve
 from fclib.analysis._certificate import Certificate
-from fclib.analysis._data import DENSE, EPS, SYMMETRIC, Data, Reduced, asymmetry, columns
+from fclib.analysis._data import (
+    DENSE,
+    EPS,
+    SYMMETRIC,
+    Array,
+    Data,
+    Reduced,
+    asymmetry,
+    balanced,
+    columns,
+)
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import Existence, Slater, existence, slater
 from fclib.analysis._self_stress import SelfStress, least_singular, lower_bound, self_stress
@@ -198,6 +208,7 @@ class Analysis:
             "self_stress": self.self_stress.verdict,
             "self_stress_reason": self.self_stress.reason,
             "reaction_bound": self.self_stress.bound,
+            "reaction_far": self.self_stress.far,
             "uniqueness": self.uniqueness.verdict,
             "uniqueness_reason": self.uniqueness.reason,
             "contraction": self.uniqueness.contraction,
@@ -336,19 +347,36 @@ def definite_by_bodies(data: Data) -> bool:
 
 def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:
     """Of the symmetric part of W, or of W'."""
+    symmetric = columns((reduced.W + reduced.W.T) / 2)
     if found.extremes is not None:
         (low, high), method = found.extremes, found.method
     else:
-        low, high, method = lowest_eigenvalue(columns((reduced.W + reduced.W.T) / 2), dense)
+        low, high, method = lowest_eigenvalue(symmetric, dense)
     size = max(data.problem.m, 10)
     threshold = max(size * EPS * max(high, -low), size * reduced.rounding)
-    if low < -threshold:
+    if low < -threshold or (
+        low <= threshold
+        and indefinite_in_part(symmetric, dense, reduced.own_size, reduced.own_rounding)
+    ):
         word = DEFINITE[2]
     elif low <= threshold:
         word = DEFINITE[1]
     else:
         word = DEFINITE[0]
     return Definiteness(word, low, high, method, threshold)
+
+
+def indefinite_in_part(
+    symmetric: Any, dense: int, own_size: Array | None = None, own_rounding: float = 0.0
+) -> bool:
+    """Whether a part is indefinite that is next to nothing beside the rest, as of heavy bodies.
+
+    With a diagonal of ones each part counts, and only rounding of its own size is zero.
+    """
+    scaled = balanced(symmetric, own_size)
+    low, high, _ = lowest_eigenvalue(scaled, dense)
+    size = max(scaled.shape[0], 10)
+    return bool(low < -size * max(EPS * max(high, -low), own_rounding))
 
 
 def uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqueness:
@@ -361,7 +389,7 @@ def uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Unique
     if reduced is None:
         reason = f"{name} is not known"
         return Uniqueness("undecided", reason, constant, full)
-    symmetric = asymmetry(reduced.W) <= SYMMETRIC
+    symmetric = asymmetry(balanced(reduced.W, reduced.own_size)) <= SYMMETRIC
     if symmetric and sign.word == DEFINITE[0]:
         constant = _contraction(data, reduced, dense)
         # from above: what the inverse may have lost to rounding

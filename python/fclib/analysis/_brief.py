@@ -19,6 +19,7 @@ from fclib.analysis._analyze import (
     UNKNOWN,
     Definiteness,
     definite_by_bodies,
+    indefinite_in_part,
     uniqueness,
 )
 from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
@@ -155,7 +156,8 @@ def sign_of(data: Data, found: Spectrum) -> Definiteness:
     low, high = found.extremes if found.extremes is not None else (0.0, found.largest)
     low = 0.0 if bodies else low
     threshold = max(found.threshold, 10 * np.finfo(float).eps * high)
-    if low < -threshold:
+    part = not data.problem.n and -threshold <= low <= threshold
+    if low < -threshold or (part and indefinite_in_part(data.W, SIDE)):
         word = DEFINITE[2]
     elif found.rank < size:
         word = DEFINITE[1]

@@ -35,18 +35,53 @@ def largest(a: Any) -> float:
     return float(abs(a).max()) if a.nnz else 0.0
 
 
+def norm(x: Any) -> float:
+    """||x||, whose squares neither overflow nor vanish; the largest double at most."""
+    with np.errstate(over="ignore"):
+        found = float(np.hypot.reduce(np.asarray(x, dtype=float), initial=0.0))
+    return min(found, float(np.finfo(float).max))
+
+
 def asymmetry(a: Any) -> float:
     """Max |A - A^T| / max |A|, 0 for the zero matrix."""
     size = largest(a)
     return largest(columns(a - a.T)) / size if size else 0.0
 
 
+def balanced(a: Any, size: Array | None = None) -> Any:
+    """D A D of a square csc_array, D = 1 / size; by default the diagonal becomes one.
+
+    A row without a diagonal entry is given the size that makes its largest entry one.
+    """
+    if a.nnz == 0:
+        return a
+    if size is None:
+        size = np.sqrt(abs(a.diagonal()))
+        held = size > 0
+        inverse = np.where(held, 1 / np.where(held, size, 1.0), 0.0)
+        entries = abs(a) + abs(a).T
+        across = (entries @ sp.diags_array(inverse)).max(axis=1).toarray().ravel()
+        alone = np.sqrt(entries.max(axis=1).toarray().ravel())
+        size = np.where(held, size, np.where(across > 0, across, alone))
+    inverse = sp.diags_array(1 / np.where(size > 0, size, 1.0))
+    return columns(inverse @ a @ inverse)
+
+
 @dataclass(frozen=True)
 class Reduced:
-    """W' = W - V R^-1 V^T, and up to where its eigenvalues may be rounding."""
+    """W' = W - V R^-1 V^T, and up to where its eigenvalues may be rounding.
+
+    Attributes:
+        W: W'.
+        rounding: of its eigenvalues.
+        own_size, own_rounding: entry (i, j) is rounded by own_rounding own_size_i own_size_j; no
+            sizes where W' is W.
+    """
 
     W: Any
     rounding: float
+    own_size: Array | None = None
+    own_rounding: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -117,7 +152,9 @@ class Data:
             lengths = np.linalg.norm(A, axis=0)
             # columns that the joints hold entirely are zero, not rounding
             left[:, np.linalg.norm(left, axis=0) <= 16 * off * lengths] = 0
-            return Reduced(columns(left.T @ left), 16 * off * float(lengths.max(initial=0.0)) ** 2)
+            digits = 16 * off
+            largest_length = float(lengths.max(initial=0.0))
+            return Reduced(columns(left.T @ left), digits * largest_length**2, lengths, digits)
         V, R = self.matrices["V"].toarray(), self.matrices["R"].toarray()
         sigma = np.linalg.svd(R, compute_uv=False)
         if not sigma[-1] > 1e-10 * sigma[0]:
@@ -128,7 +165,8 @@ class Data:
         rounding = 16 * off * (abs(W) + abs(held))
         left = W - held
         left[abs(left) <= rounding] = 0
-        return Reduced(columns(left), float(rounding.max(initial=0.0)))
+        own = np.sqrt(np.diag(abs(W) + abs(held)))
+        return Reduced(columns(left), float(rounding.max(initial=0.0)), own, 16 * off)
 
     @cached_property
     def symmetric(self) -> bool:
@@ -162,4 +200,4 @@ class Data:
     @property
     def speed(self) -> float:
         """||q||, 1 where it vanishes."""
-        return float(np.linalg.norm(self.local.q)) or 1.0
+        return norm(self.local.q) or 1.0

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _solve
-from fclib.analysis._data import EPS, Array, columns
+from fclib.analysis._data import EPS, Array, columns, norm
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError, Table, integers
 from fclib.analysis._spatial import one_contact
 
@@ -60,7 +60,8 @@ class SolutionSet:
         states: (nc,) "open", "stick", "slide +" (u_T > 0), "slide -" (u_T < 0) or, without
             friction, "closed".
         solution: one of them, in doubles.
-        error: its merit.
+        error: its merit in doubles, without the natural map that is not scaled: the same in all
+            units.
         velocity: whether all of them have this u.
         reaction: whether all of them have this r.
         isolated: whether it is a point, with no other solution near it.
@@ -140,7 +141,7 @@ class Enumeration:
         """
         if self.sound:
             return EXISTS
-        return NONE if self.complete and self.robust else UNDECIDED
+        return NONE if self.complete and self.robust and not self.solutions else UNDECIDED
 
     @property
     def sound(self) -> tuple[SolutionSet, ...]:
@@ -177,6 +178,11 @@ class Enumeration:
         known = self.complete and self.robust and self.sound == self.solutions
         alike = known and len(set(points)) == 1
         return True if alike else None
+
+
+def _error(problem: _solve.Problem, solution: _core.Solution) -> float:
+    merit = _core.merit(problem, solution)
+    return max(merit.scaled_natural, merit.dynamics, merit.bilateral, merit.kinematics)
 
 
 def _apart(a: Numbers, b: Numbers, size: float = 0.0) -> bool:
@@ -505,10 +511,16 @@ def _single(whole: _Whole) -> Enumeration:
     for one in result.points:
         values = whole.elimination.complete(dict(enumerate((*one.u, *one.r))))
         solution = whole.solution(values)
-        error = _core.merit(problem, solution).error
         found.append(
             SolutionSet(
-                (one.state,), solution, error, one.velocity, one.reaction, alone, one.u, one.r
+                (one.state,),
+                solution,
+                _error(problem, solution),
+                one.velocity,
+                one.reaction,
+                alone,
+                one.u,
+                one.r,
             )
         )
     return Enumeration(tuple(found), result.missing, result.robust, 1, 3, speed)
@@ -665,7 +677,7 @@ class _Search:
                 SolutionSet(
                     tuple(self.system.states[a][s].name for a, s in enumerate(states)),
                     solution,
-                    _core.merit(self.problem, solution).error,
+                    _error(self.problem, solution),
                     velocity,
                     reaction,
                     alone,
@@ -706,7 +718,7 @@ def _speed(problem: _solve.Problem) -> float:
     """||(q, s)||, of a global problem of its local form."""
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         problem = problem.condense()
-    return float(np.linalg.norm([*problem.q, *(() if problem.s is None else problem.s)]))
+    return norm([*problem.q, *(() if problem.s is None else problem.s)])
 
 
 def _refute(system: _System, alive: Any, change: float, end: float) -> None:

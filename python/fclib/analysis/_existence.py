@@ -303,9 +303,8 @@ def existence(
     refuted = states is not None and states.verdict == NONE
     if states is not None and states.verdict == EXISTS:
         if solution is None:
-            solution, error = min(
-                ((found.solution, found.error) for found in states.sound), key=lambda one: one[1]
-            )
+            solution = min(states.sound, key=lambda found: found.error).solution
+            error = _core.merit(problem, solution).error
         return Existence(EXISTS_ENUMERATED, states.reason, None, solution, error)
     if solution is not None and refuted:
         assert states is not None

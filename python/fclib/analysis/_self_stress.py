@@ -13,7 +13,8 @@ solvable    a velocity strictly inside K* is reached, and W is positive semidefi
                 (c - delta ||x||) rho - delta rho^2 > (x . S x + delta ||x||^2) / 4
 
             for some rho is what is needed: on the ball of that radius, where the law has a solution
-            as a variational inequality (Hartman & Stampacchia 1966), none touches the boundary.
+            as a variational inequality (Hartman & Stampacchia 1966), none touches the boundary. It
+            holds between two radii, so that others may be beyond the larger one.
 prestressed r_bar in K, not zero, with W r_bar = 0 (H r_bar + G l = 0 of a global problem).
 open        neither is proven.
 
@@ -63,7 +64,9 @@ class SelfStress:
             or (m,) the reactions r_bar, as doubles near them.
         margin: solvable: the least u_N - mu ||u_T|| (- mu_r ||u_R||) of u0, over ||q||;
             prestressed: the share of ||r_bar|| by which its contacts are inside K.
-        bound: of ||r|| for all solutions, where it is solvable; else inf.
+        bound: where it is solvable, no solution has a norm ||r|| between this one and `far`; else
+            inf.
+        far: inf where W is shown to be positive semidefinite.
     """
 
     verdict: str
@@ -71,6 +74,7 @@ class SelfStress:
     vector: Array | None = field(default=None, repr=False, compare=False)
     margin: float = float("nan")
     bound: float = inf
+    far: float = inf
 
 
 def self_stress(data: Data, condition: Slater, time_limit: float = 60.0) -> SelfStress:
@@ -129,7 +133,10 @@ def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
     root = sqrt(max(0.0, least * least - delta * energy))
     margin = min(1.0, float(margins.min()) / data.speed)
     reason = f"a velocity inside K* by {margin:.1e} of ||q||, in exact arithmetic"
-    return SelfStress(SOLVABLE, reason, x, margin, energy / (2 * (least + root))), ""
+    far = (least + root) / (2 * delta) * (1 - 1e-15) if delta else inf
+    if delta:
+        reason += f"; W may have eigenvalues of {-delta:.1e}, which solutions beyond {far:.1e} feel"
+    return SelfStress(SOLVABLE, reason, x, margin, energy / (2 * (least + root)), far), ""
 
 
 def _free(data: Data) -> Array:

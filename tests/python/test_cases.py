@@ -127,6 +127,18 @@ def test_a_proof_in_rational_numbers() -> None:
         assert sum(Fraction(float(row[2 * a])) * proof.exact_y[a] for a in range(3)) == 0
 
 
+@pytest.mark.parametrize("count", [4, 6, 8])
+def test_a_proof_where_walls_face_each_other(count: int) -> None:
+    # the normals of two of them are opposite but for rounding: neither follows from the other
+    for weights in (np.ones(count), np.tile([1.0, 1 + 1e-9], count // 2), np.eye(count)[0] + 1):
+        y = np.resize(weights, count)
+        y[count // 2 :] = y[: count // 2]
+        proof = analysis.farkas(ring(count), y)
+        assert proof is not None
+        assert proof.exact
+        assert proof.contacts == count
+
+
 def test_a_certificate_from_a_file(tmp_path: Path) -> None:
     problem = ring()
     fclib.write(tmp_path / "ring.hdf5", problem)

@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import qr
 
 from fclib import _core, _digest, _solve
 from fclib.analysis._data import Array
@@ -344,9 +345,7 @@ def _completed(
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]] | None:
     """Y and z moved so that the sums vanish exactly: those that must, or all of them."""
     nc, p = problem.nc, problem.p
-    # the bilateral multipliers and the smaller parts of y follow from the larger ones
-    unknowns = [*range(nc, nc + p), *sorted(y, key=lambda a: y[a])]
-    system = _system(problem, set(unknowns))
+    system = _system(problem, {*y, *range(nc, nc + p)})
     rows: dict[tuple[bool, int], dict[int, Fraction]] = defaultdict(dict)
     for kind, terms in ((False, system.zero), (True, system.cone)):
         if kind and which == "zero":
@@ -357,6 +356,8 @@ def _completed(
                 own[k] = own.get(k, Fraction()) + value
     if not rows:
         return None
+    # the bilateral multipliers follow from y, and of y what changes least for it
+    unknowns = [*range(nc, nc + p), *_by_independence(list(rows.values()), y, range(nc, nc + p))]
     pivots: dict[int, dict[int, Fraction]] = {}
     place = {k: number for number, k in enumerate(unknowns)}
     for equation in rows.values():
@@ -385,6 +386,25 @@ def _completed(
         else:
             x[k] = y[k] if k in y else Fraction(z.get(k - nc, 0.0))
     return {a: x[a] for a in y}, {k: x[nc + k] for k in range(p)}
+
+
+def _by_independence(equations: list[dict[int, Fraction]], y: Numbers, joints: range) -> list[int]:
+    """The contacts of y, first those whose terms are large and least dependent on each other."""
+    order = [*joints, *y]
+    place = {k: number for number, k in enumerate(order)}
+    terms = np.zeros((len(equations), len(order)))
+    for row, equation in zip(terms, equations, strict=True):
+        for k, value in equation.items():
+            row[place[k]] = float(value) * float(y.get(k, 1))
+    held, own = terms[:, : len(joints)], terms[:, len(joints) :]
+    if not np.isfinite(terms).all() or not own.size:
+        return sorted(y, key=lambda a: y[a])
+    if len(joints):
+        basis, upper, _ = qr(held, mode="economic", pivoting=True)
+        sizes = abs(np.diag(upper))
+        basis = basis[:, : int((sizes > 1e-12 * sizes.max(initial=0.0)).sum())]
+        own = own - basis @ (basis.T @ own)
+    return [order[len(joints) + int(k)] for k in qr(own, mode="r", pivoting=True)[1]]
 
 
 def read_certificate(path: str | Path) -> tuple[dict[int, Any], dict[int, Any], str | None]:

@@ -320,9 +320,9 @@ int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* prob
  *            q = H^T M^-1 f + w, the second term is ||G^T v + b|| / (1 + ||b||), and a third one
  *            ||M v - H r - G l - f|| / (1 + ||f||).
  *  MERIT_2   the relative error that every tolerance of this library bounds (3.1 returns 0): the
- *            largest of ||F|| / ||q||, of the same with rho u^ and rho q, rho = d / tr(W_aa), which
- *            does not change with the units, and of the errors of the stored v, u and l, each
- *            component relative to its own velocity. What rounding leaves of the terms is no error.
+ *            largest of ||F|| / ||q||, of the same with rho u^ and rho q, rho = 1 / mean |W_kk|,
+ * which does not change with the units, and of the errors of the stored v, u and l, each component
+ * relative to its own velocity. What rounding leaves of the terms is no error.
  */
 enum FCLIB_APICOMPILE fclib_merit { MERIT_1, MERIT_2 };
 

@@ -230,8 +230,9 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
         hat = modified_rolling(contacts, mu, mu_r)
         cone = partial(project_rolling, mu=mu, mu_r=mu_r)
         residual = partial(natural_map_rolling, reactions, mu=mu, mu_r=mu_r)
-    trace = diagonal.reshape(-1, d).mean(axis=1)
-    rho = (1 / np.where(trace > 0, trace, 1))[:, None]
+    size = abs(diagonal).reshape(-1, d).mean(axis=1)
+    others = size[size > 0].mean() if size.any() else 1.0
+    rho = (1 / np.where(size > 0, size, others))[:, None]
     scaled = reactions - rho * hat
     projected = cone(scaled)
     is_open = ~projected.any(axis=1)

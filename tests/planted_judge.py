@@ -183,8 +183,9 @@ def rounding(problem: Any, solution: fclib.Solution) -> float:
         terms = abs(H).T @ (impulse / mass) + np.abs(problem.w)
         q, diagonal = H.T @ (problem.f / mass) + problem.w, np.sum(H * H / mass[:, None], axis=0)
     d = problem.spacedim
-    trace = diagonal.reshape(-1, d).mean(axis=1)
-    rho = np.repeat(1 / np.where(trace > 0, trace, 1), d)
+    size = abs(diagonal).reshape(-1, d).mean(axis=1)
+    others = size[size > 0].mean() if size.any() else 1.0
+    rho = np.repeat(1 / np.where(size > 0, size, others), d)
     steepest = np.repeat(1 + problem.mu + getattr(problem, "mu_r", 0), d)  # u^_N = u_N + mu |u_T|
 
     def relative(weight: Any) -> float:

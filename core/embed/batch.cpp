@@ -55,11 +55,17 @@ double judge(const One& one) {
   using Vec = ContactVector<D, Real>;
   NaturalSums<Coulomb<D, Real>> sums;
   const auto m = static_cast<std::int64_t>(D) * one.nc;
+  const auto size_of = [&](Index a) {
+    Real size = 0;
+    for (std::int64_t k = D * a; k < D * (a + 1); ++k) size += std::abs(Real(one.W[k * m + k])) / D;
+    return size;
+  };
+  ContactScales<Real> scales;
+  for (Index a = 0; a < one.nc; ++a) scales.add(size_of(a));
   for (Index a = 0; a < one.nc; ++a) {
     Vec u;
     Vec q;
     Vec r;
-    Real scale = 0;
     for (int k = 0; k < D; ++k) {
       const std::int64_t at = D * a + k;
       const double* row = one.W + at * m;
@@ -69,10 +75,9 @@ double judge(const One& one) {
       u[k] = sum;
       q[k] = one.q[at];
       r[k] = one.r[at];
-      scale += Real(row[at]) / D;
       if (one.u != nullptr) one.u[at] = static_cast<double>(sum);
     }
-    const Real rho = scale > 0 ? 1 / scale : Real(1);
+    const Real rho = scales.rho(size_of(a));
     const Coulomb<D, Real> cone(one.mu[a]);
     sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }

@@ -7,6 +7,7 @@
 
 #include "contact/alart_curnier.hpp"
 #include "embed/memory.hpp"
+#include "merit/natural_sums.hpp"
 
 namespace fclib {
 
@@ -167,11 +168,15 @@ void SmallSolver<D>::prepare() {
   contacts_.clear();
   double squares = 0;
   double scaled = 0;
+  const auto size_of = [&](Index a) {
+    return diagonal_[static_cast<std::size_t>(a)].diagonal().cwiseAbs().mean();
+  };
+  ContactScales<double> scales;
+  for (Index a = 0; a < nc_; ++a) scales.add(size_of(a));
   for (Index a = 0; a < nc_; ++a) {
     const auto self = static_cast<std::size_t>(a);
     contacts_.emplace_back(diagonal_[self], mu_[a]);
-    const double trace = diagonal_[self].trace();
-    rho_[self] = trace > 0 ? D / trace : 1;
+    rho_[self] = scales.rho(size_of(a));
     const double square = part(q_, a).squaredNorm();
     squares += square;
     scaled += rho_[self] * rho_[self] * square;

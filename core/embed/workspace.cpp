@@ -105,11 +105,13 @@ double Workspace::judge(const LocalView& problem) {
   using Vec = ContactVector<D, Real>;
   const std::size_t nc = problem.mu.size();
   std::fill_n(real_.begin(), D * nc, Real(0));
-  std::fill_n(trace_.begin(), nc, Real(0));
+  std::fill_n(size_.begin(), nc, Real(0));
   problem.W.visit([&](Index row, Index col, double value) {
     real_[static_cast<std::size_t>(row)] += Real(value) * Real(r_[static_cast<std::size_t>(col)]);
-    if (row == col) trace_[static_cast<std::size_t>(row / D)] += Real(value) / D;
+    if (row == col) size_[static_cast<std::size_t>(row / D)] += std::abs(Real(value)) / D;
   });
+  ContactScales<Real> scales;
+  for (std::size_t a = 0; a < nc; ++a) scales.add(size_[a]);
   NaturalSums<Coulomb<D, Real>> sums;
   for (std::size_t a = 0; a < nc; ++a) {
     Vec u;
@@ -122,7 +124,7 @@ double Workspace::judge(const LocalView& problem) {
       u[k] = real_[at] + q[k];
       u_[at] = static_cast<double>(u[k]);
     }
-    const Real rho = trace_[a] > 0 ? 1 / trace_[a] : Real(1);
+    const Real rho = scales.rho(size_[a]);
     const Coulomb<D, Real> cone(problem.mu[a]);
     sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }
@@ -179,7 +181,7 @@ Workspace::Answer Workspace::solve(const LocalView& problem, std::span<const std
   grow(r_, m);
   grow(u_, m);
   grow(real_, m);
-  grow(trace_, problem.mu.size());
+  grow(size_, problem.mu.size());
   guess(problem.spacedim, contacts, {r_.data(), m});
   Answer answer = problem.spacedim == 2 ? solve_in(plane_, problem, settings)
                                         : solve_in(space_, problem, settings);

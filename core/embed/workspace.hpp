@@ -75,7 +75,7 @@ class Workspace {
   SmallSolver<2> plane_;
   SmallSolver<3> space_;
   std::vector<double> r_, u_;
-  std::vector<long double> real_, trace_;
+  std::vector<long double> real_, size_;
   // of the last solve
   int spacedim_ = 0;
   std::size_t known_ = 0;                                    // contacts

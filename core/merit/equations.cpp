@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "merit/natural_sums.hpp"
+
 namespace fclib {
 
 namespace {
@@ -180,6 +182,15 @@ RealVector mean_of_contacts(const RealVector& x, Index d) {
   return result;
 }
 
+/// rho of each contact, of the diagonal of W.
+RealVector rho_of_contacts(const RealVector& diagonal, Index d) {
+  RealVector result = mean_of_contacts(diagonal.cwiseAbs(), d);
+  ContactScales<Real> scales;
+  for (const Real& size : result) scales.add(size);
+  for (Real& size : result) size = scales.rho(size);
+  return result;
+}
+
 /// What is left of each component beyond its rounding.
 RealVector beyond(const RealVector& x, const RealVector& rounding) {
   RealVector result(x.size());
@@ -216,7 +227,9 @@ OwnSizes own_sizes(const LocalProblem& problem) {
   OwnSizes result;
   result.q = problem.q.cast<Real>().cwiseAbs();
   result.rounding = RealVector::Zero(problem.q.size());
-  result.scale = mean_of_contacts(diagonal(problem.W), problem.spacedim);
+  const RealVector of_W = diagonal(problem.W);
+  result.scale = mean_of_contacts(of_W, problem.spacedim);
+  result.rho = rho_of_contacts(of_W, problem.spacedim);
   if (!is_mixed(problem)) return result;
   result.l = quotient(problem.s.cast<Real>(), diagonal(problem.R));
   const RealVector moved = sizes(problem.V, result.l);
@@ -246,8 +259,9 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
   }
   result.q = sizes_transposed(problem.H, free) + problem.w.cast<Real>().cwiseAbs();
   result.rounding = rounding_unit_of_q * (result.q + Spread(mass, impulse).along(problem.H));
-  result.scale = mean_of_contacts(gram(problem.H, condensed != nullptr ? condensed->W : none),
-                                  problem.spacedim);
+  const RealVector of_W = gram(problem.H, condensed != nullptr ? condensed->W : none);
+  result.scale = mean_of_contacts(of_W, problem.spacedim);
+  result.rho = rho_of_contacts(of_W, problem.spacedim);
   return result;
 }
 
@@ -257,7 +271,7 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   const Vector& r = solution.r;
   result.q = problem.q.cast<Real>();
   result.rounding = own.rounding;
-  result.scale = own.scale;
+  result.rho = own.rho;
 
   // u = W r + V lambda + q
   result.u = product(problem.W, r) + result.q;
@@ -302,7 +316,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   const RealVector& free = own.free;
   result.q = product_transposed(problem.H, free) + w;
   result.rounding = own.rounding;
-  result.scale = own.scale;
+  result.rho = own.rho;
 
   // M v = H r + G lambda + f
   RealVector momentum = product(problem.H, r) + f;
@@ -322,7 +336,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
     const RealVector left = beyond(residual, rounding_unit * terms);
     Mismatch mismatch{.part = "v", .stored = v.size() > 0 ? solution.v[0] : 0};
     if (!left.isZero(0)) {
-      RealVector stop = sizes(problem.H, stopping(own.q, result.scale, d));
+      RealVector stop = sizes(problem.H, stopping(own.q, own.scale, d));
       if (mixed) stop += sizes(problem.G, own.l);
       const RealVector velocity = largest(fastest, solved(mass, stop));
       const RealVector least = RealVector::Constant(

@@ -31,7 +31,7 @@ struct Equations {
   RealVector q;         ///< condensed (m) [m/s]
   RealVector u;         ///< recomputed (m) [m/s]
   RealVector rounding;  ///< of q: what double precision leaves of the terms it is made of (m) [m/s]
-  RealVector scale;     ///< tr(W_aa) / d of each contact (nc)
+  RealVector rho;       ///< of the scaled natural map, of each contact (nc) [1/W]
   std::vector<Mismatch> mismatches;  ///< one of each part that is stored
 };
 
@@ -42,7 +42,8 @@ struct OwnSizes {
   RealVector l;             ///< reactions that stop the joints, each alone (p)
   RealVector q;             ///< of the terms of u without reactions (m) [m/s]
   RealVector rounding;      ///< Equations::rounding
-  RealVector scale;         ///< Equations::scale
+  RealVector scale;         ///< tr(W_aa) / d of each contact (nc)
+  RealVector rho;           ///< Equations::rho
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);

@@ -34,7 +34,7 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
     const ContactVector<D, Real> modified = cone.modified(ua);
     const Real q_square = equations.q.segment<D>(D * contact).squaredNorm();
     const Real rounding = equations.rounding.segment<D>(D * contact).norm();
-    const Real rho = equations.scale[contact] > 0 ? 1 / equations.scale[contact] : Real(1);
+    const Real rho = equations.rho[contact];
     const Real norm = sums.add(cone, modified, ra, q_square, rounding, rho);
     if (each == nullptr) continue;
     each->natural[contact] = static_cast<double>(norm);

@@ -54,8 +54,9 @@ struct Merit {
                                 "beyond rounding"},
         Field<M, double>{.name = "scaled_natural",
                          .member = &M::scaled_natural,
-                         .doc = "||r - P_K(r - rho u^)|| / ||rho q||, rho = d / tr(W_aa): the same "
-                                "in all units"},
+                         .doc =
+                             "||r - P_K(r - rho u^)|| / ||rho q||, rho = 1 / mean abs(W_kk): the "
+                             "same in all units"},
         Field<M, double>{.name = "dynamics",
                          .member = &M::dynamics,
                          .doc =

@@ -4,10 +4,29 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "contact/cone.hpp"
 
 namespace fclib {
+
+/// rho of each contact: 1 over its size, the mean |W_kk| of its block. A contact that has none
+/// takes part with the mean of the others, so that no units decide what it weighs beside them.
+template <class Real>
+class ContactScales {
+ public:
+  void add(Real size) {
+    if (size > 0) mean_ += (size - mean_) / Real(static_cast<double>(++count_));
+  }
+  [[nodiscard]] Real rho(Real size) const {
+    if (size > 0) return 1 / size;
+    return count_ > 0 ? 1 / mean_ : Real(1);
+  }
+
+ private:
+  Real mean_ = 0;
+  std::int64_t count_ = 0;
+};
 
 /// In the precision of Cone.
 template <class Cone>
@@ -17,7 +36,7 @@ class NaturalSums {
   using Real = typename Vec::Scalar;
 
   /// Adds a contact with modified velocity u^ and reaction r, ||q^a||^2, what rounding leaves of
-  /// q^a, and rho = d / tr(W_aa). The norm of its natural map.
+  /// q^a, and rho as ContactScales has it. The norm of its natural map.
   Real add(const Cone& cone, const Vec& modified, const Vec& r, Real q_square, Real rounding,
            Real rho) {
     const OfModified known{cone};

@@ -53,8 +53,7 @@ struct Measure {
       : q(problem.q.norm()), rounding(static_cast<double>(own.rounding.norm())) {
     if (kind == MeritKind::natural) return;
     const Index d = problem.spacedim;
-    rho = own.scale.cast<double>();
-    for (double& value : rho) value = value > 0 ? 1 / value : 1;
+    rho = own.rho.cast<double>();
     const auto scaled = [&](Vector x) {
       for (Eigen::Index k = 0; k < x.size(); ++k) x[k] *= rho[k / d];
       return x.stableNorm();

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import fclib
 from fclib.cli import app
-from helpers import Array, bodies, planted_global, planted_local
+from helpers import Array, bodies, dense, judge, planted_global, planted_local
 
 TOLERANCE = 1e-8
 CASES = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cases"
@@ -242,3 +242,42 @@ def test_the_natural_map_alone_may_be_asked_for() -> None:
         fclib.solve(problem, merit="wrong")  # type: ignore[arg-type]
     with pytest.raises(fclib.OptionError, match="merit"):
         fclib.merit(problem, both.solution).error_by("wrong")
+
+
+def grain_and_wall(unit: float) -> fclib.LocalProblem:
+    """A grain on the ground, and ground beside a wall that goes away: nothing can move them."""
+    W = np.zeros((6, 6))
+    W[:3, :3] = np.eye(3)
+    problem = fclib.LocalProblem(W=W, q=np.array([-1.0, 0, 0, 1, 0, 0]), mu=np.full(2, 0.5))
+    return problem.scaled(impulse=unit)
+
+
+@pytest.mark.parametrize("unit", [1e-12, 1e-9, 1.0, 1e9])
+def test_what_nothing_can_move_hides_no_grain(unit: float) -> None:
+    # its reaction is five times too large, and flings it up
+    wrong = fclib.Solution(r=unit * np.array([5.0, 0, 0, 0, 0, 0]))
+    problem = grain_and_wall(unit)
+    merit = fclib.merit(problem, wrong)
+    assert merit.scaled_natural == pytest.approx(4 / np.sqrt(2), rel=1e-6)
+    assert merit.scaled_natural == pytest.approx(judge(problem, wrong).scaled_natural)
+    for result in (fclib.solve(problem), fclib.Workspace().solve(problem)):
+        assert result.converged
+        assert result.solution.r[0] == pytest.approx(unit, rel=1e-7)
+    W, q = np.array([dense(problem.W)]), np.array([problem.q])
+    batch = fclib.solve_batch(W, q, 0.5)
+    assert batch.r[0, 0] == pytest.approx(unit, rel=1e-7)
+
+
+@pytest.mark.parametrize("size", [1.0, 2.0**30, 2.0**60])
+def test_a_negative_trace_hides_nothing(size: float) -> None:
+    # frictionless and indefinite: r_N = 0 closes, and any other pulls or closes faster
+    W = size * np.diag([-1.0, 1.0, 1.0])
+    problem = fclib.LocalProblem(W=W, q=[-1.0, 0, 0], mu=[0.0])
+    for r in (0.0, 1e-3 / size, 1.0 / size):
+        solution = fclib.Solution(r=[r, 0, 0])
+        assert fclib.merit(problem, solution).scaled_natural > 0.5
+    # both contacts open and pressed
+    W = size * np.array([[3.0, 0, 0, 0], [0, -3.0, 0, 0], [0, 0, 3.0, 0], [0, 0, 0, -3.0]])
+    problem = fclib.LocalProblem(spacedim=2, W=W, q=[1.0, 0, 1.0, 0], mu=[0.0, 0.0])
+    pressed = fclib.Solution(r=np.array([1.0, 0, 1.0, 0]) / size)
+    assert fclib.merit(problem, pressed).scaled_natural > 0.1

@@ -1,0 +1,339 @@
+"""What other values of the constants of `auto` and of its solve would do.
+
+    .venv/bin/python benchmarks/constants.py FILE... [--only NAME...] [--count 4000] [--seconds 5]
+        [--results auto-constants]
+
+A constant of C++ has no option. So the source that names it is compiled once more for each value,
+and the module is linked anew, in a folder of its own; nothing of the build changes. Rules of stages
+are given as a chain. The problems are planted ones with numbers below 100,000 (those of tables of
+other pages have larger numbers):
+
+    digits      small ones that ask for all digits
+    random      small ones that come to the stages "pivoting" or "random starts" of `auto`
+    linked      some without a solution, which an open contact links to one island
+    no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
+
+A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
+times, the least of three runs. FILEs have a limit of --seconds of CPU, as much as a failure counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import shlex
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+BUILD = ROOT / "build"
+MODULE = "_core" + str(sysconfig.get_config_var("EXT_SUFFIX"))
+REPEATS = 3
+LOOSE = 1e-4  # tolerance of what is solved without factors
+OWN = "--measure"  # this script in another process, with another module
+
+
+def other_module(folder: str) -> None:
+    """Import fclib from the folder, not from where it was installed to be edited."""
+    sys.meta_path[:] = [
+        finder for finder in sys.meta_path if not type(finder).__module__.startswith("_editable")
+    ]
+    sys.path.insert(0, folder)
+
+
+if OWN in sys.argv:
+    other_module(sys.argv[sys.argv.index(OWN) + 1])
+
+import _results  # noqa: E402
+import choose_auto  # noqa: E402
+import numpy as np  # noqa: E402
+
+import fclib  # noqa: E402
+
+sys.path.append(str(ROOT / "tests"))
+import planted_judge  # noqa: E402
+from helpers import judge  # noqa: E402
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant in C++ and other values of it."""
+
+    name: str
+    source: str  # in core/
+    values: tuple[str, ...]  # the first one is that which it has
+    problems: str
+
+
+CONSTANTS = [
+    Constant("rounding_in_error", "solve/driver.cpp", ("1e3", "0", "10", "1e5"), "digits"),
+    Constant("rounding_in_tolerance", "solve/driver.cpp", ("0.1", "0", "1e-3", "10"), "digits"),
+    Constant("most_parts", "proof/no_solution.cpp", ("8", "0", "1", "1000"), "linked"),
+    Constant("instead_of_factors", "chain/chain.cpp", ("100", "10", "1000"), "no memory"),
+]
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Other rules of a stage of the chain; none: without it."""
+
+    stage: str
+    which: int  # of that name
+    rules: tuple[dict[str, object], ...]
+
+
+RULES = [
+    Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
+    Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
+    Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
+]
+
+
+# ---- the problems
+
+
+def linked(number: int) -> fclib.GlobalProblem:
+    """Problem `number` of 2 to 12 parts without a solution, an open contact between neighbours."""
+    rng = np.random.default_rng([number, 2029])
+    parts: list[fclib.GlobalProblem] = []
+    wanted = int(rng.integers(2, 13))
+    at = 1000 * number
+    while len(parts) < wanted:
+        part = planted_judge.without_solution(at)
+        at += 1
+        if isinstance(part, fclib.GlobalProblem) and part.spacedim == 3 and part.G is None:
+            parts.append(part)
+    rows = np.cumsum([0] + [part.n for part in parts])
+    links = np.zeros((rows[-1], 3 * (wanted - 1)))
+    for k in range(wanted - 1):
+        for side in (k, k + 1):
+            at = int(rng.integers(rows[side], rows[side + 1] - 2))
+            links[at : at + 3, 3 * k : 3 * k + 3] = rng.standard_normal((3, 3))
+    w = np.tile([1e3, 0.0, 0.0], wanted - 1)
+
+    def diagonal(blocks: Sequence[Any]) -> Any:
+        shapes = np.array([block.shape for block in blocks])
+        whole = np.zeros(shapes.sum(axis=0))
+        ends = np.cumsum(shapes, axis=0)
+        for block, end in zip(blocks, ends, strict=True):
+            whole[end[0] - block.shape[0] : end[0], end[1] - block.shape[1] : end[1]] = block
+        return whole
+
+    dense = planted_judge.dense
+    return fclib.GlobalProblem(
+        spacedim=3,
+        M=diagonal([dense(part.M) for part in parts]),
+        H=np.hstack([diagonal([dense(part.H) for part in parts]), links]),
+        f=np.concatenate([part.f for part in parts]),
+        w=np.concatenate([*(part.w for part in parts), w]),
+        mu=np.concatenate([*(part.mu for part in parts), np.full(wanted - 1, 0.3)]),
+    )
+
+
+def holds(problem: Any, solution: fclib.Solution) -> bool:
+    """Whether the data hold their own solution."""
+    return bool(judge(problem, solution).error <= 0.1 * planted_judge.TOLERANCE)
+
+
+def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[str, Any, Any]]:
+    """Names, problems and guesses; `given` are files, or numbers that were picked."""
+    if kind == "no memory":
+        for file in given:
+            yield file, fclib.read(Path(file)), None
+        return
+    if kind == "linked":
+        for number in range(count // 20):
+            yield str(number), linked(number), None
+        return
+    plant = planted_judge.hard if kind == "digits" else planted_judge.planted
+    for number in map(int, given) if given else range(count):
+        problem, solution, guess = plant(number)
+        if holds(problem, solution):
+            yield str(number), problem, None if guess is None else fclib.Solution(r=guess)
+
+
+def measure(job: dict[str, Any]) -> dict[str, Any]:
+    """Solve the problems of a kind: how many, how many solved, CPU time [s], and who came where."""
+    kind, chain, seconds = job["kind"], job["chain"], job["seconds"]
+    options: dict[str, Any] = {"chain": chain} if chain else {}
+    tol = planted_judge.TOLERANCE
+    if kind == "no memory":
+        options["memory_limit"], tol = 1e-9, LOOSE
+    problems = solved = 0
+    spent = 0.0
+    late = []
+    for name, problem, guess in problems_of(kind, job["given"], job["count"]):
+        least = np.inf
+        for _ in range(job["repeats"]):
+            before = time.process_time()
+            end = before + seconds
+            result = fclib.solve(
+                problem,
+                "auto",
+                tol,
+                guess=guess,
+                callback=lambda *_, end=end: time.process_time() < end,
+                **options,
+            )
+            least = min(least, time.process_time() - before)
+        answer = result.status == "infeasible" if kind == "linked" else result.converged
+        if {"pivoting", "random starts"} & {stage.name for stage in result.stages}:
+            late.append(name)
+        problems += 1
+        solved += answer
+        spent += least if answer or kind != "no memory" else max(least, seconds)
+    return {"problems": problems, "solved": solved, "CPU [s]": spent, "late": late}
+
+
+# ---- other modules
+
+
+def command_of(source: str) -> str:
+    """How the object of core/SOURCE is compiled."""
+    path = str(ROOT / "core" / source)
+    entries = json.loads((BUILD / "compile_commands.json").read_text(encoding="utf-8"))
+    (command,) = {e["command"] for e in entries if e["file"] == path and "fPIC" in e["command"]}
+    return str(command)
+
+
+def build(constant: Constant, value: str, folder: Path) -> None:
+    """The package with another value of the constant: links to all of it, and its own module."""
+    package = folder / "fclib"
+    package.mkdir()
+    for entry in (ROOT / "python" / "fclib").iterdir():
+        if entry.name != MODULE:
+            (package / entry.name).symlink_to(entry)
+    text = (ROOT / "core" / constant.source).read_text(encoding="utf-8")
+    changed, times = re.subn(rf"(constexpr \w+ {constant.name} = )[^;]+;", rf"\g<1>{value};", text)
+    if times != 1:
+        raise SystemExit(f"{constant.name} stands {times} times in core/{constant.source}")
+    source, made = folder / "changed.cpp", folder / "changed.o"
+    source.write_text(changed, encoding="utf-8")
+    words = shlex.split(command_of(constant.source))
+    words[words.index("-o") + 1] = str(made)
+    words[-1] = str(source)
+    subprocess.run(words, cwd=BUILD, check=True)
+    told = subprocess.run(
+        ["ninja", "-C", str(BUILD), "-t", "commands", MODULE], capture_output=True, text=True
+    )
+    link = told.stdout.splitlines()[-1].removeprefix(": && ").removesuffix(" && :")
+    words = shlex.split(link)
+    words[words.index("-o") + 1] = str(package / MODULE)
+    # what comes before the archive is taken instead of its own object
+    words.insert(words.index("libfclib_core.a"), str(made))
+    subprocess.run(words, cwd=BUILD, check=True)
+
+
+def measured(folder: Path, job: dict[str, Any]) -> dict[str, Any]:
+    """`measure` in a process with the package of the folder."""
+    words = [sys.executable, __file__, OWN, str(folder), json.dumps(job)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise SystemExit(done.stderr)
+    answer: dict[str, Any] = json.loads(done.stdout)
+    return answer
+
+
+# ---- the table
+
+
+def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
+    """Of each constant and rule, for each value."""
+    files = sorted(
+        str(file.resolve())
+        for file in arguments.files
+        if file.resolve().parent.name in choose_auto.CHOOSING
+    )
+    job: dict[str, Any] = {
+        "chain": "",
+        "given": [],
+        "count": arguments.count,
+        "seconds": arguments.seconds,
+        "repeats": REPEATS,
+    }
+
+    def wanted(name: str) -> bool:
+        return not arguments.only or any(word in name for word in arguments.only)
+
+    for constant in CONSTANTS:
+        if not wanted(constant.name) or (constant.problems == "no memory" and not files):
+            continue
+        given = files if constant.problems == "no memory" else []
+        for k, value in enumerate(constant.values):
+            with tempfile.TemporaryDirectory() as folder:
+                build(constant, value, Path(folder))
+                own = {**job, "kind": constant.problems, "given": given}
+                found = measured(Path(folder), own)
+            yield row(constant.name, value, k == 0, constant.problems, found)
+    if not any(wanted(rules.stage) for rules in RULES):
+        return
+    lines = choose_auto.table()
+    job["kind"] = "random"
+    job["given"] = measured(ROOT / "python", {**job, "repeats": 1})["late"]
+    found = measured(ROOT / "python", job)
+    yield row("the chain", "as it is", True, "random", found)
+    for rules in RULES:
+        if not wanted(rules.stage):
+            continue
+        place = choose_auto.place(lines, rules.stage, rules.which)
+        for own_rules in rules.rules:
+            change: Callable[[list[str]], list[str]] = (
+                choose_auto.with_rules(place, **own_rules)
+                if own_rules
+                else choose_auto.without(place)
+            )
+            found = measured(ROOT / "python", {**job, "chain": "\n".join(change(lines))})
+            word = " ".join(f"{key}={value}" for key, value in own_rules.items()) or "without"
+            yield row(f"{rules.stage} {rules.which + 1}", word, False, "random", found)
+
+
+def row(
+    name: str, value: str, present: bool, kind: str, found: dict[str, Any]
+) -> dict[str, object]:
+    """As pages have it."""
+    return {
+        "constant": name,
+        "value": value,
+        "": "present" if present else "",
+        "problems of": kind,
+        **{key: found[key] for key in ("problems", "solved", "CPU [s]")},
+    }
+
+
+def main() -> None:
+    """A row for each value."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("files", nargs="*", type=Path)
+    parser.add_argument("--only", nargs="+", help="constants whose names have one of these in them")
+    parser.add_argument("--count", type=int, default=4000, help="numbers of planted problems")
+    parser.add_argument("--seconds", type=float, default=5, help="limit of a FILE")
+    _results.add_option(parser)
+    arguments = parser.parse_args()
+    rows = []
+    for one in rows_of(arguments):
+        print(*one.values(), sep="  ", flush=True)
+        rows.append(one)
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            rows,
+            title="Other values of constants",
+            note=f"Planted problems of the numbers 0 to {arguments.count - 1}; of linked ones a "
+            f"twentieth. A file counts as {arguments.seconds:g} s where it is not solved to "
+            f"{_results.power(LOOSE)}.",
+        )
+
+
+if __name__ == "__main__":
+    if OWN in sys.argv:
+        print(json.dumps(measure(json.loads(sys.argv[-1]))))
+    else:
+        main()

@@ -60,7 +60,7 @@ import fclib  # noqa: E402
 
 sys.path.append(str(ROOT / "tests"))
 import planted_judge  # noqa: E402
-from helpers import judge  # noqa: E402
+from helpers import dense, judge  # noqa: E402
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,6 @@ def linked(number: int) -> fclib.GlobalProblem:
             whole[end[0] - block.shape[0] : end[0], end[1] - block.shape[1] : end[1]] = block
         return whole
 
-    dense = planted_judge.dense
     return fclib.GlobalProblem(
         spacedim=3,
         M=diagonal([dense(part.M) for part in parts]),

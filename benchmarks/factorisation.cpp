@@ -2,12 +2,17 @@
 //
 // In: d, the nodes, the blocks; first (nodes + 1); row (blocks). Out, a line for each ordering:
 // CPU time of the plan [s], multiplications, numbers kept, least CPU time of a factorisation [s],
-// error of a solve.
+// error of a solve, the memory that a factorisation was said to take and that which it took
+// [bytes].
+
+#include <malloc.h>
 
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
 #include <iostream>
+#include <string>
 
 #include "linalg/fronts.hpp"
 #include "linalg/multifrontal.hpp"
@@ -17,6 +22,22 @@ using namespace fclib;
 namespace {
 
 double now() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+/// [bytes] The number behind a word of /proc/self/status, which has kilobytes.
+double status(const std::string& word) {
+  std::ifstream file("/proc/self/status");
+  for (std::string key; file >> key;) {
+    if (double value = 0; key == word && file >> value) return 1024 * value;
+  }
+  return 0;
+}
+
+/// Lets the peak of memory begin anew; what it is now [bytes].
+double restart_peak() {
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << 5;
+  return status("VmRSS:");
+}
 
 /// The same on every machine; the diagonal dominates.
 std::vector<double> values_of(const BlockPattern& pattern) {
@@ -61,10 +82,13 @@ int main() {
     const double plan = now() - start;
     Multifrontal lu(fronts);
     double least = 1e300;
+    double taken = 0;
+    const double before = restart_peak();
     for (int run = 0; run < 3; ++run) {
       const double begin = now();
       if (!lu.factorise(values)) return 1;
       least = std::min(least, now() - begin);
+      if (run == 0) taken = status("VmHWM:") - before;
     }
     Vector x = Vector::Ones(lu.size());
     lu.solve(x);
@@ -78,7 +102,7 @@ int main() {
             x.segment(d * col, d);
       }
     }
-    std::printf("%.6g %.6g %.6g %.6g %.3g\n", plan, fronts->flops, fronts->memory, least,
-                rest.norm() / std::sqrt(static_cast<double>(lu.size())));
+    std::printf("%.6g %.6g %.6g %.6g %.3g %.6g %.6g\n", plan, fronts->flops, fronts->memory, least,
+                rest.norm() / std::sqrt(static_cast<double>(lu.size())), lu.bytes(), taken);
   }
 }

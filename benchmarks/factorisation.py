@@ -7,7 +7,8 @@ The linear systems of `auto` on problems of these sizes: on the contacts (blocks
 where they share a body) and on the bodies. Only the pattern is the problem's; the numbers are
 random, with a dominant diagonal. CPU times of one thread, of a factorisation the least of three.
 The column "ratio" is plan and factorisation by the better ordering over those by minimum degree,
-where a plan is used for --uses factorisations. Needs a C++ compiler, Eigen and METIS.
+where a plan is used for --uses factorisations. "memory" is what a factorisation by minimum degree
+took at its peak, in MB, and over what was predicted. Needs a C++ compiler, Eigen and METIS.
 """
 
 from __future__ import annotations
@@ -55,7 +56,10 @@ def patterns(problem: Any) -> dict[str, tuple[int, Any]]:
 
 
 def timed(program: Path, d: int, links: Any) -> list[list[float]]:
-    """Of each ordering: plan [s], operations, numbers, factorisation [s], error."""
+    """Of each ordering: plan [s], operations, numbers, factorisation [s], error, memory [bytes].
+
+    Memory is that which a factorisation was said to take, and that which it took.
+    """
     pattern = sp.csc_array(links + sp.eye_array(links.shape[0]))
     pattern.sort_indices()
     text = " ".join(map(str, [d, pattern.shape[0], pattern.nnz, *pattern.indptr, *pattern.indices]))
@@ -98,6 +102,8 @@ def main() -> None:
                         "its factorisation [ms]": 1e3 * dissected[3],
                         "ratio": (plans + arguments.uses * better[3])
                         / (degree[0] + arguments.uses * degree[3]),
+                        "memory [MB]": degree[6] / 1e6,
+                        "memory over predicted": degree[6] / degree[5],
                     }
                     rows.append(row)
                     print(

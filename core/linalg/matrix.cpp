@@ -122,9 +122,9 @@ SparseColumns to_eigen(const Matrix& a) {
   SparseColumns result(a.rows, a.cols);
   if (a.storage == Storage::csc && is_canonical(a)) {
     result.resizeNonZeros(static_cast<Eigen::Index>(a.nnz()));
-    std::ranges::copy(a.p, result.outerIndexPtr());
-    std::ranges::copy(a.i, result.innerIndexPtr());
-    std::ranges::copy(a.x, result.valuePtr());
+    std::copy(a.p.begin(), a.p.end(), result.outerIndexPtr());
+    std::copy(a.i.begin(), a.i.end(), result.innerIndexPtr());
+    std::copy(a.x.begin(), a.x.end(), result.valuePtr());
     return result;
   }
   if (a.storage == Storage::csr && is_canonical(a)) return to_eigen(turned(a));

@@ -119,7 +119,7 @@ def command(
             count=count,
             select=select.value,
             analyze=analyze,
-            simulation=collections.Simulation(tol=ON_DEMAND, control=control, deepest=None),
+            simulation=collections.Simulation(tol=ON_DEMAND, control=control),
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")

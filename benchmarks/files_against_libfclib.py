@@ -9,7 +9,7 @@ compresses, ours does at level 6. Times are CPU
 times of a read through the C interface with the file in the system's cache, the least of many that
 the libraries take by turns in one process. The last line says what our bytes are, and what LZMA,
 which HDF5 has no filter for, would make of the numbers. Needs h5py, a C compiler, our C library
-(--ours, by default build/libfclib.so.0) and that of 3.1 (--theirs, by default the system's,
+(--ours, by default that of build/, built first) and that of 3.1 (--theirs, by default the system's,
 Debian's libfclib0).
 """
 
@@ -30,6 +30,7 @@ from pathlib import Path
 import _results
 import h5py
 import numpy as np
+from _c_library import c_library
 
 ROOT = Path(__file__).resolve().parents[1]
 PROGRAM = Path(__file__).with_suffix(".c")
@@ -155,7 +156,7 @@ def summary(rows: dict[str, dict[str, float]]) -> list[dict[str, str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("files", nargs="+", type=Path)
-    parser.add_argument("--ours", type=Path, default=ROOT / "build" / "libfclib.so.0")
+    parser.add_argument("--ours", type=Path)
     parser.add_argument("--theirs", type=Path, default=None)
     parser.add_argument("--limit", type=float, default=1.5, help="CPU time on a file [s]")
     parser.add_argument("--csv", type=Path)
@@ -166,8 +167,7 @@ def main() -> None:
     if theirs is None:
         print("skipped: libfclib 3.1 or a C compiler is not installed")
         return
-    if not options.ours.is_file():
-        sys.exit(f"{options.ours} is missing: cmake --build build --target fclib")
+    ours = options.ours or c_library()
 
     rows: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as temporary:
@@ -182,7 +182,7 @@ def main() -> None:
             f"{'its file':>8} {'our file':>8} {'each own':>8}"
         )
         for path in options.files:
-            found = figures(program, [theirs, options.ours], path, folder, options.limit)
+            found = figures(program, [theirs, ours], path, folder, options.limit)
             if isinstance(found, str):
                 print(f"{path.name[:44]:44} {found}")
                 continue

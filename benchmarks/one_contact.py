@@ -7,7 +7,7 @@ over its calls, the least of many rounds that the calls take by turns, for a bus
 most rounds and not all. The solver is the time in its own loop (`Result.cpu_s`), mean over the
 same round; what is left of the call is setup: checks, copies, conversions, the merit that judges,
 and the language. A workspace and a batch do not tell their solver apart: setup is at most the call.
-Needs a C compiler and the C library (build/libfclib.so.0).
+Builds the C library first; needs a C compiler.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 
 import _results
 import numpy as np
+from _c_library import c_library
 
 import fclib
 
@@ -68,14 +69,14 @@ def from_python(problem: fclib.LocalProblem, rounds: int, calls: int) -> dict[st
 
 def from_c(problem: fclib.LocalProblem, rounds: int, calls: int) -> dict[str, list[float]]:
     """The same of the C library."""
-    library = ROOT / "build"
+    library = c_library()
     numbers = [*np.asarray(problem.W).ravel(), *problem.q, *problem.mu]
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "one_contact"
         subprocess.run(
             [
                 *("cc", "-O2", f"-I{ROOT / 'include'}", Path(__file__).with_suffix(".c")),
-                *("-o", program, f"-L{library}", "-lfclib", f"-Wl,-rpath,{library}"),
+                *("-o", program, library, f"-Wl,-rpath,{library.parent}"),
             ],
             check=True,
         )

@@ -6,8 +6,7 @@
 Local problems with a W of random numbers, of numbers that come again and of equal blocks, and the
 local problems in the files, are written by the C library at each level: the least CPU time of the
 repeats, which take the levels by turns, over that of level 0, and the bytes over those of level 0.
-`cheap` is what the library does at first. Needs our C library (--library, by default
-build/libfclib.so.0).
+`cheap` is what the library does at first. Builds our C library first, where --library names none.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from pathlib import Path
 import _results
 import numpy as np
 import scipy.sparse as sp
+from _c_library import c_library
 
 import fclib
 
-ROOT = Path(__file__).resolve().parents[1]
 LEVELS = {"plain": 0, "cheap": -1, "1": 1, "6": 6}
 
 
@@ -55,10 +54,10 @@ def main() -> None:
     parser.add_argument("files", nargs="*", type=Path)
     parser.add_argument("--entries", type=int, nargs="+", default=[3_200_000])
     parser.add_argument("--repeats", type=int, default=5)
-    parser.add_argument("--library", type=Path, default=ROOT / "build/libfclib.so.0")
+    parser.add_argument("--library", type=Path)
     _results.add_option(parser)
     given = parser.parse_args()
-    library = ctypes.CDLL(str(given.library))
+    library = ctypes.CDLL(str(given.library or c_library()))
     library.fclib_read_local.restype = ctypes.c_void_p
     library.fclib_write_local.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
     rows: list[dict[str, str]] = []

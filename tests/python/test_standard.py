@@ -337,6 +337,26 @@ def test_problems_of_an_older_list_are_named_with_their_version(tmp_path: Path) 
 
 
 @there
+def test_a_version_of_a_set_has_families_that_did_not_change() -> None:
+    """The present one has all families, each by its newest states; an older one has its own."""
+    newest, older = known.folders(["standard"], known.version("standard")), {}
+    assert newest == known.folders(["standard"])
+    for folder in newest:
+        plan = known.plan_of(folder, version=known.version("standard"))
+        assert plan.version == known.version_of(folder)
+        assert plan.numbers().tolist() == known.plan_of(folder).numbers().tolist()
+        if "1" in published.versions(folder):
+            older[folder] = known.plan_of(folder, version="1")
+    assert known.folders(["standard"], "1") == sorted(older)
+    assert older["standard/Arch"].trajectory == known.plan_of("standard/Arch").trajectory
+    before, now = older["standard/Chute"], known.plan_of("standard/Chute")
+    assert before.trajectory != now.trajectory
+    assert before.numbers().tolist() == now.numbers().tolist()
+    with pytest.raises(collections.VersionError, match="version 99 is not stored here"):
+        known.plan_of("standard/Arch", version="99")
+
+
+@there
 def test_hard_is_of_standard() -> None:
     rated = {row.digest: row.rating for row in standing.standings("standard")[0]}
     assert {rated[choice.digest] for choice in known.choices("hard")} <= {"hard", "open"}

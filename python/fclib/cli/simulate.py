@@ -119,7 +119,7 @@ def command(
             count=count,
             select=select.value,
             analyze=analyze,
-            simulation=collections.Simulation(tol=ON_DEMAND, control=control),
+            simulation=collections.Simulation(tol=ON_DEMAND, control=control, deepest=None),
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")

@@ -23,6 +23,8 @@ ON_DEMAND = 1e-8
 # a problem's cost to NSGS, where the hard ones are selected
 HARD_TOLERANCE = 1e-6
 HARD_SWEEPS = 2000
+# penetration of a state that is stored, of the smallest body's diameter
+DEEPEST = 0.02
 
 
 def families() -> dict[str, type[scenes.Described]]:
@@ -50,11 +52,15 @@ class Simulation:
     tol: float = 1e-12  # of each step
     stabilization: float = 0.2  # of `fclib.simulate.simulate`
     options: dict[str, Any] = field(default_factory=dict)  # its further ones
+    # a state with a deeper penetration is relaxed before it is stored; None: none is
+    deepest: float | None = DEEPEST
     control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
         """In JSON's types; of a file of controls also its SHA-256."""
         known = asdict(self)
+        if self.deepest is None:
+            del known["deepest"]
         if not self.control:
             del known["control"]
         elif Path(self.control).is_file():

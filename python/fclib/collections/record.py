@@ -1,8 +1,9 @@
 """A simulation into a trajectory: the act that makes new problems.
 
 Each step is solved to go on to the next one, as precisely as the plan says. What is stored is the
-state at its start, rounded, where the problem that is assembled from the rounded state has a
-contact: that problem, and no other one, is of the family. The simulation itself is not rounded.
+state at its start, relaxed where bodies are too deep in each other, and rounded, where the problem
+that is assembled from that state has a contact: that problem, and no other one, is of the family.
+The simulation itself goes on from what it reached.
 """
 
 from __future__ import annotations
@@ -72,7 +73,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         raise TypeError(f"{plan.name} is assembled directly: there is nothing to simulate")
     if target.exists():
         raise FileExistsError(f"{target}: is there already, and a trajectory is never rewritten")
-    from fclib.simulate import control_of, model_of, problem_at, scheme_of, simulate
+    from fclib.simulate import control_of, model_of, problem_at, relaxed, scheme_of, simulate
 
     way = plan.simulation
     # the states are assembled by a model of their own, as they are from the file
@@ -101,8 +102,11 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
             last = time.monotonic()
         if step.index < first:
             continue
-        position = trajectory.rounded(step.start.position, exponent)
-        velocity = trajectory.rounded(step.start.velocity, exponent)
+        position, velocity = step.start.position, step.start.velocity
+        if way.deepest is not None:
+            position = relaxed(model, scheme, position, velocity, way.deepest)
+        position = trajectory.rounded(position, exponent)
+        velocity = trajectory.rounded(velocity, exponent)
         problem = problem_at(model, scheme, position, velocity).problem
         if problem.nc:
             if plan.chosen is None or kept.looked in plan.chosen:

@@ -14,6 +14,7 @@ mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks to
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
 periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
+relax.py          a state whose bodies are deep in each other, with these moved apart
 control.py        controls from outside: a file's rows, a function of time and state
 simulation.py     the loop, warm starts, and what each problem says of its origin
 geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
@@ -29,6 +30,7 @@ from fclib.simulate.geometry import geometry_of
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import UnsupportedSceneError
+from fclib.simulate.relax import relaxed
 from fclib.simulate.render import NoRenderer, render
 from fclib.simulate.simulation import (
     Control,
@@ -64,6 +66,7 @@ __all__ = [
     "model_of",
     "problem_at",
     "provenance",
+    "relaxed",
     "render",
     "scheme_of",
     "simulate",

@@ -130,6 +130,11 @@ class MujocoModel:
         return np.concatenate(parts)
 
     @property
+    def coordinates(self) -> int:
+        """How many entries of `position` are of bodies; those after them stay as they move."""
+        return int(self.model.nq)
+
+    @property
     def has_gait(self) -> bool:
         """Whether the scene itself says its controls at each time."""
         return self._gait is not None

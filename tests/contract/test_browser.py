@@ -205,7 +205,7 @@ def need_hdf5() -> None:
 
 
 def plain(value: Any) -> Any:
-    """What compares, the same for what is decoded already; 0 and 0.0 are one number in JavaScript."""
+    """What compares, the same for what is decoded already: 0 of JavaScript is 0.0 too."""
     return browser_module.encoded(value)
 
 

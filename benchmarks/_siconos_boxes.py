@@ -1,8 +1,9 @@
 """A script of Siconos: a pile of boxes, in m, kg and s, by the integrator that keeps M and H.
 
-    /usr/bin/python3 benchmarks/_siconos_boxes.py STEPS
+    /usr/bin/python3 benchmarks/_siconos_boxes.py STEPS [LEAN]
 
-recorded_steps.py records its steps.
+recorded_steps.py and record_simulators.py record its steps. LEAN is how far a box is further out
+than the one below it, in edges.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ MOST_ITERATIONS = 10_000
 
 def main() -> None:
     steps = int(sys.argv[1])
+    lean = float(sys.argv[2]) if len(sys.argv) > 2 else 0.1
     options = kernel.solver_options_create(numerics.SICONOS_GLOBAL_FRICTION_3D_NSGS_WR)
     options.iparam[numerics.SICONOS_IPARAM_MAX_ITER] = MOST_ITERATIONS
     options.dparam[numerics.SICONOS_DPARAM_TOL] = TOLERANCE
@@ -39,7 +41,7 @@ def main() -> None:
                 io.add_object(
                     f"box{i}",
                     [Contactor("Box")],
-                    translation=[0.1 * EDGE * i, 0, (0.52 + 1.05 * i) * EDGE],
+                    translation=[lean * EDGE * i, 0, (0.52 + 1.05 * i) * EDGE],
                     velocity=[0, 0, 0, 0.1, 0.2, 0.3],
                     mass=mass,
                     inertia=[mass * EDGE**2 / 6] * 3,

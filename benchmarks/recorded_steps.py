@@ -27,13 +27,19 @@ STEPS = (50, 150, 300)
 TIMED = 10  # steps before, whose mean time is told
 BOXES = 6
 SIZE = 0.1  # [m] half an edge
+LEAN = 0.02  # [m] that a box is further out than the one below it
 TOLERANCE = 1e-8
 REPEATS = 5  # of a solve, the least time counts
 SICONOS = Path(__file__).with_name("_siconos_boxes.py")
 
 
-def drakes() -> Iterator[tuple[Any, Any, float]]:
-    """Drake's steps by both laws, and the CPU seconds of its own."""
+def place(i: int, lean: float) -> list[float]:
+    """Of a box of the pile at the start [m]."""
+    return [lean * i, 0, 0.105 + 0.21 * i]
+
+
+def drake_pile(lean: float = LEAN) -> tuple[Any, Any]:
+    """A plant of Drake's with the pile, and its simulator."""
     import pydrake.all as drake
 
     builder = drake.DiagramBuilder()
@@ -69,10 +75,15 @@ def drakes() -> Iterator[tuple[Any, Any, float]]:
     simulator = drake.Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     for i in range(BOXES):
-        pose = drake.RigidTransform(
-            drake.RollPitchYaw(0, 0, 0.1 * i), [0.02 * i, 0, 0.105 + 0.21 * i]
-        )
+        pose = drake.RigidTransform(drake.RollPitchYaw(0, 0, 0.1 * i), place(i, lean))
         plant.SetFreeBodyPose(context, plant.GetBodyByName(f"box{i}"), pose)
+    return plant, simulator
+
+
+def drakes() -> Iterator[tuple[Any, Any, float]]:
+    """Drake's steps by both laws, and the CPU seconds of its own."""
+    plant, simulator = drake_pile()
+    context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     for step in STEPS:
         simulator.AdvanceTo((step - TIMED) * 2e-3)
         start = time.process_time()
@@ -82,17 +93,24 @@ def drakes() -> Iterator[tuple[Any, Any, float]]:
             yield recorders.drake(plant, context, law), law, took
 
 
-def bullets() -> Iterator[tuple[Any, Any, float]]:
-    """PyBullet's steps."""
+def bullet_pile(lean: float = LEAN) -> tuple[Any, int, list[int]]:
+    """PyBullet, a client of it with the pile, and the boxes."""
     import pybullet as bullet
 
     client = bullet.connect(bullet.DIRECT)
     bullet.setGravity(0, 0, -9.81)
     bullet.createMultiBody(0, bullet.createCollisionShape(bullet.GEOM_PLANE))
     box = bullet.createCollisionShape(bullet.GEOM_BOX, halfExtents=[SIZE] * 3)
+    bodies = []
     for i in range(BOXES):
-        body = bullet.createMultiBody(1.0 + i, box, basePosition=[0.02 * i, 0, 0.105 + 0.21 * i])
-        bullet.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+        bodies.append(bullet.createMultiBody(1.0 + i, box, basePosition=place(i, lean)))
+        bullet.changeDynamics(bodies[-1], -1, linearDamping=0, angularDamping=0)
+    return bullet, client, bodies
+
+
+def bullets() -> Iterator[tuple[Any, Any, float]]:
+    """PyBullet's steps."""
+    bullet, client, _ = bullet_pile()
     took = 0.0
     for step in range(max(STEPS) + 1):
         if step in STEPS:
@@ -104,8 +122,8 @@ def bullets() -> Iterator[tuple[Any, Any, float]]:
     bullet.disconnect()
 
 
-def newtons() -> Iterator[tuple[Any, Any, float]]:
-    """Newton's steps by Kamino, as it is by default but for its own collisions."""
+def newton_pile(lean: float = LEAN) -> tuple[Any, list[Any]]:
+    """Newton's Kamino, as it is by default but for its own collisions, and two states."""
     import newton
     import warp
 
@@ -115,14 +133,19 @@ def newtons() -> Iterator[tuple[Any, Any, float]]:
     builder.add_ground_plane(cfg=kind(mu=0.5))
     for i in range(BOXES):
         turn = warp.quat_from_axis_angle(warp.vec3(0, 0, 1), 0.1 * i)
-        place = warp.vec3(0.02 * i, 0, 0.105 + 0.21 * i)
-        body = builder.add_body(xform=warp.transform(place, turn))
+        body = builder.add_body(xform=warp.transform(warp.vec3(*place(i, lean)), turn))
         material = kind(mu=0.5, density=(1.0 + i) / (2 * SIZE) ** 3)
         builder.add_shape_box(body, hx=SIZE, hy=SIZE, hz=SIZE, cfg=material)
     model = builder.finalize(device="cpu")
     solver = newton.solvers.SolverKamino(
         model, newton.solvers.SolverKamino.Config(use_collision_detector=True)
     )
+    return solver, [model.state(), model.state()]
+
+
+def newtons() -> Iterator[tuple[Any, Any, float]]:
+    """Newton's steps by Kamino."""
+    solver, states = newton_pile()
     # the solve of the problem alone
     own = solver._solver_kamino.solver_fd
     solve = own.solve
@@ -135,7 +158,6 @@ def newtons() -> Iterator[tuple[Any, Any, float]]:
         took = time.process_time() - start
 
     own.solve = timed
-    states = [model.state(), model.state()]
     for step in range(max(STEPS) + 1):
         solver.step(*states, None, None, 2e-3)
         states.reverse()

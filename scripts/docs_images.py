@@ -66,6 +66,7 @@ GROUPS = {
     "families-mixed": ("mixed",),
     "families-robots": ("robots",),
     "families-machines": ("machines",),
+    "families-simulators": ("simulators",),
     "families-grains": ("granular", "rolling", "planar"),
     "families-dynamics": ("impacts", "existence", "dynamics"),
     "families-ladder": ("ladder", "local"),

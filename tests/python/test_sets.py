@@ -321,7 +321,16 @@ def test_local_problems_come_from_all_kinds_of_families() -> None:
     found = range(LocalProblems.problems - 16)  # those that spin come last
     origins = [problem.info.title for problem in map(LocalProblems().problem, found)]
     # those that came after it was chosen
-    later = {"local", "impacts", "existence", "dynamics", "robots", "machines", "rr9118"}
+    later = {
+        "local",
+        "impacts",
+        "existence",
+        "dynamics",
+        "robots",
+        "machines",
+        "simulators",
+        "rr9118",
+    }
     families = {tuple(origin.split("/")[:2]) for origin in origins}
     assert {name for name, _ in families} >= {"ladder", "rt444", *known.EXTENDED} - later
     assert len(families) >= 30

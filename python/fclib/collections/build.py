@@ -339,8 +339,13 @@ def stored_before(plan: Plan, kept: Kept, out: Path) -> Before | None:
 def guesses_of(plan: Plan, item: Item, before: Before | None) -> list[_core.Solution]:
     """The impulses that the same contacts had in the step before, where that was stored.
 
+    Of a step of another engine that engine's own.
+
     Where the hard ones are selected, what is stored depends on what comes later: none.
     """
+    reaction = getattr(getattr(plan.scene, "family", None), "reaction", None)
+    if reaction is not None:
+        return [reaction(item.step)]
     if before is None or before.step + 1 != item.step or plan.select == "hard":
         return []
     guess = guess_of(before.problem, before.solution, item.problem)

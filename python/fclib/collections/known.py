@@ -41,16 +41,17 @@ KNOWN: dict[str, tuple[str, str]] = {
     "dynamics": ("2", "silo, rope, spinning bodies, friction that differs by contact"),
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
     "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
+    "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
     "rr9118": ("1", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("1", "one problem in growing sizes and in worse and worse conditioning"),
-    "extended": ("10", "all families that came after RT-0444"),
+    "extended": ("11", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
     "hard": ("8", "of standard, what most solvers fail on; chosen by the bench"),
     "tiny": ("6", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
     *("granular", "rolling", "masonry", "deformable", "mixed", "planar", "local"),
-    *("impacts", "existence", "dynamics", "robots", "machines", "rr9118"),
+    *("impacts", "existence", "dynamics", "robots", "machines", "simulators", "rr9118"),
 )
 
 
@@ -281,6 +282,14 @@ def origin_of(row: Mapping[str, Any]) -> str:
 def published_digest(row: Mapping[str, Any]) -> str | None:
     """The digest that is published under a row's name, version and seed; None where none is."""
     folder, number = f"{row['collection']}/{row['family']}", row["number"]
+    family = families().get(row["family"])
+    if (
+        family is not None
+        and hasattr(family, "digests")
+        and (row["collection"], row["version"]) == (family.collection, version(family.collection))
+    ):
+        # of a family that is stored whole
+        return dict(enumerate(family.digests())).get(number)
     if row["version"] in published.versions(folder):
         if published.seed(folder, row["version"]) != row["seed"]:
             return None

@@ -37,6 +37,7 @@ class Contacts:
     point: Vector | None = None  # (nc x 3) in the world [m]
     frame: Vector | None = None  # (nc x 3 x 3) rows N, T1, T2
     bodies: npt.NDArray[np.int64] | None = None  # (nc x 2) N points from the first to the second
+    gap: Vector | None = None  # (nc) the signed distance, where the engine tells it [m]
 
     def __len__(self) -> int:
         return len(np.atleast_1d(np.asarray(self.mu, dtype=float)))

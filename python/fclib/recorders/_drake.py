@@ -127,6 +127,7 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
         point=np.reshape(points, (nc, 3)),
         frame=np.reshape(frames, (nc, 3, 3)),
         bodies=np.reshape(bodies, (nc, 2)).astype(np.int64),
+        gap=-np.array([pair.depth for pair in pairs]),
     )
     limits = _limits(plant, context, v0, h) if law == "hard" else None
     count = 0 if limits is None else len(np.asarray(limits.w))

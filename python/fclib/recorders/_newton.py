@@ -53,6 +53,7 @@ class Step:
     point: Vector | None = None  # (nc x 3) [m]
     frame: Vector | None = None  # (nc x 3 x 3) rows N, T1, T2
     bodies: Any = None  # (nc x 2)
+    gap: Vector | None = None  # (nc) [m]
 
 
 def newton(solver: Any, world: int = 0) -> Recorded:
@@ -110,6 +111,7 @@ def recorded(step: Step, version: str) -> Recorded:
         point=step.point,
         frame=step.frame,
         bodies=step.bodies,
+        gap=step.gap,
     )
     assembled = assemble(
         M,
@@ -255,4 +257,5 @@ def places(containers: Any, world: int, nc: int) -> dict[str, Any]:
         "point": 0.5 * np.asarray(points[0] + points[1], dtype=float),
         "frame": turn.transpose(2, 1, 0)[:, [2, 0, 1]],
         "bodies": known.bid_AB.numpy()[own].astype(np.int64),
+        "gap": np.asarray(known.gapfunc.numpy()[own][:, 3], dtype=float),
     }

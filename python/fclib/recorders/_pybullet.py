@@ -66,7 +66,7 @@ def record(
         v_free[i + 3 : i + 6] = angular - h * gyroscopic
     (step or p.stepSimulation)(**options)
 
-    rows, mu, points, frames, pairs, reactions = [], [], [], [], [], []
+    rows, mu, points, frames, pairs, gaps, reactions = [], [], [], [], [], [], []
     for contact in p.getContactPoints(**options):
         a, b = contact[1], contact[2]
         if a not in place and b not in place:
@@ -95,6 +95,7 @@ def record(
         points.append(0.5 * (np.array(contact[5]) + np.array(contact[6])))
         frames.append(frame)
         pairs.append((b, a))
+        gaps.append(contact[8])
         reactions.append(h * np.array([contact[9], contact[10], contact[12]]))
     nc = len(rows)
     contacts = Contacts(
@@ -103,6 +104,7 @@ def record(
         point=np.reshape(points, (nc, 3)),
         frame=np.reshape(frames, (nc, 3, 3)),
         bodies=np.reshape(pairs, (nc, 2)).astype(np.int64),
+        gap=np.array(gaps, dtype=float),
     )
     velocity = np.concatenate(
         [np.concatenate(p.getBaseVelocity(body, **options)) for body in bodies] or [np.zeros(0)]

@@ -229,6 +229,8 @@ class Assembled:
             "seed": self.seed,
             "step": number,
             "units": units_of(problem),
+            # what a family says of one problem, as JSON
+            **json.loads(problem.info.description or "{}"),
         }
         words = [
             family.description,

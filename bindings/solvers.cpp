@@ -54,7 +54,7 @@ bool poll_signals() {
 }
 
 template <class P>
-void bind_solve(nb::module_& m) {
+void bind_proof(nb::module_& m) {
   m.def(
       "prove_no_solution",
       [](const P& problem, const Vector& y) -> std::optional<std::tuple<Vector, Vector, double>> {
@@ -71,11 +71,29 @@ void bind_solve(nb::module_& m) {
       "problem"_a, "y"_a,
       "y, z and the bound of a proof near y (nc) that the problem has no solution (see\n"
       "Result.certificate), or None.");
+}
+
+/// The result of visit(problem) for a problem of any formulation. One function for all of them:
+/// overloads, of which most do not fit, take longer.
+template <class Visitor>
+nb::object visit_problem(nb::handle object, const Visitor& visit) {
+  nb::object result;
+  for_each_formulation([&]<class P>(std::type_identity<P>) {
+    if (!result.is_valid() && nb::isinstance<P>(object)) {
+      result = nb::cast(visit(*nb::inst_ptr<P>(object)));
+    }
+  });
+  if (!result.is_valid()) throw nb::next_overload();  // nanobind says what fits
+  return result;
+}
+
+void bind_solve(nb::module_& m) {
   m.def(
       "solve",
-      [](const P& problem, const Solver& solver, double tolerance, std::int64_t max_iterations,
-         double time_limit, const OptionValues& options, const nb::object& guess,
-         const nb::object& callback, bool history, bool natural, const nb::object& clock) {
+      [](const nb::object& problem, const Solver& solver, double tolerance,
+         std::int64_t max_iterations, double time_limit, const nb::dict& options,
+         const nb::object& guess, const nb::object& callback, bool history, bool natural,
+         const nb::object& clock) {
         Settings settings{.tolerance = tolerance,
                           .merit = natural ? MeritKind::natural : MeritKind::both,
                           .max_iterations = max_iterations,
@@ -84,13 +102,23 @@ void bind_solve(nb::module_& m) {
                           .poll = poll_signals,
                           .clock = make_clock(clock),
                           .history = history};
+        OptionValues values;
+        if (options.size() > 0) values = nb::cast<OptionValues>(options);
         const Solution start = guess.is_none() ? Solution{} : solution_from(guess, "guess");
-        const Unlocked unlocked;
-        return solve(problem, solver, settings, options, start);
+        return visit_problem(problem, [&](const auto& given) {
+          const Unlocked unlocked;
+          return solve(given, solver, settings, values, start);
+        });
       },
       "problem"_a, "solver"_a, "tolerance"_a, "max_iterations"_a, "time_limit"_a, "options"_a,
       "guess"_a.none(), "callback"_a.none(), "history"_a, "natural"_a,
-      "clock"_a.none() = nb::none());
+      "clock"_a.none() = nb::none(),
+      nb::sig(("def solve(problem: " + problem_union() +
+               ", solver: SolverInfo, tolerance: float, max_iterations: int, time_limit: float, "
+               "options: collections.abc.Mapping[str, bool | int | float | str], "
+               "guess: object | None, callback: object | None, history: bool, natural: bool, "
+               "clock: object | None = None) -> Result")
+                  .c_str()));
 }
 
 nb::object history_of(const Result& result) {
@@ -446,7 +474,8 @@ void bind_solvers(nb::module_& m) {
       "What is taken where a solution or a guess is: a Solution, that of a Result, or "
       "reactions.\n\n"
       "Raises ProblemError, by the name of what it is, for anything else.");
-  for_each_formulation([&]<class P>(std::type_identity<P>) { bind_solve<P>(m); });
+  for_each_formulation([&]<class P>(std::type_identity<P>) { bind_proof<P>(m); });
+  bind_solve(m);
 }
 
 }  // namespace fclib::bindings

@@ -861,15 +861,14 @@ Outcome iterate(const ReducedProblem& problem, const Table& table, const Means& 
     return outcome();
   }
 
-  const Vector zero = Vector::Zero(problem.m());
   bool guessed = (r.array() != 0).any();
   if (guessed && error_at<Cone>(problem, r) == endless) {
-    r = zero;
+    r.setZero();
     guessed = false;
   }
   walk<Cone>(problem, table, means, tracker, guessed, r);
   if (guessed && !tracker.stopped() && error_at<Cone>(problem, r) > tracker.tolerance()) {
-    Vector cold = zero;
+    Vector cold = Vector::Zero(problem.m());
     walk<Cone>(problem, table, means, tracker, false, cold);
     if (error_at<Cone>(problem, cold) < error_at<Cone>(problem, r)) r = cold;
   }

@@ -40,8 +40,19 @@ void BlockMatrix::fill(const Matrix& a) {
     }
   };
 
+  // one contact has one block
+  if (nc == 1) {
+    dense_ = true;
+    values_.assign(D * D, 0.0);
+    for (Index col = 0; col < D; ++col) {
+      entries_of(col, [&](Index row, double value) { values_[D * col + row] += value; });
+    }
+    return;
+  }
+
   // the pattern of blocks, the diagonal one always included
   std::vector<Index> last_seen(nc, -1);
+  column_.reserve(nc + 1);
   column_.assign(1, 0);
   diagonal_.resize(nc);
   for (Index contact = 0; contact < nc_; ++contact) {

@@ -176,7 +176,8 @@ RealVector momentum_sizes(const Matrix& mass, const std::vector<Index>& part, co
 }
 
 /// The mean of each d components.
-RealVector mean_of_contacts(const RealVector& x, Index d) {
+template <class X>
+RealVector mean_of_contacts(const X& x, Index d) {
   RealVector result = RealVector::Zero(x.size() / d);
   for (Eigen::Index k = 0; k < x.size(); ++k) result[k / d] += x[k] / d;
   return result;
@@ -225,8 +226,8 @@ RealVector largest(const RealVector& x, const RealVector& y) {
 
 OwnSizes own_sizes(const LocalProblem& problem) {
   OwnSizes result;
-  result.q = problem.q.cast<Real>().cwiseAbs();
-  result.rounding = RealVector::Zero(problem.q.size());
+  result.free_u = problem.q.cast<Real>();
+  result.q = result.free_u.cwiseAbs();
   const RealVector of_W = diagonal(problem.W);
   result.scale = mean_of_contacts(of_W, problem.spacedim);
   result.rho = rho_of_contacts(of_W, problem.spacedim);
@@ -257,6 +258,8 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
     result.l = quotient(velocity, gram(problem.G, condensed != nullptr ? condensed->R : none));
     impulse += sizes(problem.G, result.l);
   }
+  result.free_u = product_transposed(problem.H, free);
+  result.free_u += problem.w.cast<Real>();
   result.q = sizes_transposed(problem.H, free) + problem.w.cast<Real>().cwiseAbs();
   result.rounding = rounding_unit_of_q * (result.q + Spread(mass, impulse).along(problem.H));
   const RealVector of_W = gram(problem.H, condensed != nullptr ? condensed->W : none);
@@ -269,12 +272,10 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   const Index d = problem.spacedim;
   Equations result;
   const Vector& r = solution.r;
-  result.q = problem.q.cast<Real>();
-  result.rounding = own.rounding;
-  result.rho = own.rho;
 
   // u = W r + V lambda + q
-  result.u = product(problem.W, r) + result.q;
+  result.u = product(problem.W, r);
+  result.u += own.free_u;
   const RealVector stop =
       is_mixed(problem) || solution.u.size() > 0 ? stopping(own.q, own.scale, d) : RealVector();
   if (is_mixed(problem)) {
@@ -293,11 +294,11 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   }
   if (solution.u.size() > 0) {
     const RealVector difference = solution.u.cast<Real>() - result.u;
-    RealVector terms = sizes(problem.W, r) + result.q.cwiseAbs();
+    RealVector terms = sizes(problem.W, r) + own.free_u.cwiseAbs();
     if (is_mixed(problem)) terms += sizes(problem.V, solution.l);
     const RealVector velocity =
         largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
-    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
+    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
     result.mismatches.push_back(worst("u", solution.u, difference,
                                       beyond(difference, rounding_unit * terms),
                                       largest(velocity, least)));
@@ -314,9 +315,6 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   const RealVector w = problem.w.cast<Real>();
   const Vector& r = solution.r;
   const RealVector& free = own.free;
-  result.q = product_transposed(problem.H, free) + w;
-  result.rounding = own.rounding;
-  result.rho = own.rho;
 
   // M v = H r + G lambda + f
   RealVector momentum = product(problem.H, r) + f;
@@ -355,7 +353,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
     const RealVector parts = sizes_transposed(problem.H, fastest) + w.cwiseAbs();
     RealVector rounding = parts;
     if (!given_v) rounding += Spread(mass, terms).along(problem.H);
-    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(result.q));
+    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
     result.mismatches.push_back(worst("u", solution.u, difference,
                                       beyond(difference, rounding_unit * rounding),
                                       largest(contact_norms(parts, d), least)));

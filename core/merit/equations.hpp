@@ -28,10 +28,7 @@ struct Mismatch {
 
 /// What the equations say of a solution.
 struct Equations {
-  RealVector q;         ///< condensed (m) [m/s]
-  RealVector u;         ///< recomputed (m) [m/s]
-  RealVector rounding;  ///< of q: what double precision leaves of the terms it is made of (m) [m/s]
-  RealVector rho;       ///< of the scaled natural map, of each contact (nc) [1/W]
+  RealVector u;                      ///< recomputed (m) [m/s]
   std::vector<Mismatch> mismatches;  ///< one of each part that is stored
 };
 
@@ -39,11 +36,13 @@ struct Equations {
 struct OwnSizes {
   RealVector free;          ///< M^-1 f of a global problem (n) [m/s]
   std::vector<Index> part;  ///< of M that a degree of freedom is coupled to, by its first one (n)
+  RealVector free_u;        ///< q, condensed (m) [m/s]
   RealVector l;             ///< reactions that stop the joints, each alone (p)
   RealVector q;             ///< of the terms of u without reactions (m) [m/s]
-  RealVector rounding;      ///< Equations::rounding
+  RealVector rounding;      ///< what double precision leaves of the terms that q is made of (m)
+                            ///< [m/s]; empty where q is given
   RealVector scale;         ///< tr(W_aa) / d of each contact (nc)
-  RealVector rho;           ///< Equations::rho
+  RealVector rho;           ///< of the scaled natural map, of each contact (nc) [1/W]
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);

@@ -18,8 +18,8 @@ void raise(double& largest, Real value) { largest = std::max(largest, static_cas
 
 /// The parts that depend on one contact at a time; but for the errors only where `each` is there.
 template <class Cone>
-void judge_contacts(const Friction& friction, const RealVector& r, const Equations& equations,
-                    Merit& result, ContactMerits* each) {
+void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& own,
+                    const Equations& equations, Merit& result, ContactMerits* each) {
   constexpr int D = Cone::dim;
   NaturalSums<Cone> sums;
   if (each != nullptr) {
@@ -30,11 +30,12 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
   for (Eigen::Index contact = 0; contact < friction.mu.size(); ++contact) {
     const Cone cone(friction, contact);
     const ContactVector<D, Real> ua = equations.u.segment<D>(D * contact);
-    const ContactVector<D, Real> ra = r.segment<D>(D * contact);
+    const ContactVector<D, Real> ra = r.segment<D>(D * contact).template cast<Real>();
     const ContactVector<D, Real> modified = cone.modified(ua);
-    const Real q_square = equations.q.segment<D>(D * contact).squaredNorm();
-    const Real rounding = equations.rounding.segment<D>(D * contact).norm();
-    const Real rho = equations.rho[contact];
+    const Real q_square = own.free_u.segment<D>(D * contact).squaredNorm();
+    const Real rounding =
+        own.rounding.size() > 0 ? own.rounding.segment<D>(D * contact).norm() : Real(0);
+    const Real rho = own.rho[contact];
     const Real norm = sums.add(cone, modified, ra, q_square, rounding, rho);
     if (each == nullptr) continue;
     each->natural[contact] = static_cast<double>(norm);
@@ -61,7 +62,7 @@ void judge_contacts(const Friction& friction, const RealVector& r, const Equatio
 }
 
 /// Without `each` the errors alone.
-Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
+Merit judge(Index spacedim, const Friction& friction, const Solution& solution, const OwnSizes& own,
             const Equations& equations, ContactMerits* each) {
   Merit result;
   for (const Mismatch& mismatch : equations.mismatches) {
@@ -70,27 +71,39 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution,
                                             : result.bilateral;
     member = mismatch.error;
   }
-  const RealVector r = solution.r.cast<Real>();
+  const auto by_contacts = [&]<class Cone>(std::type_identity<Cone>) {
+    judge_contacts<Cone>(friction, solution.r, own, equations, result, each);
+  };
   if (spacedim == 2) {
-    judge_contacts<Coulomb<2, Real>>(friction, r, equations, result, each);
+    by_contacts(std::type_identity<Coulomb<2, Real>>{});
   } else if (spacedim == 5) {
-    judge_contacts<Rolling<5, Real>>(friction, r, equations, result, each);
+    by_contacts(std::type_identity<Rolling<5, Real>>{});
   } else if (friction.mu_r.size() > 0) {
-    judge_contacts<Rolling<3, Real>>(friction, r, equations, result, each);
+    by_contacts(std::type_identity<Rolling<3, Real>>{});
   } else {
-    judge_contacts<Coulomb<3, Real>>(friction, r, equations, result, each);
+    by_contacts(std::type_identity<Coulomb<3, Real>>{});
   }
   result.error = std::max(result.error_by(MeritKind::natural), result.scaled_natural);
   return result;
 }
 
-Equations equations_of(const LocalProblem& problem, const Solution& solution) {
-  return equations(problem, solution, own_sizes(problem));
+/// What a solution is judged by.
+struct Grounds {
+  OwnSizes own;
+  Equations found;
+};
+
+Grounds grounds_of(const LocalProblem& problem, const Solution& solution) {
+  Grounds result{own_sizes(problem), {}};
+  result.found = equations(problem, solution, result.own);
+  return result;
 }
 
-Equations equations_of(const GlobalProblem& problem, const Solution& solution) {
+Grounds grounds_of(const GlobalProblem& problem, const Solution& solution) {
   const Factorization mass(to_eigen(problem.M), "M");
-  return equations(problem, solution, mass, own_sizes(problem, mass));
+  Grounds result{own_sizes(problem, mass), {}};
+  result.found = equations(problem, solution, mass, result.own);
+  return result;
 }
 
 /// std::max drops a NaN; a solution that holds one must never look good.
@@ -98,10 +111,10 @@ template <class P>
 Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
   validate(problem);
   validate(solution, problem);
-  const Equations found = equations_of(problem, solution);
+  const auto [own, found] = grounds_of(problem, solution);
   each.mismatches = found.mismatches;
-  each.u = found.u.cast<double>();
-  return judge(problem.spacedim, friction_of(problem), solution, found, &each);
+  each.u = found.u.template cast<double>();
+  return judge(problem.spacedim, friction_of(problem), solution, own, found, &each);
 }
 
 template <class P>
@@ -111,9 +124,9 @@ Merit judge_valid(const P& problem, const Solution& solution) {
 }
 
 /// The solution gets the u that follows.
-double judge_and_complete(Index spacedim, const Friction& friction, const Equations& found,
-                          MeritKind kind, Solution& solution) {
-  const double error = judge(spacedim, friction, solution, found, nullptr).error_by(kind);
+double judge_and_complete(Index spacedim, const Friction& friction, const OwnSizes& own,
+                          const Equations& found, MeritKind kind, Solution& solution) {
+  const double error = judge(spacedim, friction, solution, own, found, nullptr).error_by(kind);
   solution.u = found.u.cast<double>();
   return error;
 }
@@ -143,16 +156,16 @@ Merit merit(const GlobalRollingProblem& problem, const Solution& solution) {
 double judge_and_complete(const LocalProblem& problem, const Friction& friction,
                           const OwnSizes& own, MeritKind kind, Solution& solution) {
   solution.u.resize(0);
-  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, own), kind,
-                            solution);
+  return judge_and_complete(problem.spacedim, friction, own, equations(problem, solution, own),
+                            kind, solution);
 }
 
 double judge_and_complete(const GlobalProblem& problem, const Friction& friction,
                           const Factorization& mass, const OwnSizes& own, MeritKind kind,
                           Solution& solution) {
   solution.u.resize(0);
-  return judge_and_complete(problem.spacedim, friction, equations(problem, solution, mass, own),
-                            kind, solution);
+  return judge_and_complete(problem.spacedim, friction, own,
+                            equations(problem, solution, mass, own), kind, solution);
 }
 
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution) {

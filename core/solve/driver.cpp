@@ -59,7 +59,7 @@ struct Measure {
       return x.stableNorm();
     };
     scaled_q = scaled(problem.q);
-    scaled_rounding = scaled(own.rounding.cast<double>());
+    if (own.rounding.size() > 0) scaled_rounding = scaled(own.rounding.cast<double>());
   }
 
   /// That of a solver. It aims below what rounding leaves, as far as it gets; the merit of what it
@@ -73,7 +73,7 @@ struct Measure {
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
 /// `prove` looks for a proof near y that the problem as it was given has no solution.
 template <class Judge>
-Result run(const LocalProblem& plain, const Friction& friction, const Measure& measure,
+Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
            const Request& request, const Solution& guess, const Judge& judge,
            const std::function<NoSolution(const Vector&)>& prove, const Primal* primal = nullptr) {
   Result result;
@@ -98,7 +98,7 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
                          .q = plain.q,
                          .friction = friction,
                          .scale = Measure::scale(measure.q, measure.rounding),
-                         .rho = measure.rho,
+                         .rho = std::move(measure.rho),
                          .scaled_scale = Measure::scale(measure.scaled_q, measure.scaled_rounding),
                          .known_r = {},
                          .known_u = {},
@@ -109,14 +109,12 @@ Result run(const LocalProblem& plain, const Friction& friction, const Measure& m
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
-  const double first_start = now(settings.clock);
-  const auto elapsed = [&] { return now(settings.clock) - first_start; };
   settings.time_limit = std::max(0.0, request.deadline.left());
   if (settings.history) {
     result.history.emplace();
-    settings.callback = [&](const Progress& progress) {
-      result.history->push_back({result.iterations + progress.iteration, progress.error, elapsed(),
-                                 std::string(progress.stage)});
+    settings.callback = [&, start = now(settings.clock)](const Progress& progress) {
+      result.history->push_back({result.iterations + progress.iteration, progress.error,
+                                 now(settings.clock) - start, std::string(progress.stage)});
       return !request.settings.callback || request.settings.callback(progress);
     };
   }
@@ -243,11 +241,13 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
   const MeritKind kind = request.settings.merit;
   const Friction friction = friction_of(problem);
   const OwnSizes own = own_sizes(problem);
-  const Measure measure(problem, own, kind);
+  Measure measure(problem, own, kind);
   const auto judge = [&](Solution& solution) {
     return judge_and_complete(problem, friction, own, kind, solution);
   };
-  if (!is_mixed(problem)) return run(problem, friction, measure, request, guess, judge, prove);
+  if (!is_mixed(problem)) {
+    return run(problem, friction, std::move(measure), request, guess, judge, prove);
+  }
   const Elimination elimination(problem, &request.deadline);
   if (!elimination.finished()) {
     return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
@@ -256,7 +256,8 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
     solution = elimination.expand(solution);
     return judge(solution);
   };
-  return run(elimination.plain(), friction, measure, request, guess, judge_expanded, prove);
+  return run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded,
+             prove);
 }
 
 template <class P>
@@ -278,10 +279,10 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const auto stop = [&] {
     return out_of_time(problem.w.size(), problem.b.size(), request, guess, judge);
   };
-  const Measure measure(local, own, kind);
+  Measure measure(local, own, kind);
   if (!is_mixed(local)) {
     const Primal primal{to_eigen(problem.M), to_eigen(problem.H)};
-    return run(local, friction, measure, request, guess, judge, prove, &primal);
+    return run(local, friction, std::move(measure), request, guess, judge, prove, &primal);
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
@@ -290,7 +291,8 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     elimination.hold(problem, condensation, solution);
     return judge_complete(solution);
   };
-  return run(elimination.plain(), friction, measure, request, guess, judge_expanded, prove);
+  return run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded,
+             prove);
 }
 
 /// What every solve does: checks, times.

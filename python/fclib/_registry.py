@@ -253,9 +253,7 @@ def solvers() -> list[_core.SolverInfo]:
     return [found[name] for name in sorted(found)]
 
 
-@functools.cache
-def _of_the_core() -> dict[str, _core.SolverInfo]:
-    return {info.name: info for info in _core.solvers()}
+_of_the_core: dict[str, _core.SolverInfo] = {}  # once one was asked for
 
 
 def find_solver(name: str) -> _core.SolverInfo:
@@ -264,9 +262,12 @@ def find_solver(name: str) -> _core.SolverInfo:
     Raises:
         OptionError: there is none, with the known names, or with what is missing.
     """
-    own = _of_the_core().get(name)
+    own = _of_the_core.get(name)
     if own is not None:
         return own
+    if not _of_the_core:
+        _of_the_core.update({info.name: info for info in _core.solvers()})
+        return find_solver(name)
     if name in _registered:
         return _registered[name]
     for provider in _providers():

@@ -23,6 +23,26 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 hypothesis.settings.register_profile("fclib", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("fclib")
 
+# files by the time that they take, of those that take long
+LONGEST = (
+    "test_report_browser",
+    "test_collection",
+    "test_capi",
+    "test_docs",
+    "test_docs_code",
+    "test_report_compute",
+    "test_bench_limits",
+    "test_tutorials",
+    "test_trajectory",
+    "test_bench",
+    "test_machines",
+    "test_report",
+    "test_malformed",
+    "test_bench_sequences",
+    "test_scenes",
+    "test_bench_profiles",
+)
+
 # a shell's job in the background ignores Ctrl-C, and so would all that it starts
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -32,6 +52,15 @@ def pytest_configure(config: pytest.Config) -> None:
     """What was just edited is what is tested."""
     if not hasattr(config, "workerinput"):  # a process that pytest-xdist has started
         rebuild.rebuild()
+    # files side by side are begun in the order of below, not with those of most tests
+    if getattr(config.option, "loadscopereorder", False):
+        config.option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest files come first: no core waits at the end while another runs one of them."""
+    place = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(place)))
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,7 @@
-/* Eight threads that write, read, solve and fail at the same time; ends with 0 where each sees its
- * own files, its own results and its own last error.
+/* Threads, eight at most, that write, read, solve and fail at the same time; ends with 0 where each
+ * sees its own files, its own results and its own last error.
  *
- *   threads FOLDER [ROUNDS [ALONE]]
+ *   threads FOLDER [ROUNDS [ALONE [COUNT]]]
  *
  * ALONE rounds come before, in the main thread: helgrind knows nothing of how C++ guards what is
  * made at its first use, so that all of it is made by then.
@@ -11,7 +11,7 @@
 #include <pthread.h>
 #include <stdatomic.h>
 
-enum { count = 8 };
+enum { most = 8 };
 
 static atomic_int told; /* how often the handler was called */
 
@@ -110,17 +110,19 @@ static void* work(void* given) {
 }
 
 int main(int argc, char** argv) {
-  if (argc < 2 || argc > 4) return 2;
+  if (argc < 2 || argc > 5) return 2;
   snprintf(folder, sizeof folder, "%s", argv[1]);
   const int rounds = argc > 2 ? atoi(argv[2]) : 20;
-  struct task alone = {count, argc > 3 ? atoi(argv[3]) : 0};
+  const int count = argc > 4 ? atoi(argv[4]) : most;
+  if (count > most) return 2;
+  struct task alone = {most, argc > 3 ? atoi(argv[3]) : 0};
   fclib_set_error_handler(count_errors, &told);
   struct fclib_local a = local_of(&identity, q, mu);
   remove(path_of("shared"));
   CHECK(fclib_write_local(&a, path_of("shared")));
   work(&alone);
-  pthread_t all[count];
-  struct task tasks[count];
+  pthread_t all[most];
+  struct task tasks[most];
   for (int k = 0; k < count; k++) {
     tasks[k] = (struct task){k, rounds};
     CHECK(!pthread_create(&all[k], NULL, work, &tasks[k]));

@@ -85,10 +85,10 @@ def test_threads_do_not_disturb_each_other(threads: Path, tmp_path: Path) -> Non
 def test_threads_are_clean_under_helgrind(threads: Path, tmp_path: Path) -> None:
     if next(library_folder().rglob("*.gcno"), None):
         pytest.skip("the counters of a build for coverage race, as they may")
-    # few rounds, for it runs the threads by turns and remembers each access
+    # few rounds of few threads, for it runs them by turns and remembers each access
     helgrind = f"--suppressions={CAPI / 'helgrind.txt'}"
     # two rounds alone come first, one of each solver: what is made at its first use is there then
-    valgrind("--tool=helgrind", helgrind, threads, tmp_path, 2, 2)
+    valgrind("--tool=helgrind", helgrind, threads, tmp_path, 2, 2, 3)
 
 
 def test_only_the_interface_is_exported() -> None:

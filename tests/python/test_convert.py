@@ -518,7 +518,7 @@ for job in jobs:
     m = problem.dimension * problem.numberOfContacts
     if job["kind"] == "local":
         result["q"] = list(problem.q)
-    if job["kind"] == "local" and problem.dimension == 3:
+    if job["kind"] == "local" and problem.dimension == 3 and job["r"]:
         options = sn.SolverOptions(sn.SICONOS_FRICTION_3D_NSGS)
         options.dparam[0], options.iparam[0] = 1e-12, 100000
         result["error"] = sn.fc3d_compute_error(
@@ -526,7 +526,7 @@ for job in jobs:
         r, u = np.zeros(m), np.zeros(m)
         result["status"] = sn.fc3d_driver(problem, r, u, options)
         result["r"] = list(r)
-    if job["kind"] == "global" and problem.dimension == 3:
+    if job["kind"] == "global" and problem.dimension == 3 and job["r"]:
         options = sn.SolverOptions(sn.SICONOS_GLOBAL_FRICTION_3D_NSGS_WR)
         options.dparam[0], options.iparam[0] = 1e-12, 100000
         r, u, v = np.zeros(m), np.zeros(m), np.zeros(job["n"])
@@ -626,10 +626,8 @@ def test_siconos_reads_real_and_rolling_problems_as_they_are(
         problem = fclib.read(source)
         path = tmp_path / f"{source.stem}.dat"
         fclib.write_siconos(path, problem)
-        norm = np.zeros(problem.m)
-        jobs.append(
-            {"path": str(path), "kind": problem.kind, "n": problem.n, "r": list(norm), "norm": 1e9}
-        )
+        # without reactions to judge, it is not solved either
+        jobs.append({"path": str(path), "kind": problem.kind, "n": problem.n, "r": []})
         given_problems.append(problem)
     assert {problem.kind for problem in given_problems} == {
         "local",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 import fclib
+import helpers_cli
 
 pytest.importorskip("mujoco")
 
@@ -18,12 +18,8 @@ STEPS = 22  # the first box lands in step 14
 
 
 def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fclib", "demo", "--out", folder, "--boxes", "2"]
-    if "--campaign" not in arguments:
-        command.append("--no-campaign")
-    return subprocess.run(
-        [*map(str, command), "--steps", str(STEPS), *arguments], capture_output=True, text=True
-    )
+    common = ("demo", "--out", folder, "--boxes", 2, "--steps", STEPS, "--no-campaign")
+    return helpers_cli.run(*common, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -97,16 +93,9 @@ def test_the_demo_ends_with_a_campaign_and_its_profile(
     monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / "cache"))
     # what makes it long is not to be shown here
     short = "solvers = ['auto', 'nsgs']\n[[problems]]\nplanted = { count = 2, contacts = 5 }\n"
-    code = (
-        "import sys, pathlib, fclib.demo, fclib.bench.campaign as c\n"
-        "c.PUBLISHED = pathlib.Path(sys.argv.pop(1))\n"
-        "import fclib.cli; fclib.cli.main()"
-    )
+    monkeypatch.setattr("fclib.bench.campaign.PUBLISHED", tmp_path)
     (tmp_path / "quick.toml").write_text(short)
-    command = [sys.executable, "-c", code, tmp_path, "demo", "--boxes", "1", "--steps", "2"]
-    done = subprocess.run(
-        [*map(str, command), "--out", str(tmp_path / "demo")], capture_output=True, text=True
-    )
+    done = helpers_cli.run("demo", "--boxes", 1, "--steps", 2, "--out", tmp_path / "demo")
     assert done.returncode == 0, done.stderr
     assert "virtual best" in done.stdout
     assert (tmp_path / "demo" / "quick.sqlite").exists()

@@ -67,12 +67,23 @@ def test_what_is_here() -> None:
         assert bool(finding["remedy"]) <= (finding["state"] == "absent")
 
 
-def test_what_is_broken_is_said_with_what_to_do(tmp_path: Path) -> None:
-    pretend(tmp_path, "clarabel", "99.0", "import nowhere")
-    pretend(tmp_path, "scs", "0.1")
-    pretend(tmp_path, "mujoco", "4.0.1")
-    pretend(tmp_path, "pooch", "9.0", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
-    findings, done = run(PYTHONPATH=before(tmp_path))
+@pytest.fixture(scope="module")
+def pretended(
+    tmp_path_factory: pytest.TempPathFactory,
+) -> tuple[dict[str, dict[str, Any]], subprocess.CompletedProcess[str]]:
+    """What is found where packages are broken, too old, or of another interpreter."""
+    folder = tmp_path_factory.mktemp("pretended")
+    pretend(folder, "clarabel", "99.0", "import nowhere")
+    pretend(folder, "scs", "0.1")
+    pretend(folder, "mujoco", "4.0.1")
+    pretend(folder, "pooch", "9.0", "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    pretend(folder, "pinocchio", "99.1", "ADMMConstraintSolver = PGSConstraintSolver = 0", "pin")
+    pretend(folder, "siconos", "99.2", "version = '99.3'")
+    return run(PYTHONPATH=before(folder), FCLIB_SICONOS_PYTHON=sys.executable)
+
+
+def test_what_is_broken_is_said_with_what_to_do(pretended: Any) -> None:
+    findings, done = pretended
     assert done.returncode == 1
     assert "No module named 'nowhere'" in findings["clarabel"]["problem"]
     assert "pip install --force-reinstall" in findings["clarabel"]["remedy"]
@@ -87,10 +98,8 @@ def test_what_is_broken_is_said_with_what_to_do(tmp_path: Path) -> None:
     assert "numpy" not in broken
 
 
-def test_solvers_that_are_no_extra_have_their_versions(tmp_path: Path) -> None:
-    pretend(tmp_path, "pinocchio", "99.1", "ADMMConstraintSolver = PGSConstraintSolver = 0", "pin")
-    pretend(tmp_path, "siconos", "99.2", "version = '99.3'")
-    findings, _ = run(PYTHONPATH=before(tmp_path), FCLIB_SICONOS_PYTHON=sys.executable)
+def test_solvers_that_are_no_extra_have_their_versions(pretended: Any) -> None:
+    findings, _ = pretended
     assert findings["pinocchio"]["found"] == "99.1"
     # the word of the other interpreter, not what is installed beside fclib
     assert findings["siconos"]["found"] == f"99.3 in {sys.executable}"

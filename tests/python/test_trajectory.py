@@ -435,11 +435,6 @@ NOT_SIMULATED = {
 }
 
 
-def stored(name: str) -> tuple[Path, Any]:
-    path = published.IN_PLACE / published.FOLDER / name
-    return path, trajectory.read(path)
-
-
 MODELS: list[Any] = []  # of the family that was tested last
 
 
@@ -456,6 +451,16 @@ def share_model(states: Any) -> None:
         MODELS.append(states.model)
 
 
+@pytest.fixture(scope="module", params=STORED or ["none"])
+def stored(request: pytest.FixtureRequest) -> tuple[str, Path, Any]:
+    """Name, file and states of a published trajectory; tests of one follow each other."""
+    name = request.param
+    path = published.IN_PLACE / published.FOLDER / name
+    states = trajectory.read(path)
+    share_model(states)
+    return name, path, states
+
+
 @there
 def test_published_trajectories_are_few_megabytes() -> None:
     names = {name.rpartition("-")[0] for name in STORED}
@@ -469,10 +474,8 @@ def test_published_trajectories_are_few_megabytes() -> None:
 
 
 @there
-@pytest.mark.parametrize("name", STORED or ["none"])
-def test_published_trajectory_is_what_its_name_says(name: str) -> None:
-    path, states = stored(name)
-    share_model(states)
+def test_published_trajectory_is_what_its_name_says(stored: tuple[str, Path, Any]) -> None:
+    name, path, states = stored
     folder, _, version = name.removesuffix(trajectory.SUFFIX).rpartition("-")
     assert f"{states.origin['collection']}/{states.scene.name}" == folder
     assert states.origin["version"] == version
@@ -493,6 +496,24 @@ def test_published_trajectory_is_what_its_name_says(name: str) -> None:
 
 @there
 @pytest.mark.slow
+def test_bodies_of_stored_states_are_not_deep_in_each_other(stored: tuple[str, Path, Any]) -> None:
+    name, _, states = stored
+    folder = name.rpartition("-")[0]
+    size = states.model.smallest_size
+    if size is None:
+        size = 0.5 * min(min(block.size) for block in states.scene.solids.blocks)
+    bound = DEEPEST
+    if name != PRESENT.get(folder):
+        bound = DEEPER.get(states.scene.name, DEEPEST)
+    for place in np.unique(np.linspace(0, len(states) - 1, 20).astype(int)).tolist():
+        contacts = states.problem(place).contacts
+        # a joint's limit has no bodies that touch
+        gap = contacts.gap[contacts.pair[:, 0] >= 0]
+        assert gap.min(initial=0.0) > -bound * 2 * size
+
+
+@there
+@pytest.mark.slow
 @pytest.mark.parametrize("name", RANGES)
 def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
     folder = f"rt444/{name}"
@@ -506,26 +527,6 @@ def test_published_sets_are_within_the_ranges_of_the_report(name: str) -> None:
         assert dofs[0] <= part.problem.n <= dofs[1]
         assert contacts[0] <= part.problem.nc <= contacts[1]
         assert part.contacts.gap.min() > -limit
-
-
-@there
-@pytest.mark.slow
-@pytest.mark.parametrize("name", STORED or ["none"])
-def test_bodies_of_stored_states_are_not_deep_in_each_other(name: str) -> None:
-    _, states = stored(name)
-    share_model(states)
-    folder = name.rpartition("-")[0]
-    size = states.model.smallest_size
-    if size is None:
-        size = 0.5 * min(min(block.size) for block in states.scene.solids.blocks)
-    bound = DEEPEST
-    if name != PRESENT.get(folder):
-        bound = DEEPER.get(states.scene.name, DEEPEST)
-    for place in np.unique(np.linspace(0, len(states) - 1, 20).astype(int)).tolist():
-        contacts = states.problem(place).contacts
-        # a joint's limit has no bodies that touch
-        gap = contacts.gap[contacts.pair[:, 0] >= 0]
-        assert gap.min(initial=0.0) > -bound * 2 * size
 
 
 @there

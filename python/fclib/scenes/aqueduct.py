@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from fclib.scenes.shared import masonry, mjcf
 from fclib.scenes.shared.family import Scene, parameter
@@ -34,6 +35,8 @@ class Aqueduct:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 60
+    # of a scene of this kind that is quickly simulated
+    small: ClassVar[Mapping[str, Any]] = {"spans": 2, "tiers": 1}
 
     spans: int = parameter(3, "1", "arches of a tier, at least 2")
     tiers: int = parameter(2, "1", "tiers, at least 1")

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ class SpheresBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 32
+    # of a scene of this kind that is quickly simulated
+    small: ClassVar[Mapping[str, Any]] = {"spheres": 36, "along_x": 4, "along_y": 3}
 
     spheres: int = parameter(945, "1", "number of spheres, at least 1")
     along_x: int = parameter(9, "1", "spheres of a layer along x, at least 1")

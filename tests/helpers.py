@@ -238,9 +238,14 @@ def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
     is_open = ~projected.any(axis=1)
     is_stick = ~is_open & (projected == scaled).all(axis=1)
     norms = np.linalg.norm
+    left = norms(residual(rho * hat).reshape(-1, d), axis=1)
+    velocities = np.maximum(left / rho[:, 0], -contacts[:, 0])
     return Verdict(
         natural=float(norms(residual(hat)) / (norms(q) or 1.0)),
-        scaled_natural=float(norms(residual(rho * hat)) / (norms(rho * q.reshape(-1, d)) or 1.0)),
+        scaled_natural=max(
+            float(norms(left) / (norms(rho * q.reshape(-1, d)) or 1.0)),
+            float(norms(velocities) / (norms(q) or 1.0)),
+        ),
         dynamics=dynamics,
         bilateral=bilateral,
         kinematics=kinematics,

@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "contact/natural_squares.hpp"
 #include "linalg/cpu_time.hpp"
 #include "linalg/memory.hpp"
 #include "methods/pivoting.hpp"
@@ -783,27 +784,21 @@ void walk(const ReducedProblem& problem, const Table& table, const Means& means,
   for (Index a = 0; a < nc; ++a) islands[group[a]].push_back(a);
   Vector u;
   problem.velocity(r, u);
-  std::vector<double> squared(islands.size(), 0.0);
-  std::vector<double> scaled(islands.size(), 0.0);
-  double sum = 0;
+  std::vector<NaturalSquares<double>> parts(islands.size());
+  const bool scaled = problem.rho.size() > 0;
   for (Index a = 0; a < nc; ++a) {
     const Cone cone(problem.friction, a);
     const typename Cone::Vec ua = u.template segment<D>(D * a);
     const typename Cone::Vec ra = r.template segment<D>(D * a);
-    const double error = natural_map(cone, ua, ra).squaredNorm() / (problem.scale * problem.scale);
-    squared[group[a]] += error;
-    sum += error;
-    if (problem.rho.size() > 0) {
-      scaled[group[a]] += natural_map(cone, ua, ra, problem.rho[a]).squaredNorm() /
-                          (problem.scaled_scale * problem.scaled_scale);
-    }
+    parts[group[a]].add_plain(cone, ua, ra);
+    if (scaled) parts[group[a]].add_scaled(cone, ua, ra, problem.rho[a]);
   }
-  if (problem.rho.size() > 0) {  // of each island the larger error
-    sum = 0;
-    for (std::size_t k = 0; k < islands.size(); ++k) {
-      squared[k] = std::max(squared[k], scaled[k]);
-      sum += squared[k];
-    }
+  double sum = 0;
+  std::vector<double> squared;  // errors
+  for (const NaturalSquares<double>& part : parts) {
+    const double error = part.error(problem.scale, problem.scaled_scale);
+    squared.push_back(error * error);
+    sum += squared.back();
   }
   for (std::size_t k = 0; k < islands.size() && !tracker.stopped(); ++k) {
     const std::vector<Index>& contacts = islands[k];

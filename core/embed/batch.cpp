@@ -79,7 +79,7 @@ double judge(const One& one) {
     }
     const Real rho = scales.rho(size_of(a));
     const Coulomb<D, Real> cone(one.mu[a]);
-    sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
+    sums.add(cone, u[0], cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }
   const double natural = sums.natural();
   const double scaled = sums.scaled_natural();

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "contact/alart_curnier.hpp"
+#include "contact/natural_squares.hpp"
 #include "embed/memory.hpp"
 #include "merit/natural_sums.hpp"
 
@@ -222,18 +223,15 @@ double SmallSolver<D>::sweep(double* r) {
 
 template <int D>
 double SmallSolver<D>::error(const double* r) const {
-  double natural = 0;
-  double scaled = 0;
+  NaturalSquares<double> squares;
   for (Index a = 0; a < nc_; ++a) {
     const Coulomb<D> cone(mu_[a]);
     const Vec u = velocity(a, r);
-    natural += natural_map(cone, u, Vec(part(r, a))).squaredNorm();
-    scaled +=
-        natural_map(cone, u, Vec(part(r, a)), rho_[static_cast<std::size_t>(a)]).squaredNorm();
+    const Vec ra = part(r, a);
+    squares.add_plain(cone, u, ra);
+    squares.add_scaled(cone, u, ra, rho_[static_cast<std::size_t>(a)]);
   }
-  const double plain = std::sqrt(natural) / scale_;
-  const double other = std::sqrt(scaled) / scaled_scale_;
-  return other <= plain ? plain : other;  // of a NaN the NaN
+  return squares.error(scale_, scaled_scale_);
 }
 
 /// Whether it is the best so far.

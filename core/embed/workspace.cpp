@@ -126,7 +126,7 @@ double Workspace::judge(const LocalView& problem) {
     }
     const Real rho = scales.rho(size_[a]);
     const Coulomb<D, Real> cone(problem.mu[a]);
-    sums.add(cone, cone.modified(u), r, q.squaredNorm(), Real(0), rho);
+    sums.add(cone, u[0], cone.modified(u), r, q.squaredNorm(), Real(0), rho);
   }
   const double natural = sums.natural();
   const double scaled = sums.scaled_natural();

@@ -36,7 +36,7 @@ void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& o
     const Real rounding =
         own.rounding.size() > 0 ? own.rounding.segment<D>(D * contact).norm() : Real(0);
     const Real rho = own.rho[contact];
-    const Real norm = sums.add(cone, modified, ra, q_square, rounding, rho);
+    const Real norm = sums.add(cone, ua[0], modified, ra, q_square, rounding, rho);
     if (each == nullptr) continue;
     each->natural[contact] = static_cast<double>(norm);
     each->cone[contact] = static_cast<double>(cone_violation(cone, ra));

@@ -1,10 +1,10 @@
 // How good a solution is, judged from the data of the problem alone.
 //
 // The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
-// error = ||F||_2 / ||q||_2; scaled, the same with rho u^, which does not change with the units. u
-// is recomputed: W r + V lambda + q, or H^T v + w, never taken from the solution. All sums are made
-// in extended precision. What rounding leaves of q, by the sizes of its terms, is no error, and
-// errors are not relative to less.
+// error = ||F||_2 / ||q||_2; scaled, the same with rho u^, summed as impulses and as velocities,
+// which does not change with the units. u is recomputed: W r + V lambda + q, or H^T v + w, never
+// taken from the solution. All sums are made in extended precision. What rounding leaves of q, by
+// the sizes of its terms, is no error, and errors are not relative to less.
 //
 // The other equations are judged by components (merit/equations.hpp). docs/mathematics.md has the
 // definitions with their reasons.
@@ -54,9 +54,9 @@ struct Merit {
                                 "beyond rounding"},
         Field<M, double>{.name = "scaled_natural",
                          .member = &M::scaled_natural,
-                         .doc =
-                             "||r - P_K(r - rho u^)|| / ||rho q||, rho = 1 / mean abs(W_kk): the "
-                             "same in all units"},
+                         .doc = "F = r - P_K(r - rho u^), rho = 1 / mean abs(W_kk): the larger of "
+                                "||F|| / ||rho q|| and of max(||F|| / rho, -u_N) of each contact "
+                                "over ||q||: the same in all units"},
         Field<M, double>{.name = "dynamics",
                          .member = &M::dynamics,
                          .doc =

@@ -35,15 +35,17 @@ class NaturalSums {
   using Vec = typename Cone::Vec;
   using Real = typename Vec::Scalar;
 
-  /// Adds a contact with modified velocity u^ and reaction r, ||q^a||^2, what rounding leaves of
-  /// q^a, and rho as ContactScales has it. The norm of its natural map.
-  Real add(const Cone& cone, const Vec& modified, const Vec& r, Real q_square, Real rounding,
-           Real rho) {
+  /// Adds a contact with normal velocity u_N, modified velocity u^ and reaction r, ||q^a||^2, what
+  /// rounding leaves of q^a, and rho as ContactScales has it. The norm of its natural map.
+  Real add(const Cone& cone, Real normal, const Vec& modified, const Vec& r, Real q_square,
+           Real rounding, Real rho) {
     const OfModified known{cone};
     const Real norm = natural_map(known, modified, r).norm();
     squares_ += square_beyond(norm, rounding);
     q_squares_ += q_square;
-    scaled_squares_ += square_beyond(natural_map(known, modified, r, rho).norm(), rho * rounding);
+    const Real scaled = natural_map(known, modified, r, rho).norm();
+    scaled_squares_ += square_beyond(scaled, rho * rounding);
+    velocity_squares_ += square_beyond(std::max(scaled / rho, -normal), rounding);
     scaled_q_ += rho * rho * q_square;
     if (rounding != 0) {
       rounding_squares_ += rounding * rounding;
@@ -53,8 +55,10 @@ class NaturalSums {
   }
 
   [[nodiscard]] double natural() const { return relative(squares_, q_squares_, rounding_squares_); }
+  /// The larger of the scaled one summed as impulses and as velocities (contact/natural_squares).
   [[nodiscard]] double scaled_natural() const {
-    return relative(scaled_squares_, scaled_q_, scaled_rounding_);
+    return std::max(relative(scaled_squares_, scaled_q_, scaled_rounding_),
+                    relative(velocity_squares_, q_squares_, rounding_squares_));
   }
 
  private:
@@ -86,6 +90,7 @@ class NaturalSums {
   Real q_squares_ = 0;
   Real rounding_squares_ = 0;
   Real scaled_squares_ = 0;
+  Real velocity_squares_ = 0;
   Real scaled_q_ = 0;
   Real scaled_rounding_ = 0;
 };

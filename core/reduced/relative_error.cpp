@@ -1,6 +1,6 @@
 #include "reduced/relative_error.hpp"
 
-#include <cmath>
+#include "contact/natural_squares.hpp"
 
 namespace fclib {
 
@@ -17,19 +17,17 @@ double natural_map_squared(const Vector& u, const Vector& r, const Friction& fri
 
 template <class Cone>
 double relative_error(const ReducedProblem& problem, const Vector& u, const Vector& r) {
-  const double natural =
-      std::sqrt(natural_map_squared<Cone>(u, r, problem.friction)) / problem.scale;
-  if (problem.rho.size() == 0) return natural;
   constexpr int d = Cone::dim;
-  double sum = 0;
-  for (Eigen::Index contact = 0; contact < problem.rho.size(); ++contact) {
+  NaturalSquares<double> squares;
+  const bool scaled = problem.rho.size() > 0;
+  for (Eigen::Index contact = 0; contact < problem.nc(); ++contact) {
     const Cone cone(problem.friction, contact);
-    sum += natural_map(cone, u.segment<d>(d * contact), r.segment<d>(d * contact),
-                       problem.rho[contact])
-               .squaredNorm();
+    const typename Cone::Vec ua = u.segment<d>(d * contact);
+    const typename Cone::Vec ra = r.segment<d>(d * contact);
+    squares.add_plain(cone, ua, ra);
+    if (scaled) squares.add_scaled(cone, ua, ra, problem.rho[contact]);
   }
-  const double scaled = std::sqrt(sum) / problem.scaled_scale;
-  return scaled <= natural ? natural : scaled;  // of a NaN the NaN
+  return squares.error(problem.scale, problem.scaled_scale);
 }
 
 #define FCLIB_INSTANTIATE(Cone)                                                             \

@@ -10,8 +10,8 @@ namespace fclib {
 template <class Cone>
 double natural_map_squared(const Vector& u, const Vector& r, const Friction& friction);
 
-/// ||r - P_K(r - u^)|| over the scale of the problem, of r and u = W r + q; with rho the larger of
-/// that and ||r - P_K(r - rho u^)|| over its own scale.
+/// ||r - P_K(r - u^)|| over the scale of the problem, of r and u = W r + q; with rho the largest of
+/// that and of both sums of r - P_K(r - rho u^) (contact/natural_squares.hpp) over their scales.
 template <class Cone>
 double relative_error(const ReducedProblem& problem, const Vector& u, const Vector& r);
 

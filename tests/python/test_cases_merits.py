@@ -102,6 +102,46 @@ def test_no_mass_ratio_hides_a_velocity(ratio: float, contact: bool) -> None:
         assert named[0]["difference"] == pytest.approx(1e-3, rel=1e-6)
 
 
+@pytest.mark.parametrize("ratio", [1.0, 1e3, 1e6, 1e9, 1e12, 1e15, 1e18])
+@pytest.mark.parametrize("local", [False, True])
+def test_no_mass_ratio_hides_a_reaction(ratio: float, local: bool) -> None:
+    given, exact = light_and_heavy(ratio, contact=True)
+    problem: Any = given.condense() if local else given
+    for guess in (exact.r, None):  # the solver's own error must see it too
+        r = fclib.solve(problem, guess=guess, tol=TOLERANCE).solution.r
+        np.testing.assert_allclose(r, exact.r, rtol=1e-6)
+    for index in range(2):  # the light one is the first, and the second where all are equal
+        r = exact.r.copy()
+        r[3 * index] *= 2  # it flies up at the 10 m/s at which it fell
+        assert fclib.merit(problem, r).scaled_natural > 0.5
+        repaired = fclib.solve(problem, guess=r, tol=TOLERANCE).solution.r
+        np.testing.assert_allclose(repaired, exact.r, rtol=1e-6)
+
+
+@pytest.mark.parametrize("mu", [0.5, 1e2, 1e4, 1e8, 1e12])
+@pytest.mark.parametrize("rolling", [False, True])
+def test_no_friction_hides_a_penetration(mu: float, rolling: bool) -> None:
+    d = 5 if rolling else 3
+    law: Any = {"mu_r": [0.1]} if rolling else {}
+    kind: Any = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
+    q = np.zeros(d)
+    q[:2] = -1.0, 1.0
+    problem = kind(spacedim=d, W=np.eye(d), q=q, mu=[mu], **law)
+    assert fclib.merit(problem, np.zeros(d)).scaled_natural > 0.5
+    result = fclib.solve(problem, tol=TOLERANCE)
+    assert result.converged
+    assert result.solution.u[0] > -1e-6
+
+
+def test_a_batch_sees_the_light_beside_the_heavy() -> None:
+    given, exact = light_and_heavy(1e15, contact=True)
+    problem = given.condense()
+    wrong = exact.r * np.repeat([2.0, 1.0], 3)
+    W, q = dense(problem.W), problem.q
+    solved = fclib.solve_batch([W], [q], problem.mu, guess=[wrong], tol=TOLERANCE)
+    np.testing.assert_allclose(np.ravel(solved.r), exact.r, rtol=1e-6)
+
+
 def stressed(size: float, local: bool) -> tuple[Any, fclib.Solution]:
     """A body squeezed by `size` between two walls, and another one on the ground."""
     H = np.zeros((4, 6))

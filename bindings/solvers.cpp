@@ -33,7 +33,10 @@ std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
     const nb::gil_scoped_acquire gil;
     const nb::object answer =
         callback(progress.iteration, progress.error, progress.time, std::string(progress.stage));
-    return answer.is_none() || nb::cast<bool>(answer);
+    if (answer.is_none()) return true;
+    const int truth = PyObject_IsTrue(answer.ptr());  // NumPy's too
+    if (truth < 0) throw nb::python_error();
+    return truth == 1;
   };
 }
 

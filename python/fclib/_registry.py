@@ -265,6 +265,8 @@ def find_solver(name: str) -> _core.SolverInfo:
     own = _of_the_core.get(name)
     if own is not None:
         return own
+    if not isinstance(name, str):
+        raise _core.OptionError(f"solver: {name!r} is not a name, such as 'auto' or 'nsgs'")
     if not _of_the_core:
         _of_the_core.update({info.name: info for info in _core.solvers()})
         return find_solver(name)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from numbers import Integral, Real
 from pathlib import Path
-from typing import Literal, TypeAlias
+from types import NoneType
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -47,7 +49,7 @@ def solve(
     max_iterations: int | None = None,
     time_limit: float | None = None,
     guess: Given | None = None,
-    callback: Callable[[int, float, float, str], bool | None] | None = None,
+    callback: Callable[[int, float, float, str], bool | np.bool_ | None] | None = None,
     history: bool = False,
     merit: MeritKind = "both",
     **options: Value,
@@ -80,27 +82,62 @@ def solve(
         UnsuitableError: the problem cannot be brought to the form that the solver takes.
         SolverError: a solver that is not of fclib failed.
     """
-    if not tol >= 0:
-        raise _core.OptionError(f"tol: {tol} is not a positive number")
-    if max_iterations is not None and max_iterations < 1:
-        raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
-    if time_limit is not None and not time_limit > 0:
-        raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    try:
+        if not tol >= 0:
+            raise _core.OptionError(f"tol: {tol} is not a positive number")
+        if max_iterations is not None and max_iterations < 1:
+            raise _core.OptionError(f"max_iterations: {max_iterations} is less than 1")
+        if time_limit is not None and not time_limit > 0:
+            raise _core.OptionError(f"time_limit: {time_limit} is not a positive number of seconds")
+    except TypeError:
+        _check_types(problem, tol, max_iterations, time_limit, callback, history)
+        raise
     if merit not in ("both", "natural"):
         raise _core.OptionError(f"merit: '{merit}' is neither both nor natural")
     values = {name: _plain(name, value) for name, value in options.items()} if options else {}
-    return _core.solve(
-        problem,
-        find_solver(solver),
-        tol,
-        max_iterations or 0,
-        math.inf if time_limit is None else time_limit,
-        values,
-        guess,
-        callback,
-        history,
-        merit == "natural",
-    )
+    try:
+        return _core.solve(
+            problem,
+            find_solver(solver),
+            tol,
+            max_iterations or 0,
+            math.inf if time_limit is None else time_limit,
+            values,
+            guess,
+            callback,
+            history,
+            merit == "natural",
+        )
+    except TypeError:
+        _check_types(problem, tol, max_iterations, time_limit, callback, history)
+        raise  # the callback's own
+
+
+def _check_types(
+    problem: object,
+    tol: object,
+    max_iterations: object,
+    time_limit: object,
+    callback: object,
+    history: object,
+) -> None:
+    """Say which argument of ``solve`` is of a wrong type, if any, once something was."""
+    if not isinstance(problem, get_args(Problem)):
+        known = ", ".join(kind.__name__ for kind in get_args(Problem))
+        raise _core.ProblemError(f"problem: a {type(problem).__name__} is none of {known}")
+    for name, value, right, meant in (
+        ("tol", tol, isinstance(tol, Real), "a number"),
+        ("max_iterations", max_iterations, _is_count(max_iterations), "a 64-bit integer"),
+        ("time_limit", time_limit, isinstance(time_limit, (Real, NoneType)), "a number of seconds"),
+        ("history", history, isinstance(history, bool), "True or False"),
+        ("callback", callback, callback is None or callable(callback), "a function"),
+    ):
+        if not right:
+            raise _core.OptionError(f"{name}: {value!r} is not {meant}")
+
+
+def _is_count(value: object) -> bool:
+    return value is None or (isinstance(value, Integral) and int(value) < 2**63)
 
 
 def _plain(name: str, value: object) -> bool | int | float | str:

@@ -282,6 +282,40 @@ def test_the_callback_stops_the_solver() -> None:
     assert result.error == pytest.approx(judge(hard(), result.solution).error, rel=1e-9)
 
 
+@pytest.mark.parametrize("answer", [False, np.False_, 0])
+def test_any_false_answer_of_the_callback_stops_the_solver(answer: Any) -> None:
+    assert fclib.solve(hard(), tol=1e-14, callback=lambda *_: answer).status == "interrupted"
+    told = fclib.solve(hard(), callback=lambda *_: np.bool_(True))
+    assert told.converged
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        ({"solver": None}, "solver: None is not a name"),
+        ({"tol": "small"}, "tol: 'small' is not a number"),
+        ({"max_iterations": 1.5}, "max_iterations: 1.5 is not a 64-bit integer"),
+        ({"max_iterations": 10**30}, "max_iterations: 10+ is not a 64-bit integer"),
+        ({"time_limit": "1 s"}, "time_limit: '1 s' is not a number of seconds"),
+        ({"callback": 3}, "callback: 3 is not a function"),
+        ({"history": 1}, "history: 1 is not True or False"),
+    ],
+)
+def test_an_argument_of_a_wrong_type_is_named(wrong: dict[str, Any], word: str) -> None:
+    with pytest.raises(fclib.OptionError, match=word):
+        fclib.solve(hard(), **wrong)
+
+
+def test_what_is_no_problem_is_refused_by_name() -> None:
+    with pytest.raises(fclib.ProblemError, match="problem: a ndarray is none of LocalProblem"):
+        fclib.solve(np.eye(3))  # type: ignore[arg-type]
+
+
+def test_a_type_error_of_the_callback_comes_through() -> None:
+    with pytest.raises(TypeError, match="unsupported operand"):
+        fclib.solve(hard(), callback=lambda iteration, *_: iteration + None)
+
+
 def test_an_error_of_the_callback_comes_through() -> None:
     def fail(*_: object) -> None:
         raise LookupError("from the callback")

@@ -148,6 +148,7 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
   double squares = 0;
   double scaled_squares = 0;
   double scaled_q = 0;
+  double velocity_squares = 0;
   for (Eigen::Index a = 0; a < nc; ++a) {
     const Cone cone(friction_of(problem), a);
     const Vec u = reduced.u.segment<d>(d * a);
@@ -159,7 +160,9 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
     // y is in K* where -y is in the polar cone: what is outside is the projection of -y on K
     each.dual_cone[a] = cone.project(-hat).norm();
     squares += std::pow(each.natural[a], 2);
-    scaled_squares += std::pow(natural_norm(cone, u, r, rho), 2);
+    const double scaled = natural_norm(cone, u, r, rho);
+    scaled_squares += scaled * scaled;
+    velocity_squares += std::pow(std::max(scaled / rho, -u[0]), 2);
     scaled_q += (rho * reduced.q.segment<d>(d * a)).squaredNorm();
     result.complementarity = std::max(result.complementarity, std::abs(r.dot(hat)));
     const Vec y = r - rho * hat;
@@ -174,7 +177,8 @@ Merit by_definition(const P& problem, const Solution& given, ContactMerits& each
     result.slide += open || stick ? 0 : 1;
   }
   result.natural = std::sqrt(squares) / reduced.q.norm();
-  result.scaled_natural = std::sqrt(scaled_squares / scaled_q);
+  result.scaled_natural = std::max(std::sqrt(scaled_squares / scaled_q),
+                                   std::sqrt(velocity_squares) / reduced.q.norm());
   result.cone = each.cone.maxCoeff();
   result.dual_cone = each.dual_cone.maxCoeff();
   result.error = std::max({result.natural, result.scaled_natural, result.dynamics, result.bilateral,

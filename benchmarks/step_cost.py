@@ -1,9 +1,11 @@
 """What a step of the time stepper costs: a humanoid that stands with twenty contacts or more.
 
-    .venv/bin/python benchmarks/step_cost.py [--steps 200]
+    .venv/bin/python benchmarks/step_cost.py [--steps 200] [--results step-cost]
 
 CPU milliseconds of a step: the system (MuJoCo's own functions and the arrays from them), the
-problem of it, the solve from the step before, and the motion.
+problem of it, the solve from a solution, and the motion; each part is called again and again on one
+step. "simulate" is what a step of a simulation takes in all: from one step to the next, with the
+words that each problem gets, and the reactions carried over.
 """
 
 from __future__ import annotations
@@ -12,6 +14,8 @@ import argparse
 import time
 from collections.abc import Callable
 from typing import Any
+
+import _results
 
 from fclib import _solve
 from fclib.scenes import Scene
@@ -66,9 +70,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--steps", type=int, default=200)
     parser.add_argument("--times", type=int, default=20, help="calls of a part in a run")
+    _results.add_option(parser)
     arguments = parser.parse_args()
     scene = Scene(name="humanoid", xml=humanoid())
-    *_, step = simulate(scene, arguments.steps)
+    going = simulate(scene, arguments.steps + RUNS * arguments.times)
+    for _ in range(arguments.steps):
+        step = next(going)
+    whole = cost(lambda: next(going), arguments.times)
     model = MujocoModel(scene)
     scheme = scheme_of(model)
     model.set_state(step.start.position, step.start.velocity)
@@ -82,7 +90,8 @@ def main() -> None:
         model.set_state(step.start.position, step.start.velocity)
 
     dry = 0 if system.dry is None else len(system.dry.bound)
-    print(f"{part.problem.nc - dry} contacts, {dry} joints with dry friction; CPU ms")
+    words = f"{part.problem.nc - dry} contacts, {dry} joints with dry friction"
+    print(f"{words}; CPU ms")
     spent = {
         "system": cost(lambda: scheme.assemble(model), arguments.times),
         "problem": cost(lambda: scheme.problem(system, model.velocity), arguments.times),
@@ -90,8 +99,19 @@ def main() -> None:
         "move": cost(move, arguments.times),
     }
     spent["step"] = sum(spent.values())
+    spent["simulate"] = whole
     for name, value in spent.items():
         print(f"{name:10}{value:8.3f}")
+    if arguments.results:
+        path = _results.store(
+            arguments.results,
+            [{"part": name, "CPU [ms]": f"{value:.2f}"} for name, value in spent.items()],
+            title="Cost of a step",
+            note=f"A humanoid that stands: {words}. The least of {RUNS} means over"
+            f" {arguments.times} calls.",
+            command="python benchmarks/step_cost.py --results step-cost",
+        )
+        print(path)
 
 
 if __name__ == "__main__":

@@ -4,8 +4,11 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseLU>
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "error.hpp"
 
@@ -61,6 +64,45 @@ std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns
   return result;
 }
 
+/// The columns that an entry of A^T A's present column may be in, as bits of words.
+class Bits {
+ public:
+  Bits(const SparseColumns& a, Index columns)
+      : words_(columns / size + 1), rows_(static_cast<std::size_t>(words_ * a.rows())) {
+    for (Index col = 0; col < columns; ++col) {
+      for (SparseColumns::InnerIterator entry(a, col); entry; ++entry) {
+        rows_[static_cast<std::size_t>(entry.row() * words_ + col / size)] |= one << (col % size);
+      }
+    }
+    found_.resize(static_cast<std::size_t>(words_));
+  }
+
+  /// Adds the columns from this one on that have an entry in a row of A.
+  void add(Index row, Index col) {
+    const std::uint64_t* own = rows_.data() + static_cast<std::size_t>(row * words_);
+    for (Index word = col / size; word < words_; ++word) found_[word] |= own[word];
+  }
+
+  /// Visits the columns that were added, this one and those after it in order, and forgets them.
+  template <class Visitor>
+  void take(Index col, const Visitor& visit) {
+    const Index first = col / size;
+    found_[first] &= ~std::uint64_t{0} << (col % size);
+    for (Index word = first; word < words_; ++word) {
+      for (std::uint64_t left = std::exchange(found_[word], 0); left; left &= left - 1) {
+        visit(word * size + std::countr_zero(left));
+      }
+    }
+  }
+
+ private:
+  static constexpr Index size = 64;
+  static constexpr std::uint64_t one = 1;
+  Index words_;
+  std::vector<std::uint64_t> rows_;
+  std::vector<std::uint64_t> found_;
+};
+
 /// A^T A, in which each sum is taken once: column by column what lies on and below the diagonal,
 /// and its mirror image. Nothing where the deadline passes.
 std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& deadline) {
@@ -71,6 +113,9 @@ std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& dead
   std::vector<double> sum(m, -0.0);  // what nothing is changed by, signed zeros included
   std::vector<Index> last(m, -1);
   std::vector<Index> found;
+  // words take less than entries where rows are dense
+  std::optional<Bits> bits;
+  if (a.rows() * (m / 64 + 1) <= a.nonZeros()) bits.emplace(a, m);
   SparseColumns lower(m, m);
   lower.reserve(rows.nonZeros());
   for (Index col = 0; col < m; ++col) {
@@ -82,6 +127,11 @@ std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& dead
       const Index* row = rows.innerIndexPtr() + first;
       const double* value = rows.valuePtr() + first;
       const Index count = rows.outerIndexPtr()[k + 1] - first;
+      if (bits) {
+        bits->add(static_cast<Index>(k), col);
+        for (Index at = 0; at < count; ++at) sum[row[at]] += value[at] * entry.value();
+        continue;
+      }
       for (Index at = 0; at < count; ++at) {
         sum[row[at]] += value[at] * entry.value();
         if (last[row[at]] != col) {
@@ -90,11 +140,16 @@ std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& dead
         }
       }
     }
-    std::sort(found.begin(), found.end());
     lower.startVec(col);
-    for (const Index row : found) {
+    const auto keep = [&](Index row) {
       lower.insertBack(row, col) = sum[row];
       sum[row] = -0.0;
+    };
+    if (bits) {
+      bits->take(col, keep);
+    } else {
+      std::sort(found.begin(), found.end());
+      std::for_each(found.begin(), found.end(), keep);
     }
   }
   lower.finalize();

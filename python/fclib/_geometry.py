@@ -347,6 +347,8 @@ def turned(
     result = np.zeros((len(source), r.shape[1]))
     old, new, given = before[source[found]], now[found], r[source[found]]
     for part, axes in parts:
+        if part.start >= r.shape[1]:  # no rolling
+            continue
         world = np.einsum("cij,ci->cj", old[:, axes], given[:, part])
         result[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
     still = found & limits

@@ -199,6 +199,10 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
 
     They are carried over in the world and turned into the new frames, forces and moments alike.
     """
+    limits = contacts.pair[:, 0] < 0
+    if np.array_equal(state.pair, contacts.pair):
+        every = np.arange(len(contacts))
+        return _geometry.turned(state.r, every, state.frame, contacts.frame, contacts.parts, limits)
     known: dict[tuple[int, int], list[int]] = {}
     for i, (first, second) in enumerate(state.pair.tolist()):
         known.setdefault((first, second), []).append(i)
@@ -208,7 +212,6 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
         candidates = known.get((first, second))
         if candidates:
             source[i] = candidates.pop(0)
-    limits = contacts.pair[:, 0] < 0
     return _geometry.turned(state.r, source, state.frame, contacts.frame, contacts.parts, limits)
 
 

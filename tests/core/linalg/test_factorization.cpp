@@ -42,6 +42,31 @@ TEST(Factorization, gram_keeps_stored_zeros_and_their_signs) {
   EXPECT_EQ(gram.coeff(1, 2), -1);
 }
 
+TEST(Factorization, gram_is_the_same_of_dense_and_of_sparse_rows) {
+  // rows without entries make the others few: columns are then looked for entry by entry
+  testing::RandomData random(7);
+  const Eigen::Index m = 150;
+  Eigen::MatrixXd dense = random.dense(10, m);
+  dense = (dense.array() < -0.5).select(0.0, dense);
+  dense.col(70).setZero();
+  const auto gram_of = [&](Eigen::Index rows) {
+    SparseColumns one(rows, rows);
+    one.setIdentity();
+    Eigen::MatrixXd b = Eigen::MatrixXd::Zero(rows, m);
+    b.topRows(10) = dense;
+    return Factorization(one, "A").gram(b.sparseView());
+  };
+  const SparseColumns few = gram_of(10), many = gram_of(1000);
+  ASSERT_EQ(few.nonZeros(), many.nonZeros());
+  EXPECT_LT(few.nonZeros(), m * m);
+  for (Eigen::Index k = 0; k < few.nonZeros(); ++k) {
+    EXPECT_EQ(few.innerIndexPtr()[k], many.innerIndexPtr()[k]);
+    EXPECT_EQ(few.valuePtr()[k], many.valuePtr()[k]);
+  }
+  const Eigen::MatrixXd product = dense.transpose() * dense;
+  EXPECT_LT((Eigen::MatrixXd(few) - product).norm(), 1e-12 * product.norm());
+}
+
 TEST(Factorization, gram_is_symmetric_and_keeps_bodies_apart) {
   testing::RandomData random(6);
   // two bodies that do not touch: a block-diagonal matrix

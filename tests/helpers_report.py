@@ -37,7 +37,11 @@ def make_collection(folder: Path, analyze: bool = False) -> Path:
 
 
 def make_store(
-    path: Path, collection: Path, labels: Sequence[str] = tuple(LABELS), files: int = 6
+    path: Path,
+    collection: Path,
+    labels: Sequence[str] = tuple(LABELS),
+    files: int = 6,
+    tolerances: Sequence[float] = TOLERANCES,
 ) -> Path:
     """Runs of some problems, with failures and histories; the solver `rare` has run two of them."""
     alone = path.parent / "alone.hdf5"
@@ -47,21 +51,27 @@ def make_store(
     local = Path(str(found[0]).replace("-global", "-local"))
     # one problem by its local form, which the catalogue knows by its file alone
     facts = [look(file) for file in (local, *found[1:])] + [look(alone, "Alone")]
-    add_runs(path, facts, labels)
+    add_runs(path, facts, labels, tolerances=tolerances)
     return path
 
 
 def add_runs(
-    path: Path, facts: Sequence[ProblemFacts], labels: Sequence[str], history: bool = True
+    path: Path,
+    facts: Sequence[ProblemFacts],
+    labels: Sequence[str],
+    history: bool = True,
+    tolerances: Sequence[float] = TOLERANCES,
 ) -> None:
     """Runs whose costs and statuses are drawn by lot, the same every time."""
     draw = random.Random(5)
     limits = Limits(time=10.0, wall=20.0, memory=1000.0)
     with Store(path) as store:
-        number = store.begin("made", 'title = "Made"\n', len(facts) * len(labels) * 2, 0, "here")
+        number = store.begin(
+            "made", 'title = "Made"\n', len(facts) * len(labels) * len(tolerances), 0, "here"
+        )
         for p, fact in enumerate(facts):
             for label in labels:
-                for tol in TOLERANCES:
+                for tol in tolerances:
                     if label == "rare" and p > 1:
                         continue
                     solved = draw.random() < 0.8

@@ -20,6 +20,7 @@ import pytest
 from typer.testing import CliRunner
 
 import fclib
+import helpers_cli
 from fclib import bench, cli
 from fclib._solve import MERITS
 from fclib.bench.campaign import parse_solver
@@ -46,8 +47,7 @@ def campaign(**changes: Any) -> bench.Campaign:
 
 
 def run_cli(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "fclib", "bench", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
+    return helpers_cli.run("bench", *arguments)
 
 
 # ---- what is run

@@ -89,7 +89,8 @@ def made(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
         (folder / name).write_text(SCENE)
     shutil.copy(root / "examples/python/own_solver.py", folder / "my_solver.py")
     collection = make_collection(folder / "collection")
-    quick = make_store(folder / "quick.sqlite", collection, files=4)
+    # of one tolerance: each has pictures of its own
+    quick = make_store(folder / "quick.sqlite", collection, files=4, tolerances=(1e-8,))
     with contextlib.closing(sqlite3.connect(quick)) as store:
         store.execute("UPDATE machines SET node = 'node7'")
         store.commit()

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import fclib
+import helpers_cli
 from capi_library import CAPI, compile_program
 from helpers import planted_global, planted_local
 
@@ -401,9 +402,7 @@ def test_the_commands_say_one_line_for_each_spoilt_file(corpus: Path, command: l
     paths = [str(path_of(corpus, case)) for case in CASES]
     before = {path: Path(path).read_bytes() for path in paths}
     arguments = [*command, "--json", *paths, str(corpus / "good.hdf5")]
-    run = subprocess.run(
-        [sys.executable, "-m", "fclib", *arguments], capture_output=True, text=True
-    )
+    run = helpers_cli.run(*arguments)
     assert run.returncode == 1
     lines = run.stderr.splitlines()
     assert len(lines) == len(paths), run.stderr
@@ -666,11 +665,7 @@ def spoilt_solution(corpus: Path, folder: Path, case: str) -> Path:
 
 def test_check_names_what_is_wrong_with_a_solution(corpus: Path, tmp_path: Path) -> None:
     paths = {case: spoilt_solution(corpus, tmp_path, case) for case in SOLUTIONS}
-    run = subprocess.run(
-        [sys.executable, "-m", "fclib", "check", *map(str, paths.values())],
-        capture_output=True,
-        text=True,
-    )
+    run = helpers_cli.run("check", *paths.values())
     assert run.returncode == 1
     lines = run.stderr.splitlines()
     assert len(lines) == len(paths), run.stderr

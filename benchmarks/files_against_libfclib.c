@@ -4,6 +4,9 @@
  *   time THEIRS OURS FILE_THEIRS FILE_OURS LIMIT least CPU times of a read [s], taken by turns
  *                                                for LIMIT seconds: 3.1 its own file, ours its
  *                                                own, ours that of 3.1, 3.1 ours
+ *   write THEIRS OURS FILE OUT LIMIT             least CPU times of a write [s] of what ours reads
+ *                                                from FILE, taken by turns: 3.1, ours plain, ours
+ *                                                as it is by default
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -25,6 +28,7 @@ struct library {
   void (*delete_local)(struct fclib_local*);
   void (*delete_global)(struct fclib_global*);
   void (*delete_solutions)(struct fclib_solution*, int);
+  int (*set_compression)(int); /* NULL in 3.1 */
 };
 
 static void* symbol(void* handle, const char* name) {
@@ -54,6 +58,7 @@ static struct library load(const char* path) {
   *(void**)&lib.delete_local = symbol(handle, "fclib_delete_local");
   *(void**)&lib.delete_global = symbol(handle, "fclib_delete_global");
   *(void**)&lib.delete_solutions = symbol(handle, "fclib_delete_solutions");
+  *(void**)&lib.set_compression = dlsym(handle, "fclib_set_compression");
   return lib;
 }
 
@@ -181,11 +186,39 @@ static int take_times(const struct library* theirs, const struct library* ours,
   return 0;
 }
 
+static int take_times_of_writes(const struct library* theirs, const struct library* ours,
+                                const char* from, const char* to, double limit) {
+  struct problem p = read_problem(ours, from, 1);
+  if (!p.local) p = read_problem(ours, from, 0);
+  if (!p.local && !p.global) return 3;
+  const struct library* library[3] = {theirs, ours, ours};
+  const int level[3] = {0, 0, FCLIB_COMPRESS_CHEAPLY};
+  double least[3] = {1e9, 1e9, 1e9};
+  const double begun = now();
+  for (int turn = 0; turn < 5 || (now() - begun < limit && turn < 1000); turn++) {
+    for (int k = 0; k < 3; k++) {
+      const struct library* lib = library[k];
+      if (lib->set_compression) lib->set_compression(level[k]);
+      remove(to);
+      const double start = now();
+      if (p.local ? !lib->write_local(p.local, to) : !lib->write_global(p.global, to)) return 1;
+      const double taken = now() - start;
+      if (taken < least[k]) least[k] = taken;
+    }
+  }
+  for (int k = 0; k < 3; k++) printf("%.9f ", least[k]);
+  printf("\n");
+  free_problem(ours, p);
+  return 0;
+}
+
 int main(int argc, char** argv) {
   if (argc < 6) return 2;
   const struct library theirs = load(argv[2]), ours = load(argv[3]);
   if (!strcmp(argv[1], "copy") && argc == 7) return copy(&theirs, &ours, argv[4], argv[5], argv[6]);
   if (!strcmp(argv[1], "time") && argc == 7)
     return take_times(&theirs, &ours, argv[4], argv[5], atof(argv[6]));
+  if (!strcmp(argv[1], "write") && argc == 7)
+    return take_times_of_writes(&theirs, &ours, argv[4], argv[5], atof(argv[6]));
   return 2;
 }

@@ -1,16 +1,16 @@
-"""Files of ours beside those of libfclib 3.1: how large, and how long a read takes, in one run.
+"""Files of ours beside those of libfclib 3.1: how large, and how long a read and a write take.
 
     .venv/bin/python benchmarks/files_against_libfclib.py FILE... [--limit 1.5] [--csv OUT]
         [--results NAME]
 
 Each problem (with its solution and guesses) is written by both libraries, and each library reads
 both files: the same numbers, bit by bit, or the run fails. 3.1 never
-compresses, ours does at level 6. Times are CPU
-times of a read through the C interface with the file in the system's cache, the least of many that
-the libraries take by turns in one process. The last line says what our bytes are, and what LZMA,
-which HDF5 has no filter for, would make of the numbers. Needs h5py, a C compiler, our C library
-(--ours, by default that of build/, built first) and that of 3.1 (--theirs, by default the system's,
-Debian's libfclib0).
+compresses, ours does at level 6. Times are CPU times of a read, and of a write of a new file,
+through the C interface with the file in the system's cache, the least of many that the libraries
+take by turns in one process. The last line says what our bytes are, and what LZMA, which HDF5 has
+no filter for, would make of the numbers. Needs h5py, a C compiler, our C library (--ours, by
+default that of build/, built first) and that of 3.1 (--theirs, by default the system's, Debian's
+libfclib0).
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ COLUMNS = (
     "ours_own",
     "ours_of_3_1",
     "ours_same",
+    "write_plain",
+    "write_default",
     "entries",
     "indices",
     "entries_lzma",
@@ -111,6 +113,14 @@ def figures(
     if timed.returncode:
         sys.exit(f"{path}: {timed.stderr.strip()}")
     own, ours_own, ours_of_theirs, theirs_of_ours = map(float, timed.stdout.split())
+    written = subprocess.run(
+        [program, "write", *libraries, path, folder / "written.hdf5", str(limit)],
+        capture_output=True,
+        text=True,
+    )
+    if written.returncode:
+        sys.exit(f"{path}: {written.stderr.strip()}")
+    write, write_plain, write_default = map(float, written.stdout.split())
     sizes = theirs.stat().st_size, ours.stat().st_size
     return {
         "bytes_3_1": sizes[0],
@@ -120,6 +130,8 @@ def figures(
         "ours_own": ours_own / own,
         "ours_of_3_1": ours_of_theirs / own,
         "ours_same": ours_own / theirs_of_ours,
+        "write_plain": write_plain / write,
+        "write_default": write_default / write,
         **parts(ours),
     }
 
@@ -128,7 +140,8 @@ def line(name: str, row: dict[str, float]) -> str:
     return (
         f"{name[:44]:44} {row['bytes_3_1']:9.0f} {row['bytes_ours']:9.0f} "
         f"{row['size_ratio']:6.1%} {row['read_3_1_ms']:8.3f} {row['ours_of_3_1']:8.2f} "
-        f"{row['ours_same']:8.2f} {row['ours_own']:8.2f}"
+        f"{row['ours_same']:8.2f} {row['ours_own']:8.2f} "
+        f"{row['write_plain']:8.2f} {row['write_default']:8.2f}"
     )
 
 
@@ -139,6 +152,8 @@ def summary(rows: dict[str, dict[str, float]]) -> list[dict[str, str]]:
         "ours_of_3_1": "CPU time of a read, both libraries the file of 3.1",
         "ours_same": "CPU time of a read, both libraries our file",
         "ours_own": "CPU time of a read, each its own file",
+        "write_plain": "CPU time of a write, neither compresses",
+        "write_default": "CPU time of a write, each as a C program has it by default",
     }
     found = []
     for name, title in shown.items():
@@ -177,9 +192,10 @@ def main() -> None:
             ["cc", "-O1", f"-I{ROOT / 'include'}", "-o", program, PROGRAM, "-ldl"], check=True
         )
         print(
-            f"{'':44} {'bytes':>9} {'bytes':>9} {'':>6} {'ms':>8}  CPU time of a read, ours : 3.1\n"
+            f"{'':44} {'bytes':>9} {'bytes':>9} {'':>6} {'ms':>8}  "
+            "CPU time, ours : 3.1, of a read and of a write\n"
             f"{'':44} {'3.1':>9} {'ours':>9} {'ratio':>6} {'3.1':>8} "
-            f"{'its file':>8} {'our file':>8} {'each own':>8}"
+            f"{'its file':>8} {'our file':>8} {'each own':>8} {'plain':>8} {'default':>8}"
         )
         for path in options.files:
             found = figures(program, [theirs, ours], path, folder, options.limit)

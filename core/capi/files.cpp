@@ -53,10 +53,10 @@ struct Asked {
 template <class C>
 int write_problem(const C* c, const char* path, const fclib_options* asked) {
   return guarded(0, [&] {
-    const auto problem = problem_as_given(given(c, "problem"));
+    const ProblemView problem = view_as_given(given(c, "problem"));
     WriteOptions options = write_options(asked);
     options.append = true;
-    write_file(&given(path, "path"), &problem, nullptr, {}, options);
+    write_file(&given(path, "path"), problem, options);
     return 1;
   });
 }

@@ -1,26 +1,27 @@
 #include "capi/from_c.hpp"
 
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "capi/errors.hpp"
-#include "io/hdf5/raw.hpp"
 
 namespace fclib::c {
 
 namespace {
 
 template <class Number>
-std::vector<Number> numbers(const Number* values, std::size_t size, const Place& where) {
+std::span<const Number> numbers(const Number* values, std::size_t size, const Place& where) {
   if (size == 0) return {};
   if (values == nullptr) fail(where, "is NULL, but has " + std::to_string(size) + " entries");
-  return {values, values + size};
+  return {values, size};
 }
 
 std::string text(const char* value) { return value != nullptr ? std::string(value) : absent_text; }
 
-Matrix matrix(const fclib_matrix& c, const Place& where) {
-  Matrix a;
+MatrixView view_of(const fclib_matrix& c, const Place& where) {
+  MatrixView a;
   a.rows = c.m;
   a.cols = c.n;
   const std::size_t rows = size_of(c.m, where / "m");
@@ -50,6 +51,58 @@ Matrix matrix(const fclib_matrix& c, const Place& where) {
   return a;
 }
 
+Matrix copy_of(const MatrixView& a) {
+  return {.storage = a.storage,
+          .rows = a.rows,
+          .cols = a.cols,
+          .p = {a.p.begin(), a.p.end()},
+          .i = {a.i.begin(), a.i.end()},
+          .x = {a.x.begin(), a.x.end()},
+          .info = a.info};
+}
+
+/// The members of a problem that are numbers and matrices, checked for what its own sizes need, and
+/// its mu as long as they say; `take` makes of a matrix what the problem is to have of it.
+template <class C, class Take>
+CoreOf<C> sizes_of(const C& c, const Take& take) {
+  using P = CoreOf<C>;
+  P problem;
+  // the matrices say how long the vectors are
+  std::optional<Place> there;
+  std::optional<Place> missing;
+  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
+    if constexpr (std::is_same_v<Type, Index>) {
+      problem.*field.member = c.*member;
+    } else if constexpr (std::is_same_v<Type, Matrix>) {
+      const Place where = place_of<P>(field);
+      if (field.presence == Presence::mixed) {
+        (c.*member != nullptr ? there : missing) = where;
+        if (c.*member == nullptr) return;
+      }
+      problem.*field.member = take(field, view_of(given(c.*member, where), where));
+    }
+  });
+  if (there && missing) fail(*missing, "is NULL, but " + std::string(*there) + " is not");
+  const auto [planar, spatial] = P::dimensions;
+  if (c.spacedim != planar && c.spacedim != spatial) {
+    fail(place_of<P>("spacedim"), "is " + std::to_string(c.spacedim) + ", but must be " +
+                                      std::to_string(planar) + " or " + std::to_string(spatial));
+  }
+  count_contacts(problem);
+  return problem;
+}
+
+template <class C>
+ProblemInfo info_of(const C& c) {
+  ProblemInfo info{absent_group, absent_group, absent_group};
+  if (c.info != nullptr) {
+    for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
+      info.*field.member = text(c.info->*member);
+    });
+  }
+  return info;
+}
+
 }  // namespace
 
 std::size_t size_of(int count, const Place& where) {
@@ -66,41 +119,41 @@ Vector vector(const double* values, Index size, const Place& where) {
 template <class C>
 CoreOf<C> problem_as_given(const C& c) {
   using P = CoreOf<C>;
-  P problem;
-  // the matrices say how long the vectors are
-  std::optional<Place> there;
-  std::optional<Place> missing;
-  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
-    if constexpr (std::is_same_v<Type, Index>) {
-      problem.*field.member = c.*member;
-    } else if constexpr (std::is_same_v<Type, Matrix>) {
-      const Place where = place_of<P>(field);
-      if (field.presence == Presence::mixed) {
-        (c.*member != nullptr ? there : missing) = where;
-        if (c.*member == nullptr) return;
-      }
-      problem.*field.member = matrix(given(c.*member, where), where);
-    }
-  });
-  if (there && missing) fail(*missing, "is NULL, but " + std::string(*there) + " is not");
-  const auto [planar, spatial] = P::dimensions;
-  if (c.spacedim != planar && c.spacedim != spatial) {
-    fail(place_of<P>("spacedim"), "is " + std::to_string(c.spacedim) + ", but must be " +
-                                      std::to_string(planar) + " or " + std::to_string(spatial));
-  }
-  count_contacts(problem);
+  P problem = sizes_of(c, [](const auto&, const MatrixView& a) { return copy_of(a); });
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
     if constexpr (std::is_same_v<Type, Vector>) {
       problem.*field.member = vector(c.*member, problem.size(field.rows), place_of<P>(field));
     }
   });
-  problem.info = {absent_group, absent_group, absent_group};
-  if (c.info != nullptr) {
-    for_each_member<fclib_info>([&](const auto& field, char* fclib_info::* member) {
-      problem.info.*field.member = text(c.info->*member);
-    });
-  }
+  problem.info = info_of(c);
   return problem;
+}
+
+template <class C>
+ProblemView view_as_given(const C& c) {
+  using P = CoreOf<C>;
+  std::vector<std::pair<std::string_view, MatrixView>> matrices;
+  const P sizes = sizes_of(c, [&](const auto& field, const MatrixView& a) {
+    matrices.emplace_back(field.name, a);
+    return Matrix{.storage = a.storage, .rows = a.rows, .cols = a.cols};
+  });
+  ProblemView view{.kind = std::string(P::kind), .members = {}, .info = info_of(c), .geometry = {}};
+  for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
+    const bool written = field.presence != Presence::mixed || is_mixed(sizes);
+    if constexpr (std::is_same_v<Type, Vector>) {
+      const auto size = static_cast<std::size_t>(sizes.size(field.rows));
+      const auto values = numbers<double>(c.*member, size, place_of<P>(field));
+      if (written) view.members.push_back({field.name, values});
+    } else if constexpr (std::is_same_v<Type, Matrix>) {
+      for (const auto& [name, a] : matrices) {
+        const bool absent = field.presence != Presence::required && a.absent();
+        if (name == field.name && written && !absent) view.members.push_back({name, a});
+      }
+    } else {
+      view.members.push_back({field.name, sizes.*field.member});
+    }
+  });
+  return view;
 }
 
 template <class C>
@@ -141,6 +194,7 @@ Solution solution_of(const fclib_solution& c, const P& problem, Parts parts) {
 
 #define FCLIB_FROM_C(kind)                                             \
   template CoreOf<fclib_##kind> problem_as_given(const fclib_##kind&); \
+  template ProblemView view_as_given(const fclib_##kind&);             \
   template CoreOf<fclib_##kind> problem_of(const fclib_##kind&);       \
   template CoreOf<fclib_##kind> valid_problem(const fclib_##kind&);    \
   template Solution solution_of(const fclib_solution&, const CoreOf<fclib_##kind>&, Parts);

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "capi/structs.hpp"
+#include "io/hdf5/raw.hpp"
 
 namespace fclib::c {
 
@@ -15,7 +16,11 @@ Vector vector(const double* values, Index size, const Place& where);
 template <class C>
 CoreOf<C> problem_as_given(const C& c);
 
-/// The same without the room that nzmax leaves, for who validates it.
+/// The same without copies, to be written.
+template <class C>
+ProblemView view_as_given(const C& c);
+
+/// As problem_as_given(), without the room that nzmax leaves, for who validates it.
 template <class C>
 CoreOf<C> problem_of(const C& c);
 

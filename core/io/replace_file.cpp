@@ -104,6 +104,18 @@ void write_all(int file, std::string_view bytes, const std::string& path) {
   }
 }
 
+using Pieces = std::span<const std::string_view>;
+
+void write_all(int file, Pieces pieces, const std::string& path) {
+  for (const std::string_view piece : pieces) write_all(file, piece, path);
+}
+
+std::size_t size_of(Pieces pieces) {
+  std::size_t size = 0;
+  for (const std::string_view piece : pieces) size += piece.size();
+  return size;
+}
+
 std::string read_all(int file, std::size_t size, const std::string& path) {
   std::string bytes(size, '\0');
   std::size_t done = 0;
@@ -182,11 +194,13 @@ struct JournalEnd {
   std::uint64_t hash = 0;
 };
 
-std::uint64_t hash_of(std::string_view bytes) {
+std::uint64_t hash_of(Pieces pieces) {
   std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
-  for (const char byte : bytes) {
-    hash ^= static_cast<unsigned char>(byte);
-    hash *= 0x100000001b3U;
+  for (const std::string_view piece : pieces) {
+    for (const char byte : piece) {
+      hash ^= static_cast<unsigned char>(byte);
+      hash *= 0x100000001b3U;
+    }
   }
   return hash;
 }
@@ -205,11 +219,11 @@ std::vector<std::string> journals_of(const std::string& target) {
   return places;
 }
 
-void put_in_place(const std::string& target, std::string_view bytes, const std::string& path) {
+void put_in_place(const std::string& target, Pieces pieces, const std::string& path) {
   const Descriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
   if (file.id() < 0) fail_in_system(path, "cannot be written");
-  write_all(file.id(), bytes, path);
-  if (::ftruncate(file.id(), static_cast<off_t>(bytes.size())) != 0 || ::fsync(file.id()) != 0) {
+  write_all(file.id(), pieces, path);
+  if (::ftruncate(file.id(), static_cast<off_t>(size_of(pieces))) != 0 || ::fsync(file.id()) != 0) {
     fail_in_system(path, "cannot be written");
   }
 }
@@ -223,7 +237,7 @@ void sync_folder_of(const std::string& name) {
 
 /// Writes over the bytes of a file that must stay the same file. They are in a journal by then,
 /// from which finish_rewrite() goes on after a kill.
-void rewrite(const std::string& path, const std::string& target, std::string_view bytes) {
+void rewrite(const std::string& path, const std::string& target, Pieces pieces) {
   finish_rewrite(path);
   std::string journal;
   Descriptor file(-1);
@@ -237,11 +251,12 @@ void rewrite(const std::string& path, const std::string& target, std::string_vie
     }
     journal = place;
     JournalEnd end;
-    end.size = bytes.size();
-    end.hash = hash_of(bytes);
+    end.size = size_of(pieces);
+    end.hash = hash_of(pieces);
     try {
-      write_all(opened.id(), bytes, path);
-      write_all(opened.id(), {reinterpret_cast<const char*>(&end), sizeof end}, path);
+      write_all(opened.id(), pieces, path);
+      write_all(opened.id(), std::string_view(reinterpret_cast<const char*>(&end), sizeof end),
+                path);
       if (::fsync(opened.id()) != 0) fail_in_system(path, "cannot be written");
     } catch (...) {
       ::unlink(place.c_str());
@@ -255,7 +270,7 @@ void rewrite(const std::string& path, const std::string& target, std::string_vie
     fail_in_system(path, "cannot be written without a journal, and that cannot be");
   }
   // a journal that stays after a failure has the whole file
-  put_in_place(target, bytes, path);
+  put_in_place(target, pieces, path);
   ::unlink(journal.c_str());
 }
 
@@ -290,13 +305,15 @@ void finish_rewrite(const std::string& path) {
     if (whole) {
       std::memcpy(&end, bytes.data() + bytes.size() - sizeof end, sizeof end);
       bytes.resize(bytes.size() - sizeof end);
-      whole = end.magic == expected.magic && end.size == bytes.size() && end.hash == hash_of(bytes);
     }
+    const std::array<std::string_view, 1> all{bytes};
+    whole = whole && end.magic == expected.magic && end.size == bytes.size() &&
+            end.hash == hash_of(all);
     if (whole && ::access(target.c_str(), W_OK) != 0) {
       fail(path, "was being written when its writer ended, and is not yours to repair; " + place +
                      " has what it is to be");
     }
-    if (whole) put_in_place(target, bytes, path);
+    if (whole) put_in_place(target, all, path);
     ::unlink(place.c_str());
   }
 }
@@ -329,19 +346,23 @@ std::string read_file(const std::string& path) {
 }
 
 void replace_file(const std::string& path, std::string_view bytes) {
+  replace_file(path, Pieces(&bytes, 1));
+}
+
+void replace_file(const std::string& path, Pieces pieces) {
   const std::string target = resolve_links(path);
   const std::optional<struct stat> old = status_of(path, target);
   // a file of several names stays the one that they name
-  if (old && old->st_nlink > 1) return rewrite(path, target, bytes);
+  if (old && old->st_nlink > 1) return rewrite(path, target, pieces);
   Temporary file(path, target);
   if (!file.ok()) {
     const bool forbidden = errno == EACCES || errno == EPERM || errno == EROFS;
-    if (old && forbidden) return rewrite(path, target, bytes);
+    if (old && forbidden) return rewrite(path, target, pieces);
     fail_in_system(path, "cannot be written");
   }
-  if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, bytes);
+  if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, pieces);
   if (!old) ::fchmod(file.id(), mode_of_new_files());
-  write_all(file.id(), bytes, path);
+  write_all(file.id(), pieces, path);
   if (::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");
   file.take_the_place();
 }

@@ -1,6 +1,7 @@
 // Whole files at once: a writer never leaves half a file behind.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -23,6 +24,9 @@ std::string read_file(const std::string& path);
 /// journal, NAME.fclib-journal, from which the next reader or writer of fclib goes on. Throws Error
 /// (file) that names the file.
 void replace_file(const std::string& path, std::string_view bytes);
+
+/// The same of bytes that lie in pieces, one after another.
+void replace_file(const std::string& path, std::span<const std::string_view> pieces);
 
 /// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
 /// since the file itself is replaced; it goes with the process that holds it. Where the file system

@@ -6,11 +6,13 @@
 #include <memory>
 #include <new>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
+#include "geometry.hpp"
 #include "linalg/matrix.hpp"
 #include "problem_info.hpp"
 
@@ -76,6 +78,32 @@ struct RawProblem {
   };
   std::vector<Member> members;  ///< those that the file has
   ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
+};
+
+/// A matrix in memory of others.
+struct MatrixView {
+  Storage storage = Storage::csr;
+  Index rows = 0;
+  Index cols = 0;
+  std::span<const Index> p = {};
+  std::span<const Index> i = {};
+  std::span<const double> x = {};
+  std::optional<MatrixInfo> info = {};
+
+  /// Read from a file without it.
+  [[nodiscard]] bool absent() const { return rows == 0 && cols == 0 && x.empty() && p.empty(); }
+};
+
+/// A problem in memory of others, as it is to be written.
+struct ProblemView {
+  struct Member {
+    std::string_view name;  ///< of the field
+    std::variant<Index, MatrixView, std::span<const double>> value;
+  };
+  std::string kind;
+  std::vector<Member> members;  ///< those that are written, in the order of the fields
+  ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
+  GeometryPointer geometry;
 };
 
 /// The problem of this kind, without validation, and without a copy of its arrays.

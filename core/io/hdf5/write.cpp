@@ -1,6 +1,8 @@
 #include "io/hdf5/write.hpp"
 
+#include <list>
 #include <optional>
+#include <span>
 #include <utility>
 #include <variant>
 
@@ -20,10 +22,20 @@ void write_text_if_there(const Target& group, const std::string& name, const std
   if (text != absent_text && text != absent_group) write_text(group, name, text);
 }
 
-void write_matrix(const Target& parent, const std::string& name, const Matrix& a) {
+MatrixView view_of(const Matrix& a) {
+  return {.storage = a.storage,
+          .rows = a.rows,
+          .cols = a.cols,
+          .p = a.p,
+          .i = a.i,
+          .x = a.x,
+          .info = a.info};
+}
+
+void write_matrix(const Target& parent, const std::string& name, const MatrixView& a) {
   const NewGroup created(parent, name);
   const Target& group = created.target();
-  const auto nnz = static_cast<Index>(a.nnz());
+  const auto nnz = static_cast<Index>(a.x.size());
   const auto nz = [&]() -> Index {
     switch (a.storage) {
       case Storage::triplet:
@@ -42,10 +54,10 @@ void write_matrix(const Target& parent, const std::string& name, const Matrix& a
   write_number(group, "n", a.cols);
   write_number(group, "nz", nz);
   if (a.storage != Storage::dense) {
-    write_numbers(group, "p", a.p);
-    write_numbers(group, "i", a.i);
+    write_lasting(group, "p", a.p);
+    write_lasting(group, "i", a.i);
   }
-  write_numbers(group, "x", a.x);
+  write_lasting(group, "x", a.x);
   if (a.info) {
     write_text_if_there(group, "comment", a.info->comment);
     write_number(group, "conditioning", a.info->conditioning);
@@ -54,33 +66,54 @@ void write_matrix(const Target& parent, const std::string& name, const Matrix& a
   }
 }
 
+/// The problem as it is written; `kept` has the matrices that were converted for that.
 template <class P>
-void write_fields(const Target& root, const P& problem, const WriteOptions& options) {
+ProblemView view_of(const P& problem, const WriteOptions& options, std::list<Matrix>& kept) {
   const bool as_given = !options.validate;
-  const NewGroup created(root, group_name<P>());
-  const Target& group = created.target();
-  const NewGroup vectors(group, "vectors");
+  ProblemView view{.kind = std::string(P::kind),
+                   .members = {},
+                   .info = problem.info,
+                   .geometry = problem.geometry};
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
-    const std::string name(field.name);
     if (field.presence == Presence::mixed && !is_mixed(problem)) return;
+    const Member& member = problem.*field.member;
     if constexpr (std::is_same_v<Member, Matrix>) {
-      const Matrix& a = problem.*field.member;
-      // read from a file without it
-      if (field.presence != Presence::required && as_given && a.empty() && a.p.empty()) return;
-      Storage storage = a.storage;
+      Storage storage = member.storage;
       if (storage == Storage::dense && !options.dense) storage = Storage::csr;
       if (P::triplets_on_disk) storage = Storage::triplet;
-      if (storage == a.storage || as_given) {
-        write_matrix(group, name, a);
-      } else {
-        write_matrix(group, name, converted(a, storage));
-      }
+      const bool as_it_is = storage == member.storage || as_given;
+      const MatrixView a =
+          view_of(as_it_is ? member : kept.emplace_back(converted(member, storage)));
+      if (field.presence != Presence::required && as_given && a.absent()) return;
+      view.members.push_back({field.name, a});
     } else if constexpr (std::is_same_v<Member, Vector>) {
-      write_numbers(vectors.target(), name, problem.*field.member);
+      const std::span<const double> values(member.data(), static_cast<std::size_t>(member.size()));
+      view.members.push_back({field.name, values});
     } else {
-      write_number(group, name, problem.*field.member);
+      view.members.push_back({field.name, member});
     }
   });
+  return view;
+}
+
+void write_fields(const Target& root, const ProblemView& problem) {
+  const NewGroup created(root, "fclib_" + problem.kind);
+  const Target& group = created.target();
+  const NewGroup vectors(group, "vectors");
+  for (const ProblemView::Member& member : problem.members) {
+    const std::string name(member.name);
+    std::visit(
+        [&]<class Value>(const Value& value) {
+          if constexpr (std::is_same_v<Value, MatrixView>) {
+            write_matrix(group, name, value);
+          } else if constexpr (std::is_same_v<Value, Index>) {
+            write_number(group, name, value);
+          } else {
+            write_lasting(vectors.target(), name, value);
+          }
+        },
+        member.value);
+  }
   bool informed = false;
   for_each_field<ProblemInfo>([&](const auto& field) {
     informed = informed || problem.info.*field.member != absent_group;
@@ -97,7 +130,7 @@ void write_solution_group(const Target& parent, const std::string& name, const S
   for_each_field<Solution>([&](const auto& field) {
     const Vector& values = solution.*field.member;
     if (field.presence != Presence::required && values.size() == 0) return;
-    write_numbers(group.target(), std::string(field.name), values);
+    write_lasting(group.target(), std::string(field.name), values);
   });
 }
 
@@ -133,7 +166,46 @@ void require_owner(const Group& root, const std::string& kind, bool owned_before
   }
 }
 
+void write_view(const std::string& path, const ProblemView& problem, const Solution* solution,
+                const std::vector<Solution>& guesses, const WriteOptions& options) {
+  const Start start = options.append ? Start::existing_or_empty : Start::empty;
+  change_file(path, start, options.compression, [&](const Target& root) {
+    const std::string& kind = problem.kind;
+    const std::string group = "fclib_" + kind;
+    const std::vector<std::string> before = kinds_of(root);
+    const bool owned = before.empty() || owner_of(before) == kind;
+    if (root.has(group)) {
+      make_room(root, group, options.replace);
+      // those of another problem stay
+      if (owned) make_room(root, "solution", options.replace);
+      if (owned) make_room(root, "guesses", options.replace);
+      if (owned) make_room(root, "solutions", options.replace);
+      if (owned) remove_geometry(root);
+    }
+    write_fields(root, problem);
+    if (problem.geometry) {
+      remove_geometry(root);
+      write_geometry(root, *problem.geometry);
+    }
+    if (options.validate) {
+      require_owner(root, kind, owned, solution != nullptr || !guesses.empty());
+    }
+    if (solution != nullptr) {
+      make_room(root, "solution", options.replace);
+      write_solution_group(root, "solution", *solution);
+    }
+    if (!guesses.empty()) {
+      make_room(root, "guesses", options.replace);
+      write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
+    }
+  });
+}
+
 }  // namespace
+
+void write_file(const std::string& path, const ProblemView& problem, const WriteOptions& options) {
+  write_view(path, problem, nullptr, {}, options);
+}
 
 void write_file(const std::string& path, ProblemPointer problem, const Solution* solution,
                 const std::vector<Solution>& guesses, const WriteOptions& options) {
@@ -150,41 +222,10 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
           problem);
     });
   }
-  const Start start = options.append ? Start::existing_or_empty : Start::empty;
-  change_file(path, start, options.compression, [&](const Target& root) {
-    const std::string kind =
-        std::visit([]<class P>(const P*) { return std::string(P::kind); }, problem);
-    const std::string group = "fclib_" + kind;
-    const std::vector<std::string> before = kinds_of(root);
-    const bool owned = before.empty() || owner_of(before) == kind;
-    if (root.has(group)) {
-      make_room(root, group, options.replace);
-      // those of another problem stay
-      if (owned) make_room(root, "solution", options.replace);
-      if (owned) make_room(root, "guesses", options.replace);
-      if (owned) make_room(root, "solutions", options.replace);
-      if (owned) remove_geometry(root);
-    }
-    std::visit(
-        [&](const auto* p) {
-          write_fields(root, *p, options);
-          if (!p->geometry) return;
-          remove_geometry(root);
-          write_geometry(root, *p->geometry);
-        },
-        problem);
-    if (options.validate) {
-      require_owner(root, kind, owned, solution != nullptr || !guesses.empty());
-    }
-    if (solution != nullptr) {
-      make_room(root, "solution", options.replace);
-      write_solution_group(root, "solution", *solution);
-    }
-    if (!guesses.empty()) {
-      make_room(root, "guesses", options.replace);
-      write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
-    }
-  });
+  std::list<Matrix> kept;
+  const ProblemView view =
+      std::visit([&](const auto* p) { return view_of(*p, options, kept); }, problem);
+  write_view(path, view, solution, guesses, options);
 }
 
 void write_solution(const std::string& path, const Solution& solution,

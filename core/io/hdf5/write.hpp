@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "io/hdf5/raw.hpp"
 #include "problem.hpp"
 
 namespace fclib {
@@ -29,6 +30,9 @@ struct WriteOptions {
 /// not.
 void write_file(const std::string& path, ProblemPointer problem, const Solution* solution = nullptr,
                 const std::vector<Solution>& guesses = {}, const WriteOptions& options = {});
+
+/// The same of a problem as it is, nothing checked: without validation.
+void write_file(const std::string& path, const ProblemView& problem, const WriteOptions& options);
 
 /// Puts a solution into a file that has its problem, by default in place of the one it had.
 void write_solution(const std::string& path, const Solution& solution,

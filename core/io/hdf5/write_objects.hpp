@@ -13,10 +13,13 @@ namespace fclib::hdf5 {
 /// to write a number.
 struct Style {
   /// `scratch` gives a group of another file, to try things in; it is asked for where it is needed.
-  Style(int compression, std::function<hid_t()> scratch);
+  /// `lend` is told of numbers that stay where they are until the file is written.
+  Style(int compression, std::function<hid_t()> scratch,
+        std::function<void(const void* data, std::size_t size)> lend);
 
   int compression;
   std::function<hid_t()> scratch;
+  std::function<void(const void* data, std::size_t size)> lend;
   Handle group;
   Handle plain;    ///< a dataset in one piece
   Handle compact;  ///< a dataset in its own header
@@ -54,6 +57,13 @@ void write_numbers(const Target& group, const std::string& name, const std::int3
 template <class Values>
 void write_numbers(const Target& group, const std::string& name, const Values& values) {
   write_numbers(group, name, values.data(), static_cast<std::size_t>(values.size()));
+}
+
+/// The same of values that stay where they are until the file is written: they are not copied.
+template <class Values>
+void write_lasting(const Target& group, const std::string& name, const Values& values) {
+  group.style->lend(values.data(), static_cast<std::size_t>(values.size()) * sizeof *values.data());
+  write_numbers(group, name, values);
 }
 
 template <class Number>

@@ -113,6 +113,44 @@ def test_free_fall() -> None:
     np.testing.assert_allclose([step.time for step in steps], H * k)
 
 
+SLIDER = (
+    '<body name="ball" pos="0 0 {z}"><joint name="slide" type="slide" axis="0 0 1"/>'
+    '<geom size="0.1" mass="1"/></body>'
+)
+
+
+@pytest.mark.parametrize("z", [0.5, 0.1])
+@pytest.mark.parametrize(
+    ("equalities", "named"),
+    [
+        (
+            '<joint name="low" joint1="slide"/><joint name="high" joint1="slide"'
+            ' polycoef="0.2 0 0 0 0"/>',
+            "joint high, joint low contradict each other: .* off by 0.2 m",
+        ),
+        (
+            '<joint joint1="slide"/><joint joint1="slide" polycoef="0.2 0 0 0 0"/>',
+            "joint 0 of slide, joint 1 of slide contradict",
+        ),
+        (
+            '<weld body1="ball" relpose="0 0 0.1 1 0 0 0"/>'
+            '<joint name="up" joint1="slide" polycoef="0.3 0 0 0 0"/>',
+            "joint up, weld 0 of ball and world contradict",
+        ),
+    ],
+)
+def test_equalities_that_contradict_each_other_are_named(
+    z: float, equalities: str, named: str
+) -> None:
+    """In the air and on the floor; no number of a row is said."""
+    xml = (
+        f"<mujoco><worldbody>{FLOOR.format(mu=0.5)}{SLIDER.format(z=z)}</worldbody>"
+        f"<equality>{equalities}</equality></mujoco>"
+    )
+    with pytest.raises(fclib.UnsuitableError, match=f"two, step 0: the equalities {named}"):
+        list(simulate(Scene(name="two", xml=xml), 3))
+
+
 def test_box_at_rest_stays() -> None:
     steps = run(mjcf(SLAB), 100)
     assert {step.problem.nc for step in steps} == {4}

@@ -215,6 +215,12 @@ class MujocoModel:
             dry_friction(m, d, rows),
         )
 
+    def equalities(self) -> list[str]:
+        """The names (p) of what the columns of G are of, as it was assembled last."""
+        m, d = self.model, self.data
+        kept = kept_equalities(d, take(jacobian(m, d), np.arange(d.ne)))
+        return [equality_name(m, i) for i in d.efc_id[: d.ne][kept]]
+
     def control(self, values: Any) -> None:
         """Set the controls (nu) until they are set again. ValueError for another number of them."""
         values = np.asarray(values, dtype=float)
@@ -550,6 +556,27 @@ def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
     if not d.ne:
         return empty((rows.shape[0], 0)), np.zeros(0)
     gradients = take(rows, np.arange(d.ne))
-    sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-    kept = np.flatnonzero(sizes > ROUNDING * sizes.max(initial=0.0))
+    kept = kept_equalities(d, gradients)
     return take(gradients, kept), d.efc_pos[: d.ne][kept]
+
+
+def kept_equalities(d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
+    """Which rows of equalities do not vanish, by their gradients (n x ne)."""
+    sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
+    return np.flatnonzero(sizes > ROUNDING * sizes.max(initial=0.0))
+
+
+def equality_name(m: Any, i: int) -> str:
+    """Of an equality: its own, or what it joins."""
+    kind = mujoco.mjtEq(m.eq_type[i])
+    word = kind.name.removeprefix("mjEQ_").lower()
+    own = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_EQUALITY, i)
+    if own:
+        return f"{word} {own}"
+    joined = mujoco.mjtObj(m.eq_objtype[i])
+    if kind == mujoco.mjtEq.mjEQ_JOINT:
+        joined = mujoco.mjtObj.mjOBJ_JOINT
+    elif kind == mujoco.mjtEq.mjEQ_TENDON:
+        joined = mujoco.mjtObj.mjOBJ_TENDON
+    ends = [mujoco.mj_id2name(m, joined, k) for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0]
+    return f"{word} {i} of {' and '.join(end or 'one without a name' for end in ends)}"

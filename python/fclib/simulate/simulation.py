@@ -14,11 +14,12 @@ from fclib import _core, _geometry, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
-from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, Vector
+from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
 from fclib.simulate.mujoco_model import MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
+RANK: Final = 1e-9  # of a row of equalities, relative to the largest, that follows from others
 STABILIZATION: Final = 0.2  # share of a violation undone in a step
 
 
@@ -163,15 +164,24 @@ def _march(
             model.control(control(index * scheme.h, state))
             state = replace(state, position=model.position)
         info = describe(model.scene, scheme, settings, index, model.left_out)
-        part = scheme.problem(scheme.assemble(model), model.velocity, info)
+        system = scheme.assemble(model)
+        part = scheme.problem(system, model.velocity, info)
         problem, contacts = part.problem, part.contacts
 
         options: dict[str, Any] = {"merit": "natural"} | settings["options"]
         if settings["warm_start"] and problem.nc and len(state.r):
             options["guess"] = _core.Solution(r=carry_over(state, contacts))
-        result = _solve.solve(problem, solver=settings["solver"], tol=settings["tol"], **options)
+        try:
+            result = _solve.solve(
+                problem, solver=settings["solver"], tol=settings["tol"], **options
+            )
+            after = part.after(result.solution.v)
+        except _core.UnsuitableError as error:
+            word = contradiction(model, system)
+            if not word:
+                raise
+            raise _core.UnsuitableError(f"{model.scene.name}, step {index}: {word}") from error
 
-        after = part.after(result.solution.v)
         if not np.isfinite(after).all():
             raise FloatingPointError(
                 f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
@@ -192,6 +202,34 @@ def _march(
         model.integrate(scheme.h, after, scheme.theta)
         r = np.reshape(result.solution.r, (-1, contacts.dimension))
         state = State(index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r)
+
+
+def contradiction(model: Model, system: System) -> str:
+    """Which equalities of a scene contradict each other, in words; empty where none do."""
+    if not isinstance(model, MujocoModel) or not len(system.violation):
+        return ""
+    import scipy.linalg as la  # takes a while
+
+    names = model.equalities()
+    factor = la.cholesky(system.M.toarray(), lower=True)
+    scaled = la.solve_triangular(factor, system.G.toarray(), lower=True)
+    _, triangle, pivots = la.qr(scaled, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(triangle))
+    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    kept, others = pivots[:rank], pivots[rank:]
+    share = np.linalg.lstsq(scaled[:, kept], scaled[:, others], rcond=None)[0]
+    gaps = np.abs(system.violation[others] - share.T @ system.violation[kept])
+    if not gaps.size or not gaps.max() > 0:
+        return ""
+    worst = int(gaps.argmax())
+    weights = np.abs(share[:, worst])
+    involved = kept[weights > RANK * weights.max(initial=0.0)]
+    words = sorted({names[k] for k in (others[worst], *involved)})
+    return (
+        f"the equalities {', '.join(words)} contradict each other: where the others hold one is off"
+        f" by {gaps[worst]:.2g} m or rad, and equalities are rigid here, not soft as in MuJoCo;"
+        ' leave one of them out (active="false" in the MJCF)'
+    )
 
 
 def carry_over(state: State, contacts: Contacts) -> Vector:

@@ -173,7 +173,7 @@ def test_net_hands_its_weight_to_its_edge() -> None:
 def macroscopic_friction(load: float, mu: float) -> float:
     """Force that drives the box over that on its lid, in the middle of the first stroke."""
     family: Any = scenes.get("ShearBox")(
-        across=8, layers=4, load=load, mu=mu, stroke=0.03, time_step=1e-3
+        across=8, layers=4, load=load, mu=mu, stroke=0.02, time_step=1e-3
     )
     begin = family.settle * 1.1
     pairs = []

@@ -60,7 +60,7 @@ def store(
         "version": fclib.__version__,
         "commit": commit(),
         "date": datetime.datetime.now(datetime.timezone.utc).date().isoformat(),
-        "machine": machine(),
+        "machine": f"{machine()}, load {os.getloadavg()[0]:.0f}",
         "note": note,
     }
     for target, text in (

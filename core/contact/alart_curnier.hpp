@@ -4,9 +4,20 @@
 // points r = map(r - rho u) are the solutions of the contact law, for any rho > 0.
 #pragma once
 
+#include <cmath>
+
 #include "contact/cone.hpp"
 
 namespace fclib {
+
+/// Of a group of components. By components, as all here: each expression of Eigen is a type that
+/// the compiler takes long to make.
+template <int size>
+double part_norm(const double* part) {
+  double sum = 0;
+  for (int k = 0; k < size; ++k) sum += part[k] * part[k];
+  return std::sqrt(sum);
+}
 
 template <class Cone>
 typename Cone::Vec alart_curnier_projection(const Cone& cone, const typename Cone::Vec& z) {
@@ -16,10 +27,12 @@ typename Cone::Vec alart_curnier_projection(const Cone& cone, const typename Con
     return result;
   }
   for (int g = 0; g < Cone::groups; ++g) {
-    auto part = result.template segment<Cone::group_size>(1 + g * Cone::group_size);
-    const double norm = part.norm();
+    constexpr int size = Cone::group_size;
+    double* const part = &result[1 + g * size];
+    const double norm = part_norm<size>(part);
     const double radius = cone.coefficient(g) * z[0];
-    if (norm > radius) part *= radius / norm;
+    if (!(norm > radius)) continue;
+    for (int k = 0; k < size; ++k) part[k] *= radius / norm;
   }
   return result;
 }
@@ -28,21 +41,23 @@ typename Cone::Vec alart_curnier_projection(const Cone& cone, const typename Con
 template <class Cone>
 ContactMatrix<Cone::dim> alart_curnier_jacobian(const Cone& cone, const typename Cone::Vec& z) {
   constexpr int size = Cone::group_size;
-  ContactMatrix<Cone::dim> jacobian = ContactMatrix<Cone::dim>::Zero();
+  ContactMatrix<Cone::dim> jacobian;
+  jacobian.setZero();
   if (!(z[0] > 0)) return jacobian;
   jacobian(0, 0) = 1;
   for (int g = 0; g < Cone::groups; ++g) {
     const int at = 1 + g * size;
-    const auto part = z.template segment<size>(at);
-    const double norm = part.norm();
+    const double norm = part_norm<size>(&z[at]);
     const double mu = cone.coefficient(g);
-    auto block = jacobian.template block<size, size>(at, at);
-    block.setIdentity();
+    for (int k = at; k < at + size; ++k) jacobian(k, k) = 1;
     if (norm <= mu * z[0]) continue;
-    const Eigen::Matrix<double, size, 1> direction = part / norm;
-    block -= direction * direction.transpose();
-    block *= mu * z[0] / norm;
-    jacobian.template block<size, 1>(at, 0) = mu * direction;
+    for (int col = at; col < at + size; ++col) {
+      for (int row = at; row < at + size; ++row) {
+        jacobian(row, col) -= z[row] / norm * (z[col] / norm);
+        jacobian(row, col) *= mu * z[0] / norm;
+      }
+      jacobian(col, 0) = mu * (z[col] / norm);
+    }
   }
   return jacobian;
 }

@@ -1,6 +1,7 @@
 #include "contact/local_solver.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "contact/newton_contact.hpp"
 
@@ -10,22 +11,33 @@ template <class Cone>
 bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
                       const typename Cone::Vec& b, typename Cone::Vec& r) {
   constexpr int size = Cone::group_size;
+  constexpr int D = Cone::dim;
   typename Cone::Vec next = r;
-  typename Cone::Vec u = a * r + b;
+  typename Cone::Vec u = detail::affine<D>(a, r, b);
   if (!(a(0, 0) > 0)) return false;
   next[0] = std::max(0.0, r[0] - u[0] / a(0, 0));
-  u += a.col(0) * (next[0] - r[0]);
+  const double moved = next[0] - r[0];
+  for (int k = 0; k < D; ++k) u[k] += a(k, 0) * moved;
   for (int g = 0; g < Cone::groups; ++g) {
     const int at = 1 + g * size;
     // the norm of the block: a step of one over it never overshoots
-    const double norm = a.template block<size, size>(at, at).cwiseAbs().rowwise().sum().maxCoeff();
+    double norm = 0;
+    for (int row = at; row < at + size; ++row) {
+      double sum = 0;
+      for (int col = at; col < at + size; ++col) sum += std::abs(a(row, col));
+      norm = std::max(norm, sum);
+    }
     if (!(norm > 0)) return false;
-    auto part = next.template segment<size>(at);
-    part -= u.template segment<size>(at) / norm;
+    for (int k = at; k < at + size; ++k) next[k] -= u[k] / norm;
     const double radius = cone.coefficient(g) * next[0];
-    const double length = part.norm();
-    if (length > radius) part *= radius / length;
-    u += a.template middleCols<size>(at) * (part - r.template segment<size>(at));
+    const double length = part_norm<size>(&next[at]);
+    const double shorter = length > radius ? radius / length : 1.0;
+    for (int k = at; k < at + size; ++k) next[k] *= shorter;
+    for (int row = 0; row < D; ++row) {
+      double sum = 0;
+      for (int col = at; col < at + size; ++col) sum += a(row, col) * (next[col] - r[col]);
+      u[row] += sum;
+    }
   }
   r = next;
   return true;
@@ -36,7 +48,11 @@ void LocalStep<Cone>::other(ContactProblem<Cone>& contact, const Vec& b, Vec& ne
   const Vec old = next;
   if (!solved(contact, b, next)) contact.projected.solve(b, accuracy, iterations, next);
   if (relaxation != 1) {
-    next = contact.projected.cone().project(relaxation * next + (1.0 - relaxation) * old);
+    Vec between;
+    for (int k = 0; k < Cone::dim; ++k) {
+      between[k] = relaxation * next[k] + (1.0 - relaxation) * old[k];
+    }
+    next = contact.projected.cone().project(between);
   }
 }
 

@@ -24,6 +24,36 @@ namespace fclib {
 
 namespace detail {
 
+// By components: each expression of Eigen is a type that the compiler takes long to make.
+
+/// A x + b.
+template <int D>
+ContactVector<D> affine(const ContactMatrix<D>& a, const ContactVector<D>& x,
+                        const ContactVector<D>& b) {
+  ContactVector<D> result = a * x;
+  for (int k = 0; k < D; ++k) result[k] += b[k];
+  return result;
+}
+
+/// I - A B.
+template <int D>
+ContactMatrix<D> one_less(const ContactMatrix<D>& a, const ContactMatrix<D>& b) {
+  ContactMatrix<D> result = a * b;
+  for (int col = 0; col < D; ++col) {
+    for (int row = 0; row < D; ++row) {
+      result(row, col) = (row == col ? 1.0 : 0.0) - result(row, col);
+    }
+  }
+  return result;
+}
+
+template <int D>
+bool all_finite(const ContactVector<D>& x) {
+  bool finite = true;
+  for (int k = 0; k < D; ++k) finite = finite && std::isfinite(x[k]);
+  return finite;
+}
+
 /// Damped Newton on `function(r, jacobian)`, which returns Phi and, where jacobian is not null,
 /// fills in an element of its generalised Jacobian. Phi is zero to rounding at accuracy times
 /// `size`.
@@ -37,20 +67,22 @@ bool damped_newton(
   ContactVector<D> x = r;
   ContactMatrix<D> jacobian;
   ContactVector<D> phi = function(x, &jacobian);
-  double norm = phi.norm();
+  double norm = part_norm<D>(phi.data());
   for (int k = 0; k < max_iterations && norm > accuracy * size; ++k) {
-    const ContactVector<D> step = -(inverse<D>(jacobian) * phi);
+    const ContactMatrix<D> inverted = inverse<D>(jacobian);
+    const ContactVector<D> step = inverted * phi;
     double length = 1;
     bool falls = false;
     for (int halving = 0; halving < max_halvings && !falls; ++halving, length *= 0.5) {
-      const ContactVector<D> trial = x + length * step;
-      const double trial_norm = function(trial, nullptr).norm();
+      ContactVector<D> trial;
+      for (int c = 0; c < D; ++c) trial[c] = x[c] - length * step[c];
+      const double trial_norm = part_norm<D>(function(trial, nullptr).data());
       falls = trial_norm <= (1 - sufficient * length) * norm;
       if (falls) x = trial;
     }
     if (!falls) break;
     phi = function(x, &jacobian);
-    norm = phi.norm();
+    norm = part_norm<D>(phi.data());
   }
   if (!(norm <= std::max(accuracy, rounding) * size)) return false;
   r = x;
@@ -75,21 +107,35 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   for (int g = 0; g < Cone::groups; ++g) {
     constexpr int size = Cone::group_size;
     const int at = 1 + g * size;
-    steps.template segment<size>(at).setConstant(size /
-                                                 a.template block<size, size>(at, at).trace());
+    double trace = 0;
+    for (int k = at; k < at + size; ++k) trace += a(k, k);
+    for (int k = at; k < at + size; ++k) steps[k] = size / trace;
   }
-  if (!(steps.minCoeff() > 0) || !steps.allFinite()) return false;
-  const Mat free = Mat::Identity() - steps.asDiagonal() * a;  // d (r - R u) / d r
+  for (int k = 0; k < D; ++k) {
+    if (!(steps[k] > 0) || !std::isfinite(steps[k])) return false;
+  }
+  Mat free;  // d (r - R u) / d r
+  for (int col = 0; col < D; ++col) {
+    for (int row = 0; row < D; ++row) {
+      free(row, col) = (row == col ? 1.0 : 0.0) - steps[row] * a(row, col);
+    }
+  }
   const auto function = [&](const Vec& x, Mat* jacobian) -> Vec {
-    const Vec z = x - steps.cwiseProduct(a * x + b);
-    if (jacobian != nullptr) *jacobian = Mat::Identity() - alart_curnier_jacobian(cone, z) * free;
-    return x - alart_curnier_projection(cone, z);
+    const Vec u = detail::affine<D>(a, x, b);
+    Vec z;
+    for (int k = 0; k < D; ++k) z[k] = x[k] - steps[k] * u[k];
+    if (jacobian != nullptr) *jacobian = detail::one_less<D>(alart_curnier_jacobian(cone, z), free);
+    Vec phi = alart_curnier_projection(cone, z);
+    for (int k = 0; k < D; ++k) phi[k] = x[k] - phi[k];
+    return phi;
   };
-  const double size = r.norm() + steps.cwiseProduct(b).norm();
+  Vec scaled;
+  for (int k = 0; k < D; ++k) scaled[k] = steps[k] * b[k];
+  const double size = part_norm<D>(r.data()) + part_norm<D>(scaled.data());
   const Vec before = r;
   if (!detail::damped_newton<D>(function, size, accuracy, max_iterations, r)) return false;
   r = cone.project(r);  // rounding leaves the cone
-  if (r.allFinite()) return true;
+  if (detail::all_finite<D>(r)) return true;
   r = before;
   return false;
 }
@@ -107,60 +153,73 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
     return true;
   }
   const double mu = cone.mu();
-  const double trace = a.trace();
+  double trace = 0;
+  for (int k = 0; k < D; ++k) trace += a(k, k);
   if (mu < least_friction || !(trace > 0)) return false;
   const double scale = D / trace;
   // L_x, the matrix of the product x o .
   const auto arrow = [](const Vec& x) {
-    Mat result = x[0] * Mat::Identity();
-    result.template block<1, T>(0, 1) = x.template tail<T>().transpose();
-    result.template block<T, 1>(1, 0) = x.template tail<T>();
+    Mat result;
+    result.setZero();
+    for (int k = 0; k < D; ++k) {
+      result(k, k) = x[0];
+      result(0, k) = result(k, 0) = x[k];
+    }
     return result;
   };
   // (s)^(1/2) by the spectral values of s
   const auto root = [](const Vec& s) {
-    const double tangent = s.template tail<T>().norm();
+    const double tangent = part_norm<T>(&s[1]);
     const double high = std::sqrt(std::max(s[0] + tangent, 0.0));
     const double low = std::sqrt(std::max(s[0] - tangent, 0.0));
-    Vec result = Vec::Zero();
+    Vec result;
     result[0] = 0.5 * (high + low);
-    if (tangent > 0)
-      result.template tail<T>() = (0.5 * (high - low) / tangent) * s.template tail<T>();
+    const double part = tangent > 0 ? 0.5 * (high - low) / tangent : 0.0;
+    for (int k = 1; k < D; ++k) result[k] = part * s[k];
     return result;
   };
   const auto function = [&](const Vec& reaction, Mat* jacobian) -> Vec {
     Vec x = reaction;
     x[0] *= mu;
-    Vec y = scale * (a * reaction + b);
+    Vec y = detail::affine<D>(a, reaction, b);
+    for (int k = 0; k < D; ++k) y[k] *= scale;
     const double sliding = Coulomb<D>::tangential_norm(y);
     y[0] = y[0] / mu + sliding;
     const Mat product_x = arrow(x);
     const Mat product_y = arrow(y);
-    const Vec squares = product_x * x + product_y * y;
-    const Vec phi = x + y - root(squares);
+    const Vec square_y = product_y * y;
+    const Vec squares = detail::affine<D>(product_x, x, square_y);
+    Vec phi = root(squares);
+    for (int k = 0; k < D; ++k) phi[k] = x[k] + y[k] - phi[k];
     if (jacobian != nullptr) {
       // smoothed by what is negligible beside Phi, so that the root has an inverse
       Vec smooth = squares;
-      smooth[0] += 1e-8 * phi.squaredNorm() + 1e-30 * squares[0];
+      double square = 0;
+      for (int k = 0; k < D; ++k) square += phi[k] * phi[k];
+      smooth[0] += 1e-8 * square + 1e-30 * squares[0];
       const Mat divided = inverse<D>(arrow(root(smooth)));
-      Mat x_jacobian = Mat::Identity();
-      x_jacobian(0, 0) = mu;
-      Mat y_jacobian = scale * a;
-      y_jacobian.row(0) /= mu;
-      if (sliding > 0) {
-        y_jacobian.row(0) +=
-            (y.template tail<T>() / sliding).transpose() * (scale * a.template bottomRows<T>());
+      Mat y_jacobian;
+      for (int col = 0; col < D; ++col) {
+        for (int row = 0; row < D; ++row) y_jacobian(row, col) = scale * a(row, col);
+        double slid = 0;
+        for (int row = 1; row < D; ++row) slid += y[row] * y_jacobian(row, col);
+        y_jacobian(0, col) = y_jacobian(0, col) / mu + (sliding > 0 ? slid / sliding : 0.0);
       }
-      *jacobian = x_jacobian - divided * product_x * x_jacobian + y_jacobian -
-                  divided * product_y * y_jacobian;
+      // (I - divided L_x) diag(mu, 1, 1) + (I - divided L_y) dy/dr
+      *jacobian = detail::one_less<D>(divided, product_y) * y_jacobian;
+      const Mat by_x = detail::one_less<D>(divided, product_x);
+      for (int col = 0; col < D; ++col) {
+        const double unit = col == 0 ? mu : 1.0;
+        for (int row = 0; row < D; ++row) (*jacobian)(row, col) += unit * by_x(row, col);
+      }
     }
     return phi;
   };
   Vec x = r;
-  const double size = r.norm() + scale * b.norm();
+  const double size = part_norm<D>(r.data()) + scale * part_norm<D>(b.data());
   if (!detail::damped_newton<D>(function, size, accuracy, max_iterations, x)) return false;
   x = cone.project(x);
-  if (!x.allFinite()) return false;
+  if (!detail::all_finite<D>(x)) return false;
   r = x;
   return true;
 }

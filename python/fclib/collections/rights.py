@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from typing import Any
 
@@ -16,9 +17,15 @@ CITATION = (
 DOI = "to be assigned"
 
 
+@functools.cache
+def is_ours(scene: str) -> bool:
+    """Whether a scene has the name of a family."""
+    return scene in families()
+
+
 def of(plan: Plan) -> dict[str, str | None]:
     """License and citation of a plan's problems; nothing is said of a scene that is not ours."""
-    if plan.scene.name not in families():
+    if not is_ours(plan.scene.name):
         return {"license": None, "citation": None}
     citation = CITATION.format(set=plan.collection, version=plan.version)
     return {"license": LICENSE, "citation": citation}

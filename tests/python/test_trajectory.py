@@ -331,12 +331,41 @@ def test_verify_says_by_how_much_a_problem_differs(
     (verdict,) = collections.verify(tmp_path)
     assert (verdict.status, verdict.origin) == (status, origin)
     if share:
-        assert list(verdict.differences) == ["f"]
-        assert 0.1 * share < verdict.differences["f"] < 10 * share
+        # to the digits that are left of it
+        assert dict(verdict.differences) == {"f": pytest.approx(share, rel=1e-15 / share)}
     told = invoke("collection", "verify", tmp_path)
     assert told.exit_code == int(status != "ok")
     words = {"published": "have the data of the published version", "differs": "1 problems differ"}
     assert words[origin] in told.output
+
+
+def test_what_cancels_in_the_sums_is_measured(
+    installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two entries that differ by opposite amounts; where nothing assembles, there are the sums."""
+    collections.build([plan(form="global")], tmp_path, pictures=False)
+    row = collections.read_catalog(tmp_path).to_pylist()[5]
+    problem = read(tmp_path / row["global_file"])
+    path = published.path_of(FOLDER, row["version"])
+    assert path is not None
+    states = trajectory.read(path)
+    place = states.index(row["number"])
+    distance = importlib.import_module("fclib.collections.verify").distance
+    changed, share = problem.H.copy(), 1e-3 * np.abs(problem.H.data).max()
+    for other in range(1, changed.nnz):
+        changed.data[:] = problem.H.data
+        changed.data[[0, other]] += [share, -share]
+        wrong = problem.replace(H=changed)
+        if not states.differences(place, wrong):
+            break
+    assert states.differences(place, wrong) == {}
+    assert distance(wrong, row) == {"H": pytest.approx(1e-3)}
+
+    def missing(*_: Any) -> Any:
+        raise ImportError("MuJoCo")
+
+    monkeypatch.setattr(trajectory.Trajectory, "problem", missing)
+    assert distance(wrong, row) == {}
 
 
 def test_differences_of_two_problems() -> None:

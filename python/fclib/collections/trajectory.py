@@ -142,8 +142,8 @@ class Trajectory:
         """How far a problem is from the published one: of each matrix and vector that is not equal.
 
         Returns:
-            For each ||A - A'|| / ||A|| in the Frobenius norm, estimated from two sums with signs,
-            right within a factor of a few; infinite for all where the pattern is another one.
+            For each ||A - A'|| / ||A|| in the Frobenius norm, estimated from two sums with signs
+            (`_digest.distance`); infinite for all where the pattern is another one.
         """
         if _digest.structure(problem) != self.structure[place]:
             return dict.fromkeys(_digest.parts(problem), math.inf)

@@ -114,7 +114,10 @@ class Plan:
         if self.problems is None and self.steps is None:
             raise ValueError("a plan needs a number of problems or of steps")
         if self.chosen is not None and (self.count is not None or self.select != "every"):
-            raise ValueError("a plan that names its problems takes no count and no selection")
+            raise ValueError(
+                "these problems are named, or chosen by a list (standard, hard, tiny, rr9118):"
+                " no count and no selection applies to them"
+            )
 
     @property
     def name(self) -> str:

@@ -42,6 +42,7 @@ class Tangent(Same):
         l: (p,) where there are bilateral constraints, else None.
         degenerate: (nc,) contacts on a border between two statuses.
         unique: whether the changes are determined; else those of r and l are the least ones.
+        error: ``Merit.error`` of the solution; where it is not one, nothing here means anything.
     """
 
     r: Array
@@ -50,6 +51,7 @@ class Tangent(Same):
     l: Array | None  # noqa: E741
     degenerate: npt.NDArray[np.bool_]
     unique: bool
+    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +67,7 @@ class Gradient(Same):
         f, w, M, H, b: of a global one.
         degenerate: (nc,) contacts on a border between two statuses.
         unique: whether it is determined; else it belongs to the least change of r and l.
+        error: ``Merit.error`` of the solution; where it is not one, nothing here means anything.
     """
 
     mu: Array
@@ -78,6 +81,7 @@ class Gradient(Same):
     b: Array | None
     degenerate: npt.NDArray[np.bool_]
     unique: bool
+    error: float
 
 
 def jvp(
@@ -111,8 +115,8 @@ def jvp(
         b: change of b.
 
     Raises:
-        ProblemError: a datum that the problem does not have, or a wrong shape.
-        UnsuitableError: the problem has rolling friction.
+        ProblemError: a datum that the problem does not have, a wrong shape, or what is no number.
+        UnsuitableError: the problem has rolling friction, or its M is not positive definite.
     """
     point = _Point(problem, solution)
     given = {"mu": mu, "q": q, "W": W, "s": s, "f": f, "w": w, "M": M, "H": H, "b": b}
@@ -146,8 +150,8 @@ def vjp(
         l: the same of l, where there are bilateral constraints.
 
     Raises:
-        ProblemError: weights of a wrong shape, or of what the problem does not have.
-        UnsuitableError: the problem has rolling friction.
+        ProblemError: weights of a wrong shape, or of what the problem does not have, or no numbers.
+        UnsuitableError: the problem has rolling friction, or its M is not positive definite.
     """
     return _Point(problem, solution).gradient({"r": r, "u": u, "v": v, "l": l})
 
@@ -159,10 +163,25 @@ def _dense(matrix: Any) -> Array:
 def _of_shape(name: str, value: Any, like: Any) -> Array | None:
     if like is None:
         raise _core.ProblemError(f"{name}: this problem has no such datum")
-    array = _dense(value)
-    if array.shape != like.shape:
-        raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected {like.shape}")
-    return array
+    return _numbers(name, value, like.shape)
+
+
+def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
+    """What a caller gives, as finite numbers of this shape."""
+    value = value.toarray() if hasattr(value, "toarray") else value
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        raise _core.ProblemError(f"{name}: is not an array of numbers") from None
+    if array.dtype.kind not in "biuf":
+        raise _core.ProblemError(f"{name}: is not an array of real numbers")
+    if array.shape != shape:
+        raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected {shape}")
+    if np.ma.is_masked(value):
+        raise _core.ProblemError(f"{name}: has masked entries")
+    if not np.isfinite(array).all():
+        raise _core.ProblemError(f"{name}: has an entry that is not a finite number")
+    return array.astype(np.float64)
 
 
 def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
@@ -190,11 +209,11 @@ class _Point:
         solution = _core.solution_from(solution)
         self.problem = problem
         self.d, self.nc, self.m, self.p = problem.spacedim, problem.nc, problem.m, problem.p
-        self.r = solution.r
-        if self.r.shape != (self.m,):
-            raise _core.ProblemError(f"r: has the shape {self.r.shape}, expected ({self.m},)")
         if self.p and solution.l is None:
             raise _core.ProblemError("l: is missing, and the problem has bilateral constraints")
+        # which looks at the data of both
+        self.error = _core.merit(problem, solution).error
+        self.r = solution.r
         self.l = solution.l if self.p else np.zeros(0)
         self.v: Array | None = None
         self.moving = np.zeros(0)
@@ -240,7 +259,10 @@ class _Point:
     def _law(self, diagonal: Array) -> None:
         """by_u du + by_r dr = by_mu dmu, contact by contact."""
         d, nc = self.d, self.nc
-        rho = 1 / np.maximum(diagonal.reshape(nc, d).mean(axis=1), np.finfo(float).tiny)
+        size = diagonal.reshape(nc, d).mean(axis=1)
+        # a contact that moves nothing has no scale of its own
+        size[size <= 0] = size.max(initial=0.0) or 1.0
+        rho = 1 / size
         mu = self.problem.mu
         u, r = self.u.reshape(nc, d), self.r.reshape(nc, d)
         z = r - rho[:, None] * u
@@ -326,6 +348,7 @@ class _Point:
             l=found[self.parts["l"]] if self.p else None,
             degenerate=self.degenerate,
             unique=unique,
+            error=self.error,
         )
 
     def gradient(self, weights: dict[str, npt.ArrayLike | None]) -> Gradient:
@@ -334,11 +357,9 @@ class _Point:
         for name, values in weights.items():
             if values is None:
                 continue
-            array = np.asarray(values, dtype=np.float64)
             part = self.parts.get(name)
             size = self.m if name == "u" else (0 if part is None else part.stop - part.start)
-            if array.shape != (size,):
-                raise _core.ProblemError(f"{name}: has the shape {array.shape}, expected ({size},)")
+            array = _numbers(name, values, (size,))
             if name == "u":
                 by_u = array
             else:
@@ -364,4 +385,10 @@ class _Point:
                 "H": by_H,
                 "b": joints,
             }
-        return Gradient(mu=by_mu, **(nothing | mine), degenerate=self.degenerate, unique=unique)
+        return Gradient(
+            mu=by_mu,
+            **(nothing | mine),
+            degenerate=self.degenerate,
+            unique=unique,
+            error=self.error,
+        )

@@ -3,6 +3,7 @@
 import copy
 import dataclasses
 import pickle
+import warnings
 from typing import Any
 
 import numpy as np
@@ -162,3 +163,45 @@ def test_wrong_input_is_refused_by_its_name() -> None:
     rolling: Any = planted_local(seed=0, d=5, nc=3, rolling=True)
     with pytest.raises(fclib.UnsuitableError, match="without rolling"):
         fclib.vjp(rolling.problem, rolling.solution, r=np.zeros(15))
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([np.nan, 0, 0], "not a finite number"),
+        ([1j, 0, 0], "not an array of real numbers"),
+        ("abc", "not an array of real numbers"),
+        ([[1], [2, 3]], "not an array of numbers"),
+        (np.ma.array([1.0, 0, 0], mask=[True, False, False]), "masked"),
+    ],
+)
+def test_what_is_no_number_is_refused(values: Any, said: str) -> None:
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0.2, 0], mu=[0.5])
+    solution = fclib.solve(problem)
+    with pytest.raises(fclib.ProblemError, match=f"^q: .*{said}"):
+        fclib.jvp(problem, solution, q=values)
+    with pytest.raises(fclib.ProblemError, match=f"^r: .*{said}"):
+        fclib.vjp(problem, solution, r=values)
+
+
+def test_a_solution_that_is_none_is_told_by_its_error() -> None:
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0.2, 0], mu=[0.5])
+    assert fclib.jvp(problem, fclib.solve(problem), q=problem.q).error <= 1e-8
+    assert fclib.jvp(problem, np.zeros(3), q=problem.q).error > 0.5
+    assert fclib.vjp(problem, np.zeros(3), r=problem.q).error > 0.5
+    with pytest.raises(fclib.ProblemError, match=r"r\[0\]: .*finite"):
+        fclib.jvp(problem, [np.nan, 0, 0], q=problem.q)
+
+
+def test_matrices_without_a_scale() -> None:
+    still = fclib.LocalProblem(W=np.zeros((3, 3)), q=[1, 0.2, 0], mu=[0.5])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tangent = fclib.jvp(still, np.zeros(3), q=[1, 2, 3])
+    np.testing.assert_array_equal(tangent.u, [1, 2, 3])
+    assert not tangent.r.any()
+    massless = fclib.GlobalProblem(
+        M=np.diag([1.0, 1, 0]), H=np.eye(3), f=np.ones(3), w=np.zeros(3), mu=[0.5]
+    )
+    with pytest.raises(fclib.UnsuitableError, match="M is not positive definite"):
+        fclib.jvp(massless, np.zeros(3), f=np.ones(3))

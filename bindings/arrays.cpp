@@ -6,6 +6,7 @@
 #include <string>
 
 #include "error.hpp"
+#include "linalg/places.hpp"
 
 namespace fclib::bindings {
 
@@ -27,6 +28,11 @@ nb::object as_array(nb::handle object, const char* type, const char* what) {
     if (kind.find_first_of("biuf") == std::string::npos) {
       unfit(what, "is not an array of real numbers");
     }
+    // asarray takes what a masked array hides for its values
+    if (!array.is(object) && nb::hasattr(object, "mask") &&
+        nb::cast<bool>(numpy.attr("ma").attr("is_masked")(object))) {
+      unfit(what, "has masked entries");
+    }
     return numpy.attr("ascontiguousarray")(array, type);
   } catch (const nb::python_error&) {
     unfit(what, "is not an array of numbers");
@@ -44,7 +50,7 @@ std::vector<Index> indices_from(nb::handle object, const char* what) {
   const auto array = as_contiguous<std::int64_t>(object, "int64", what);
   std::vector<Index> result(array.shape(0));
   for (std::size_t k = 0; k < result.size(); ++k) {
-    if (array.data()[k] < 0 || array.data()[k] > std::numeric_limits<Index>::max()) {
+    if (array.data()[k] != static_cast<Index>(array.data()[k])) {
       unfit(what, "an index does not fit 32 bits");
     }
     result[k] = static_cast<Index>(array.data()[k]);
@@ -119,6 +125,7 @@ Matrix matrix_from(nb::handle object, const char* what) {
     source = source.attr("tocsr")();
     format = "csr";
   }
+  if (nb::cast<int>(source.attr("ndim")) != 2) unfit(what, "is not a matrix");
   a.rows = size_from(source.attr("shape")[0], what);
   a.cols = size_from(source.attr("shape")[1], what);
   if (format == "coo") {
@@ -137,6 +144,7 @@ Matrix matrix_from(nb::handle object, const char* what) {
     if (used < a.i.size()) a.i.resize(used);
     if (used < a.x.size()) a.x.resize(used);
   }
+  validate_places(a, what);  // SciPy itself follows them without looking
   return a;
 }
 

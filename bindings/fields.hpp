@@ -356,7 +356,7 @@ void def_equality(nb::class_<Struct>& cls) {
       [](const Struct& self, nb::handle other) {
         return nb::isinstance<Struct>(other) && equal(self, nb::cast<const Struct&>(other));
       },
-      nb::sig("def __eq__(self, other: object, /) -> bool"));
+      nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"));
   cls.def("__hash__", [](const Struct& self) {
     std::size_t hash = 0;
     const auto add = [&](double value) {
@@ -392,7 +392,7 @@ void def_value(nb::class_<Struct>& cls) {
       [](const Struct& self, nb::handle other) {
         return nb::isinstance<Struct>(other) && self == nb::cast<const Struct&>(other);
       },
-      nb::sig("def __eq__(self, other: object, /) -> bool"));
+      nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"));
   cls.def("__hash__", [](nb::handle self) {
     const nb::object values = to_dict<Struct>(self).values();
     return nb::hash(nb::steal(PySequence_Tuple(values.ptr())));

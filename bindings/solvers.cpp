@@ -284,7 +284,7 @@ void def_same(nb::class_<Class>& cls, Same same, Name name) {
       [same](const Class& self, nb::handle other) {
         return nb::isinstance<Class>(other) && same(self, nb::cast<const Class&>(other));
       },
-      nb::sig("def __eq__(self, other: object, /) -> bool"));
+      nb::arg("other").none(), nb::sig("def __eq__(self, other: object, /) -> bool"));
   cls.def("__hash__", [name](const Class& self) {
     return static_cast<Py_ssize_t>(std::hash<std::string>{}(name(self)));
   });

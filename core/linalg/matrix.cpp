@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "error.hpp"
+#include "linalg/places.hpp"
 
 namespace fclib {
 
@@ -47,7 +48,7 @@ void require_pointers(const Matrix& a, Index count, const std::string& where) {
 
 }  // namespace
 
-void validate(const Matrix& a, const std::string& where) {
+void validate_places(const Matrix& a, const std::string& where) {
   if (a.rows < 0 || a.cols < 0) invalid(where, "a size is negative");
   switch (a.storage) {
     case Storage::triplet:
@@ -70,6 +71,10 @@ void validate(const Matrix& a, const std::string& where) {
                      "/x", "the value array");
       break;
   }
+}
+
+void validate(const Matrix& a, const std::string& where) {
+  validate_places(a, where);
   for (std::size_t k = 0; k < a.x.size(); ++k) {
     if (!std::isfinite(a.x[k])) {
       invalid(where + "/x[" + std::to_string(k) + "]", "the value is not a finite number");

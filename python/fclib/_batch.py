@@ -171,6 +171,8 @@ def _floats(name: str, values: Any) -> Floats:
         raise _core.ProblemError(f"{name}: is not an array of numbers") from None
     if array.dtype.kind not in "biuf":
         raise _core.ProblemError(f"{name}: is not an array of real numbers")
+    if np.ma.is_masked(values):
+        raise _core.ProblemError(f"{name}: has masked entries")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
@@ -182,8 +184,9 @@ def _shaped(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
 
 
 def _broadcast(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
+    array = _floats(name, values)
     try:
-        return np.ascontiguousarray(np.broadcast_to(_floats(name, values), shape))
+        return np.ascontiguousarray(np.broadcast_to(array, shape))
     except ValueError:
         raise _core.ProblemError(
             f"{name}: has the shape {np.shape(values)}, which does not become {shape}"

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import re
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
@@ -10,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fclib
 from helpers import planted_global, planted_local
@@ -180,3 +182,54 @@ def test_what_is_shown_is_text_and_no_markup() -> None:
     problem = local().replace(info=fclib.ProblemInfo(title="<script>"))
     assert "&lt;script&gt;" in problem._repr_html_()
     assert "M3DFC" in problem._repr_html_()
+
+
+def test_values_are_compared_with_nothing() -> None:
+    for thing in things():
+        assert (thing == None, thing != None) == (False, True)  # noqa: E711
+
+
+def wrong_places() -> dict[str, Any]:
+    """Matrices of SciPy that contradict themselves, which SciPy does not look at."""
+    found = {}
+    for name, array, place, value in (
+        ("W/i[0]", "indices", 0, 6),
+        ("W/i[0]", "indices", 0, -1),
+        ("W/i[0]", "indices", 0, 2**31 - 1),
+        ("W/p[3]", "indptr", 2, 1000),
+        ("W/p[2]", "indptr", 2, -1),
+        ("W/p[0]", "indptr", 0, 5),
+        ("W/i", "indptr", 6, 1000),
+    ):
+        matrix = sp.csr_array(np.ones((6, 6)))
+        getattr(matrix, array)[place] = value
+        found[f"{array}[{place}] = {value}"] = (matrix, name)
+    return found
+
+
+@pytest.mark.parametrize("what", wrong_places())
+def test_a_matrix_that_contradicts_itself_is_refused_where_it_is_made(what: str) -> None:
+    matrix, where = wrong_places()[what]
+    with pytest.raises(fclib.ProblemError, match=f"^{re.escape(where)}: "):
+        fclib.LocalProblem(W=matrix, q=np.ones(6), mu=[0.5, 0.5])
+
+
+def test_a_sparse_vector_is_no_matrix() -> None:
+    with pytest.raises(fclib.ProblemError, match="W: is not a matrix"):
+        fclib.LocalProblem(W=sp.coo_array(np.arange(3.0)), q=np.ones(3), mu=[0.5])
+
+
+def test_masked_entries_are_refused() -> None:
+    whole = {"W": np.eye(3), "q": np.array([-1.0, 0, 0]), "mu": np.array([0.5])}
+    for name in whole:
+        data: dict[str, Any] = dict(whole)
+        masked = np.ma.array(data[name])
+        fclib.LocalProblem(**data | {name: masked})
+        masked[(0,) * masked.ndim] = np.ma.masked
+        with pytest.raises(fclib.ProblemError, match=f"^{name}: has masked entries"):
+            fclib.LocalProblem(**data | {name: masked})
+        with pytest.raises(fclib.ProblemError, match=f"^{name}: has masked entries"):
+            fclib.solve_batch(**{k: v[None] for k, v in (data | {name: masked}).items()})
+    guess = np.ma.array(np.ones(3), mask=[True, False, False])
+    with pytest.raises(fclib.ProblemError, match="masked"):
+        fclib.solve(fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5]), guess=guess)

@@ -27,11 +27,28 @@ using Describe = decltype(&fclib_plugin_describe);
 
 constexpr std::int64_t endless = 1'000'000;  // iterations, where the caller sets none
 
+Error plugin_error(std::string_view name, const std::string& message) {
+  return {ErrorKind::option, message, "solver '" + std::string(name) + "'"};
+}
+
 [[noreturn]] void bad_plugin(std::string_view name, const std::string& message) {
-  throw Error(ErrorKind::option, message, "solver '" + std::string(name) + "'");
+  throw plugin_error(name, message);
 }
 
 std::string text_of(const char* text) { return text != nullptr ? text : ""; }
+
+/// What a function of a plugin returns; where it throws, refusal(word) is thrown in its place.
+template <class Called, class Refusal>
+auto unthrown(Called&& called, Refusal&& refusal) {
+  std::string word = "something that is no exception";
+  try {
+    return called();
+  } catch (const std::exception& error) {
+    word = error.what();
+  } catch (...) {  // the word says so
+  }
+  throw refusal(word);
+}
 
 /// A call of a plugin: what its functions look at. Nothing is thrown through the plugin.
 struct Call {
@@ -46,6 +63,7 @@ struct Call {
 
   bool stop(const double* iterate) {
     try {
+      if (iterate == nullptr) throw SolverError("stop() was given no iterate", "a plugin");
       ++iterations;
       r = Eigen::Map<const Vector>(iterate, problem.m());
       reason = monitor.report(iterations, error_of(problem, r), &r);
@@ -111,7 +129,11 @@ Outcome run(Function function, const std::string& name, const std::vector<Option
   given.text = [](void* context, const char* option) {
     return static_cast<Call*>(context)->text(text_of(option));
   };
-  const int code = function(&given, r.data());
+  const int code =
+      unthrown([&] { return function(&given, r.data()); },
+               [&](const std::string& word) {
+                 return SolverError("fclib_plugin_solve threw: " + word, "solver " + name);
+               });
   if (call.thrown) std::rethrow_exception(call.thrown);
   if (code != 0) {
     throw SolverError("fclib_plugin_solve returned " + std::to_string(code), "solver " + name);
@@ -183,7 +205,9 @@ Solver entry_of(void* handle, std::string_view name) {
                .solve = {},
                .origin = "plugin"};
   if (const auto describe = exported<Describe>(handle, "fclib_plugin_describe")) {
-    const fclib_plugin_about* about = describe();
+    const fclib_plugin_about* about = unthrown(describe, [&](const std::string& word) {
+      return plugin_error(name, "fclib_plugin_describe threw: " + word);
+    });
     if (about == nullptr || about->size < static_cast<int>(sizeof *about)) {
       bad_plugin(name, "fclib_plugin_describe returned no struct fclib_plugin_about with its size");
     }

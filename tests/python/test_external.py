@@ -1,5 +1,6 @@
 """Users' own solvers, programs and other packages behind the contract: what they may do wrong."""
 
+import contextlib
 import importlib.util
 import os
 import signal
@@ -434,6 +435,15 @@ def test_a_program_that_lies_is_found_out(tmp_path: Path) -> None:
     assert result.status == "inaccurate"
 
 
+@pytest.mark.parametrize("said", ["iterations=-3", "cpu_s=-5.0", "cpu_s=np.inf"])
+def test_a_program_cannot_claim_less_than_no_work(tmp_path: Path, said: str) -> None:
+    pytest.importorskip("h5py")
+    claim = f"h5py.File(sys.argv[2], 'a')['solution'].attrs.update({said})\n"
+    body = "import h5py\n" + WRITE + claim
+    with pytest.raises(fclib.SolverError, match=f"{said.partition('=')[0]} = .*from 0 on"):
+        fclib.solve(problem_of(), program(tmp_path, body), time_limit=20)
+
+
 def test_a_program_that_writes_nan_has_diverged(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     assert h5py
@@ -544,6 +554,28 @@ def test_conic_solvers_refuse_an_asymmetric_matrix(package: str) -> None:
         fclib.solve(planted_local(7, skew=1.0).problem, f"{package}:aclm")
 
 
+@pytest.mark.parametrize("name", ["aclm", "relaxation"])
+def test_scs_ends_quietly_on_an_indefinite_matrix(
+    name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("scs")
+    problem = local_problem(np.diag([1.0, -1, 2]), [-1, 0.5, 0], [0.5])
+    assert fclib.solve(problem, f"scs:{name}", time_limit=10).status == "stalled"
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_other_threads_print_is_kept_while_scs_starts(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    scs = pytest.importorskip("fclib.external.scs")
+    with contextlib.redirect_stdout(scs._Others(sys.stdout)):
+        print("mine")
+        thread = threading.Thread(target=print, args=("theirs",))
+        thread.start()
+        thread.join()
+    assert capsys.readouterr().out == "theirs\n"
+
+
 def test_what_is_absent_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("FCLIB_SICONOS_PYTHON", "/nowhere/python")
     find_spec = importlib.util.find_spec
@@ -646,7 +678,22 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "told.c").write_text(TELLS_OF_ITS_OPTIONS)
     (folder / "wrong.c").write_text(TELLS_OF_ITS_OPTIONS.replace('"2"', '"two"'))
     (folder / "unsized.c").write_text(TELLS_OF_ITS_OPTIONS.replace("sizeof about", "0"))
-    sources = {
+    solve = 'extern "C" int fclib_plugin_solve(const fclib_plugin_problem* p, double* r)'
+    for name, body in {
+        "throws": 'throw std::runtime_error("no idea");',
+        "throws-seven": "throw 7;",
+        "null": "return p->stop(p->context, nullptr);",
+    }.items():
+        (folder / f"{name}.cpp").write_text(
+            "#include <fclib_plugin.h>\n#include <stdexcept>\n"
+            f"{solve} {{ (void)p, (void)r; {body} }}\n"
+        )
+    (folder / "told-nothing.cpp").write_text(
+        f"#include <fclib_plugin.h>\n{solve} {{ (void)p, (void)r; return 0; }}\n"
+        'extern "C" const fclib_plugin_about* fclib_plugin_describe() { throw 7; }\n'
+    )
+    thrown = ("throws", "throws-seven", "null", "told-nothing")
+    sources = {name: folder / f"{name}.cpp" for name in thrown} | {
         "pgs": ROOT / "examples/plugin/pgs.c",
         "pgs-cpp": folder / "pgs.cpp",
         "refuse": folder / "refuse.c",
@@ -747,6 +794,24 @@ def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
 
     with pytest.raises(KeyError, match="mine"):
         fclib.solve(problem, f"plugin:{shared_objects}/libpgs.so", callback=stop)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("throws", "libthrows.so: fclib_plugin_solve threw: no idea"),
+        ("throws-seven", "fclib_plugin_solve threw: something that is no exception"),
+        ("null", "no iterate"),
+    ],
+)
+def test_what_a_shared_object_throws_is_said(shared_objects: Path, name: str, said: str) -> None:
+    with pytest.raises(fclib.SolverError, match=said):
+        fclib.solve(problem_of(), f"plugin:{shared_objects}/lib{name}.so")
+
+
+def test_a_shared_object_whose_description_throws(shared_objects: Path) -> None:
+    with pytest.raises(fclib.OptionError, match="fclib_plugin_describe threw"):
+        fclib.find_solver(f"plugin:{shared_objects}/libtold-nothing.so")
 
 
 def test_a_campaign_runs_a_shared_object(shared_objects: Path, tmp_path: Path) -> None:

@@ -51,7 +51,11 @@ class ConicSolver(Protocol):
     """A solver of one program for several c."""
 
     def solve(self, c: Array, x: Array, time_left: float) -> Array:
-        """The solution, from x or from a point of its own."""
+        """The solution, from x or from a point of its own.
+
+        Raises:
+            ArithmeticError: it cannot be looked for with these numbers.
+        """
 
 
 Make: TypeAlias = Callable[[Program], ConicSolver]
@@ -160,7 +164,11 @@ def _relaxation(problem: Local, r: Array, monitor: _core.Monitor, make: Make) ->
     """One convex problem; what it does not solve is said to be inaccurate."""
     if monitor.stop(r):
         return r
-    r = Relaxation(problem, make).solve(np.zeros(problem.nc), r, monitor.time_left)
+    try:
+        r = Relaxation(problem, make).solve(np.zeros(problem.nc), r, monitor.time_left)
+    except ArithmeticError:
+        monitor.status = "stalled"
+        return r
     if not monitor.stop(r):
         monitor.status = "inaccurate"
     return r
@@ -174,7 +182,11 @@ def _aclm(problem: Local, r: Array, monitor: _core.Monitor, make: Make) -> Array
     s = convex.modification(r) if r.any() else np.zeros(problem.nc)
     best, least, since = r, monitor.error(r), 0
     while True:
-        r = convex.solve(s, r, monitor.time_left)
+        try:
+            r = convex.solve(s, r, monitor.time_left)
+        except ArithmeticError:
+            monitor.status = "stalled"
+            return best
         stop = monitor.stop(r)
         error = monitor.error(r)
         since += 1

@@ -20,7 +20,6 @@ program that is given {tol} is asked again, for more, where it was content too e
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import shlex
 import shutil
@@ -124,8 +123,10 @@ def _number(told: Mapping[str, float | str], name: str, program: str) -> float |
     value = told.get(name)
     if value is None:
         return None
-    if not (isinstance(value, (int, float)) and math.isfinite(value) and abs(value) < 2**62):
-        raise _registry.SolverError(f"{program}: its solution has {name} = {value!r}, no number")
+    if not (isinstance(value, (int, float)) and 0 <= value < 2**62):
+        raise _registry.SolverError(
+            f"{program}: its solution has {name} = {value!r}, no number from 0 on"
+        )
     return float(value)
 
 

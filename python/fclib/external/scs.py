@@ -6,11 +6,15 @@ O'Donoghue, "Operator splitting for a homogeneous embedding of the linear comple
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 import importlib.metadata
 import importlib.util
+import io
 import math
+import sys
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -46,6 +50,26 @@ def find(name: str) -> _core.SolverInfo | None:
     return next((info for info in solvers() if info.name == name), None)
 
 
+class _Others(io.TextIOBase):
+    """What threads print, but for this one: SCS tells of a failure there, whatever it is told."""
+
+    def __init__(self, stream: Any) -> None:
+        self.stream = stream
+        self.silent = threading.get_ident()
+
+    def write(self, text: str) -> int:
+        if self.stream is None or threading.get_ident() == self.silent:
+            return len(text)
+        return int(self.stream.write(text))
+
+    def flush(self) -> None:
+        if self.stream is not None:
+            self.stream.flush()
+
+
+_start = threading.Lock()  # standard output is that of one thread at a time
+
+
 class Conic:
     """One program for several c, each solve from the last one's solution."""
 
@@ -56,20 +80,24 @@ class Conic:
         self.solver: Any = None
 
     def solve(self, c: Any, x: Any, time_left: float) -> Any:
-        """The solution."""
+        """The solution. Raises ArithmeticError where SCS cannot begin."""
         program = self.program
         if self.solver is None:
             data = {"P": program.P, "A": program.A, "b": np.zeros(program.A.shape[0]), "c": c}
             cones = {"z": program.zeros, "l": program.nonnegatives, "q": list(program.cones)}
-            self.solver = self.package.SCS(
-                data,
-                cones,
-                verbose=False,
-                eps_abs=self.tolerance,
-                eps_rel=0.0,
-                max_iters=MAX_ITERATIONS,
-                time_limit_secs=time_left if math.isfinite(time_left) else 0.0,
-            )
+            try:
+                with _start, contextlib.redirect_stdout(_Others(sys.stdout)):
+                    self.solver = self.package.SCS(
+                        data,
+                        cones,
+                        verbose=False,
+                        eps_abs=self.tolerance,
+                        eps_rel=0.0,
+                        max_iters=MAX_ITERATIONS,
+                        time_limit_secs=time_left if math.isfinite(time_left) else 0.0,
+                    )
+            except ValueError as error:  # W is not positive semidefinite, or too large a number
+                raise ArithmeticError(str(error)) from error
             return self.solver.solve(warm_start=True, x=x)["x"]
         self.solver.update(c=c)
         return self.solver.solve(warm_start=True)["x"]

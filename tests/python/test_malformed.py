@@ -4,6 +4,7 @@ Each case takes a good mixed local file, or a global one, and spoils one thing.
 """
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -672,3 +673,23 @@ def test_check_names_what_is_wrong_with_a_solution(corpus: Path, tmp_path: Path)
     for line, (case, path) in zip(lines, paths.items(), strict=True):
         assert line.startswith(f"fclib: {path}: "), line
         assert SOLUTIONS[case][1] in line.removeprefix(f"fclib: {path}"), line
+
+
+@pytest.mark.parametrize("name", [f"{ROOT}/W", f"{ROOT}/vectors/q", "solution"])
+def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "problem.hdf5"
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0], mu=[0.5])
+    fclib.write(path, problem, fclib.solve(problem).solution)
+    os.mkfifo(tmp_path / "pipe")
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file[name] = h5py.ExternalLink("pipe", "/there")
+    code = f"import fclib; fclib.read({str(path)!r}); print(fclib.read_solution({str(path)!r}))"
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
+    )
+    if name == "solution":
+        assert run.stdout == "None\n"
+    else:
+        assert f"/{name}: the " in run.stderr
+        assert "is missing" in run.stderr

@@ -13,7 +13,7 @@ constexpr const char* mark = "layout";
 constexpr const char* layout = "FCLIB geometry 1";
 
 bool is_ours(const Group& root, const std::string& name) {
-  if (!root.has(name) || H5Oexists_by_name(root.id, name.c_str(), H5P_DEFAULT) <= 0) return false;
+  if (!root.has(name)) return false;
   const Handle group(H5Gopen2(root.id, name.c_str(), H5P_DEFAULT), H5Gclose);
   if (!group.ok() || H5Aexists(group.id(), mark) <= 0) return false;
   const Handle attribute(H5Aopen(group.id(), mark, H5P_DEFAULT), H5Aclose);
@@ -47,6 +47,7 @@ std::vector<std::string> names_of(const Group& group) {
 }
 
 H5T_class_t class_of(const Group& group, const std::string& name) {
+  if (!group.has(name)) fail(group.child(name), "the dataset is missing");
   const Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
   if (!dataset.ok()) fail(group.child(name), "is not a dataset that HDF5 can open");
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);

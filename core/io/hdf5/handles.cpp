@@ -30,6 +30,17 @@ std::mutex& library_mutex() {
   return instance;
 }
 
+/// Whether an external link may be followed: HDF5 would wait for ever at the end of a pipe.
+herr_t follow_to_files_alone(const char* from, const char*, const char* to, const char*, unsigned*,
+                             hid_t, void*) {
+  for (const fs::path& target : {fs::path(to), fs::path(from).parent_path() / to}) {
+    std::error_code error;
+    const auto status = fs::status(target, error);
+    if (fs::exists(status) && !fs::is_regular_file(status)) return -1;
+  }
+  return 0;
+}
+
 }  // namespace
 
 void fail(const std::string& where, const std::string& message) {
@@ -56,14 +67,16 @@ bool Group::has(const std::string& name) const {
   const htri_t linked = H5Lexists(id, name.c_str(), H5P_DEFAULT);
   // what cannot be looked up is not what is not there
   if (linked < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
-  return linked > 0 && H5Oexists_by_name(id, name.c_str(), H5P_DEFAULT) > 0;
+  if (linked == 0) return false;
+  const Handle access(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
+  H5Pset_elink_cb(access.id(), follow_to_files_alone, nullptr);
+  return H5Oexists_by_name(id, name.c_str(), access.id()) > 0;
 }
 
 Handle open_group(const Group& parent, const std::string& name) {
+  if (!parent.has(name)) fail(parent.child(name), "the group is missing");
   Handle group(H5Gopen2(parent.id, name.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!group.ok()) {
-    fail(parent.child(name), parent.has(name) ? "is not a group" : "the group is missing");
-  }
+  if (!group.ok()) fail(parent.child(name), "is not a group");
   return group;
 }
 

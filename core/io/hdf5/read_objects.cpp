@@ -72,10 +72,9 @@ void read_as(const Numbers& dataset, hid_t memory, void* values) {
 
 Numbers open_numbers(const Group& group, const std::string& name, bool integers) {
   const std::string path = group.child(name);
+  if (!group.has(name)) fail(path, "the dataset is missing");
   Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
-  if (!dataset.ok()) {
-    fail(path, group.has(name) ? "is not a dataset that HDF5 can open" : "the dataset is missing");
-  }
+  if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.id());
   if (integers && kind != H5T_INTEGER) fail(path, "does not hold integers");

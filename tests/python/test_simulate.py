@@ -151,6 +151,23 @@ def test_equalities_that_contradict_each_other_are_named(
         list(simulate(Scene(name="two", xml=xml), 3))
 
 
+def test_rows_of_equalities_that_are_rounding_are_left_out() -> None:
+    """A loop in a plane, but for 1e-11: bearings keep what is out of it.
+
+    Rows of such noise would ask for multipliers of 1e11 and more.
+    """
+    link = '<geom size="0.1" mass="1" pos="0.5 0 0"/>'
+    xml = (
+        '<mujoco><worldbody><body><joint axis="0 1 0"/>'
+        f'{link}<body name="second" pos="1 0 0.5"><joint axis="0 1 1e-11"/>{link}</body></body>'
+        '</worldbody><equality><connect body1="second" anchor="1 0 0"/></equality></mujoco>'
+    )
+    for step in simulate(Scene(name="loop", xml=xml), 3):
+        sizes = np.linalg.norm(step.problem.G.toarray(), axis=0)
+        assert sizes.min() > 1e-9 * sizes.max()
+        assert step.result.converged
+
+
 def test_box_at_rest_stays() -> None:
     steps = run(mjcf(SLAB), 100)
     assert {step.problem.nc for step in steps} == {4}

@@ -66,7 +66,7 @@ CONTACTS_FULL, ROWS_FULL, SINGULAR = (
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
     for name in ("CONTACTFULL", "CNSTRFULL", "INERTIA")
 )
-ROUNDING: Final = 1e-12  # an equality's row this much smaller than the largest says 0 = 0
+RANK: Final = 1e-9  # an equality's row this small beside the largest is rounding: 0 = 0
 
 
 class MujocoModel:
@@ -563,7 +563,7 @@ def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
 def kept_equalities(d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
     """Which rows of equalities do not vanish, by their gradients (n x ne)."""
     sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-    return np.flatnonzero(sizes > ROUNDING * sizes.max(initial=0.0))
+    return np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
 
 
 def equality_name(m: Any, i: int) -> str:

@@ -15,11 +15,10 @@ from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
-from fclib.simulate.mujoco_model import MujocoModel
+from fclib.simulate.mujoco_model import RANK, MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
-RANK: Final = 1e-9  # of a row of equalities, relative to the largest, that follows from others
 STABILIZATION: Final = 0.2  # share of a violation undone in a step
 
 

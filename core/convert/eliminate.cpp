@@ -306,9 +306,9 @@ Solution Elimination::expand(const Solution& plain) const {
   return result;
 }
 
-void Elimination::hold(const GlobalProblem& bodies, const Condensation& condensation,
+bool Elimination::hold(const GlobalProblem& bodies, const Condensation& condensation,
                        Solution& solution) const {
-  if (turn_.size() == 0) return;
+  if (turn_.size() == 0) return false;
   const auto triangle = turn_.triangularView<Eigen::Upper>();
   const auto correction = [&] {
     RealVector broken = bodies.b.cast<Real>();
@@ -321,6 +321,7 @@ void Elimination::hold(const GlobalProblem& bodies, const Condensation& condensa
   Vector impulse = Vector::Zero(solution.v.size());
   multiply_add(bodies.G, correction(), impulse);
   solution.v += condensation.mass().solve(impulse);
+  return true;
 }
 
 LocalProblem eliminate(const LocalProblem& problem) {

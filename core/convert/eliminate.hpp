@@ -41,8 +41,8 @@ class Elimination {
 
   /// Betters lambda (p) of a whole solution, and takes out of v (n) what its rounding breaks of the
   /// constraints: where joints nearly follow from each other lambda is so large that light bodies
-  /// feel it.
-  void hold(const GlobalProblem& bodies, const Condensation& condensation,
+  /// feel it. False where no constraints are so close, and nothing is changed.
+  bool hold(const GlobalProblem& bodies, const Condensation& condensation,
             Solution& solution) const;
 
   /// Bilateral constraints that follow from others.

@@ -287,9 +287,16 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
   const auto judge_expanded = [&](Solution& solution) {
-    solution = condensation.expand(elimination.expand(solution));
-    elimination.hold(problem, condensation, solution);
-    return judge_complete(solution);
+    Solution expanded = condensation.expand(elimination.expand(solution));
+    solution = expanded;
+    const bool held = elimination.hold(problem, condensation, solution);
+    const double error = judge_complete(solution);
+    if (!held || error <= request.settings.tolerance) return error;
+    // what puts velocities back may be more than the rounding of multipliers explains
+    const double other = judge_complete(expanded);
+    if (!(other <= request.settings.tolerance)) return error;
+    solution = std::move(expanded);
+    return other;
   };
   return run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded,
              prove);

@@ -435,12 +435,12 @@ def test_a_program_that_lies_is_found_out(tmp_path: Path) -> None:
     assert result.status == "inaccurate"
 
 
-@pytest.mark.parametrize("said", ["iterations=-3", "cpu_s=-5.0", "cpu_s=np.inf"])
-def test_a_program_cannot_claim_less_than_no_work(tmp_path: Path, said: str) -> None:
+@pytest.mark.parametrize("said", ["iterations=-3", "cpu_s=np.inf", "cpu_s=np.nan"])
+def test_a_program_cannot_claim_what_is_no_work(tmp_path: Path, said: str) -> None:
     pytest.importorskip("h5py")
     claim = f"h5py.File(sys.argv[2], 'a')['solution'].attrs.update({said})\n"
     body = "import h5py\n" + WRITE + claim
-    with pytest.raises(fclib.SolverError, match=f"{said.partition('=')[0]} = .*from 0 on"):
+    with pytest.raises(fclib.SolverError, match=f"{said.partition('=')[0]} = .*no number"):
         fclib.solve(problem_of(), program(tmp_path, body), time_limit=20)
 
 

@@ -66,7 +66,7 @@ def test_set_is_shown_with_its_problems() -> None:
 def test_list_refuses_what_would_change_it(tmp_path: Path) -> None:
     done = invoke("collection", "build", "tiny", "--count", 1, "--out", tmp_path)
     assert done.exit_code == 2
-    assert "names its problems" in done.output
+    assert "no count and no selection" in done.output
 
 
 def test_family_of_local_problems_is_built_with_its_figure(tmp_path: Path) -> None:

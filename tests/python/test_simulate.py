@@ -163,9 +163,34 @@ def test_rows_of_equalities_that_are_rounding_are_left_out() -> None:
         '</worldbody><equality><connect body1="second" anchor="1 0 0"/></equality></mujoco>'
     )
     for step in simulate(Scene(name="loop", xml=xml), 3):
-        sizes = np.linalg.norm(step.problem.G.toarray(), axis=0)
+        G: Any = step.problem.G
+        sizes = np.linalg.norm(G.toarray(), axis=0)
         assert sizes.min() > 1e-9 * sizes.max()
         assert step.result.converged
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-8, 1e-6, 1e-3, 0.7])
+@pytest.mark.parametrize("mass", [1.0, 1e-5])
+def test_a_loop_in_an_inclined_plane(angle: float, mass: float) -> None:
+    """A four-bar linkage: of the three rows of its last hinge two are independent."""
+
+    def bar(length: float, weight: float) -> str:
+        ends = f"0 0 0 {length} 0 0"
+        return (
+            '<joint axis="0 1 0"/>'
+            f'<geom type="capsule" fromto="{ends}" size="0.02" mass="{weight}"/>'
+        )
+
+    xml = (
+        f'<mujoco><compiler angle="radian"/><worldbody><body euler="0 0 {angle}" pos="0 0 1">'
+        f'<body>{bar(0.5, 1)}<body pos="0.5 0 0" euler="0 1 0">{bar(0.7, mass)}'
+        f'<body name="last" pos="0.7 0 0" euler="0 0.7 0">{bar(0.6, 1)}</body></body></body></body>'
+        '</worldbody><equality><connect body1="last" anchor="0.6 0 0"/></equality></mujoco>'
+    )
+    for step in simulate(Scene(name="loop", xml=xml), 50):
+        assert step.result.converged
+        assert step.problem.p == 2
+        assert np.abs(np.asarray(step.result.solution.l)).max() < 1
 
 
 def test_box_at_rest_stays() -> None:

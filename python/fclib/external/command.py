@@ -111,22 +111,22 @@ def _solve(words: list[str], problem: Local, r: Any, monitor: _core.Monitor) -> 
             f"{words[0]}: its solution has r of length {solution.r.size}, expected {r.size}"
         )
     stop = monitor.stop(solution.r)
-    monitor.iterations = int(_number(told, "iterations", words[0]) or 0)
-    if (cpu_s := _number(told, "cpu_s", words[0])) is not None:
+    monitor.iterations = int(_number(told, "iterations", words[0], 0) or 0)
+    # the bench has looked at the clock itself, and calls less than nothing a lie
+    if (cpu_s := _number(told, "cpu_s", words[0], -(2**62))) is not None:
         monitor.cpu_s, reported = cpu_s, True
     if not stop and not any("{tol}" in word for word in words):
         monitor.status = "inaccurate"  # it would do the same again
     return solution.r
 
 
-def _number(told: Mapping[str, float | str], name: str, program: str) -> float | None:
+def _number(told: Mapping[str, float | str], name: str, program: str, least: float) -> float | None:
     value = told.get(name)
     if value is None:
         return None
-    if not (isinstance(value, (int, float)) and 0 <= value < 2**62):
-        raise _registry.SolverError(
-            f"{program}: its solution has {name} = {value!r}, no number from 0 on"
-        )
+    if not (isinstance(value, (int, float)) and least <= value < 2**62):
+        number = "number from 0 on" if least == 0 else "number"
+        raise _registry.SolverError(f"{program}: its solution has {name} = {value!r}, no {number}")
     return float(value)
 
 

@@ -66,7 +66,8 @@ CONTACTS_FULL, ROWS_FULL, SINGULAR = (
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
     for name in ("CONTACTFULL", "CNSTRFULL", "INERTIA")
 )
-RANK: Final = 1e-9  # an equality's row this small beside the largest is rounding: 0 = 0
+RANK: Final = 1e-9  # what is left of an equality's row, beside the largest, that is rounding
+ROUNDING: Final = 1e-12  # [m, rad] of positions: a gap that is less contradicts nothing
 
 
 class MujocoModel:
@@ -561,9 +562,28 @@ def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
 
 
 def kept_equalities(d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
-    """Which rows of equalities do not vanish, by their gradients (n x ne)."""
+    """Which rows of equalities say something, by their gradients (n x ne).
+
+    Those that vanish do not, nor do those that follow from others: a loop in a plane that is
+    inclined has three rows of which two are independent, and their rounding would contradict. Where
+    the positions contradict, all are kept, for the solve to refuse.
+    """
     sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-    return np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
+    kept = np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
+    import scipy.linalg as la  # takes a while
+
+    dense = take(gradients, kept).toarray()
+    _, triangle, order = la.qr(dense, mode="economic", pivoting=True)
+    independent = int((np.abs(np.diag(triangle)) > RANK * sizes.max(initial=0.0)).sum())
+    if independent == len(kept):
+        return kept
+    first, others = order[:independent], order[independent:]
+    share = la.lstsq(dense[:, first], dense[:, others])[0]
+    violation = d.efc_pos[: d.ne][kept]
+    if np.abs(violation[others] - share.T @ violation[first]).max() > ROUNDING:
+        return kept
+    said: npt.NDArray[np.intp] = kept[np.sort(first)]
+    return said
 
 
 def equality_name(m: Any, i: int) -> str:

@@ -15,7 +15,7 @@ from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
-from fclib.simulate.mujoco_model import RANK, MujocoModel
+from fclib.simulate.mujoco_model import RANK, ROUNDING, MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
@@ -218,7 +218,7 @@ def contradiction(model: Model, system: System) -> str:
     kept, others = pivots[:rank], pivots[rank:]
     share = np.linalg.lstsq(scaled[:, kept], scaled[:, others], rcond=None)[0]
     gaps = np.abs(system.violation[others] - share.T @ system.violation[kept])
-    if not gaps.size or not gaps.max() > 0:
+    if not gaps.size or not gaps.max() > ROUNDING:
         return ""
     worst = int(gaps.argmax())
     weights = np.abs(share[:, worst])

@@ -558,32 +558,43 @@ def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
         return empty((rows.shape[0], 0)), np.zeros(0)
     gradients = take(rows, np.arange(d.ne))
     kept = kept_equalities(d, gradients)
-    return take(gradients, kept), d.efc_pos[: d.ne][kept]
+    G = take(gradients, kept)
+    return G, consistent(G, d.efc_pos[: d.ne][kept])
 
 
 def kept_equalities(d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
-    """Which rows of equalities say something, by their gradients (n x ne).
-
-    Those that vanish do not, nor do those that follow from others: a loop in a plane that is
-    inclined has three rows of which two are independent, and their rounding would contradict. Where
-    the positions contradict, all are kept, for the solve to refuse.
-    """
+    """Which rows of equalities do not vanish, by their gradients (n x ne)."""
     sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-    kept = np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
+    return np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
+
+
+def consistent(G: Sparse, violation: Vector) -> Vector:
+    """The violation (p) without what rounding alone makes of rows that follow from others.
+
+    A loop in an inclined plane has three rows of which two are independent: where the positions are
+    exact but for rounding, the third contradicts them by all that the violations are.
+    """
+    dense = G.toarray()
+    sizes = np.linalg.norm(dense, axis=0)
+    if not violation.any():
+        return violation
     import scipy.linalg as la  # takes a while
 
-    dense = take(gradients, kept).toarray()
     _, triangle, order = la.qr(dense, mode="economic", pivoting=True)
-    independent = int((np.abs(np.diag(triangle)) > RANK * sizes.max(initial=0.0)).sum())
-    if independent == len(kept):
-        return kept
-    first, others = order[:independent], order[independent:]
+    rank = int((np.abs(np.diag(triangle)) > RANK * sizes.max()).sum())
+    first, others = order[:rank], order[rank:]
+    if not len(others):
+        return violation
     share = la.lstsq(dense[:, first], dense[:, others])[0]
-    violation = d.efc_pos[: d.ne][kept]
-    if np.abs(violation[others] - share.T @ violation[first]).max() > ROUNDING:
-        return kept
-    said: npt.NDArray[np.intp] = kept[np.sort(first)]
-    return said
+    follows = share.T @ violation[first]
+    gaps = np.abs(violation[others] - follows)
+    terms = np.abs(violation[others]) + np.abs(share.T) @ np.abs(violation[first])
+    rounded = (gaps > RANK * terms) & (gaps <= ROUNDING)
+    if not rounded.any():
+        return violation
+    result = np.array(violation)
+    result[others[rounded]] = follows[rounded]
+    return result
 
 
 def equality_name(m: Any, i: int) -> str:

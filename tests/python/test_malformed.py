@@ -529,7 +529,9 @@ def test_a_dataset_beyond_the_end_of_the_file(corpus: Path, tmp_path: Path) -> N
     for true, false in ((size, 2**40), (8 * size, 2**43)):
         data = data.replace(true.to_bytes(8, "little"), false.to_bytes(8, "little"))
     path.write_bytes(data)
-    with pytest.raises(fclib.FileError, match=rf"/{ROOT}/vectors/q: declares {2**40} entries"):
+    # HDF5 1.14 sees it first
+    word = rf"/{ROOT}/vectors/q: (declares {2**40} entries|is not a dataset that HDF5 can open)"
+    with pytest.raises(fclib.FileError, match=word):
         fclib.read(path)
 
 

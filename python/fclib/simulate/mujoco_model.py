@@ -574,18 +574,11 @@ def consistent(G: Sparse, violation: Vector) -> Vector:
     A loop in an inclined plane has three rows of which two are independent: where the positions are
     exact but for rounding, the third contradicts them by all that the violations are.
     """
-    dense = G.toarray()
-    sizes = np.linalg.norm(dense, axis=0)
     if not violation.any():
         return violation
-    import scipy.linalg as la  # takes a while
-
-    _, triangle, order = la.qr(dense, mode="economic", pivoting=True)
-    rank = int((np.abs(np.diag(triangle)) > RANK * sizes.max()).sum())
-    first, others = order[:rank], order[rank:]
+    first, others, share = dependence(G.toarray())
     if not len(others):
         return violation
-    share = la.lstsq(dense[:, first], dense[:, others])[0]
     follows = share.T @ violation[first]
     gaps = np.abs(violation[others] - follows)
     terms = np.abs(violation[others]) + np.abs(share.T) @ np.abs(violation[first])
@@ -595,6 +588,23 @@ def consistent(G: Sparse, violation: Vector) -> Vector:
     result = np.array(violation)
     result[others[rounded]] = follows[rounded]
     return result
+
+
+def dependence(
+    columns: Vector,
+) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Vector]:
+    """Independent ones of the columns (n x p), the others, and these as combinations of those.
+
+    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, to RANK.
+    """
+    import scipy.linalg as la  # takes a while
+
+    _, triangle, order = la.qr(columns, mode="economic", pivoting=True)
+    sizes = np.abs(np.diag(triangle))
+    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
+    first, others = order[:rank], order[rank:]
+    share: Any = np.linalg.lstsq(columns[:, first], columns[:, others], rcond=None)[0]
+    return first, others, share
 
 
 def equality_name(m: Any, i: int) -> str:

@@ -15,7 +15,7 @@ from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
-from fclib.simulate.mujoco_model import RANK, ROUNDING, MujocoModel
+from fclib.simulate.mujoco_model import RANK, ROUNDING, MujocoModel, dependence
 
 Model: TypeAlias = MujocoModel | DeformableModel
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
@@ -212,11 +212,7 @@ def contradiction(model: Model, system: System) -> str:
     names = model.equalities()
     factor = la.cholesky(system.M.toarray(), lower=True)
     scaled = la.solve_triangular(factor, system.G.toarray(), lower=True)
-    _, triangle, pivots = la.qr(scaled, mode="economic", pivoting=True)
-    sizes = np.abs(np.diag(triangle))
-    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
-    kept, others = pivots[:rank], pivots[rank:]
-    share = np.linalg.lstsq(scaled[:, kept], scaled[:, others], rcond=None)[0]
+    kept, others, share = dependence(scaled)
     gaps = np.abs(system.violation[others] - share.T @ system.violation[kept])
     if not gaps.size or not gaps.max() > ROUNDING:
         return ""

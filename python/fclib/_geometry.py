@@ -343,14 +343,16 @@ def turned(
         parts: components of a vector, and the axes of the frame that they are along.
         limits: (nc) contacts without a frame, whose components go as they are.
     """
-    found = source >= 0
-    result = np.zeros((len(source), r.shape[1]))
-    old, new, given = before[source[found]], now[found], r[source[found]]
+    found = (source >= 0).nonzero()[0]
+    source = source.take(found)
+    given = r.take(source, axis=0)
+    old, new = before.take(source, axis=0), now.take(found, axis=0)
+    carried = np.zeros_like(given)
     for part, axes in parts:
         if part.start >= r.shape[1]:  # no rolling
             continue
         world = np.einsum("cij,ci->cj", old[:, axes], given[:, part])
-        result[found, part] = np.einsum("cij,cj->ci", new[:, axes], world)
-    still = found & limits
-    result[still] = r[source[still]]
+        carried[:, part] = np.einsum("cij,cj->ci", new[:, axes], world)
+    result = np.zeros((len(now), r.shape[1]))
+    result[found] = np.where(limits.take(found)[:, None], given, carried)
     return result.ravel()

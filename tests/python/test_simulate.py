@@ -744,6 +744,22 @@ def test_dry_friction_of_a_tendon_stops_what_it_pulls() -> None:
     assert abs(pull @ v) < 1e-9
 
 
+def test_dry_friction_of_a_tendon_acts_along_it_at_each_angle() -> None:
+    """A cord from (1, 0, 0) to the end of an arm at (cos a, 0, sin a) is 2 sin(a / 2) long."""
+    arm = (
+        '<body><joint axis="0 -1 0"/><site name="end" pos="1 0 0"/>'
+        '<inertial pos="0.5 0 0" mass="1" diaginertia="0.1 0.1 0.1"/></body>'
+    )
+    cord = (
+        '<tendon><spatial frictionloss="0.1"><site site="post"/><site site="end"/></spatial>'
+        "</tendon>"
+    )
+    post = '<site name="post" pos="1 0 0"/>'
+    xml = mjcf(post + arm, floor=False, gravity="0 0 0", rest=cord + start("1", "2"))
+    for step in run(xml, 30):
+        assert step.problem.H[0, 1] == pytest.approx(math.cos(step.position[0] / 2), rel=1e-12)
+
+
 def test_dry_friction_holds_an_arm_beside_contacts_in_the_plane_and_in_space() -> None:
     """A box on the ground, and an arm with a limit whose friction exceeds its weight's moment."""
     arm = (

@@ -49,25 +49,21 @@ def lengths_of(starts: Index) -> Index:
 
 def columns_of(matrix: Sparse) -> npt.NDArray[np.intp]:
     """The column (nnz) of each entry."""
-    return np.repeat(np.arange(len(matrix.indptr) - 1), lengths_of(matrix.indptr))
+    return np.arange(len(matrix.indptr) - 1).repeat(lengths_of(matrix.indptr))
 
 
 def times(matrix: Sparse, x: Vector) -> Vector:
     """A x."""
-    weights = matrix.data * x[columns_of(matrix)]
-    sums: Vector = np.asarray(
-        np.bincount(matrix.indices, weights, minlength=matrix.shape[0]), dtype=float
-    )
-    return sums
+    weights = matrix.data * x.repeat(lengths_of(matrix.indptr))
+    sums = np.bincount(matrix.indices, weights, matrix.shape[0])
+    return np.asarray(sums, dtype=float)  # of no entries NumPy's are integers
 
 
 def transposed_times(matrix: Sparse, x: Vector) -> Vector:
     """A^T x."""
-    weights = matrix.data * x[matrix.indices]
-    sums: Vector = np.asarray(
-        np.bincount(columns_of(matrix), weights, minlength=matrix.shape[1]), dtype=float
-    )
-    return sums
+    weights = matrix.data * x.take(matrix.indices)
+    sums = np.bincount(columns_of(matrix), weights, matrix.shape[1])
+    return np.asarray(sums, dtype=float)
 
 
 def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
@@ -75,24 +71,26 @@ def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
 
     Entries all lie in rows that have a number.
     """
-    lengths = np.append(lengths_of(matrix.indptr), 0)[columns]
+    first = matrix.indptr.take(columns)
+    # that of -1 is the pointer past the end
+    lengths = np.maximum(matrix.indptr.take(columns + 1) - first, 0)
     starts = pointers(lengths)
-    first = np.append(matrix.indptr[:-1], 0)[columns]
-    entries = np.repeat(first - starts[:-1], lengths) + np.arange(starts[-1])
-    indices = matrix.indices[entries]
+    entries = (first - starts[:-1]).repeat(lengths) + np.arange(starts[-1])
+    indices = matrix.indices.take(entries)
     size = matrix.shape[0]
     if rows is not None:
-        indices, size = rows[indices], int((rows >= 0).sum())
-    return by_columns(matrix.data[entries], indices, starts, (size, len(columns)))
+        indices, size = rows.take(indices), int((rows >= 0).sum())
+    return by_columns(matrix.data.take(entries), indices, starts, (size, len(columns)))
 
 
-def without_zeros(data: Vector, rows: Index, columns: Index, shape: tuple[int, int]) -> Sparse:
-    """A matrix of entries that come column by column; zeros are dropped."""
-    kept = data != 0
-    if not kept.all():
-        data, rows, columns = data[kept], rows[kept], columns[kept]
-    starts = pointers(np.bincount(columns, minlength=shape[1]))
-    return by_columns(data, rows.astype(np.int32, copy=False), starts, shape)
+def without_zeros(data: Vector, rows: Index, starts: Index, shape: tuple[int, int]) -> Sparse:
+    """A matrix by columns of arrays, which are copied; zeros are dropped."""
+    kept = data.nonzero()[0]
+    if len(kept) == len(data):
+        starts = starts.astype(np.int32, copy=False)
+        return by_columns(data.copy(), rows.astype(np.int32), starts, shape)
+    starts = kept.searchsorted(starts).astype(np.int32)
+    return by_columns(data.take(kept), rows.take(kept).astype(np.int32, copy=False), starts, shape)
 
 
 def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
@@ -102,11 +100,11 @@ def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
     n = matrix.shape[0]
     columns, others = columns_of(matrix), columns_of(other)
     if len(others) <= n and (other.indices == others).all():
-        at = np.flatnonzero(matrix.indices == columns)
+        at = (matrix.indices == columns).nonzero()[0]
         if len(at) == n:
             # a diagonal onto one that is there
             sums = matrix.data.copy()
-            sums[at[others]] += factor * other.data
+            sums[at.take(others)] += factor * other.data
             if sums.all():
                 return by_columns(sums, matrix.indices, matrix.indptr, matrix.shape)
     places = np.concatenate((columns * n + matrix.indices, others * n + other.indices))
@@ -120,10 +118,11 @@ def summed(values: Vector, places: Index, shape: tuple[int, int]) -> Sparse:
     sums: Vector = np.asarray(
         np.bincount(inverse.ravel(), values, minlength=len(unique)), dtype=float
     )
-    return without_zeros(sums, unique % shape[0], unique // shape[0], shape)
+    starts = unique.searchsorted(shape[0] * np.arange(shape[1] + 1))
+    return without_zeros(sums, unique % shape[0], starts, shape)
 
 
 def diagonal(values: Vector) -> Sparse:
     """A diagonal matrix, without zeros."""
-    kept = np.flatnonzero(values)
-    return without_zeros(values[kept], kept, kept, (len(values), len(values)))
+    n = len(values)
+    return without_zeros(values, np.arange(n), np.arange(n + 1), (n, n))

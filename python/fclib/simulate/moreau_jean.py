@@ -62,6 +62,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -77,7 +78,6 @@ from fclib.simulate.arrays import (
     by_columns,
     columns_of,
     lengths_of,
-    pointers,
     take,
     times,
     transposed_times,
@@ -151,6 +151,44 @@ class DryFriction:
     bound: Vector  # (k) F [N], [N m]
     mass: Vector  # (k) a of the auxiliary degrees of freedom, of the size of the joint's inertia
     pair: npt.NDArray[np.int64]  # (k x 2) < 0, as of a limit: which joint or tendon
+
+    # what a step adds to a problem, the same at each: an auxiliary degree of freedom and a contact
+    # for each, of which N is the auxiliary velocity and T1 the joint's
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """The contacts (k)."""
+        k = len(self.bound)
+        return Contacts(self.pair, np.zeros((k, 3)), np.zeros((k, 3, 3)), np.zeros(k), np.ones(k))
+
+    @cached_property
+    def first(self) -> npt.NDArray[np.intp]:
+        """A degree of freedom (k) that each acts on."""
+        first: npt.NDArray[np.intp] = self.gradient.indices[self.gradient.indptr[:-1]]
+        return first
+
+    @cached_property
+    def places(self) -> npt.NDArray[np.int32]:
+        """The auxiliary degrees of freedom (k)."""
+        n, k = self.gradient.shape
+        return np.arange(n, n + k, dtype=np.int32)
+
+    @cached_property
+    def ends(self) -> npt.NDArray[np.int32]:
+        """How many entries there are up to the end of each N, and of each T1 (k x 2)."""
+        lengths = lengths_of(self.gradient.indptr)
+        both = np.column_stack((np.ones_like(lengths), lengths))
+        return both.cumsum(dtype=np.int32).reshape(both.shape)
+
+    @cached_property
+    def rows(self) -> npt.NDArray[np.int32]:
+        """Of the columns N and T1 of each, the rows of the entries."""
+        return np.insert(self.gradient.indices, self.gradient.indptr[:-1], self.places)
+
+    @cached_property
+    def values(self) -> Vector:
+        """And the entries."""
+        return np.insert(self.gradient.data, self.gradient.indptr[:-1], 1.0)
 
 
 @dataclass(frozen=True)
@@ -332,48 +370,38 @@ def with_dry_friction(
     tree: npt.NDArray[np.int64],
 ) -> tuple[Sparse, Sparse, Sparse, Vector, Vector, Contacts, npt.NDArray[np.int64]]:
     """The problem's data with an auxiliary degree of freedom and a contact for each friction."""
-    k, d = len(dry.bound), contacts.dimension
-    n = len(f)
-    gradient = dry.gradient
-    own = np.arange(k, dtype=np.int32)
-    # N is the auxiliary velocity, T1 the joint's
-    lengths = np.zeros((k, d), dtype=np.int32)
-    lengths[:, 0], lengths[:, 1] = 1, lengths_of(gradient.indptr)
-    starts = pointers(np.append(lengths_of(H.indptr), lengths))
-    rows = np.empty(len(gradient.data) + k, dtype=np.int32)
-    values = np.empty(len(rows))
-    of_joint = np.ones(len(rows), dtype=bool)
-    at = gradient.indptr[:-1] + own
-    of_joint[at] = False
-    rows[at], rows[of_joint] = n + own, gradient.indices
-    values[at], values[of_joint] = 1.0, gradient.data
-    first = gradient.indices[gradient.indptr[:-1]]
+    n, d = len(f), contacts.dimension
+    k, own = len(dry.bound), dry.contacts
+    starts = np.empty((k, d), dtype=np.int32)
+    # N and T1; what comes after has no entries
+    starts[:, :1], starts[:, 1:] = dry.ends[:, :1], dry.ends[:, 1:]
+    starts += H.indptr[-1]
     return (
         by_columns(
             np.concatenate((M.data, dry.mass)),
-            np.concatenate((M.indices, n + own)),
-            np.concatenate((M.indptr, M.indptr[-1] + 1 + own)),
+            np.concatenate((M.indices, dry.places)),
+            np.concatenate((M.indptr, dry.places + (M.indptr[-1] + 1 - n))),
             (n + k, n + k),
         ),
         by_columns(
-            np.concatenate((H.data, values)),
-            np.concatenate((H.indices, rows)),
-            starts,
+            np.concatenate((H.data, dry.values)),
+            np.concatenate((H.indices, dry.rows)),
+            np.concatenate((H.indptr, starts.ravel())),
             (n + k, H.shape[1] + d * k),
         ),
         by_columns(G.data, G.indices, G.indptr, (n + k, G.shape[1])),
         np.concatenate((f, -h * dry.bound)),
         np.concatenate((w, np.zeros(d * k))),
         Contacts(
-            np.concatenate((contacts.pair, dry.pair)),
-            np.concatenate((contacts.point, np.zeros((k, 3)))),
-            np.concatenate((contacts.frame, np.zeros((k, 3, 3)))),
-            np.concatenate((contacts.gap, np.zeros(k))),
-            np.concatenate((contacts.mu, np.ones(k))),
+            np.concatenate((contacts.pair, own.pair)),
+            np.concatenate((contacts.point, own.point)),
+            np.concatenate((contacts.frame, own.frame)),
+            np.concatenate((contacts.gap, own.gap)),
+            np.concatenate((contacts.mu, own.mu)),
             None if contacts.mu_r is None else np.concatenate((contacts.mu_r, np.zeros(k))),
             contacts.planar,
         ),
-        np.concatenate((tree, tree[first])),
+        np.concatenate((tree, tree.take(dry.first))),
     )
 
 

@@ -30,7 +30,6 @@ from fclib.simulate.arrays import (
     Sparse,
     Vector,
     added,
-    by_columns,
     columns_of,
     diagonal,
     empty,
@@ -58,9 +57,9 @@ from fclib.simulate.plane import in_plane
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
 LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
 # MuJoCo's numbers; its enumerations are slow to ask
-FRICTION_DOF, FRICTION_TENDON, LIMIT_JOINT, LIMIT_TENDON = (
+FRICTION_DOF, FRICTION_TENDON = (
     int(getattr(mujoco.mjtConstraint, f"mjCNSTR_{name}"))
-    for name in ("FRICTION_DOF", "FRICTION_TENDON", "LIMIT_JOINT", "LIMIT_TENDON")
+    for name in ("FRICTION_DOF", "FRICTION_TENDON")
 )
 CONTACTS_FULL, ROWS_FULL, SINGULAR = (
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
@@ -92,10 +91,18 @@ class MujocoModel:
         self._cell = None if scene.period is None else periodic_cell(scene, m)
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
+        self._gravity = float(np.linalg.norm(m.opt.gravity))
+        # of each geometry
+        self._body = m.geom_bodyid.astype(np.intp)
+        self._root = m.body_rootid[self._body].astype(np.intp)
         self._pattern = mass_pattern(m)
-        # the same at all configurations, where no actuator feeds back
+        self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
+        # these change with no configuration where no actuator feeds back
         feeds = (m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE).any()
         self._linear = None if feeds else linear_forces(m, self.data)
+        # nor that of joints, alone
+        self._dry: DryFriction | None = None
+        self._rubbing_tendons = bool(m.tendon_frictionloss.any())
         self.rolling = has_condim(m, 6)
         # every contact detected gives rows
         m.geom_gap[:] = 0
@@ -149,8 +156,7 @@ class MujocoModel:
     @property
     def trees(self) -> npt.NDArray[np.int64]:
         """The body, or tree of bodies, of each degree of freedom (n)."""
-        trees: npt.NDArray[np.int64] = self.model.dof_treeid.astype(np.int64)
-        return trees
+        return self._trees
 
     @property
     def smallest_size(self) -> float | None:
@@ -201,6 +207,8 @@ class MujocoModel:
             d.ctrl[:] = self._gait.controls(d.time + h)
         force = self._force()
         C, K = self._linear or linear_forces(m, d)
+        if self._dry is None or self._rubbing_tendons:
+            self._dry = dry_friction(m, d, rows)
         if self.scene.gyroscopic:
             C = sp.csc_array(C + gyroscopic(m, d))
         return System(
@@ -213,7 +221,7 @@ class MujocoModel:
             G,
             violation,
             self.trees,
-            dry_friction(m, d, rows),
+            self._dry,
         )
 
     def equalities(self) -> list[str]:
@@ -275,11 +283,11 @@ class MujocoModel:
     def _set_reach(self, h: float, shared_speed: bool) -> None:
         """Detect contacts as far as the geometries may move within h; their margins add up."""
         m, d = self.model, self.data
-        body = m.geom_bodyid
-        omega = d.cvel[body, :3]
+        twist = d.cvel.take(self._body, axis=0)
+        omega = twist[:, :3]
         # MuJoCo gives the linear velocity at the centre of mass of the whole tree
-        arm = d.geom_xpos - d.subtree_com[m.body_rootid[body]]
-        velocity = d.cvel[body, 3:] + crossed(omega, arm)
+        arm = d.geom_xpos - d.subtree_com.take(self._root, axis=0)
+        velocity = twist[:, 3:] + crossed(omega, arm)
         speed = np.sqrt((velocity * velocity).sum(axis=1))
         speed += np.sqrt((omega * omega).sum(axis=1)) * m.geom_rbound
         if shared_speed:
@@ -287,11 +295,12 @@ class MujocoModel:
         if self._cell:
             speed = speed[self._cell.geometry]
         # half of the activation for each of the two
-        reach = h * speed + h**2 * np.linalg.norm(m.opt.gravity) + 0.5 * self.scene.activation
+        reach = h * speed + h**2 * self._gravity + 0.5 * self.scene.activation
 
-        m.geom_margin[:] = np.maximum(self._margin, reach)
+        margin = np.maximum(self._margin, reach)
+        m.geom_margin[:] = margin
         m.body_margin[:] = 0
-        np.maximum.at(m.body_margin, body, m.geom_margin)
+        np.maximum.at(m.body_margin, self._body, margin)
         if m.npair:
             pair = np.column_stack((m.pair_geom1, m.pair_geom2))
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
@@ -333,9 +342,9 @@ class MujocoModel:
 
 def crossed(a: Vector, b: Vector) -> Vector:
     """The products a x b of rows (k x 3), as `np.cross` in a third of its time."""
-    product = np.empty_like(a)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        product[:, i] = a[:, j] * b[:, k] - a[:, k] * b[:, j]
+    second, third = (1, 2, 0), (2, 0, 1)
+    ahead = a.take(second, axis=1) * b.take(third, axis=1)
+    product: Vector = ahead - a.take(third, axis=1) * b.take(second, axis=1)
     return product
 
 
@@ -457,11 +466,7 @@ class MassPattern:
     def fill(self, values: Vector) -> Sparse:
         """M (n x n), by columns and without explicit zeros."""
         n = len(self.pointers) - 1
-        found = values[self.entries]
-        if found.all():
-            return by_columns(found, self.rows, self.pointers, (n, n))
-        columns = np.repeat(np.arange(n), np.diff(self.pointers))
-        return without_zeros(found, self.rows, columns, (n, n))
+        return without_zeros(values.take(self.entries), self.rows, self.pointers, (n, n))
 
 
 def mass_pattern(m: Any) -> MassPattern:
@@ -480,13 +485,9 @@ def mass_pattern(m: Any) -> MassPattern:
 
 def jacobian(m: Any, d: Any) -> Sparse:
     """All of MuJoCo's constraint rows, as columns (n x nefc), without its explicit zeros."""
-    lengths = d.efc_J_rownnz
-    entries = int(lengths.sum())
-    row = np.repeat(np.arange(d.nefc), lengths)
-    found = without_zeros(d.efc_J[:entries], d.efc_J_colind[:entries], row, (m.nv, d.nefc))
-    if np.shares_memory(found.data, d.efc_J):
-        found.data, found.indices = found.data.copy(), found.indices.copy()
-    return found
+    starts = pointers(d.efc_J_rownnz)
+    entries, shape = slice(starts[-1]), (m.nv, len(starts) - 1)
+    return without_zeros(d.efc_J[entries], d.efc_J_colind[entries], starts, shape)
 
 
 def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
@@ -496,56 +497,55 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     """
     data = source.data
     contact = data.contact
+    address, geom = contact.efc_address, contact.geom
     # a body of a mocap, or one whose joints do not move the point, has rows without entries
-    entries = np.append(lengths_of(rows.indptr), 0)
-    address = contact.efc_address
-    first = address[:, None] + np.arange(3)
-    moves = entries[np.where(first < rows.shape[1], first, -1)].any(axis=1)
-    geom = contact.geom
-    rigid = (geom[:, 0] >= 0) & (geom[:, 1] >= 0)
-    which = np.flatnonzero((address >= 0) & rigid & moves)
-    dim = contact.dim[which]
-    friction = contact.friction[which]
-    friction[friction <= LEAST_MU] = 0
+    starts = rows.indptr
+    moves = starts.take(address + 3, mode="clip") > starts.take(address, mode="clip")
+    rigid = geom.min(axis=1, initial=0) >= 0
+    which = ((address >= 0) & rigid & moves).nonzero()[0]
+    address = address.take(which)
+    dim = contact.dim.take(which)
+    friction = contact.friction.take(which, axis=0)
+    friction *= friction > LEAST_MU
     # sliding has two coefficients, rolling two more
-    for one, other, use in ((0, 1, dim > 1), (3, 4, dim == 6)):
-        differs = use & (friction[:, one] != friction[:, other])
+    for one, other in ((0, 1), (3, 4)) if source.rolling else ((0, 1),):
+        differs = friction[:, one] != friction[:, other]
         if differs.any():
             both = friction[differs, one] * friction[differs, other]
             friction[differs, one] = np.sqrt(both)
 
-    kind = data.efc_type
-    limits = np.flatnonzero((kind == LIMIT_JOINT) | (kind == LIMIT_TENDON))
-    nc = len(which) + len(limits)
+    limits = slice(data.ne + data.nf, data.ne + data.nf + data.nl)
+    touching, nc = len(which), len(which) + data.nl
     d = components(planar=False, rolling=source.rolling)
     # -1 where a component has no row
     source_row = np.full((nc, d), -1)
-    source_row[: len(which), :3] = first[which]
+    source_row[:touching, :3] = address[:, None] + np.arange(3)
     if source.rolling:
         # N, T1, T2, spin, R1, R2
         rolls = np.flatnonzero(dim == 6)
-        source_row[rolls, 3:] = address[which[rolls]][:, None] + (4, 5)
-    source_row[len(which) :, 0] = limits
+        source_row[rolls, 3:] = address[rolls][:, None] + (4, 5)
+    source_row[touching:, 0] = np.arange(limits.start, limits.stop)
     H = take(rows, source_row.ravel())
 
-    def with_limits(values: npt.NDArray[Any], of_limits: Any = 0.0) -> npt.NDArray[Any]:
-        if not len(limits):
+    def with_limits(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Of all, with 0 for the limits."""
+        if nc == touching:
             return values
-        tail = np.zeros((len(limits), *values.shape[1:]), dtype=values.dtype)
-        tail[:] = of_limits
-        return np.concatenate((values, tail))
+        found = np.zeros((nc, *values.shape[1:]), dtype=values.dtype)
+        found[:touching] = values
+        return found
 
     contacts = Contacts(
-        pair=with_limits(
-            geom[which].astype(np.int64),
-            np.column_stack((-1 - kind[limits], data.efc_id[limits])),
-        ),
-        point=with_limits(contact.pos[which]),
-        frame=with_limits(contact.frame[which].reshape(-1, 3, 3)),
-        gap=with_limits(contact.dist[which], data.efc_pos[limits]),
+        pair=with_limits(geom.take(which, axis=0).astype(np.int64)),
+        point=with_limits(contact.pos.take(which, axis=0)),
+        frame=with_limits(contact.frame.take(which, axis=0).reshape(-1, 3, 3)),
+        gap=with_limits(contact.dist.take(which)),
         mu=with_limits(friction[:, 0].copy()),
         mu_r=with_limits(np.where(dim == 6, friction[:, 3], 0.0)) if source.rolling else None,
     )
+    contacts.pair[touching:, 0] = -1 - data.efc_type[limits]
+    contacts.pair[touching:, 1] = data.efc_id[limits]
+    contacts.gap[touching:] = data.efc_pos[limits]
     return H, contacts
 
 

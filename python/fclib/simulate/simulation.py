@@ -157,14 +157,14 @@ def _march(
         np.zeros((0, 3, 3)),
         np.zeros((0, 3)),
     )
+    info_of = descriptions(model.scene, scheme, settings, model.left_out)
     for index in range(state.index, state.index + steps):
         if control is not None:
             assert isinstance(model, MujocoModel)
             model.control(control(index * scheme.h, state))
             state = replace(state, position=model.position)
-        info = describe(model.scene, scheme, settings, index, model.left_out)
         system = scheme.assemble(model)
-        part = scheme.problem(system, model.velocity, info)
+        part = scheme.problem(system, model.velocity, info_of(index))
         problem, contacts = part.problem, part.contacts
 
         options: dict[str, Any] = {"merit": "natural"} | settings["options"]
@@ -259,6 +259,13 @@ def describe(
 
     The last line of the description is JSON, which `provenance` reads back.
     """
+    return descriptions(scene, scheme, settings, left_out)(index)
+
+
+def descriptions(
+    scene: Scene, scheme: MoreauJean, settings: dict[str, Any], left_out: Sequence[str] = ()
+) -> Callable[[int], _core.ProblemInfo]:
+    """What gives `describe` of each step: most of the words are the same."""
     origin = {
         "generator": "fclib.simulate",
         "fclib": _core.version,
@@ -279,10 +286,8 @@ def describe(
         **({"gyroscopic": True} if scene.gyroscopic else {}),
         "stabilization": scheme.stabilization,
         **settings,
-        "step": index,
-        "time": index * scheme.h,
-        "units": {"length": "m", "mass": "kg", "time": "s"},
     }
+    units = {"length": "m", "mass": "kg", "time": "s"}
     words = [scene.description]
     words += [
         f"{name}: {text}."
@@ -298,18 +303,28 @@ def describe(
     words_of_components = (
         "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
     )
-    return _core.ProblemInfo(
-        title=f"{scene.title or scene.name}, step {index}",
-        description="\n".join([*words, json.dumps(origin, default=str)]).lstrip(),
-        math_info=(
-            f"Moreau-Jean step, theta = {scheme.theta:g}, h = {scheme.h:g} s; {law};"
-            " Coulomb friction;"
-            " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
-            f"{GYROSCOPIC if scene.gyroscopic else ''}"
-            f" v in m/s and rad/s, r in N s, components {words_of_components},"
-            " r_R in N m s, mu_r in m)"
-        ),
+    title = f"{scene.title or scene.name}, step "
+    # the JSON of each is that of one dictionary, in this order
+    before = "\n".join([*words, json.dumps(origin, default=str)]).lstrip()[:-1]
+    after = json.dumps({"units": units})[1:]
+    math_info = (
+        f"Moreau-Jean step, theta = {scheme.theta:g}, h = {scheme.h:g} s; {law};"
+        " Coulomb friction;"
+        " M v = H r + G lambda + f, u = H^T v + w, G^T v + b = 0;"
+        f"{GYROSCOPIC if scene.gyroscopic else ''}"
+        f" v in m/s and rad/s, r in N s, components {words_of_components},"
+        " r_R in N m s, mu_r in m)"
     )
+
+    def of_step(index: int) -> _core.ProblemInfo:
+        place = json.dumps({"step": index, "time": index * scheme.h})[1:-1]
+        return _core.ProblemInfo(
+            title=f"{title}{index}",
+            description=f"{before}, {place}, {after}",
+            math_info=math_info,
+        )
+
+    return of_step
 
 
 def engine(scene: Scene) -> dict[str, str]:

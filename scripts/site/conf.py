@@ -6,6 +6,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 import formulas
+import menu
 
 import fclib
 
@@ -35,5 +36,6 @@ copybutton_exclude = ".linenos, .gp, .go"
 
 
 def setup(app: Any) -> None:
-    """Formulas become MathML, which browsers draw themselves."""
+    """Formulas become MathML, which browsers draw themselves; the menu is rendered once."""
     app.add_html_math_renderer("mathml", (formulas.inline, None), (formulas.display, None))
+    menu.put(app)

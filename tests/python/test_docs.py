@@ -107,6 +107,23 @@ def test_no_page_needs_another_host(site: Path, pages: dict[Path, Page]) -> None
         assert not re.search(r"@import", style.read_text()), style.name
 
 
+@pytest.mark.parametrize(
+    ("page", "levels"),
+    [("architecture", "1"), ("families/index", "1"), ("solvers/splitting", "12"), ("search", "")],
+)
+def test_the_menu_marks_the_way_to_the_page(site: Path, page: str, levels: str) -> None:
+    text = (site / f"{page}.html").read_text()
+    menu = text[text.index('<div class="sidebar-tree">') :].partition("</div>")[0]
+    marked = re.findall(r'<li class="toctree-l(\d) current([^"]*)"><a class="([^"]*)"', menu)
+    assert "".join(level for level, *_ in marked) == levels
+    assert menu.count('href="#"') == menu.count("current reference") == bool(levels)
+    for k, (_, rest, link) in enumerate(marked):
+        last = k == len(marked) - 1
+        assert ("current-page" in rest, link.startswith("current")) == (last, last)
+    # a part of the menu is open where the page is one of it
+    assert menu.count('checked=""') == sum("has-children" in rest for _, rest, _ in marked)
+
+
 def test_every_picture_has_a_text(site: Path, pages: dict[Path, Page]) -> None:
     assert not [(p.relative_to(site), page.alone) for p, page in pages.items() if page.alone]
 

@@ -54,7 +54,9 @@ test: setup $(VENV)/.test-tools $(VENV)/.docs-tools $(VENV)/.test-system
 	ctest --test-dir $(BUILD) --output-on-failure
 	@if command -v emcmake >/dev/null && command -v node >/dev/null; then $(MAKE) wasm; \
 	  else echo "== there is no Emscripten: the tests of the module for browsers are skipped"; fi
-	FCLIB_BUILD=$(CURDIR)/$(BUILD) $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+	@# compiled tests are kept, where the environment forbids it too: each process would make them anew
+	PYTHONDONTWRITEBYTECODE= FCLIB_BUILD=$(CURDIR)/$(BUILD) \
+	  $(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 wasm:
 	@command -v emcmake >/dev/null && command -v node >/dev/null || { echo "make wasm needs Emscripten \

@@ -62,6 +62,7 @@ def count(build: Path, tests: Sequence[str]) -> None:
     data = {
         "PYTHONPATH": str(package_with_counts(build)),
         "FCLIB_BUILD": str(build),
+        "PYTHONDONTWRITEBYTECODE": "",  # as make test does
         "COVERAGE_FILE": str(build / "python-lines"),
     }
     # on all cores, as make test does

@@ -80,10 +80,11 @@ def _glob(path: Path) -> Iterator[Path]:
 
 
 def sample(paths: list[Path], count: int | None) -> list[Path]:
-    """So many of them, evenly spread over their order; all where count is None."""
+    """So many of them, evenly spread over their order, one from the middle; all without a count."""
     if count is None or count >= len(paths):
         return paths
-    chosen = np.linspace(0, len(paths) - 1, count).round().astype(int)
+    first = 0 if count > 1 else (len(paths) - 1) / 2
+    chosen = np.linspace(first, len(paths) - 1, count).round().astype(int)
     return [paths[k] for k in chosen]
 
 

@@ -369,6 +369,30 @@ def test_the_same_problem_gives_the_same_bytes(tmp_path: Path, mixed: int) -> No
 # ---- files of other writers
 
 
+def test_a_file_that_is_being_written_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "open.hdf5"
+    fclib.write(path, one_contact())
+    with h5py.File(path, "r+") as file:
+        file["fclib_local/vectors/q"][0] = 7.0
+        for read in (fclib.read, fclib.read_solution, fclib.contents):
+            with pytest.raises(fclib.FileError, match=r"open\.hdf5: another program has it open"):
+                read(path)
+    with h5py.File(path, "r"):  # one that reads it is in nobody's way
+        problem = fclib.read(path)
+        assert isinstance(problem, fclib.LocalProblem)
+        assert problem.q[0] == 7.0
+
+
+def test_a_file_that_is_being_copied_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "part.hdf5"
+    fclib.write(tmp_path / "whole.hdf5", planted_local(1, nc=20).problem)
+    whole = (tmp_path / "whole.hdf5").read_bytes()
+    for size in range(0, len(whole), max(1, len(whole) // 50)):
+        path.write_bytes(whole[:size])
+        with pytest.raises(fclib.FileError, match=r"part\.hdf5: .*(cut short|not an HDF5 file)"):
+            fclib.read(path)
+
+
 def write_by_hand(path: Path, variant: str) -> None:
     """A local problem of two contacts in 2D, W in columns, as somebody else may have written it."""
     integer = {"int64": "<i8", "big-endian": ">i4"}.get(variant, "<i4")

@@ -1,5 +1,7 @@
 #include "io/hdf5/handles.hpp"
 
+#include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -39,6 +41,15 @@ herr_t follow_to_files_alone(const char* from, const char*, const char* to, cons
     if (fs::exists(status) && !fs::is_regular_file(status)) return -1;
   }
   return 0;
+}
+
+/// Whether a program has a file open to write it: HDF5 locks it meanwhile.
+bool is_being_written(const std::string& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool locked = flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  close(file);
+  return locked;
 }
 
 }  // namespace
@@ -91,6 +102,7 @@ Handle open_file(const std::string& path) {
   }
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file.ok()) {
+    if (is_being_written(path)) fail("", "another program has it open, and may write to it");
     fail("", H5Fis_hdf5(path.c_str()) > 0
                  ? "cannot be opened by HDF5 (the file is damaged or cut short)"
                  : "is not an HDF5 file");

@@ -23,6 +23,7 @@ import fclib
 import helpers_cli
 from fclib import bench, cli
 from fclib._solve import MERITS
+from fclib.bench import problems
 from fclib.bench.campaign import parse_solver
 from fclib.bench.job import Job, Record
 from helpers import planted_global, planted_local
@@ -134,6 +135,13 @@ def test_problems_are_made_the_same_each_time(
         monkeypatch.setenv("FCLIB_CACHE", str(tmp_path / folder))
         digests.append(sorted(job.key for job in campaign().plan()))
     assert digests[0] == digests[1]
+
+
+def test_a_sample_is_evenly_spread() -> None:
+    paths = [Path(str(k)) for k in range(9)]
+    for count, chosen in ((1, "4"), (2, "08"), (3, "048"), (9, "012345678"), (99, "012345678")):
+        assert "".join(map(str, problems.sample(paths, count))) == chosen
+    assert problems.sample(paths, None) == paths
 
 
 def test_history_on_request(tmp_path: Path) -> None:
@@ -344,7 +352,7 @@ def test_interrupted_before_there_is_a_store(
     command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
     command += ["--scheduler", "tcp://localhost:1", "--store", store]
     result = CliRunner().invoke(cli.app, list(map(str, command)))
-    assert result.exit_code == 1
+    assert result.exit_code == 130
     assert "interrupted" in result.stderr
     assert not store.exists()
 

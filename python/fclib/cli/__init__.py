@@ -18,14 +18,14 @@ _profile.py    the profile of `profile` and `demo`
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 
 import fclib
-from fclib.cli._output import fail, print_version
+from fclib.cli._output import fail, interrupted, print_version
 
 COMMANDS = (
     "info",
@@ -79,6 +79,20 @@ class Commands(TyperGroup):
         super().__init__(**settings)
         self.commands: Any = Imported()
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Import the command; from then on Ctrl-C unwinds it."""
+        found = super().resolve_command(ctx, args)
+        if ctx.obj is not None:
+            ctx.obj()
+        return found
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            interrupted()
+
     def get_params(self, ctx: Any) -> list[Any]:
         """The options, those of completion hidden."""
         params: list[Any] = super().get_params(ctx)
@@ -100,10 +114,14 @@ app = typer.Typer(
 app.callback(invoke_without_command=True)(print_version)
 
 
-def main() -> None:
-    """Entry point of the ``fclib`` script. What no command deals with is one line all the same."""
+def main(imported: Callable[[], Any] | None = None) -> None:
+    """Run a command. What it does not deal with is one line all the same.
+
+    Args:
+        imported: is called when all is imported, and the command is about to begin.
+    """
     try:
-        app()
+        app(obj=imported)
     except fclib.Error as error:
         fail(str(error))
     except OSError as error:

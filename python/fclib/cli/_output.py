@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -80,6 +81,13 @@ def fail(message: str) -> NoReturn:
     """End the process with one line on the standard error and exit status 1."""
     err.print(f"fclib: {message}", style="red", highlight=False)
     raise SystemExit(1)
+
+
+def interrupted(message: str = "interrupted") -> NoReturn:
+    """End the process as Ctrl-C does: one line on the standard error and exit status 130."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one has nothing left to end
+    err.print(f"fclib: {message}", style="red", highlight=False)
+    raise SystemExit(130)
 
 
 def usage_error(error: Exception) -> NoReturn:

@@ -18,7 +18,17 @@ from fclib.bench import machine
 from fclib.bench.campaign import SET, parse_solver
 from fclib.bench.runner import RETRIES
 from fclib.bench.store import Status
-from fclib.cli._output import Json, Report, err, fail, make_table, out, parse_options, usage_error
+from fclib.cli._output import (
+    Json,
+    Report,
+    err,
+    fail,
+    interrupted,
+    make_table,
+    out,
+    parse_options,
+    usage_error,
+)
 from fclib.cli._progress import duration, live
 from fclib.collections import library
 
@@ -172,8 +182,8 @@ def run(
                 tell=tell,
             )
     except KeyboardInterrupt:
-        there = path.exists()
-        fail(f"interrupted; the same command goes on with {path}" if there else "interrupted")
+        goes_on = f"; the same command goes on with {path}" if path.exists() else ""
+        interrupted(f"interrupted{goes_on}")
     except ImportError as error:
         fail(str(error))
     record = {

@@ -86,7 +86,9 @@ def command(
     try:
         from fclib import report
         from fclib.collections import CatalogError
-
+    except ImportError as error:
+        fail(f'{error}; pip install "fclib[report]"')
+    try:
         if alone:
             _serve(folder)
             return

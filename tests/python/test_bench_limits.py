@@ -13,12 +13,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 import fclib
 from fclib import _solve, analysis, bench
-from fclib.bench import problems, processes
+from fclib.bench import meter, problems, processes
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
 from fclib.bench.supervisor import prove
@@ -297,6 +298,41 @@ BAD = """
         solved(monitor, r)
 
 
+    # what they take in memory
+
+    @bad
+    def shares_with_children(problem, r, monitor):
+        block = np.ones(150 * 125_000)  # 150 MB
+        readers = [subject_to_parent(lambda: block.sum()) for _ in range(4)]
+        time.sleep(0.5)
+        for reader in readers:
+            os.kill(reader, 9)
+            os.waitpid(reader, 0)
+        solved(monitor, r)
+
+
+    @bad
+    def forks_and_fills(problem, r, monitor):
+        for _ in range(4):
+            subject_to_parent(lambda: np.ones(100 * 125_000))
+        time.sleep(ASLEEP)
+
+
+    def subject_to_parent(work):
+        pid = os.fork()
+        if pid == 0:
+            kept = work()
+            time.sleep(ASLEEP)
+            os._exit(int(kept is None))
+        return pid
+
+
+    @bad
+    def grows_for_a_moment(problem, r, monitor):
+        np.ones(150 * 125_000)
+        solved(monitor, r)
+
+
     @bad
     def has_no_room(problem, r, monitor):
         raise OSError(28, "No space left on device")
@@ -431,6 +467,26 @@ def test_and_without_control_groups(
     assert record.measured == "processes"
 
 
+@pytest.mark.parametrize("groups", [True, False])
+def test_memory_is_that_of_all_processes_each_page_once(
+    groups: bool, folder: Path, request: pytest.FixtureRequest
+) -> None:
+    supervisor = request.getfixturevalue("supervisor" if groups else "supervisor_without_groups")
+    for name in ("shares_with_children", "grows_for_a_moment"):
+        record = supervisor.do(job(folder, f"bad-{name}", wall=60.0))
+        assert record.status == "converged", record
+        assert record.memory is not None
+        assert 140 < record.memory < MEMORY
+    # five processes, of which none has more than 100 MB
+    assert supervisor.do(job(folder, "bad-forks_and_fills", wall=60.0)).status == "memory"
+
+
+def test_a_control_group_takes_the_cache_of_files_for_no_memory() -> None:
+    stat = "anon 5000000\nfile 900000000\nkernel 4096\nshmem 0\nfile_mapped 2000000\n"
+    assert meter.of_group(stat) == 7.0
+    assert meter.of_group(stat.replace("shmem 0", "shmem 3000000")) == 8.0
+
+
 def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     # only who sleeps is to meet the clock on the wall, on a machine that is shared
     wall = LIMIT if EXPECTED[name] == "wall_limit" else 20 * LIMIT
@@ -542,6 +598,22 @@ def test_a_file_that_changes_is_no_fault_of_the_solver(folder: Path, tmp_path: P
         assert str(path) in record.message
     finally:
         supervisor.end()
+
+
+def test_a_file_that_another_program_writes_is_read_later(
+    folder: Path, tmp_path: Path, supervisor: SupervisorClient
+) -> None:
+    path = tmp_path / "problem.hdf5"
+    shutil.copy(folder / "problem.hdf5", path)
+    asked = dataclasses.replace(job(folder, "auto"), problem=problems.look(path))
+    with h5py.File(path, "r+") as file:
+        q = file["fclib_local/vectors/q"][:]
+        file["fclib_local/vectors/q"][:] = q + 1.0
+        record = supervisor.do(asked)
+        assert (record.status, record.ran, record.merits) == ("unreadable", False, None)
+        assert "another program has it open" in record.message
+        file["fclib_local/vectors/q"][:] = q
+    assert supervisor.do(asked).status == "converged"
 
 
 def test_a_supervisor_that_is_killed_is_replaced(

@@ -65,7 +65,7 @@ class Meter:
             with contextlib.suppress(OSError):
                 group.mkdir()
                 self.group = group
-        self.by_group = self.group is not None and (self.group / "memory.current").exists()
+        self.by_group = self.group is not None and (self.group / "memory.stat").exists()
         # [s] of descendants that had ended before
         self._ended = self._own_ended()
         self._offset = 0.0  # [MB] of resident size that is not in the proportional one
@@ -116,8 +116,8 @@ class Meter:
         """[MB] in memory, each page once."""
         if self.by_group:
             assert self.group is not None
-            with contextlib.suppress(OSError, ValueError):
-                return int((self.group / "memory.current").read_text()) / 1e6
+            with contextlib.suppress(OSError, ValueError, KeyError):
+                return of_group((self.group / "memory.stat").read_text())
         members = self.members()
         if len(members) <= 1:
             return processes.resident(self.pid)
@@ -145,6 +145,12 @@ class Meter:
         if self.group is not None:
             remove(self.group)
         return status
+
+
+def of_group(stat: str) -> float:
+    """[MB] of a control group by its memory.stat, without the cache of the files that it reads."""
+    sizes = {name: int(size) for name, size in map(str.split, stat.splitlines())}
+    return (sizes["anon"] + max(sizes["shmem"], sizes["file_mapped"])) / 1e6
 
 
 def remove(group: Path) -> None:

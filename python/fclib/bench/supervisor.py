@@ -90,6 +90,7 @@ class Watch:
         if self.measured:
             processes.forget_peak(meter.pid)
             self.memory_before = self.memory = meter.memory()
+            self.resident_before = processes.resident(meter.pid)
             self.own_before = processes.cpu_clock(meter.pid)
             self.cpu_before = meter.cpu()
         self.own = 0.0  # [s] of CPU of the worker alone
@@ -126,9 +127,9 @@ class Watch:
         self.end = time.monotonic()
         self.cpu = max(self.cpu, self.meter.cpu() - self.cpu_before)
         self.own = processes.cpu_clock(self.meter.pid) - self.own_before
-        peaks = (self.meter.memory(), processes.peak_memory(self.meter.pid))
-        # that of a process says nothing of a group which a controller counts
-        self.memory = max(self.memory, *peaks[: 1 if self.meter.by_group else 2])
+        # between two looks: what the worker itself has grown by
+        grown = processes.peak_memory(self.meter.pid) - self.resident_before
+        self.memory = max(self.memory, self.meter.memory(), self.memory_before + grown)
 
     def limit_cpu(self, seconds: int) -> None:
         """Set RLIMIT_CPU of each process, for the case that this one is held up.

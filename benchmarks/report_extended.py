@@ -79,7 +79,7 @@ def opened(site: Path) -> dict[str, tuple[float, float]]:
         found[name].append((seconds, busy(tools) - before))
 
     with sync_playwright() as playwright:
-        chromium = shutil.which("chromium")
+        chromium = shutil.which("chromium-headless-shell") or shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for _ in range(REPEATS):
             for name in ("overview", "catalogue"):

@@ -88,7 +88,7 @@ def open_pages(site: Path) -> dict[str, tuple[float, float]]:
     }
     found: dict[str, tuple[float, float]] = {}
     with sync_playwright() as playwright:
-        chromium = shutil.which("chromium")
+        chromium = shutil.which("chromium-headless-shell") or shutil.which("chromium")
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for name, (address, mark) in marks.items():
             times, busy = [], []

@@ -83,7 +83,8 @@ def main() -> int:
     parser.add_argument("files", nargs="+", type=Path, metavar="FILE", help="FCLIB files")
     _results.add_option(parser)
     arguments = parser.parse_args()
-    chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    known = ("chromium-headless-shell", "chromium", "chromium-browser")
+    chromium = next(filter(None, map(shutil.which, known)), None)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         site = Path(folder) / "site"

@@ -83,6 +83,8 @@ PAGES = {
     "report-pair": ("index.html#/profiles", "main .plot >> nth=-1", (1100, 900)),
     "report-network": ("network.html", ".scene .plot", (1100, 900)),
 }
+# in the order of preference; the first is what the tests install
+CHROMIUM = ("chromium-headless-shell", "chromium", "chromium-browser")
 SHOWN = "standard/Arch/0064"  # its forces are of its reference solution
 
 
@@ -212,9 +214,8 @@ def stored_runs(folder: Path, store: Path) -> None:
     last = {(run.digest, run.solver): run for run in sorted(rows, key=standing.when)}
     with Store(store) as target:
         for run in last.values():
-            # without the hash of a solver's code: what was built twice would count as two
-            version, method = run.version.partition("-")[0], methods.get(run.solver, "")
-            choice = SolverChoice(run.solver, {}, version, method, "fclib")
+            # without their version: a solver that ran again after a change would count as two
+            choice = SolverChoice(run.solver, {}, "", methods.get(run.solver, ""), "fclib")
             seconds = run.limit or 0.0
             limits = Limits(time=seconds, wall=3 * seconds, memory=4000.0)
             record = Record(
@@ -246,7 +247,7 @@ def pages(wanted: list[str], site: Path, out: Path) -> None:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
-        chromium = driver.chromium.launch(executable_path=chromium_path())
+        chromium = driver.chromium.launch(executable_path=chromium_path(), args=["--no-sandbox"])
         for name in wanted:
             place, part, (width, height) = PAGES[name]
             page = chromium.new_page(viewport={"width": width, "height": height})
@@ -266,7 +267,7 @@ def pages(wanted: list[str], site: Path, out: Path) -> None:
 
 def chromium_path() -> str | None:
     """Of the system, where there is one; else Playwright's own."""
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+    return next(filter(None, map(shutil.which, CHROMIUM)), None)
 
 
 def main() -> int:

@@ -52,7 +52,8 @@ def main() -> int:
             data = content if isinstance(content, bytes) else content.encode()
             (folder / path).write_bytes(data)
         handler = partial(_Quiet, directory=name)
-        chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+        known = ("chromium-headless-shell", "chromium", "chromium-browser")
+        chromium = next(filter(None, map(shutil.which, known)), None)
         with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server, sync_playwright() as driver:
             threading.Thread(target=server.serve_forever, daemon=True).start()
             browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])

@@ -17,6 +17,7 @@ import pytest
 
 import fclib
 from fclib.bench import profiles
+from fclib.collections import known, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers_browser import chromium
 from helpers_report import LABELS, make_collection, make_store, periodic_step, read_data
@@ -458,6 +459,24 @@ def test_a_page_of_one_problem(browser: Any, collection: Path, tmp_path: Path) -
         assert not go.wrong
 
 
+def test_a_long_thin_scene_begins_near_its_middle(browser: Any, tmp_path: Path) -> None:
+    distances = {}
+    for family in ("Chain", "Arch"):
+        stored = known.plan_of(f"standard/{family}").trajectory
+        assert stored is not None
+        target = tmp_path / f"{family}.html"
+        write_view(view_of(trajectory.read(stored).problem(0).problem), target)
+        go = Opener(browser, target)
+        page = go("")
+        eye = draw(page, ".scene .plot").evaluate("plot => plot.layout.scene.camera.eye")
+        distances[family] = float(np.linalg.norm(list(eye.values())))
+        assert ("long and thin" in page.inner_text(".scene")) == (family == "Chain")
+        for context in go.contexts:
+            context.close()
+        assert not go.wrong
+    assert distances["Chain"] < 0.5 * distances["Arch"]
+
+
 def test_a_page_without_positions_says_so(browser: Any, collection: Path, tmp_path: Path) -> None:
     problem = read(sorted(collection.rglob("*-local.hdf5"))[-1])
     bare = problem.replace(bodies=None, contacts=None)
@@ -604,6 +623,8 @@ FILTERS = {
     "error < 1e-6": [0],
     'error = ""': [1],
     "solved by < 50%": [1],
+    "solved by < 50 %": [1],
+    "contacts < 100 or solved by = 100 %": [0, 2],
     "": [0, 1, 2],
     "nothing": [],
     "colour = red": "no column colour",
@@ -613,6 +634,9 @@ FILTERS = {
     "(nc > 5": "not closed",
     "nc > 5 or": "missing at the end",
     "nc > 5)": ") is not understood",
+    "nc > 1 000": "written as one, 1000",
+    "nc > 1,000": "written as one, 1000",
+    "50 < nc": "the column comes first",
     "and": "and stands where",
 }
 

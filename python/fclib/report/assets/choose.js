@@ -42,8 +42,8 @@
       const name = (r) => s.solvers[r.s].label, tol = Fclib.tolerance(s.tolerances[state.ctol]);
       if (!rows.length) { says.replaceChildren("No problem like that was run to this tolerance."); table.replaceChildren(); return; }
       const [best, second] = rows, [low, high] = Fclib.odds(best.solved, best.of);
-      says.replaceChildren("Take ", h("b", {}, link("solver", [name(best)], {}, name(best))), `: it solved ${best.solved} of ${best.of} such problems to ${tol} (${Fclib.percent(best.solved / best.of)}; for the next one ${Math.round(100 * low)} to ${Math.round(100 * high)} %), in ${number(best.mean)} s in the mean`,
-        ...second ? [`; then `, link("solver", [name(second)], {}, name(second)), `, ${second.solved} of ${second.of} in ${number(second.mean)} s`] : [], `. By ${runs} runs: `, h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"), ".");
+      says.replaceChildren("Take ", h("b", {}, link("solver", [name(best)], {}, name(best))), `. It solved ${best.solved} of ${best.of} such problems to ${tol}, and should solve the next one with a chance of ${Math.round(100 * low)} to ${Math.round(100 * high)} %. Its mean CPU time is ${number(best.mean)} s, where a failure counts as ${number(10 ** state.weight)} times the limit.`,
+        ...second ? [" The second is ", link("solver", [name(second)], {}, name(second)), `: ${second.solved} of ${second.of}, ${number(second.mean)} s.`] : [], ` This follows from ${runs} runs: `, h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"), ".");
       table.replaceChildren(h("details", {}, h("summary", {}, "All solvers by this weight"), Fclib.table({
         caption: "Solvers, the best first; a failure is charged so many times the limit as the weight says", rows, page: 20, sort: { key: "mean", down: false },
         columns: [{ key: "solver", label: "solver", head: true, value: name, cell: (r) => link("solver", [name(r)], {}, name(r)) }, { key: "solved", label: "solved" }, { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved }, { key: "refused", label: "does not take it" }, { key: "mean", label: "mean [s]", type: "number" }],
@@ -63,7 +63,7 @@
   // ---- classes, and what is open
   Fclib.pages.classes = async (page) => {
     const s = site(), list = s.standings || [];
-    page.append(h("h1", {}, "Easy, hard and open"), h("p", {}, "A problem is easy where more than half of the solvers that take it solve it, hard where fewer do, and open where none has, and no solution that came from elsewhere is within the tolerance."));
+    page.append(h("h1", {}, "Easy, hard and open"), h("p", {}, "A problem is easy if more than half of the solvers that take it solve it, and hard if fewer do. It is open if no solver has solved it, and nobody else's solution is within the tolerance."));
     if (!list.length) page.append(h("p", {}, "No stored runs came with this report: they are in the package fclib-collection."));
     for (const one of list) {
       page.append(h("h2", {}, one.set), h("p", { class: "small" }, `Classes ${one.basis}.`));

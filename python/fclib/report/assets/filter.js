@@ -45,19 +45,26 @@
         at += found[1];
         const { text: sign } = tokens[at++], value = tokens[at++];
         if (!value || (!value.quoted && (value.text === ")" || SIGNS.has(value.text)))) throw new Wrong(`${column.label} ${sign} needs a value`);
-        const of = read[column.key], wanted = value.text, bound = Number(wanted.replace(/%$/, "")) / (wanted.endsWith("%") ? 100 : 1);
+        let wanted = value.text, end = value.to;
+        if (!value.quoted && !Number.isNaN(Number(wanted)) && peek() && !peek().quoted) {
+          const after = peek(isWord(",") ? 1 : 0);
+          if (isWord("%")) { end = tokens[at++].to; wanted += "%"; }
+          else if (/^\d{1,3}$/.test(wanted) && after && !after.quoted && /^\d{3}$/.test(after.text)) throw new Wrong(`${wanted} and ${after.text}: a number is written as one, ${wanted}${after.text}`);
+        }
+        const of = read[column.key], bound = Number(wanted.replace(/%$/, "")) / (wanted.endsWith("%") ? 100 : 1);
         if (COMPARE[sign]) {
           if (wanted === "" || Number.isNaN(bound)) throw new Wrong(`${wanted} is no number, and ${column.label} ${sign} needs one`);
-          return note(first.from, value.to, (k) => typeof of(k) === "number" && COMPARE[sign](of(k), bound));
+          return note(first.from, end, (k) => typeof of(k) === "number" && COMPARE[sign](of(k), bound));
         }
         // few values stand in many rows: each is compared once
         const target = plain(wanted), seen = new Map();
         const same = (v) => wanted === "" ? v === null || v === undefined || v === "" : v === bound || (v !== null && v !== undefined && plain(v === true ? "yes" : v === false ? "no" : String(v)) === target);
         const equal = (v) => { let known = seen.get(v); if (known === undefined) seen.set(v, known = same(v)); return known; };
-        return note(first.from, value.to, (k) => equal(of(k)) === (sign === "="));
+        return note(first.from, end, (k) => equal(of(k)) === (sign === "="));
       }
       if (isSign(0)) throw new Wrong(`${first.text} stands without a column before it`);
       at++;
+      if (isSign(0) && !first.quoted && !Number.isNaN(Number(first.text))) throw new Wrong(`${first.text} stands before ${peek().text}: the column comes first, as in contacts > 50`);
       if (isSign(0)) throw new Wrong(`there is no column ${first.text}; there are: ${known()}`);
       if (!first.quoted && /^[!&|,]$/.test(first.text)) throw new Wrong(`${first.text} is not understood; and, or, not, != are`);
       const part = first.text.toLowerCase();

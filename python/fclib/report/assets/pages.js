@@ -269,7 +269,7 @@
       let parsed;
       try { parsed = Fclib.parseFilter(state.q, { columns: shownColumns, read, words }); } catch (error) {
         says.className = "small bad";
-        says.textContent = `The filter is not understood: ${error.message}. ${listed.length ? "Listed is what was there before." : "Nothing is listed."}`;
+        says.textContent = `The filter is not understood: ${error.message}. ${listed.length ? "The list is as it was before." : "Nothing is listed."}`;
         return listed;
       }
       const limits = sliders.flatMap(({ key }) => [[`${key}+`, (v, x) => v >= x], [`${key}-`, (v, x) => v <= x]].filter(([name]) => state[name] !== "").map(([name, within]) => (k) => { const v = read[key](k); return v !== null && v !== undefined && within(v, Number(state[name])); }));
@@ -313,7 +313,7 @@
       table,
       h("details", {}, h("summary", {}, "What the columns are"), facts(shownColumns.map((c) => [c.label, [c.doc, c.doc && " ", h("code", {}, c.key)]]))),
       h("details", {}, h("summary", {}, "What the filter understands"),
-        h("p", { class: "small" }, "A word is looked for in names, titles, kinds, classes, applications and what families say of themselves. A condition is a column, by its label or its name, one of = != < > <= >= and a value. Blanks between mean ", h("code", {}, "and"), "; ", h("code", {}, "or"), ", ", h("code", {}, "not"), " and brackets work; what has blanks stands in \"quotes\"."),
+        h("p", { class: "small" }, "A word is looked for in names, titles, kinds, classes, applications and the descriptions of families. A condition is a column, a sign and a value, in this order. A column has its label or its name, and the signs are = != < > <= >=. A blank between two words or conditions means ", h("code", {}, "and"), ". You can also write ", h("code", {}, "or"), ", ", h("code", {}, "not"), " and brackets. Put a text with blanks into \"quotes\"."),
         h("ul", { class: "small" }, ["contacts > 100 and μ max < 0.5", "masonry (class = hard or class = open)", "form != G3DFC", "best solver = nsgs", "\"tower of\" not rt444", "solved by < 50%"].map((text) => h("li", {}, h("a", { href: to("catalogue", [], { q: text }) }, h("code", {}, text))))),
         h("p", { class: "small" }, "The address of this page keeps the filter.")));
     says.after(Fclib.selection(() => listed));

@@ -148,7 +148,9 @@
     };
     const { from, to, ratios } = window3d(), far = Math.max((Fclib.isNarrow() ? 1.4 : 1.1) * length(ratios), 1.6 * ratios[2]);
     const eye = (turn, tilt, distance) => ({ x: distance * Math.cos(tilt) * Math.sin(turn), y: -distance * Math.cos(tilt) * Math.cos(turn), z: distance * Math.sin(tilt) });
-    const start = { eye: eye(0.6, placed ? 0.3 : 0.4, far), center: { x: 0, y: 0, z: -0.05 }, up: { x: 0, y: 0, z: 1 } };
+    // a long thin scene is shown from near its middle, or no body could be seen; picture.py has the same bound
+    const thin = placed && moving.length > 2 && [...ratios].sort((a, b) => b - a)[1] < 0.15;
+    const start = { eye: eye(0.6, placed ? 0.3 : 0.4, thin ? 0.25 * far : far), center: { x: 0, y: 0, z: thin ? 0 : -0.05 }, up: { x: 0, y: 0, z: 1 } };
     const look = (box, camera) => Plotly.relayout(box, { "scene.camera": camera });
     const move = (turn, tilted, factor) => (box) => {
       const now = box.layout.scene.camera, { x, y, z } = now.eye, distance = Math.hypot(x, y, z);
@@ -209,6 +211,7 @@
       table: () => Fclib.table({ caption: "Contacts", name: `contacts-${name}`, columns, rows: points.map((_, k) => ({ k })), page: 25, largest: true }),
       note: [solved && h("ul", { class: "legend" }, STATUS.map((status, s) => h("li", {}, h("span", { class: "key", style: `background: var(--${status})` }), `${status} (${[...view.status].filter((one) => Number(one) === s).length})`))),
         source === "file" ? `To scale, in ${unit}: shapes and positions as the file has them${solids.strain ? "; colour is the displacement since there was no stress" : ""}${flat ? "; a plane" : ""}.` : placed ? `To scale, in metres: ${note}. A body is drawn as the hull of its centre and its contacts: its shape is not known.` : `A network without positions, laid out ${note}.`,
+        thin && !flat && " The scene is long and thin: this is its middle, and − shows more of it.",
         limits.length > 0 && ` ${limits.length} of the contacts are limits of joints or dry friction in them, which have no place.`,
         solved && (view.forces ? " An arrow is the force on that body of the two which it lifts; its colour is the contact's status." : " The size of a disc is that of the reaction.")],
     });

@@ -192,7 +192,7 @@ static int take_times_of_writes(const struct library* theirs, const struct libra
   if (!p.local) p = read_problem(ours, from, 0);
   if (!p.local && !p.global) return 3;
   const struct library* library[3] = {theirs, ours, ours};
-  const int level[3] = {0, 0, FCLIB_COMPRESS_CHEAPLY};
+  const int level[3] = {0, 0, 6};
   double least[3] = {1e9, 1e9, 1e9};
   const double begun = now();
   for (int turn = 0; turn < 5 || (now() - begun < limit && turn < 1000); turn++) {

@@ -6,7 +6,7 @@
 Local problems with a W of random numbers, of numbers that come again and of equal blocks, and the
 local problems in the files, are written by the C library at each level: the least CPU time of the
 repeats, which take the levels by turns, over that of level 0, and the bytes over those of level 0.
-`cheap` is what the library does at first. Builds our C library first, where --library names none.
+Builds our C library first, where --library names none.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from _c_library import c_library
 
 import fclib
 
-LEVELS = {"plain": 0, "cheap": -1, "1": 1, "6": 6}
+LEVELS = {"plain": 0, "1": 1, "3": 3, "6": 6}
 
 
 def made(entries: int) -> dict[str, fclib.LocalProblem]:

@@ -164,7 +164,7 @@ void bind_hdf5(nb::module_& m) {
       "Puts a solution into a file that has its problem, in place of the one it had, atomically. "
       "It is that of the global problem where the file holds several.\n\n"
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
-      "outside -1..9 (-1: only what packs at once).");
+      "outside 0..9.");
   m.def(
       "read_attributes",
       [](const fs::path& path, const std::string& group) {
@@ -216,7 +216,7 @@ void bind_hdf5(nb::module_& m) {
       "Puts guesses into a file that has their problem, atomically: in place of those it had "
       "(\"replace\"), or after them (\"add\").\n\n"
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
-      "or a compression outside -1..9 (-1: only what packs at once).");
+      "or a compression outside 0..9.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
         "write",
@@ -257,7 +257,7 @@ void bind_hdf5(nb::module_& m) {
         "9. Dense matrices are written by rows, which every reader takes; dense keeps those of a "
         "local problem as they are.\n\n"
         "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
-        "mode or a compression outside -1..9 (-1: only what packs at once).");
+        "mode or a compression outside 0..9.");
   });
 }
 

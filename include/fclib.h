@@ -243,14 +243,9 @@ enum fclib_write_mode {
 /** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */
 int fclib_set_write_mode(enum fclib_write_mode mode);
 
-/** New. A level of compression that costs little: large arrays that shrink to a 16th are packed,
- *  at level 1, all others are stored as they are. */
-#define FCLIB_COMPRESS_CHEAPLY (-1)
-
-/** New. Sets the level of compression of all writes of the process: FCLIB_COMPRESS_CHEAPLY, which
- * it is at first unless the environment's FCLIB_COMPRESSION says 0 to 9; 0 (none); 1 to 9, of which
- * 6 is for archives. The filters are those that every HDF5 has. Returns 1, or 0 for a level
- * outside.
+/** New. Sets the level of compression of all writes of the process: 0 (none), as 3.1 has it, which
+ * it is at first unless the environment's FCLIB_COMPRESSION says 0 to 9; or 1 to 9, of which 6 is
+ * for archives. The filters are those that every HDF5 has. Returns 1, or 0 for a level outside.
  */
 int fclib_set_compression(int level);
 
@@ -425,7 +420,7 @@ const char* fclib_status_name(enum fclib_status status);
  *            "time_limit" ([s], 0: none), "merit" ("both", or "natural": without the scaled map),
  *            the options of the solver, the array "guess" (m reactions to start from), and a
  *            function that is told of the progress
- *  a write   "mode" ("add", "replace"), "compression" (-1 to 9): in the place of what
+ *  a write   "mode" ("add", "replace"), "compression" (0 to 9): in the place of what
  *            fclib_set_write_mode() and fclib_set_compression() have set for all
  *
  *  A name that the call does not know is an error of that call. */

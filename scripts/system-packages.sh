@@ -26,6 +26,9 @@ need libgtest-dev sh -c 'pkg-config --exists gtest || ls /usr/include/gtest/gtes
 # orders large factorisations, which go without where it is not
 ls /usr/include/metis.h /usr/local/include/metis.h 2>/dev/null | grep -q . || optional=" libmetis-dev"
 
+# packs and unpacks the arrays of files, in a part of the time that zlib takes
+ls /usr/include/libdeflate.h /usr/local/include/libdeflate.h 2>/dev/null | grep -q . || optional="$optional libdeflate-dev"
+
 # draws the picture of the demo, which goes without where it is not; ldconfig is not on every PATH
 if ! { PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true; } | grep -qE 'libOSMesa|libEGL'; then optional="$optional libosmesa6"; fi
 # shows the report's pages to the tests, at a quarter of what the whole browser takes

@@ -19,11 +19,11 @@ namespace fclib::c {
 
 namespace {
 
-/// The level that the environment names, or one that costs a client next to nothing.
+/// The level that the environment names, or none, as libfclib 3.1 has it.
 int first_compression() {
   const char* const named = std::getenv("FCLIB_COMPRESSION");
   const bool level = named != nullptr && *named >= '0' && *named <= '9' && named[1] == '\0';
-  return level ? *named - '0' : compress_cheaply;
+  return level ? *named - '0' : 0;
 }
 
 // settings of the process
@@ -42,10 +42,8 @@ struct Asked {
     using A = Asked;
     return std::tuple{
         OptionField<A, Mode>{.name = "mode", .member = &A::mode, .choices = modes},
-        OptionField<A, int>{.name = "compression",
-                            .member = &A::compression,
-                            .lowest = compress_cheaply,
-                            .highest = 9},
+        OptionField<A, int>{
+            .name = "compression", .member = &A::compression, .lowest = 0, .highest = 9},
     };
   }
 };
@@ -272,9 +270,8 @@ int fclib_set_write_mode(fclib_write_mode mode) {
 
 int fclib_set_compression(int level) {
   return guarded(0, [&] {
-    if (level < FCLIB_COMPRESS_CHEAPLY || level > 9) {
-      fail("compression level",
-           std::to_string(level) + " is neither in 0..9 nor FCLIB_COMPRESS_CHEAPLY");
+    if (level < 0 || level > 9) {
+      fail("compression level", std::to_string(level) + " is not in 0..9");
     }
     compression = level;
     return 1;

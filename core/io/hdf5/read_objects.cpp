@@ -63,6 +63,7 @@ void require_chunks(const Handle& properties, hid_t dataset, double entries, dou
 
 void read_as(const Numbers& dataset, hid_t memory, void* values) {
   if (dataset.size > 0 &&
+      !read_chunks(dataset.id.id(), dataset.packing, memory, dataset.size, values) &&
       H5Dread(dataset.id.id(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
     fail(dataset.path, "cannot be read (the file is damaged or cut short)");
   }
@@ -97,7 +98,8 @@ Numbers open_numbers(const Group& group, const std::string& name, bool integers)
   }
   const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
                                                  (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
-  return {std::move(dataset), path, size, narrow};
+  return {std::move(dataset), path, size, narrow,
+          properties.ok() ? packing_of(properties.id()) : Packing()};
 }
 
 void read_into(const Numbers& dataset, double* values) {

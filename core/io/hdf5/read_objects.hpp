@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "io/hdf5/chunks.hpp"
 #include "io/hdf5/handles.hpp"
 
 namespace fclib::hdf5 {
@@ -17,6 +18,7 @@ struct Numbers {
   std::string path;
   std::size_t size;
   bool narrow;  ///< integers of 32 bits at most, with their sign
+  Packing packing;
 };
 
 Numbers open_numbers(const Group& group, const std::string& name, bool integers);

@@ -1,7 +1,6 @@
 #include "io/hdf5/transaction.hpp"
 
 #include <filesystem>
-#include <optional>
 
 #include "io/hdf5/memory_file.hpp"
 #include "io/hdf5/write.hpp"
@@ -24,10 +23,8 @@ MemoryFile copy_of(const std::string& path) {
 }
 
 void require_level(int compression) {
-  if (compression < compress_cheaply || compression > 9) {
-    throw Error(ErrorKind::option,
-                "is " + std::to_string(compression) +
-                    ", but must be 0 to 9, or -1 (only what packs at once)",
+  if (compression < 0 || compression > 9) {
+    throw Error(ErrorKind::option, "is " + std::to_string(compression) + ", but must be 0 to 9",
                 "the compression level");
   }
 }
@@ -45,14 +42,8 @@ void change_file(const std::string& path, Start start, int compression,
     const bool existing =
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
     MemoryFile file = existing ? copy_of(path) : MemoryFile();
-    std::optional<MemoryFile> scratch;
-    const Style style(
-        compression,
-        [&] {
-          if (!scratch) scratch.emplace();
-          return scratch->id();
-        },
-        [&](const void* data, std::size_t size) { file.lend(data, size); });
+    const Style style(compression,
+                      [&](const void* data, std::size_t size) { file.lend(data, size); });
     const Target root{{file.id(), "/"}, &style};
     if (!existing) {
       write_text_attribute(root, "format", format_version);

@@ -9,10 +9,6 @@
 
 namespace fclib {
 
-/// A level of compression: deflate at level 1, of those arrays alone that it packs in next to no
-/// time, since they shrink to a small part.
-constexpr int compress_cheaply = -1;
-
 /// How a file is written.
 struct WriteOptions {
   bool validate = true;  ///< false: the data goes in as it is, nothing checked, no matrix converted
@@ -20,7 +16,7 @@ struct WriteOptions {
   bool replace = false;  ///< what is there already gives way; false: it is an error
   bool dense = false;    ///< false: a dense matrix goes in by rows, since 3.1 reads no dense ones;
                          ///< without validation all stays as it is
-  int compression = 6;   ///< level of deflate, 0 (none) to 9, or compress_cheaply
+  int compression = 6;   ///< level of deflate, 0 (none) to 9
 };
 
 /// Writes a new file, or replaces the old one whole; or adds to it (WriteOptions::append), where a

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "io/hdf5/chunks.hpp"
+
 namespace fclib::hdf5 {
 
 namespace {
@@ -21,11 +23,6 @@ constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
 constexpr std::size_t index_bytes = 254;
 /// What the filter of an array is found by.
 constexpr std::size_t sample_entries = std::size_t{1} << 12;
-/// What is packed cheaply shrinks to this part: the time that deflate takes goes with what it
-/// leaves.
-constexpr double cheap_part = 1.0 / 16;
-/// ... and what by its numbers and bytes would keep more than this is not tried.
-constexpr double hopeless_part = 0.35;
 /// Datasets up to this many bytes lie in their own header.
 constexpr std::size_t compact_bytes = 4096;
 /// Groups of up to this many members keep them in their own header: all of ours do.
@@ -53,33 +50,19 @@ Handle dataset_properties() {
   return properties;
 }
 
-/// The properties of a dataset in chunks.
-Handle packed(const Array& array, Filter filter, int compression) {
-  Handle layout = dataset_properties();
-  const hsize_t chunk = std::min(array.size, chunk_bytes / H5Tget_size(array.stored));
-  H5Pset_chunk(layout.id(), 1, &chunk);
-  if (filter == Filter::shuffle_and_deflate) H5Pset_shuffle(layout.id());
-  H5Pset_deflate(layout.id(), compression < 0 ? 1U : static_cast<unsigned>(compression));
-  return layout;
-}
-
-Handle create_array(hid_t group, const std::string& name, const Array& array, Filter filter,
-                    const Style& style) {
+Handle create_dataset(const Group& group, const std::string& name, const Array& array,
+                      const Handle& layout) {
   const hsize_t extent = array.size;
   const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
-  const Handle own =
-      filter != Filter::none ? packed(array, filter, style.compression) : Handle(-1, H5Pclose);
-  const hid_t layout = own.ok()                         ? own.id()
-                       : array.bytes() <= compact_bytes ? style.compact.id()
-                                                        : style.plain.id();
-  Handle dataset(
-      H5Dcreate2(group, name.c_str(), array.stored, space.id(), H5P_DEFAULT, layout, H5P_DEFAULT),
-      H5Dclose);
-  if (!dataset.ok()) fail(name, "cannot be created");
-  if (array.size > 0) {
-    check(H5Dwrite(dataset.id(), array.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data), name);
-  }
+  Handle dataset(H5Dcreate2(group.id, name.c_str(), array.stored, space.id(), H5P_DEFAULT,
+                            layout.id(), H5P_DEFAULT),
+                 H5Dclose);
+  if (!dataset.ok()) fail(group.child(name), "cannot be created");
   return dataset;
+}
+
+void write_all(const Handle& dataset, const Array& array, const std::string& path) {
+  check(H5Dwrite(dataset.id(), array.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data), path);
 }
 
 /// How many of these doubles differ from all others.
@@ -124,67 +107,53 @@ double bytes_by_planes(const double* values, std::size_t size) {
   return bits / 8;
 }
 
-/// The parts that are likely to be left of doubles by deflate, told from their beginning. Shuffling
-/// gathers the bytes that numbers of one size share, but hides numbers that come again: these
-/// deflate finds, at one to two bytes each.
-struct LikelyParts {
-  double plain;
-  double shuffled;
-};
-LikelyParts likely_parts(const Array& array) {
+/// The filter that makes an array small, by the part that deflate is likely to leave of doubles,
+/// told from their beginning. Shuffling gathers the bytes that numbers of one size share, but hides
+/// numbers that come again: these deflate finds, at one to two bytes each. Indices are shuffled.
+/// (Against a trial of both: 0.7 % more bytes in the collection.)
+Filter likely_filter(const Array& array) {
+  if (H5Tget_size(array.stored) != sizeof(double)) return Filter::shuffle_and_deflate;
   const auto* values = static_cast<const double*>(array.data);
   const std::size_t size = std::min(array.size, sample_entries);
   const auto fresh = static_cast<double>(distinct(values, size));
   const double repeated = static_cast<double>(size) - fresh;
   const double bytes = sizeof(double) * static_cast<double>(size);
-  return {(7.6 * fresh + 1.6 * repeated) / bytes, bytes_by_planes(values, size) / bytes};
-}
-
-bool has_doubles(const Array& array) { return H5Tget_size(array.stored) == sizeof(double); }
-
-/// The filter that makes an array small. Indices are shuffled. (Against a trial of both: 0.7 % more
-/// bytes in the collection.)
-Filter likely_filter(const Array& array) {
-  if (!has_doubles(array)) return Filter::shuffle_and_deflate;
-  const auto [plain, shuffled] = likely_parts(array);
-  const auto bytes = static_cast<double>(array.bytes());
-  if (bytes * std::min(plain, shuffled) + index_bytes > bytes) return Filter::none;
+  const double plain = (7.6 * fresh + 1.6 * repeated) / bytes;
+  const double shuffled = bytes_by_planes(values, size) / bytes;
+  const auto all = static_cast<double>(array.bytes());
+  if (all * std::min(plain, shuffled) + index_bytes > all) return Filter::none;
   return plain < shuffled ? Filter::deflate : Filter::shuffle_and_deflate;
 }
 
-/// The filter of an array; where only what packs at once is packed, found by a trial.
-Filter best_filter(const Target& group, const Array& array) {
-  const Style& style = *group.style;
-  if (array.size < chunked_from || style.compression == 0) return Filter::none;
-  if (style.compression > 0) return likely_filter(array);
-  if (array.size < 8 * sample_entries) return Filter::none;  // not worth a trial
-  if (has_doubles(array)) {
-    const auto [plain, shuffled] = likely_parts(array);
-    if (std::min(plain, shuffled) > hopeless_part) return Filter::none;
+/// Packs an array with this filter, at a level from 1 on.
+void write_packed(const Target& group, const std::string& name, const Array& array, Filter filter) {
+  const std::size_t width = H5Tget_size(array.stored);
+  const Packing packing{.chunk = std::min(array.size, chunk_bytes / width),
+                        .shuffled = filter == Filter::shuffle_and_deflate};
+  const int level = group.style->compression;
+  const Handle layout = dataset_properties();
+  const hsize_t chunk = packing.chunk;
+  H5Pset_chunk(layout.id(), 1, &chunk);
+  if (packing.shuffled) H5Pset_shuffle(layout.id());
+  H5Pset_deflate(layout.id(), static_cast<unsigned>(level));
+  const Handle dataset = create_dataset(group, name, array, layout);
+  const Bytes bytes{static_cast<const char*>(array.data), array.size, width};
+  if (!write_chunks(dataset.id(), bytes, packing, level, group.child(name))) {
+    write_all(dataset, array, group.child(name));
   }
-  const hid_t scratch = style.scratch();
-  Array sample = array;
-  sample.size = sample_entries;
-  Filter best = Filter::none;
-  auto least = static_cast<std::size_t>(cheap_part * static_cast<double>(sample.bytes()));
-  for (const Filter filter : {Filter::shuffle_and_deflate, Filter::deflate}) {
-    std::size_t size = index_bytes;
-    {
-      const Handle trial = create_array(scratch, "trial", sample, filter, style);
-      check(H5Dflush(trial.id()), "");
-      size += H5Dget_storage_size(trial.id());
-    }
-    check(H5Ldelete(scratch, "trial", H5P_DEFAULT), "");
-    if (size < least) {
-      best = filter;
-      least = size;
-    }
-  }
-  return best;
 }
 
 void write_array(const Target& group, const std::string& name, const Array& array) {
-  create_array(group.id, name, array, best_filter(group, array), *group.style);
+  const Style& style = *group.style;
+  const bool packable = array.size >= chunked_from && style.compression > 0;
+  const Filter filter = packable ? likely_filter(array) : Filter::none;
+  if (filter != Filter::none) {
+    write_packed(group, name, array, filter);
+    return;
+  }
+  const Handle& layout = array.bytes() <= compact_bytes ? style.compact : style.plain;
+  const Handle dataset = create_dataset(group, name, array, layout);
+  if (array.size > 0) write_all(dataset, array, group.child(name));
 }
 
 Handle text_type(const std::string& text) {
@@ -207,10 +176,8 @@ Handle compact_properties() {
 
 }  // namespace
 
-Style::Style(int level, std::function<hid_t()> scratch_of,
-             std::function<void(const void* data, std::size_t size)> lend_of)
+Style::Style(int level, std::function<void(const void* data, std::size_t size)> lend_of)
     : compression(level),
-      scratch(std::move(scratch_of)),
       lend(std::move(lend_of)),
       group(group_properties()),
       plain(dataset_properties()),

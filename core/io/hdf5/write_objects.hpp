@@ -12,13 +12,10 @@ namespace fclib::hdf5 {
 /// How a whole file is written. The properties are made once: HDF5 takes longer to make them than
 /// to write a number.
 struct Style {
-  /// `scratch` gives a group of another file, to try things in; it is asked for where it is needed.
   /// `lend` is told of numbers that stay where they are until the file is written.
-  Style(int compression, std::function<hid_t()> scratch,
-        std::function<void(const void* data, std::size_t size)> lend);
+  Style(int compression, std::function<void(const void* data, std::size_t size)> lend);
 
   int compression;
-  std::function<hid_t()> scratch;
   std::function<void(const void* data, std::size_t size)> lend;
   Handle group;
   Handle plain;    ///< a dataset in one piece

@@ -193,6 +193,81 @@ def test_a_loop_in_an_inclined_plane(angle: float, mass: float) -> None:
         assert np.abs(np.asarray(step.result.solution.l)).max() < 1
 
 
+PLACES = [(1e-9, 0.0), (1e-9, 1.0), (1e-3, 0.0), (1e-3, 1e6), (1.0, 1e6), (1e3, 0.0), (1e3, 1e6)]
+
+
+def linkage(size: float, away: float, off: float) -> Scene:
+    """A four-bar linkage in an inclined plane; its last hinge is tied twice, to points off apart.
+
+    A wheel turns with its first bar: of nanometres the other rows are 1e-9 of its row.
+    """
+
+    def bar(k: int, inside: str) -> str:
+        place, length = (lengths[k - 1] if k else 0.0), lengths[k]
+        return (
+            f'<body pos="{place!r} 0 0" euler="0 {turns[k]} 0"><joint name="bar{k}" axis="0 1 0"/>'
+            f'<inertial pos="{length / 2!r} 0 0" mass="{size**-2!r}" diaginertia=".1 .1 .1"/>'
+            f"{inside}</body>"
+        )
+
+    # turned sites: MuJoCo puts others within 1e-6 m of their body there
+    site = '<site name="{}" pos="{!r} 0 {!r}" quat="0.8 0.6 0 0"/>'
+    turns, lengths = (0.3, 1.0, 0.7), (0.5 * size, 0.7 * size, 0.6 * size)
+    inside, angle, x, z = site.format("end", lengths[2], 0.0), 0.0, 0.0, 0.0
+    for k in (2, 1, 0):
+        inside = bar(k, inside)
+    for turn, length in zip(turns, lengths, strict=True):
+        angle += turn
+        x, z = x + length * math.cos(angle), z - length * math.sin(angle)
+    xml = (
+        f'<mujoco><compiler angle="radian"/><option gravity="0 0 {-9.81 * size!r}"/><worldbody>'
+        f'<body pos="{away!r} {0.7 * away!r} 0" euler="0.2 0.1 0.7">{inside}'
+        f"{site.format('first', x, z)}{site.format('second', x + off, z)}</body>"
+        '<body><joint name="wheel" axis="0 0 1"/><inertial pos="0 0 0" mass="1"'
+        ' diaginertia="1 1 1"/></body></worldbody><equality><joint joint1="wheel" joint2="bar0"/>'
+        '<connect name="first" site1="end" site2="first"/>'
+        '<connect name="second" site1="end" site2="second"/></equality></mujoco>'
+    )
+    return Scene(name="loop", xml=xml)
+
+
+@pytest.mark.parametrize(("size", "away"), PLACES)
+def test_a_redundant_loop_runs_at_every_size_and_place(size: float, away: float) -> None:
+    for step in simulate(linkage(size, away, 0.0), 20):
+        assert step.result.converged
+        assert step.problem.p == 7
+    assert 0.1 < np.abs(step.velocity).max() < 10
+
+
+@pytest.mark.parametrize(("size", "away"), PLACES)
+def test_a_contradiction_is_named_at_every_size_and_place(size: float, away: float) -> None:
+    with pytest.raises(fclib.UnsuitableError, match="connect first, connect second contradict"):
+        next(simulate(linkage(size, away, 1e-3 * size), 1))
+
+
+@pytest.mark.parametrize(("size", "away"), [(1.0, 0.0), (1e-3, 1.0), (1.0, 1e6)])
+def test_a_loop_that_moves_only_since_rows_depend_keeps_moving(
+    size: float, away: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Bennett's linkage: each step opens it, where its rows are independent and would lock it."""
+    # scripts of benchmarks/ import what stands beside them
+    monkeypatch.syspath_prepend(Path(__file__).parents[2] / "benchmarks")
+    made: Any = importlib.import_module("loop_rounding")
+    xml = made.document(made.bennett(size), size, away, 0.7, 0.0)
+    for step in simulate(Scene(name="loop", xml=xml), 150):
+        assert step.result.converged
+        assert np.abs(np.asarray(step.result.solution.l)).max() * size < 1
+    assert np.abs(step.velocity).max() > 0.1
+
+
+def test_rows_that_are_small_beside_their_rounding_ask_for_no_large_multipliers() -> None:
+    """Far from the origin a loop in a plane that is inclined by 1e-9: a row of 1e-9."""
+    xml = linkage(1.0, 1e4, 0.0).xml.replace("0.2 0.1 0.7", "1e-9 0 1e-9")
+    for step in simulate(Scene(name="loop", xml=xml), 20):
+        assert step.result.converged
+        assert np.abs(np.asarray(step.result.solution.l)).max() < 1
+
+
 def test_box_at_rest_stays() -> None:
     steps = run(mjcf(SLAB), 100)
     assert {step.problem.nc for step in steps} == {4}

@@ -10,6 +10,7 @@
 arrays.py         what a step needs of sparse matrices, on their arrays
 moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
+equalities.py     MuJoCo's equalities: which follow from others, which contradict them
 mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks too much
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane

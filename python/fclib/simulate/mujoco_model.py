@@ -30,15 +30,14 @@ from fclib.simulate.arrays import (
     Sparse,
     Vector,
     added,
-    columns_of,
     diagonal,
-    empty,
     lengths_of,
     pointers,
     summed,
     take,
     without_zeros,
 )
+from fclib.simulate.equalities import Equalities
 from fclib.simulate.moreau_jean import Contacts, DryFriction, System, components
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
@@ -65,8 +64,6 @@ CONTACTS_FULL, ROWS_FULL, SINGULAR = (
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
     for name in ("CONTACTFULL", "CNSTRFULL", "INERTIA")
 )
-RANK: Final = 1e-9  # what is left of an equality's row, beside the largest, that is rounding
-ROUNDING: Final = 1e-12  # [m, rad] of positions: a gap that is less contradicts nothing
 
 
 class MujocoModel:
@@ -96,6 +93,7 @@ class MujocoModel:
         self._body = m.geom_bodyid.astype(np.intp)
         self._root = m.body_rootid[self._body].astype(np.intp)
         self._pattern = mass_pattern(m)
+        self._ties = Equalities(m)
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         # these change with no configuration where no actuator feeds back
         feeds = (m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE).any()
@@ -201,7 +199,7 @@ class MujocoModel:
         if self._cell:
             # no limits in such a scene: all pairs are geometries
             contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
-        G, violation = equality_columns(d, rows)
+        G, violation = self._ties.columns(d, rows)
         if self._gait:
             # at the end of the step, where its springs are taken too
             d.ctrl[:] = self._gait.controls(d.time + h)
@@ -224,11 +222,12 @@ class MujocoModel:
             self._dry,
         )
 
-    def equalities(self) -> list[str]:
-        """The names (p) of what the columns of G are of, as it was assembled last."""
-        m, d = self.model, self.data
-        kept = kept_equalities(d, take(jacobian(m, d), np.arange(d.ne)))
-        return [equality_name(m, i) for i in d.efc_id[: d.ne][kept]]
+    def equalities(self) -> tuple[list[str], Vector]:
+        """What the columns of G are of, as it was assembled last: names (p), rounding (p) [m, rad].
+
+        The second is what rounding may make of each violation.
+        """
+        return self._ties.of_columns(self.data, jacobian(self.model, self.data))
 
     def control(self, values: Any) -> None:
         """Set the controls (nu) until they are set again. ValueError for another number of them."""
@@ -547,77 +546,3 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     contacts.pair[touching:, 1] = data.efc_id[limits]
     contacts.gap[touching:] = data.efc_pos[limits]
     return H, contacts
-
-
-def equality_columns(d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
-    """G (n x p) and the violation (p) of the equalities.
-
-    Rows that vanish are left out: a loop in a plane has one out of it, which says 0 = 0.
-    """
-    if not d.ne:
-        return empty((rows.shape[0], 0)), np.zeros(0)
-    gradients = take(rows, np.arange(d.ne))
-    kept = kept_equalities(d, gradients)
-    G = take(gradients, kept)
-    return G, consistent(G, d.efc_pos[: d.ne][kept])
-
-
-def kept_equalities(d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
-    """Which rows of equalities do not vanish, by their gradients (n x ne)."""
-    sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
-    return np.flatnonzero(sizes > RANK * sizes.max(initial=0.0))
-
-
-def consistent(G: Sparse, violation: Vector) -> Vector:
-    """The violation (p) without what rounding alone makes of rows that follow from others.
-
-    A loop in an inclined plane has three rows of which two are independent: where the positions are
-    exact but for rounding, the third contradicts them by all that the violations are.
-    """
-    if not violation.any():
-        return violation
-    first, others, share = dependence(G.toarray())
-    if not len(others):
-        return violation
-    follows = share.T @ violation[first]
-    gaps = np.abs(violation[others] - follows)
-    terms = np.abs(violation[others]) + np.abs(share.T) @ np.abs(violation[first])
-    rounded = (gaps > RANK * terms) & (gaps <= ROUNDING)
-    if not rounded.any():
-        return violation
-    result = np.array(violation)
-    result[others[rounded]] = follows[rounded]
-    return result
-
-
-def dependence(
-    columns: Vector,
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Vector]:
-    """Independent ones of the columns (n x p), the others, and these as combinations of those.
-
-    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, to RANK.
-    """
-    import scipy.linalg as la  # takes a while
-
-    _, triangle, order = la.qr(columns, mode="economic", pivoting=True)
-    sizes = np.abs(np.diag(triangle))
-    rank = int((sizes > RANK * sizes.max(initial=0.0)).sum())
-    first, others = order[:rank], order[rank:]
-    share: Any = np.linalg.lstsq(columns[:, first], columns[:, others], rcond=None)[0]
-    return first, others, share
-
-
-def equality_name(m: Any, i: int) -> str:
-    """Of an equality: its own, or what it joins."""
-    kind = mujoco.mjtEq(m.eq_type[i])
-    word = kind.name.removeprefix("mjEQ_").lower()
-    own = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_EQUALITY, i)
-    if own:
-        return f"{word} {own}"
-    joined = mujoco.mjtObj(m.eq_objtype[i])
-    if kind == mujoco.mjtEq.mjEQ_JOINT:
-        joined = mujoco.mjtObj.mjOBJ_JOINT
-    elif kind == mujoco.mjtEq.mjEQ_TENDON:
-        joined = mujoco.mjtObj.mjOBJ_TENDON
-    ends = [mujoco.mj_id2name(m, joined, k) for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0]
-    return f"{word} {i} of {' and '.join(end or 'one without a name' for end in ends)}"

@@ -14,8 +14,9 @@ from fclib import _core, _geometry, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
+from fclib.simulate.equalities import RANK, dependence, gaps_of
 from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
-from fclib.simulate.mujoco_model import RANK, ROUNDING, MujocoModel, dependence
+from fclib.simulate.mujoco_model import MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
@@ -207,18 +208,15 @@ def contradiction(model: Model, system: System) -> str:
     """Which equalities of a scene contradict each other, in words; empty where none do."""
     if not isinstance(model, MujocoModel) or not len(system.violation):
         return ""
-    import scipy.linalg as la  # takes a while
-
-    names = model.equalities()
-    factor = la.cholesky(system.M.toarray(), lower=True)
-    scaled = la.solve_triangular(factor, system.G.toarray(), lower=True)
-    kept, others, share = dependence(scaled)
-    gaps = np.abs(system.violation[others] - share.T @ system.violation[kept])
-    if not gaps.size or not gaps.max() > ROUNDING:
+    names, rounding = model.equalities()
+    columns, violation = system.G.toarray(), system.violation
+    kept, others, share = found = dependence(columns, violation, rounding)
+    gaps, weights = gaps_of(columns, violation, rounding, found)
+    if not gaps.size or not weights.max() > 1:
         return ""
-    worst = int(gaps.argmax())
-    weights = np.abs(share[:, worst])
-    involved = kept[weights > RANK * weights.max(initial=0.0)]
+    worst = int(weights.argmax())
+    shares = np.abs(share[:, worst])
+    involved = kept[shares > RANK * shares.max(initial=0.0)]
     words = sorted({names[k] for k in (others[worst], *involved)})
     return (
         f"the equalities {', '.join(words)} contradict each other: where the others hold one is off"

@@ -668,6 +668,27 @@ def test_the_version_of_a_solver_is_that_of_what_it_is_made_of(
     assert len(set(digests.values())) == len(digests)
 
 
+def test_the_version_takes_in_each_package_that_a_module_imports(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "own_module.py"
+    own.write_text("import first_own\nimport second_own\n" + OWN.replace("own_helper", "first_own"))
+    packages = ("first_own", "second_own")
+    versions = set()
+    for changed in (None, *packages):
+        for name in packages:
+            (tmp_path / name).mkdir(exist_ok=True)
+            factor = 2 if name == changed else 1
+            text = f"def solve(r): return {factor} * r"
+            (tmp_path / name / "__init__.py").write_text(text)
+        for name in (*packages, "own_module"):
+            sys.modules.pop(name, None)
+        chosen = campaign(solvers=["own-fingerprint"], modules=[str(own)])
+        versions.add(chosen.solvers[0].version)
+    assert len(versions) == 3
+
+
 # ---- a budget
 
 

@@ -79,7 +79,8 @@ def _of_module(module: ModuleType, path: Path) -> str:
     while waiting:
         current, file = waiting.pop()
         text = file.read_bytes()
-        parts[file.name] = hashlib.sha256(text).digest()
+        # by its whole name: packages have files of one name
+        parts[f"{current.__name__}.py"] = hashlib.sha256(text).digest()
         for name in _imported(text, current.__name__, getattr(current, "__package__", "") or ""):
             found = sys.modules.get(name)
             where = Path(getattr(found, "__file__", None) or "").resolve()

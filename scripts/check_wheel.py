@@ -78,6 +78,7 @@ def look_into(wheel: Path) -> None:
     }
     wanted |= {f"fclib/bench/campaigns/{path.name}" for path in (ROOT / "campaigns").glob("*.toml")}
     wanted |= {
+        "fclib_command.py",
         "fclib/_core.pyi",
         *(f"fclib/licenses/{one}" for one in ("HDF5", "Eigen", "nanobind")),
     }

@@ -20,8 +20,8 @@ std::span<const Number> numbers(const Number* values, std::size_t size, const Pl
 
 std::string text(const char* value) { return value != nullptr ? std::string(value) : absent_text; }
 
-MatrixView view_of(const fclib_matrix& c, const Place& where) {
-  MatrixView a;
+RawMatrixView view_of(const fclib_matrix& c, const Place& where) {
+  RawMatrixView a;
   a.rows = c.m;
   a.cols = c.n;
   const std::size_t rows = size_of(c.m, where / "m");
@@ -51,7 +51,7 @@ MatrixView view_of(const fclib_matrix& c, const Place& where) {
   return a;
 }
 
-Matrix copy_of(const MatrixView& a) {
+Matrix copy_of(const RawMatrixView& a) {
   return {.storage = a.storage,
           .rows = a.rows,
           .cols = a.cols,
@@ -119,7 +119,7 @@ Vector vector(const double* values, Index size, const Place& where) {
 template <class C>
 CoreOf<C> problem_as_given(const C& c) {
   using P = CoreOf<C>;
-  P problem = sizes_of(c, [](const auto&, const MatrixView& a) { return copy_of(a); });
+  P problem = sizes_of(c, [](const auto&, const RawMatrixView& a) { return copy_of(a); });
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {
     if constexpr (std::is_same_v<Type, Vector>) {
       problem.*field.member = vector(c.*member, problem.size(field.rows), place_of<P>(field));
@@ -132,8 +132,8 @@ CoreOf<C> problem_as_given(const C& c) {
 template <class C>
 ProblemView view_as_given(const C& c) {
   using P = CoreOf<C>;
-  std::vector<std::pair<std::string_view, MatrixView>> matrices;
-  const P sizes = sizes_of(c, [&](const auto& field, const MatrixView& a) {
+  std::vector<std::pair<std::string_view, RawMatrixView>> matrices;
+  const P sizes = sizes_of(c, [&](const auto& field, const RawMatrixView& a) {
     matrices.emplace_back(field.name, a);
     return Matrix{.storage = a.storage, .rows = a.rows, .cols = a.cols};
   });

@@ -172,6 +172,22 @@ def test_includes_follow_the_arrow(includes: dict[str, set[str]]) -> None:
     assert not wrong, f"against the arrow ({ARROW}): {wrong}"
 
 
+def test_a_type_is_defined_once(root: Path) -> None:
+    """Of two types of one name in one library the linker may take the functions of either."""
+    files: dict[str, list[str]] = {}
+    for path in sorted((root / "core").rglob("*.hpp")):
+        around: list[str] = []
+        for line in path.read_text().splitlines():
+            if found := re.match(r"namespace ([\w:]*)", line):
+                around.append(found[1])
+            elif line.startswith("}  // namespace"):
+                around.pop()
+            elif found := re.match(r"(?:struct|class|enum class) (\w+)(?!\w)[^;<]*\{", line):
+                files.setdefault("::".join([*around, found[1]]), []).append(path.name)
+    assert len(files) > 100
+    assert not {name: where for name, where in files.items() if len(where) > 1}
+
+
 def reached(includes: dict[str, set[str]], name: str) -> set[str]:
     """All that a file includes, by way of others too."""
     seen: set[str] = set()

@@ -80,8 +80,8 @@ struct RawProblem {
   ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
 };
 
-/// A matrix in memory of others.
-struct MatrixView {
+/// A matrix in memory of others, as it is to be written.
+struct RawMatrixView {
   Storage storage = Storage::csr;
   Index rows = 0;
   Index cols = 0;
@@ -98,7 +98,7 @@ struct MatrixView {
 struct ProblemView {
   struct Member {
     std::string_view name;  ///< of the field
-    std::variant<Index, MatrixView, std::span<const double>> value;
+    std::variant<Index, RawMatrixView, std::span<const double>> value;
   };
   std::string kind;
   std::vector<Member> members;  ///< those that are written, in the order of the fields

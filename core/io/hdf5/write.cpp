@@ -22,7 +22,7 @@ void write_text_if_there(const Target& group, const std::string& name, const std
   if (text != absent_text && text != absent_group) write_text(group, name, text);
 }
 
-MatrixView view_of(const Matrix& a) {
+RawMatrixView view_of(const Matrix& a) {
   return {.storage = a.storage,
           .rows = a.rows,
           .cols = a.cols,
@@ -32,7 +32,7 @@ MatrixView view_of(const Matrix& a) {
           .info = a.info};
 }
 
-void write_matrix(const Target& parent, const std::string& name, const MatrixView& a) {
+void write_matrix(const Target& parent, const std::string& name, const RawMatrixView& a) {
   const NewGroup created(parent, name);
   const Target& group = created.target();
   const auto nnz = static_cast<Index>(a.x.size());
@@ -82,7 +82,7 @@ ProblemView view_of(const P& problem, const WriteOptions& options, std::list<Mat
       if (storage == Storage::dense && !options.dense) storage = Storage::csr;
       if (P::triplets_on_disk) storage = Storage::triplet;
       const bool as_it_is = storage == member.storage || as_given;
-      const MatrixView a =
+      const RawMatrixView a =
           view_of(as_it_is ? member : kept.emplace_back(converted(member, storage)));
       if (field.presence != Presence::required && as_given && a.absent()) return;
       view.members.push_back({field.name, a});
@@ -104,7 +104,7 @@ void write_fields(const Target& root, const ProblemView& problem) {
     const std::string name(member.name);
     std::visit(
         [&]<class Value>(const Value& value) {
-          if constexpr (std::is_same_v<Value, MatrixView>) {
+          if constexpr (std::is_same_v<Value, RawMatrixView>) {
             write_matrix(group, name, value);
           } else if constexpr (std::is_same_v<Value, Index>) {
             write_number(group, name, value);

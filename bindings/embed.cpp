@@ -24,12 +24,6 @@ using In = nb::ndarray<const Number, nb::ndim<1>, nb::c_contig, nb::device::cpu>
 template <class Number>
 using Out = nb::ndarray<Number, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-bool poll_signals() {
-  const nb::gil_scoped_acquire gil;
-  if (PyErr_CheckSignals() != 0) throw nb::python_error();
-  return true;
-}
-
 }  // namespace
 
 void bind_embed(nb::module_& m) {

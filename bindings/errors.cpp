@@ -33,6 +33,12 @@ void translate(const std::exception_ptr& pointer, void*) {
 
 }  // namespace
 
+bool poll_signals() {
+  const nb::gil_scoped_acquire gil;
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+  return true;
+}
+
 void bind_errors(nb::module_& m) {
   const auto define = [&](const char* name, nb::handle bases, const char* doc) {
     const std::string full = nb::cast<std::string>(m.attr("__name__")) + "." + name;

@@ -22,6 +22,9 @@ std::string problem_union();
 Solution solution_from(nb::handle object, const char* what);
 const std::string solution_type = "Solution | Result | numpy.typing.ArrayLike";
 
+/// Lets Ctrl-C through: true, or it throws.
+bool poll_signals();
+
 // in this order: signatures name the classes that are bound before
 
 /// Error and what derives from it.

@@ -49,13 +49,6 @@ Clock make_clock(const nb::object& clock) {
   };
 }
 
-/// Lets Ctrl-C through.
-bool poll_signals() {
-  const nb::gil_scoped_acquire gil;
-  if (PyErr_CheckSignals() != 0) throw nb::python_error();
-  return true;
-}
-
 template <class P>
 void bind_proof(nb::module_& m) {
   m.def(

@@ -160,12 +160,6 @@ def address_space(pid: int) -> int:
     return int(fields[20]) if fields else 0
 
 
-def own_cpu(pid: int) -> float:
-    """[s] of CPU that a process has used itself, in ticks."""
-    fields = _stat(pid)
-    return sum(map(int, fields[11:13])) / TICKS if fields else 0.0
-
-
 def lower(pid: int, kind: int, value: int) -> None:
     """Set the soft limit of a process, as far as its hard one allows."""
     with contextlib.suppress(OSError):  # it has ended

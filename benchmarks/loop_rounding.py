@@ -172,10 +172,10 @@ class Watch:
                 self.turned = max(self.turned, most / known)
             return found
 
-        def weighed(columns: Any, violation: Any, rounding: Any, known: Any) -> Any:
-            found = gaps_of(columns, violation, rounding, known)
-            self.gap = max(self.gap, found[1].max(initial=0.0))
-            return found
+        def weighed(columns: Any, violation: Any, rounding: Any, found: Any) -> Any:
+            gaps, weights = gaps_of(columns, violation, rounding, found)
+            self.gap = max(self.gap, weights.max(initial=0.0))
+            return gaps, weights
 
         equalities.dependence, equalities.gaps_of = seen, weighed
         return self

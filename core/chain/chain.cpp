@@ -554,6 +554,23 @@ class Island {
     }
   }
 
+  void run(const HeldBodiesStage& rules) {
+    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
+      if (problem_.primal == nullptr) return;
+      HeldBodies<D> method(problem_, system());
+      Polisher polish(*this, rules.polish, rules.again);
+      method.solve(
+          rules, tolerance_,
+          [&](double error, const Vector& r) {
+            if (take(0, error, r)) return true;
+            polish(error, r);
+            return done();
+          },
+          [&] { return tracker_.report(1, error_, best_); });
+      own_factorisations_ = method.factorisations();
+    }
+  }
+
   /// Around the folds of the path.
   void run(const HomotopyStage& rules) {
     Homotopy<Cone> method(problem_, system());

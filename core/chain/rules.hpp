@@ -22,6 +22,7 @@
 #include <vector>
 
 #include "contact/contact_functions.hpp"
+#include "methods/held_bodies.hpp"
 #include "methods/homotopy.hpp"
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
@@ -522,6 +523,89 @@ struct NoSolutionStage : ProximalRules {
   }
 };
 
+/// Where most bodies rest, and reactions that hold them are far from unique.
+struct HeldBodiesStage : HeldBodiesRules {
+  static constexpr std::string_view name = "held_bodies";
+  static constexpr std::string_view families = InteriorPointStage::families;
+  static constexpr std::string_view doc =
+      "a convex problem on the whole and Coulomb's law on the bodies that move in it, in turn; "
+      "problems known by their bodies";
+  double polish = 1e-5;
+  double again = 10;
+
+  static constexpr auto fields() {
+    using O = HeldBodiesStage;
+    return std::tuple_cat(
+        std::tuple{
+            limit_field<O, int>(&O::rounds, "rounds", "of both at most"),
+            OptionField<O, int>{.name = "patience",
+                                .member = &O::patience,
+                                .unit = "rounds",
+                                .doc = "in which the error must halve",
+                                .lowest = 1,
+                                .highest = 1e6},
+            OptionField<O, double>{.name = "rest",
+                                   .member = &O::rest,
+                                   .unit = "||q||_inf",
+                                   .doc = "speed of a body, at one of its contacts, up to which it "
+                                          "is held",
+                                   .lowest = 0},
+            OptionField<O, double>{.name = "creep",
+                                   .member = &O::creep,
+                                   .unit = "error ||q||",
+                                   .doc = "the same, by the error of the convex problem's solution",
+                                   .lowest = 0},
+            OptionField<O, double>{.name = "change",
+                                   .member = &O::change,
+                                   .unit = "1",
+                                   .doc = "factor on creep after rounds that held too many or "
+                                          "too few",
+                                   .lowest = 1},
+            OptionField<O, double>{.name = "doubt",
+                                   .member = &O::doubt,
+                                   .unit = "error ||q||",
+                                   .doc = "slip up to which a contact is taken to stick, by the "
+                                          "error on the bodies that move",
+                                   .lowest = 0},
+            OptionField<O, double>{.name = "accuracy",
+                                   .member = &O::accuracy,
+                                   .unit = "1",
+                                   .doc = "of the convex problem: complementarity and residual",
+                                   .lowest = 0},
+            OptionField<O, int>{.name = "convex_limit",
+                                .member = &O::convex_limit,
+                                .unit = "iterations",
+                                .doc = "of the interior point on a convex problem at most",
+                                .lowest = 1,
+                                .highest = 1e6},
+            OptionField<O, double>{.name = "interior_above",
+                                   .member = &O::interior_above,
+                                   .unit = "1",
+                                   .doc = "error over which the bodies that move are given to "
+                                          "interior points before the proximal point",
+                                   .lowest = 0},
+            OptionField<O, int>{.name = "sweeps",
+                                .member = &O::sweeps,
+                                .unit = "sweeps",
+                                .doc = "of Gauss-Seidel before these",
+                                .lowest = 0,
+                                .highest = 1e6},
+            OptionField<O, int>{.name = "interior_limit",
+                                .member = &O::interior_limit,
+                                .unit = "iterations",
+                                .doc = "of that interior point at most",
+                                .lowest = 1,
+                                .highest = 1e6},
+            OptionField<O, std::int64_t>{.name = "proximal",
+                                         .member = &O::proximal,
+                                         .unit = "factorisations",
+                                         .doc = "of the proximal point on these bodies at most",
+                                         .lowest = 1,
+                                         .highest = 1e9}},
+        polish_fields<O>());
+  }
+};
+
 struct HomotopyStage {
   static constexpr std::string_view name = "homotopy";
   static constexpr std::string_view families = InteriorPointStage::families;
@@ -642,7 +726,7 @@ struct RandomStartsStage {
 using Method =
     std::variant<GaussSeidelStage, SweepOnStage, SpectralGradientStage, ConjugateGradientsStage,
                  NewtonStage, PolishStage, ProximalStage, InteriorPointStage, AssociatedStage,
-                 NoSolutionStage, HomotopyStage, PivotingStage, RandomStartsStage>;
+                 NoSolutionStage, HeldBodiesStage, HomotopyStage, PivotingStage, RandomStartsStage>;
 
 struct StageRule {
   std::string name;
@@ -655,7 +739,8 @@ using Table = std::vector<StageRule>;
 /// Whether a method takes Coulomb's cone alone.
 inline bool coulomb_alone(const Method& method) {
   return std::holds_alternative<InteriorPointStage>(method) ||
-         std::holds_alternative<AssociatedStage>(method);
+         std::holds_alternative<AssociatedStage>(method) ||
+         std::holds_alternative<HeldBodiesStage>(method);
 }
 
 /// The chain that a text describes. Throws Error (option), which names the stage and its line.

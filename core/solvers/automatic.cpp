@@ -33,6 +33,10 @@ interior point                  : interior_point      from=swept                
 gauss-seidel                    : sweep_on            law=coulomb
 interior point, shorter steps   : interior_point      from=nothing                     tau=10 step_cap=0.8 delta=1e-3 limit=100
 gauss-seidel                    : sweep_on            law=coulomb
+# where most bodies rest: reactions that hold them are found by convex problems; then with all that
+# creep and slide, however little
+held bodies                     : held_bodies         at_least=100                     patience=8
+held bodies                     : held_bodies         at_least=100                     creep=0 doubt=0 interior_above=0.03 patience=8
 interior point, smoothed        : interior_point      from=swept                       smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 associated                      : associated
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts

@@ -341,6 +341,16 @@ def stage_names(result: fclib.Result) -> list[str]:
     return [stage.name for stage in result.stages]
 
 
+@pytest.mark.parametrize(("seed", "push"), [(5, 0.0), (6, 1.0)])
+def test_bodies_that_rest_are_held(seed: int, push: float) -> None:
+    """Few bodies move in a jammed packing: the others are held, and their reactions are convex."""
+    problem = Packing().of_size(1000, push, seed)
+    result = fclib.solve(problem, chain=["held bodies : held_bodies"])
+    assert result.converged
+    blind = fclib.solve(problem, chain=["held bodies : held_bodies doubt=1e12 limit=3"])
+    assert not blind.converged  # no slip is believed: the convex problem alone
+
+
 def test_the_chain_of_auto_is_its_table(tmp_path: Path) -> None:
     problem = bodies(4, 20, mu=0.5, hyperstatic=True)
     lines = auto_chain()

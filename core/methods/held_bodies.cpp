@@ -1,0 +1,309 @@
+#include "methods/held_bodies.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <numeric>
+
+#include "methods/interior_point.hpp"
+#include "methods/proximal_point.hpp"
+#include "reduced/gauss_seidel.hpp"
+#include "reduced/relative_error.hpp"
+
+namespace fclib {
+
+namespace {
+
+/// The number of the body that each coordinate is of: coordinates that M links, and near ones of
+/// which one feels no other contact than the other does. M of a sphere links nothing.
+std::vector<Index> bodies(const Primal& primal, int d) {
+  const auto count = static_cast<std::size_t>(primal.M.rows());
+  std::vector<Index> parent(count);
+  std::iota(parent.begin(), parent.end(), Index{0});
+  const auto root = [&](Index k) {
+    while (parent[k] != k) k = parent[k] = parent[parent[k]];
+    return k;
+  };
+  const auto link = [&](Index a, Index b) { parent[root(a)] = root(b); };
+  for (Index column = 0; column < primal.M.cols(); ++column) {
+    for (SparseColumns::InnerIterator entry(primal.M, column); entry; ++entry) {
+      if (entry.value() != 0) link(static_cast<Index>(entry.row()), column);
+    }
+  }
+  std::vector<std::vector<Index>> felt(count);  // contacts, ascending
+  for (Index column = 0; column < primal.H.cols(); ++column) {
+    for (SparseColumns::InnerIterator entry(primal.H, column); entry; ++entry) {
+      std::vector<Index>& own = felt[entry.row()];
+      if (entry.value() != 0 && (own.empty() || own.back() != column / d)) {
+        own.push_back(column / d);
+      }
+    }
+  }
+  constexpr Index reach = 5;  // coordinates of a rigid body but one
+  const auto within = [](const std::vector<Index>& some, const std::vector<Index>& all) {
+    return !some.empty() && std::includes(all.begin(), all.end(), some.begin(), some.end());
+  };
+  for (Index k = 0; k < static_cast<Index>(count); ++k) {
+    for (Index near = std::max<Index>(0, k - reach); near < k; ++near) {
+      if (within(felt[k], felt[near]) || within(felt[near], felt[k])) link(k, near);
+    }
+  }
+  std::vector<Index> body(count);
+  for (Index k = 0; k < static_cast<Index>(count); ++k) body[k] = root(k);
+  return body;
+}
+
+/// H H^T + eps M, whose eps is small beside H H^T and large beside its rounding.
+SparseColumns squares(const Primal& primal) {
+  constexpr double eps = 1e-9;
+  SparseColumns product = primal.H * SparseColumns(primal.H.transpose());
+  const double share = eps * product.diagonal().sum() / primal.M.diagonal().sum();
+  return product + share * primal.M;
+}
+
+}  // namespace
+
+template <int D>
+HeldBodies<D>::HeldBodies(const ReducedProblem& problem, CoupledSystem& system)
+    : problem_(problem),
+      system_(system),
+      squares_(squares(*problem.primal), "H H^T"),
+      body_(bodies(*problem.primal, D)) {}
+
+template <int D>
+void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,
+                          FunctionRef<bool()> count) {
+  constexpr double inner = 0.1;  // of the tolerance
+  constexpr double stuck = 0.9;  // of the last error
+  const double size = problem_.q.template lpNorm<Eigen::Infinity>();
+  shift_ = Vector::Zero(problem_.nc());
+  r_ = Vector::Zero(problem_.m());
+  double least = std::numeric_limits<double>::infinity();
+  double last = least;
+  double creep = rules.creep;
+  int since = 0;
+  for (int round = 0; round < rules.rounds; ++round) {
+    if (!convex(rules, count)) return;
+    const double error = relative_error<Cone>(problem_, u_, r_);
+    if (report(error, r_)) return;
+    if (error < 0.5 * least) {
+      least = error;
+      since = 0;
+    } else if (++since > rules.patience) {
+      return;
+    }
+    Part part;
+    if (!release(std::max(rules.rest * size, creep * error * problem_.scale), part) &&
+        !release(rules.rest * size, part)) {
+      return;
+    }
+    Vector r = part.problem.known_r;
+    double left = 0;
+    if (!solve_part(rules, part, error > rules.interior_above, inner * tolerance, r, left, count)) {
+      return;
+    }
+    // too many were held, or too few
+    const bool solved = left <= inner * tolerance;
+    if (!solved) {
+      creep = std::min(creep * rules.change, rules.creep);
+    } else if (error > stuck * last) {
+      creep /= rules.change;
+    }
+    last = error;
+    Vector u;
+    part.problem.velocity(r, u);
+    shift_.setZero();
+    for (std::size_t k = 0; k < part.contacts.size(); ++k) {
+      const Index a = part.contacts[k];
+      const auto at = D * static_cast<Eigen::Index>(k);
+      const double slip = u.template segment<D - 1>(at + 1).norm();
+      if (slip > rules.doubt * left * problem_.scale) shift_[a] = problem_.friction.mu[a] * slip;
+    }
+  }
+}
+
+template <int D>
+bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, bool far,
+                               double tolerance, Vector& r, double& error,
+                               FunctionRef<bool()> count) {
+  CoupledSystem system(part.problem);
+  Vector u;
+  part.problem.velocity(r, u);
+  error = relative_error<Cone>(part.problem, u, r);
+  bool ended = false;
+  const auto proximal = [&](ProximalRules own) {
+    ProximalPoint<Cone> method(part.problem, system);
+    Vector x = r;
+    const double found = method.solve(own, tolerance, x, [&](double) { return ended = count(); });
+    if (found < error) {
+      error = found;
+      r = x;
+    }
+    return ended || error <= tolerance;
+  };
+  const auto interior = [&](const InteriorPointRules& own, const Vector& start) {
+    InteriorPoint<D> method(part.problem, system);
+    method.solve(own, start, [&](double found, const Vector& x) {
+      if (found < error) {
+        error = found;
+        r = x;
+      }
+      return (ended = count()) || error <= tolerance;
+    });
+    return ended || error <= tolerance;
+  };
+  const auto sweep = [&] {
+    GaussSeidel<Cone> contacts(part.problem);
+    Vector x = r;
+    for (int k = 0; k < rules.sweeps; ++k) contacts.sweep(x, u);
+    part.problem.velocity(x, u);
+    const double found = relative_error<Cone>(part.problem, u, x);
+    if (found < error) {
+      error = found;
+      r = x;
+    }
+    return (ended = count()) || error <= tolerance;
+  };
+  const auto run = [&] {
+    if (far) {
+      if (sweep()) return;
+      // as the first stages of `auto`
+      if (interior(
+              {.tau = std::clamp(4 * error, 0.03, 1.0), .max_iterations = rules.interior_limit},
+              Vector(r)) ||
+          proximal({.kappa = 10, .max_factorisations = rules.proximal})) {
+        return;
+      }
+      if (interior(
+              {.tau = 10, .step_cap = 0.8, .delta = 1e-3, .max_iterations = rules.interior_limit},
+              Vector::Zero(r.size()))) {
+        return;
+      }
+    } else if (proximal({.kappa = 1000,
+                         .easy = 10,
+                         .hard = 0.2,
+                         .max_factorisations = rules.proximal / 2})) {
+      return;
+    }
+    proximal({.kappa = 10, .max_factorisations = rules.proximal});
+  };
+  run();
+  factorisations_ += system.factorisations();
+  return !ended;
+}
+
+template <int D>
+bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> count) {
+  ReducedProblem shifted = problem_;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    shifted.q[D * a] += shift_[a];
+    if (shifted.known_u.size() > 0) shifted.known_u[D * a] += shift_[a];
+  }
+  InteriorPoint<D> method(shifted, system_);
+  bool ended = false;
+  method.solve({.associated = true,
+                .max_iterations = rules.convex_limit,
+                .patience = std::numeric_limits<int>::max()},
+               Vector::Zero(problem_.m()), [&](double, const Vector& r) {
+                 if (r.allFinite()) r_ = r;
+                 if (count()) return ended = true;
+                 return method.tau() <= rules.accuracy && method.residual() <= rules.accuracy;
+               });
+  problem_.velocity(r_, u_);
+  return !ended;
+}
+
+template <int D>
+bool HeldBodies<D>::release(double slow, Part& part) {
+  const SparseColumns& H = problem_.primal->H;
+  const SparseColumns& M = problem_.primal->M;
+  const Vector v = squares_.solve(Vector(H * u_));
+  part.contacts.clear();
+  std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
+  const auto each_body = [&](Index a, auto&& f) {
+    Index last = -1;
+    for (int k = 0; k < D; ++k) {
+      for (SparseColumns::InnerIterator entry(H, D * a + k); entry; ++entry) {
+        if (body_[entry.row()] != last) f(last = body_[entry.row()]);
+      }
+    }
+  };
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    each_body(a, [&](Index body) {
+      if (moves[body]) return;
+      double squared = 0;
+      for (int k = 0; k < D; ++k) {
+        double own = 0;  // what this body alone adds to the velocity
+        for (SparseColumns::InnerIterator entry(H, D * a + k); entry; ++entry) {
+          if (body_[entry.row()] == body) own += entry.value() * v[entry.row()];
+        }
+        squared += own * own;
+      }
+      moves[body] = squared > slow * slow;
+    });
+  }
+  std::vector<Index> place(body_.size(), -1);  // among the coordinates that are not held
+  Index free = 0;
+  for (std::size_t k = 0; k < body_.size(); ++k) {
+    if (moves[body_[k]]) place[k] = free++;
+  }
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  for (Index column = 0; column < M.cols(); ++column) {
+    for (SparseColumns::InnerIterator entry(M, column); entry; ++entry) {
+      if (place[entry.row()] < 0 || place[column] < 0) continue;
+      entries.emplace_back(place[entry.row()], place[column], entry.value());
+    }
+  }
+  part.primal.M.resize(free, free);
+  part.primal.M.setFromTriplets(entries.begin(), entries.end());
+  entries.clear();
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    bool touched = false;
+    each_body(a, [&](Index body) { touched = touched || moves[body]; });
+    if (!touched) continue;
+    const auto at = D * static_cast<Index>(part.contacts.size());
+    part.contacts.push_back(a);
+    for (int k = 0; k < D; ++k) {
+      for (SparseColumns::InnerIterator entry(H, D * a + k); entry; ++entry) {
+        if (place[entry.row()] >= 0)
+          entries.emplace_back(place[entry.row()], at + k, entry.value());
+      }
+    }
+  }
+  const auto size = static_cast<Eigen::Index>(part.contacts.size());
+  if (size == 0) return false;
+  part.primal.H.resize(free, D * size);
+  part.primal.H.setFromTriplets(entries.begin(), entries.end());
+
+  const Factorization mass(part.primal.M, "M");
+  part.problem.W = BlockMatrix(Matrix::from_eigen(mass.gram(part.primal.H)), D);
+  part.problem.primal = &part.primal;
+  part.problem.scale = problem_.scale;
+  part.problem.scaled_scale = problem_.scaled_scale;
+  part.problem.deadline = problem_.deadline;
+  part.problem.friction.mu.resize(size);
+  if (problem_.rho.size() > 0) part.problem.rho.resize(size);
+  Vector r(D * size);
+  Vector u(D * size);
+  for (Eigen::Index k = 0; k < size; ++k) {
+    const Index a = part.contacts[static_cast<std::size_t>(k)];
+    part.problem.friction.mu[k] = problem_.friction.mu[a];
+    if (problem_.rho.size() > 0) part.problem.rho[k] = problem_.rho[a];
+    r.template segment<D>(D * k) = r_.template segment<D>(D * a);
+    for (int j = 0; j < D; ++j) {
+      double held = 0;  // what held bodies add
+      for (SparseColumns::InnerIterator entry(H, D * a + j); entry; ++entry) {
+        if (place[entry.row()] < 0) held += entry.value() * v[entry.row()];
+      }
+      u[D * k + j] = u_[D * a + j] - held;
+    }
+  }
+  part.problem.W.multiply_add(-r, u, part.problem.q);
+  part.problem.known_r = r;
+  part.problem.known_u = u;
+  return true;
+}
+
+template class HeldBodies<2>;
+template class HeldBodies<3>;
+
+}  // namespace fclib

@@ -1,0 +1,94 @@
+// Coulomb's law where few bodies move and all others rest, held by reactions that are far from
+// unique: a convex problem on the whole and Newton's method on the bodies that move, in turn.
+//
+// With s = mu ||u_T|| given, u + (s, 0, 0) in K*, r in K, orthogonal, is convex (methods/
+// relaxation.hpp). Its velocity is unique and depends continuously on s, and Coulomb's law is
+// s = mu ||u_T(s)|| (Acary, Cadoux, Lemarechal & Malick 2011). That fixed point is sought on few
+// bodies only:
+//
+//   1. the convex problem, by the interior point: what rests there rests to many digits, and its
+//      reactions are at the centre of those that there are;
+//   2. bodies that hardly move are held at rest. Coulomb's law for the others, from the reactions
+//      of 1, gives s; s = 0 at contacts that hardly slide, and at those of held bodies alone.
+//
+// Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
+// "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
+// may rest in the end, and 2 is far harder with them than without.
+//
+// Let W = H^T M^-1 H, and B what is not held. The problem of 2 is u = W_B r + q_B on the contacts
+// of B, with W_B = H_B^T M_BB^-1 H_B and q_B such that the reactions of 1 give the velocity of 1,
+// but for what the held bodies add to it. A body is a set of coordinates that M links. How fast one
+// is follows from u alone: v is that of least squares in H^T v = u, by one factorisation of H H^T +
+// eps M.
+#pragma once
+
+#include "contact/coulomb.hpp"
+#include "function_ref.hpp"
+#include "linalg/factorization.hpp"
+#include "systems/coupled_system.hpp"
+
+namespace fclib {
+
+struct HeldBodiesRules {
+  int rounds = 40;               ///< of both, at most
+  int patience = 15;             ///< rounds in which the error must halve
+  double rest = 1e-6;            ///< speed of a body that rests, over ||q||_inf ...
+  double creep = 0.1;            ///< ... and over the error of 1 and ||q||
+  double change = 3;             ///< of `creep`: less where 2 was solved and 1 got no better
+  double doubt = 1;              ///< slip of a contact that sticks, over the error of 2 and ||q||
+  double accuracy = 1e-11;       ///< of the convex problem: complementarity and residual
+  int convex_limit = 100;        ///< iterations on a convex problem
+  double interior_above = 1e-3;  ///< error of 1 over which 2 begins with interior points
+  int sweeps = 40;               ///< of Gauss-Seidel before these
+  int interior_limit = 60;       ///< iterations of each
+  std::int64_t proximal = 80;    ///< factorisations of the proximal point after each
+};
+
+/// Problems known by their bodies, without bilateral constraints.
+template <int D>
+class HeldBodies {
+ public:
+  using Cone = Coulomb<D>;
+  using Report = FunctionRef<bool(double error, const Vector& r)>;
+
+  /// Keeps references. The problem has a primal form.
+  HeldBodies(const ReducedProblem& problem, CoupledSystem& system);
+
+  /// `report(error, r)` is told of each solution of 1, `count()` of each iteration; both end it by
+  /// returning true.
+  void solve(const HeldBodiesRules& rules, double tolerance, Report report,
+             FunctionRef<bool()> count);
+
+  /// On the bodies that move.
+  [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
+
+ private:
+  /// The bodies that are not held, with their contacts.
+  struct Part {
+    std::vector<Index> contacts;
+    Primal primal;
+    ReducedProblem problem;
+  };
+
+  /// r_ and u_ of the convex problem with s = shift_. False where it was ended.
+  bool convex(const HeldBodiesRules& rules, FunctionRef<bool()> count);
+
+  /// The bodies that are faster than `slow`, at one of their contacts. False where none is.
+  bool release(double slow, Part& part);
+
+  /// Improves r, of the part; its error. False where it was ended.
+  bool solve_part(const HeldBodiesRules& rules, const Part& part, bool far, double tolerance,
+                  Vector& r, double& error, FunctionRef<bool()> count);
+
+  const ReducedProblem& problem_;
+  CoupledSystem& system_;
+  Factorization squares_;    // of H H^T + eps M
+  std::vector<Index> body_;  // of each coordinate
+  std::int64_t factorisations_ = 0;
+  Vector shift_, r_, u_;
+};
+
+extern template class HeldBodies<2>;
+extern template class HeldBodies<3>;
+
+}  // namespace fclib

@@ -235,6 +235,9 @@ def changes(lines: list[str]) -> list[Change]:
     for key, number in (("worth", 1), ("worth", 5), ("first_look", 50), ("first_look", 250)):
         change = with_rules(at_spectral, **{key: number})
         result.append(Change(f"{spectral}: {key}={number}", spectral, change))
+    longer = f"{spectral}, longer"
+    change = with_rules(place(lines, longer), **{"from": "best"})
+    result.append(Change(f"{longer}: from=best", longer, change))
     polish = place(lines, "proximal newton", 1)
     for below in ("1e-6", "1e-4", "1e-3"):
         result.append(

@@ -30,6 +30,8 @@ spectral gradient               : spectral_gradient   at_least=150 law=coulomb  
 proximal newton                 : polish              below=1e-5                       limit=24
 # from near what the sweeps have; then, where its path folds, from far away
 interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60
+# dense heaps on which its path ends: gradients, for what the interior point has cost
+spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
 interior point, shorter steps   : interior_point      from=nothing                     tau=10 step_cap=0.8 delta=1e-3 limit=100
 gauss-seidel                    : sweep_on            law=coulomb

@@ -34,9 +34,10 @@ Result guarded(Result failure, const Body& body) noexcept {
 /// Throws Error (problem).
 [[noreturn]] void fail(const Place& where, const std::string& message);
 
-/// What a pointer of the caller points to.
+/// What a pointer of the caller points to. The name is no reference: GCC 14 would warn that the
+/// result may refer to it.
 template <class T>
-T& given(T* pointer, const Place& name) {
+T& given(T* pointer, Place name) {
   if (pointer == nullptr) fail(name, "is NULL");
   return *pointer;
 }

@@ -172,10 +172,19 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
+  /// What is known of the bodies: of the whole problem, if anything, and which contacts of it the
+  /// island has; none: all.
+  struct KnownBodies {
+    const Primal* whole = nullptr;
+    std::span<const Index> contacts;
+  };
+
   /// `proves` says whether y (nc of the island) proves that there is no solution.
-  Island(const ReducedProblem& problem, const Table& table, const Means& means, Tracker& tracker,
-         double tolerance, bool guessed, std::function<bool(const Vector&)> proves)
+  Island(const ReducedProblem& problem, const KnownBodies& bodies, const Table& table,
+         const Means& means, Tracker& tracker, double tolerance, bool guessed,
+         std::function<bool(const Vector&)> proves)
       : problem_(problem),
+        bodies_(bodies),
         table_(table),
         means_(means),
         tracker_(tracker),
@@ -556,8 +565,10 @@ class Island {
 
   void run(const HeldBodiesStage& rules) {
     if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      if (problem_.primal == nullptr) return;
-      HeldBodies<D> method(problem_, system());
+      if (bodies_.whole == nullptr) return;
+      const bool all = bodies_.contacts.empty();
+      const Primal part = all ? Primal() : restricted(*bodies_.whole, bodies_.contacts, D);
+      HeldBodies<D> method(problem_, all ? *bodies_.whole : part, system());
       Polisher polish(*this, rules.polish, rules.again);
       method.solve(
           rules, tolerance_,
@@ -725,6 +736,7 @@ class Island {
   }
 
   const ReducedProblem& problem_;
+  KnownBodies bodies_;
   const Table& table_;
   const Means& means_;
   Tracker& tracker_;
@@ -786,7 +798,9 @@ void walk(const ReducedProblem& problem, const Table& table, const Means& means,
   const auto proves = [&](const Vector& y) {
     return problem.proves_no_solution != nullptr && (*problem.proves_no_solution)(y);
   };
-  whole.emplace(problem, table, means, tracker, tolerance, guessed, proves);
+  using KnownBodies = typename Island<Cone>::KnownBodies;
+  whole.emplace(problem, KnownBodies{problem.primal, {}}, table, means, tracker, tolerance, guessed,
+                proves);
   whole->solve(r, On::whole);
   if (tracker.stopped()) return;
   const std::vector<Index> group = problem.W.components();
@@ -835,8 +849,10 @@ void walk(const ReducedProblem& problem, const Table& table, const Means& means,
       for (Eigen::Index j = 0; j < size; ++j) padded[contacts[static_cast<std::size_t>(j)]] = y[j];
       return proves(padded);
     };
-    const double error = Island<Cone>(part, table, means, tracker, share, guessed, proves_island)
-                             .solve(x, On::islands);
+    const KnownBodies bodies{problem.primal, contacts};
+    const double error =
+        Island<Cone>(part, bodies, table, means, tracker, share, guessed, proves_island)
+            .solve(x, On::islands);
     sum += error * error;
     for (Eigen::Index j = 0; j < size; ++j)
       r.template segment<D>(D * contacts[j]) = x.template segment<D>(D * j);

@@ -52,6 +52,34 @@ std::vector<Index> bodies(const Primal& primal, int d) {
   return body;
 }
 
+/// Some coordinates, whose numbers `place` has (-1: left out), and some contacts.
+Primal selected(const Primal& primal, std::span<const Index> place, Index count,
+                std::span<const Index> contacts, int d) {
+  Primal part;
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  for (Index column = 0; column < primal.M.cols(); ++column) {
+    for (SparseColumns::InnerIterator entry(primal.M, column); entry; ++entry) {
+      if (place[entry.row()] < 0 || place[column] < 0) continue;
+      entries.emplace_back(place[entry.row()], place[column], entry.value());
+    }
+  }
+  part.M.resize(count, count);
+  part.M.setFromTriplets(entries.begin(), entries.end());
+  entries.clear();
+  Index column = 0;
+  for (const Index a : contacts) {
+    for (int k = 0; k < d; ++k, ++column) {
+      for (SparseColumns::InnerIterator entry(primal.H, d * a + k); entry; ++entry) {
+        if (place[entry.row()] < 0) continue;
+        entries.emplace_back(place[entry.row()], column, entry.value());
+      }
+    }
+  }
+  part.H.resize(count, column);
+  part.H.setFromTriplets(entries.begin(), entries.end());
+  return part;
+}
+
 /// H H^T + eps M, whose eps is small beside H H^T and large beside its rounding.
 SparseColumns squares(const Primal& primal) {
   constexpr double eps = 1e-9;
@@ -62,12 +90,38 @@ SparseColumns squares(const Primal& primal) {
 
 }  // namespace
 
+Primal restricted(const Primal& primal, std::span<const Index> contacts, int d) {
+  std::vector<Index> place(static_cast<std::size_t>(primal.M.rows()), -1);
+  std::vector<Index> linked;
+  const auto take = [&](Eigen::Index row) {
+    if (place[row] >= 0) return;
+    place[row] = 0;
+    linked.push_back(static_cast<Index>(row));
+  };
+  for (const Index a : contacts) {
+    for (int k = 0; k < d; ++k) {
+      for (SparseColumns::InnerIterator entry(primal.H, d * a + k); entry; ++entry) {
+        take(entry.row());
+      }
+    }
+  }
+  for (std::size_t k = 0; k < linked.size(); ++k) {
+    for (SparseColumns::InnerIterator entry(primal.M, linked[k]); entry; ++entry) take(entry.row());
+  }
+  // in their order: coordinates of a body are near each other
+  std::sort(linked.begin(), linked.end());
+  for (std::size_t k = 0; k < linked.size(); ++k) place[linked[k]] = static_cast<Index>(k);
+  return selected(primal, place, static_cast<Index>(linked.size()), contacts, d);
+}
+
 template <int D>
-HeldBodies<D>::HeldBodies(const ReducedProblem& problem, CoupledSystem& system)
+HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
+                          CoupledSystem& system)
     : problem_(problem),
+      primal_(primal),
       system_(system),
-      squares_(squares(*problem.primal), "H H^T"),
-      body_(bodies(*problem.primal, D)) {}
+      squares_(squares(primal), "H H^T"),
+      body_(bodies(primal, D)) {}
 
 template <int D>
 void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,
@@ -214,8 +268,7 @@ bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> cou
 
 template <int D>
 bool HeldBodies<D>::release(double slow, Part& part) {
-  const SparseColumns& H = problem_.primal->H;
-  const SparseColumns& M = problem_.primal->M;
+  const SparseColumns& H = primal_.H;
   const Vector v = squares_.solve(Vector(H * u_));
   part.contacts.clear();
   std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
@@ -246,33 +299,14 @@ bool HeldBodies<D>::release(double slow, Part& part) {
   for (std::size_t k = 0; k < body_.size(); ++k) {
     if (moves[body_[k]]) place[k] = free++;
   }
-  std::vector<Eigen::Triplet<double, Index>> entries;
-  for (Index column = 0; column < M.cols(); ++column) {
-    for (SparseColumns::InnerIterator entry(M, column); entry; ++entry) {
-      if (place[entry.row()] < 0 || place[column] < 0) continue;
-      entries.emplace_back(place[entry.row()], place[column], entry.value());
-    }
-  }
-  part.primal.M.resize(free, free);
-  part.primal.M.setFromTriplets(entries.begin(), entries.end());
-  entries.clear();
   for (Index a = 0; a < problem_.nc(); ++a) {
     bool touched = false;
     each_body(a, [&](Index body) { touched = touched || moves[body]; });
-    if (!touched) continue;
-    const auto at = D * static_cast<Index>(part.contacts.size());
-    part.contacts.push_back(a);
-    for (int k = 0; k < D; ++k) {
-      for (SparseColumns::InnerIterator entry(H, D * a + k); entry; ++entry) {
-        if (place[entry.row()] >= 0)
-          entries.emplace_back(place[entry.row()], at + k, entry.value());
-      }
-    }
+    if (touched) part.contacts.push_back(a);
   }
   const auto size = static_cast<Eigen::Index>(part.contacts.size());
   if (size == 0) return false;
-  part.primal.H.resize(free, D * size);
-  part.primal.H.setFromTriplets(entries.begin(), entries.end());
+  part.primal = selected(primal_, place, free, part.contacts, D);
 
   const Factorization mass(part.primal.M, "M");
   part.problem.W = BlockMatrix(Matrix::from_eigen(mass.gram(part.primal.H)), D);

@@ -22,6 +22,9 @@
 // eps M.
 #pragma once
 
+#include <span>
+#include <vector>
+
 #include "contact/coulomb.hpp"
 #include "function_ref.hpp"
 #include "linalg/factorization.hpp"
@@ -44,6 +47,9 @@ struct HeldBodiesRules {
   std::int64_t proximal = 80;    ///< factorisations of the proximal point after each
 };
 
+/// The coordinates of some contacts, with all that M links to them, and these contacts.
+Primal restricted(const Primal& primal, std::span<const Index> contacts, int d);
+
 /// Problems known by their bodies, without bilateral constraints.
 template <int D>
 class HeldBodies {
@@ -51,8 +57,8 @@ class HeldBodies {
   using Cone = Coulomb<D>;
   using Report = FunctionRef<bool(double error, const Vector& r)>;
 
-  /// Keeps references. The problem has a primal form.
-  HeldBodies(const ReducedProblem& problem, CoupledSystem& system);
+  /// Keeps references. W is H^T M^-1 H of `primal`.
+  HeldBodies(const ReducedProblem& problem, const Primal& primal, CoupledSystem& system);
 
   /// `report(error, r)` is told of each solution of 1, `count()` of each iteration; both end it by
   /// returning true.
@@ -81,6 +87,7 @@ class HeldBodies {
                   Vector& r, double& error, FunctionRef<bool()> count);
 
   const ReducedProblem& problem_;
+  const Primal& primal_;
   CoupledSystem& system_;
   Factorization squares_;    // of H H^T + eps M
   std::vector<Index> body_;  // of each coordinate

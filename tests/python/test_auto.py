@@ -13,6 +13,7 @@ import hypothesis
 import numpy as np
 import numpy.typing as npt
 import pytest
+import scipy.sparse as sp
 from hypothesis import strategies as st
 
 import fclib
@@ -341,14 +342,46 @@ def stage_names(result: fclib.Result) -> list[str]:
     return [stage.name for stage in result.stages]
 
 
+HELD = "held bodies : held_bodies"
+
+
 @pytest.mark.parametrize(("seed", "push"), [(5, 0.0), (6, 1.0)])
 def test_bodies_that_rest_are_held(seed: int, push: float) -> None:
     """Few bodies move in a jammed packing: the others are held, and their reactions are convex."""
     problem = Packing().of_size(1000, push, seed)
-    result = fclib.solve(problem, chain=["held bodies : held_bodies"])
+    result = fclib.solve(problem, chain=[HELD])
     assert result.converged
-    blind = fclib.solve(problem, chain=["held bodies : held_bodies doubt=1e12 limit=3"])
+    blind = fclib.solve(problem, chain=[HELD + " doubt=1e12 limit=3"])
     assert not blind.converged  # no slip is believed: the convex problem alone
+
+
+def test_bodies_of_an_island_are_held() -> None:
+    """A packing, and a ball that falls on the ground beside it: an island of its own."""
+    packing = Packing().of_size(400, 0.0, 0)
+    ball = fclib.GlobalProblem(
+        spacedim=3, M=np.eye(3), H=np.eye(3), f=[1.0, 0.0, -1.0], w=np.zeros(3), mu=[0.5]
+    )
+    parts = (ball, packing)
+    data: dict[str, Any] = {
+        name: sp.block_diag([getattr(part, name) for part in parts], "csc") for name in "MH"
+    }
+    for name in ("f", "w", "mu"):
+        data[name] = np.concatenate([getattr(part, name) for part in parts])
+    problem = fclib.GlobalProblem(spacedim=3, **data)
+    result = fclib.solve(problem, chain=["sweeps : gauss_seidel on=whole limit=5 worth=0", HELD])
+    assert result.converged
+    assert result.stages[-1].solved
+
+
+def test_boxes_that_overlap_are_solved() -> None:
+    """A pile of Drake's, of which most boxes rest."""
+    path = Path(__file__).parents[2].parent / "shared/data/challenges/drakehard-sap-0140.hdf5"
+    if not path.is_file():
+        pytest.skip("there is no such file")
+    problem = fclib.read(path)
+    result = fclib.solve(problem, tol=1e-10)
+    assert result.converged
+    assert_honest(problem, result, 1e-10)
 
 
 def test_the_chain_of_auto_is_its_table(tmp_path: Path) -> None:

@@ -351,9 +351,11 @@ def test_interrupted_before_there_is_a_store(
     store = tmp_path / "new.sqlite"
     command = ["bench", "--problems", tmp_path / "one.hdf5", "--solver", "auto"]
     command += ["--scheduler", "tcp://localhost:1", "--store", store]
+    before = signal.getsignal(signal.SIGINT)
     result = CliRunner().invoke(cli.app, list(map(str, command)))
     assert result.exit_code == 130
     assert "interrupted" in result.stderr
+    assert signal.getsignal(signal.SIGINT) is before
     assert not store.exists()
 
 

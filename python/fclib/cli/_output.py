@@ -85,8 +85,9 @@ def fail(message: str) -> NoReturn:
 
 def interrupted(message: str = "interrupted") -> NoReturn:
     """End the process as Ctrl-C does: one line on the standard error and exit status 130."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one has nothing left to end
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one has nothing left to end
     err.print(f"fclib: {message}", style="red", highlight=False)
+    signal.signal(signal.SIGINT, before)  # a program may have called this, and goes on
     raise SystemExit(130)
 
 

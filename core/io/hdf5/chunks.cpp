@@ -153,9 +153,10 @@ bool write_chunks(hid_t dataset, const Bytes& numbers, const Packing& packing, i
 
 bool read_chunks(hid_t dataset, const Packing& packing, hid_t memory, std::size_t size,
                  void* values) {
+  if (packing.chunk == 0) return false;
   const std::size_t width = H5Tget_size(memory);
-  if (!little_endian || packing.chunk == 0 || (width != 4 && width != 8) ||
-      !same_type(dataset, memory) || decompressor() == nullptr) {
+  if (!little_endian || (width != 4 && width != 8) || !same_type(dataset, memory) ||
+      decompressor() == nullptr) {
     return false;
   }
   const std::size_t bytes = packing.chunk * width;

@@ -85,7 +85,8 @@
     const most = free.reduce((all, x) => Math.max(all, Math.abs(x)), 0) || 1, rows = await forceRows(fclib, problem), shown = Fclib.shower(problem, view);
     const highest = problem.mu.reduce((all, x) => Math.max(all, x), 0);
     const { contacts, bodies, ...bare } = problem; // what is solved
-    let chosen = null, solver = "auto", state, last = solution && { r: solution.r, ...sizes.p ? { l: solution.l } : {} }, reference = null;
+    const stored = solution && { r: solution.r, ...sizes.p ? { l: solution.l } : {} };
+    let chosen = null, solver = "auto", state, last = stored, anew = false, reference = null;
     const fresh = () => ({ mu: null, muOf: new Map(), gap: 0, gapOf: new Map(), size: 1, turn: 0, tilt: 0 });
     state = fresh();
     const told = h("p", { class: "small", role: "status" }), rate = h("p", { class: "small soft" });
@@ -108,6 +109,7 @@
       try {
         while (again) {
           again = false;
+          if (anew) [last, anew] = [stored, false]; // of several solutions, the one at first
           const own = changed(), began = performance.now();
           const result = await fclib.solve(own, { solver, tol: TOLERANCE, time_limit: LIMIT, guess: last });
           const passed = performance.now() - began;
@@ -147,12 +149,12 @@
       if (known) { chosen = k; put(); }
     } });
     const method = h("select", { onchange: () => { solver = method.value; follow(); } }, solvers.map(({ name }) => h("option", { value: name, selected: name === solver }, name)));
-    const reset = h("button", { type: "button", onclick: () => { state = fresh(); one.value = ""; chosen = null; put(); say(""); follow(); } }, "Reset");
+    const reset = h("button", { type: "button", onclick: () => { state = fresh(); anew = true; one.value = ""; chosen = null; put(); say(""); follow(); } }, "Reset");
     const box = h("div", { class: "panel what-if" }, h("h3", {}, "What if"), h("div", { class: "controls" }, h("label", {}, "μ and gap of contact", one), h("label", {}, "solver", method), reset),
       h("div", { class: "ranges" }, mu.element, gap.element, size.element, turn && turn.element, tilt && tilt.element), told, rate,
       h("details", {}, h("summary", {}, "What the sliders change"), h("p", { class: "small soft" }, `μ of all contacts starts at the file's own, up to ${number(highest)}, and is one value once it is moved. The gap over the time step is added to the normal part of ${whole ? "w" : "q"}. `,
         whole ? rows ? "The size multiplies f, the momentum without reactions: weight and earlier motion alike; the turn turns its forces on each body, and leaves its moments. w stays." : "The size multiplies f, the momentum without reactions. It cannot be turned: the bodies are not free and rigid." : "The size multiplies q, the velocity of the contacts without reactions. A local problem has no forces that could be turned: its global form has.",
-        ` Each solution starts from the one before, to ${TOLERANCE.toExponential()}.`)));
+        ` Each solution starts from the one before, to ${TOLERANCE.toExponential()}; Reset starts from the stored one, if there is one.`)));
     follow();
     return box;
   };

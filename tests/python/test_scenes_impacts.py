@@ -92,7 +92,7 @@ def test_squeezed_spheres_have_no_solution_and_the_proof_says_why(side: int) -> 
         assert np.asarray(problem.w) @ y == -closing
         # apart by as much, walls and spheres at rest are a solution without gravity's step
         assert (np.asarray(family.of_size(side, -closing).w) >= 0).all()
-    assert str(fclib.solve(family.of_size(side, 1.0), time_limit=10.0).status) == "infeasible"
+    assert str(fclib.solve(family.of_size(side, 1.0), time_limit=100.0).status) == "infeasible"
     assert fclib.solve(family.of_size(side, -1.0)).converged
 
 

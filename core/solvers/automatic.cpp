@@ -35,6 +35,8 @@ spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb f
 gauss-seidel                    : sweep_on            law=coulomb
 interior point, shorter steps   : interior_point      from=nothing                     tau=10 step_cap=0.8 delta=1e-3 limit=100
 gauss-seidel                    : sweep_on            law=coulomb
+# a proof is found at once or not at all, and spares what follows
+no solution?                    : no_solution                                          limit=60
 # where most bodies rest: reactions that hold them are found by convex problems; then with all that
 # creep and slide, however little
 held bodies                     : held_bodies         at_least=100                     patience=8
@@ -43,7 +45,6 @@ interior point, smoothed        : interior_point      from=swept                
 associated                      : associated
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
-no solution?                    : no_solution                                          limit=60
 proximal point                  : proximal_point      from=best                        limit=200
 # another width of smoothing is another path
 homotopy                        : homotopy                                             smoothing=0.3 limit=1500

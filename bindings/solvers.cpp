@@ -15,6 +15,7 @@
 #include <type_traits>
 
 #include "arrays.hpp"
+#include "chain/description.hpp"
 #include "fields.hpp"
 #include "fingerprints.hpp"
 #include "module.hpp"
@@ -369,6 +370,16 @@ void bind_solvers(nb::module_& m) {
       "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
       nb::rv_policy::reference,
       "The solver of this name in the core. Raises OptionError where there is none.");
+  nb::class_<chain::MethodInfo>(m, "ChainMethod", "A method that a stage of a chain may name.")
+      .def_ro("name", &chain::MethodInfo::name)
+      .def_ro("doc", &chain::MethodInfo::doc)
+      .def_ro("rules", &chain::MethodInfo::rules, "the keys that its stages take")
+      .def("__repr__", [](const chain::MethodInfo& self) {
+        return "<ChainMethod " + self.name + ": " + self.doc + ">";
+      });
+  m.def("chain_methods", &chain::describe_methods,
+        "The words of the option chain of ``auto``: first, without a name, the keys that any stage "
+        "may have, then each method with its rules.");
   bind_python_solvers(m);
 
   nb::class_<Stage> stage(m, "Stage", "A part of a solve, by a method of its own.");

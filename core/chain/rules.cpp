@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "chain/description.hpp"
 #include "error.hpp"
 
 namespace fclib::chain {

@@ -746,14 +746,4 @@ inline bool coulomb_alone(const Method& method) {
 /// The chain that a text describes. Throws Error (option), which names the stage and its line.
 Table parse_table(std::string_view text);
 
-/// A method as it is shown to a user.
-struct MethodInfo {
-  std::string name;
-  std::string doc;
-  std::vector<OptionInfo> rules;
-};
-
-/// All methods; first what has no name, the keys of `When`.
-std::vector<MethodInfo> describe_methods();
-
 }  // namespace fclib::chain

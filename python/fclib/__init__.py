@@ -10,6 +10,7 @@ import typing
 
 from fclib._batch import BatchResult, solve_batch
 from fclib._core import (
+    ChainMethod,
     Error,
     FileError,
     GlobalProblem,
@@ -28,6 +29,7 @@ from fclib._core import (
     Solution,
     SolverInfo,
     UnsuitableError,
+    chain_methods,
     component_order,
     contact_merits,
     contents,
@@ -122,6 +124,7 @@ def sequence(
 __all__ = [
     "BatchResult",
     "Bodies",
+    "ChainMethod",
     "Contacts",
     "Error",
     "FileError",
@@ -148,6 +151,7 @@ __all__ = [
     "UnsuitableError",
     "Workspace",
     "__version__",
+    "chain_methods",
     "collection",
     "component_order",
     "contact_merits",

@@ -384,6 +384,22 @@ def test_boxes_that_overlap_are_solved() -> None:
     assert_honest(problem, result, 1e-10)
 
 
+def test_each_word_of_a_chain_is_told_and_taken() -> None:
+    anywhere, *methods = fclib.chain_methods()
+    rules = {method.name: {rule.name for rule in method.rules} for method in methods}
+    for line in auto_chain():
+        _, _, stage = line.partition(":")
+        name, *words = stage.split()
+        keys = {word.partition("=")[0] for word in words}
+        assert keys <= rules[name] | {rule.name for rule in anywhere.rules}
+    for method in methods:
+        assert method.doc
+        told = " ".join(
+            f"{rule.name}={str(rule.default).lower()}" for rule in anywhere.rules + method.rules
+        )
+        fclib.solve(bodies(2, 3), chain=[f"stage : {method.name} {told}"])
+
+
 def test_the_chain_of_auto_is_its_table(tmp_path: Path) -> None:
     problem = bodies(4, 20, mu=0.5, hyperstatic=True)
     lines = auto_chain()

@@ -302,6 +302,17 @@ def test_solvers_shows_one_in_full() -> None:
     assert record["solver"] == names[0]
 
 
+def test_solvers_tells_the_words_of_a_chain() -> None:
+    methods = fclib.chain_methods()
+    told = run("solvers", "--chain").stdout
+    shown = records(run("solvers", "--chain", "--json"))
+    assert [record["method"] for record in shown] == [method.name or None for method in methods]
+    for method, record in zip(methods, shown, strict=True):
+        for rule, described in zip(method.rules, record["rules"], strict=True):
+            assert described["default"] == rule.default
+            assert f"{rule.name} = " in told
+
+
 def test_solvers_names_what_is_absent() -> None:
     nowhere = os.environ | {"FCLIB_SICONOS_PYTHON": "/nowhere/python"}
     table = start("solvers", env=nowhere)

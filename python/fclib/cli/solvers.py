@@ -69,6 +69,30 @@ def record_of(solver: fclib.SolverInfo) -> dict[str, Any]:
     }
 
 
+def show_option(option: fclib.OptionInfo) -> None:
+    """An option: its default, its values and what it means."""
+    lines = default_of(option).strip().splitlines() or [""]
+    value = "" if len(lines) > 1 else lines[0]
+    out.print(Text.assemble("  ", (option.name, "bold"), f" = {value}"))
+    for line in lines if len(lines) > 1 else []:
+        out.print(Padding(Text(line), (0, 0, 0, 4), expand=False), soft_wrap=True)
+    for line in (domain_of(option), option.doc):
+        out.print(Padding(Text(line), (0, 0, 0, 6), expand=False))
+
+
+def show_chain(report: Report) -> None:
+    """The words of the option chain of `auto`."""
+    for method in fclib.chain_methods():
+        if report.as_json:
+            rules = [describe(rule) for rule in method.rules]
+            report.add({"method": method.name or None, "meaning": method.doc, "rules": rules})
+            continue
+        out.print(Text.assemble((method.name or "any stage", "bold"), f"  {method.doc}"))
+        for rule in method.rules:
+            show_option(rule)
+        out.print()
+
+
 def show(solver: fclib.SolverInfo) -> None:
     """A solver in full."""
     rolling = {3: "planar", 5: "spatial"}
@@ -86,13 +110,7 @@ def show(solver: fclib.SolverInfo) -> None:
         if text:
             out.print(f"  {name:10}  {text}", highlight=False)
     for option in solver.options:
-        lines_of = default_of(option).strip().splitlines() or [""]
-        value = "" if len(lines_of) > 1 else lines_of[0]
-        out.print(Text.assemble("  ", (option.name, "bold"), f" = {value}"))
-        for line in lines_of if len(lines_of) > 1 else []:
-            out.print(Padding(Text(line), (0, 0, 0, 4), expand=False), soft_wrap=True)
-        for line in (domain_of(option), option.doc):
-            out.print(Padding(Text(line), (0, 0, 0, 6), expand=False))
+        show_option(option)
     if solver.options:
         first = solver.options[0]
         given = f"--option {first.name}={default_of(first)}"
@@ -106,10 +124,16 @@ def command(
     names: Annotated[
         list[str] | None, typer.Argument(help="Show these in full.", show_default=False)
     ] = None,
+    chain: Annotated[
+        bool, typer.Option("--chain", help="Show what a stage of auto's option chain may say.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """List the solvers, or show some of them with their options."""
     report = Report(as_json)
+    if chain:
+        show_chain(report)
+        return
     try:
         chosen = [fclib.find_solver(name) for name in names] if names else fclib.solvers()
     except fclib.OptionError as error:

@@ -83,7 +83,10 @@ class Chain:
         """The scene; the seed draws the offsets, and the gaps between a half and the whole."""
         random = np.random.Generator(np.random.PCG64(seed))
         draws = random.uniform(-1.0, 1.0, size=(self.links - 1, 3))
-        offsets, gaps = self.offset * draws[:, :2], self.gap * (0.75 + 0.25 * draws[:, 2])
+        # a link that is further out lies against the side of its neighbour
+        side = 0.5 * (self.width - self.thickness) - self.thickness + OVERLAP
+        offsets = np.clip(self.offset * draws[:, :2], -side, side)
+        gaps = self.gap * (0.75 + 0.25 * draws[:, 2])
 
         # clear length of a link: all links together, without gaps, have the length asked for
         pitch = (self.length - 2 * self.thickness) / self.links

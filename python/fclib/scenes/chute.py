@@ -51,6 +51,12 @@ class Chute:
     hexahedra: bool = parameter(
         False, "1", "whether polyhedra have six flat faces, which touch in several points"
     )
+    thinnest: float = parameter(
+        1.0, "1", "hexahedra are flattened by shares from this to 1, in (0, 1]"
+    )
+    tilt: float = parameter(
+        1.0, "1", "share of a random rotation, from hexahedra that lie on the slope, in [0, 1]"
+    )
     gaps: bool = parameter(
         False, "1", "law of gaps: every contact within a step's reach, open ones too"
     )
@@ -62,15 +68,18 @@ class Chute:
         name = type(self).__name__
         mjcf.check(
             self,
-            positive=("radius", "density", "slope", "trough", "time_step"),
-            non_negative=("mu", "spread", "spheres", "margin"),
+            positive=("radius", "thinnest", "density", "slope", "trough", "time_step"),
+            non_negative=("mu", "spread", "spheres", "tilt", "margin"),
             at_least={"grains": 1, "shapes": 1, "across": 1, "layers": 1},
         )
         for what, bound in (("spread", 1), ("slope", math.pi / 2)):
             if not getattr(self, what) < bound:
                 raise ValueError(f"{name}: {what} must be < {bound:g}, not {getattr(self, what)}")
-        if not self.spheres <= 1:
-            raise ValueError(f"{name}: spheres must be <= 1, not {self.spheres}")
+        for what in ("spheres", "thinnest", "tilt"):
+            if not getattr(self, what) <= 1:
+                raise ValueError(f"{name}: {what} must be <= 1, not {getattr(self, what)}")
+        if not self.hexahedra and min(self.thinnest, self.tilt) < 1:
+            raise ValueError(f"{name}: thinnest and tilt are of hexahedra")
         if self.gaps and self.restitution:
             raise ValueError(f"{name}: restitution must be 0 by the law of gaps")
 
@@ -78,9 +87,15 @@ class Chute:
         """The scene; the seed draws the grains and how they are turned."""
         random = np.random.Generator(np.random.PCG64(seed))
         corners = (mjcf.hexahedra if self.hexahedra else mjcf.polyhedra)(random, self.shapes)
+        if self.thinnest < 1:
+            corners[:, :, 2] *= random.uniform(self.thinnest, 1.0, size=(self.shapes, 1))
+            corners /= np.linalg.norm(corners, axis=2).max(axis=1)[:, None, None]
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         draws = random.uniform(size=(self.grains, 3))
         turned = mjcf.rotations(random, self.grains)
+        if self.tilt < 1:
+            corners = mjcf.on_a_face(corners)
+            turned = self._lying(turned)
 
         pitch = 2.05 * self.radius
         width = pitch * self.across
@@ -125,6 +140,15 @@ class Chute:
             ),
             law="gap" if self.gaps else "velocity",
         )
+
+    def _lying(self, turned: Vector) -> Vector:
+        """The rotations (k x 4) that a share of each leads to, from a face on the slope."""
+        half = self.tilt * np.arccos(np.clip(turned[:, 0], -1, 1))
+        axis = turned[:, 1:] / np.linalg.norm(turned[:, 1:], axis=1)[:, None]
+        w, (x, y, z) = np.cos(half), (np.sin(half)[:, None] * axis).T
+        # then about y, by the slope
+        c, s = math.cos(0.5 * self.slope), math.sin(0.5 * self.slope)
+        return np.column_stack((c * w - s * y, c * x + s * z, c * y + s * w, c * z - s * x))
 
     def _surface(self) -> str:
         """The friction of a grain; that of a contact is the larger one of its two geometries."""

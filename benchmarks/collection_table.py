@@ -2,16 +2,20 @@
 
     .venv/bin/python benchmarks/collection_table.py FOLDER... [--sample 8] [--limit 3000]
         [--results NAME]
+    .venv/bin/python benchmarks/collection_table.py --exclusions [--results NAME]
 
 Sizes and density, contact components for a degree of freedom, are those of the catalogues. The rank
 ratio (contact components over the rank of W) and the conditioning of W (its largest singular value
-over the smallest that is not zero) are computed by fclib.analysis for a sample of each family,
-evenly spread, of the problems that have at most LIMIT contact components; docs/analysis.md has
-methods and thresholds.
+over the smallest that is not zero) are those of fclib.analysis, for a sample of each family, evenly
+spread, of the problems that have at most LIMIT contact components; docs/analysis.md has methods and
+thresholds.
 
 The last column says whether ours has the published range: both ends of each figure are met to 10 %
 (conditioning: of its logarithm). Else it names what is not, with the share by which the worse end
 is off.
+
+With --exclusions, the ends that no problem can have within the published ranges of the other
+figures, to the same tenth: density is three components of a contact over the degrees of freedom.
 
 published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
 contact problems with Coulomb friction: formulations and numerical comparisons, 2018, table
@@ -22,8 +26,9 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,14 +37,17 @@ import numpy as np
 
 import fclib
 from fclib import collections
-from fclib.analysis import analyze
+from fclib.analysis._brief import spectrum_of_W
+from fclib.analysis._data import Data, asymmetry
+from fclib.analysis._spectrum import spectrum
 
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 HEAD = (
     *("set", "mu", "problems", "dof", "contacts", "density", "rank ratio", "conditioning"),
     "within",
 )
-COMPARED = ("dof", "contacts", "density", "rank_ratio", "conditioning")
+COUNTED = ("dof", "contacts", "density")
+COMPARED = (*COUNTED, "rank_ratio", "conditioning")
 CLOSE = 0.1
 
 
@@ -56,24 +64,26 @@ def span(values: Iterable[Any]) -> str:
     return texts[0] if texts[0] == texts[1] else " to ".join(texts)
 
 
+def figures(problem: Any) -> tuple[float, float]:
+    """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN where it does not."""
+    data = Data.of(problem)
+    found = spectrum_of_W(data, asymmetry(data.W))
+    if found is None and data.reduced is not None:
+        found = spectrum(data.reduced.W, rounding=data.reduced.rounding)
+    if found is None or found.doubtful or not found.rank:
+        return np.nan, np.nan
+    return problem.m / found.rank, found.conditioning
+
+
 def spectra(folder: Path, rows: Sequence[dict[str, Any]], sample: int, limit: int) -> list[Any]:
     """Rank ratio and conditioning of W of a sample of a family's problems."""
     small = [row for row in rows if row["spacedim"] * row["nc"] <= limit]
     found = []
     for place in np.unique(np.linspace(0, len(small) - 1, min(sample, len(small))).round()):
         row = small[int(place)]
-        # the spectrum of a large M, which is not asked for, would take minutes
-        large = row["nnz_M"] and row["nnz_M"] > 1_000_000
-        local = row["local_file"] and large
-        if large and not local:
-            continue
-        path = row["local_file"] if local else row["global_file"] or row["local_file"]
-        problem = fclib.read(folder / path)
-        record = analyze(problem).record
-        if record["rank_W"]:
-            components = row["spacedim"] * row["nc"]
-            found.append((components / record["rank_W"], record["conditioning_W"]))
-    return found
+        path = row["local_file"] or row["global_file"]
+        found.append(figures(fclib.read(folder / path)))
+    return [pair for pair in found if np.isfinite(pair).all()]
 
 
 def off(published: str, values: Sequence[float], *, logarithm: bool) -> float:
@@ -107,6 +117,51 @@ def within(row: dict[str, str], rows: Sequence[dict[str, Any]], figures: Sequenc
     return ", ".join(words) or "yes"
 
 
+def exclusions(published: dict[str, str]) -> Iterator[dict[str, str]]:
+    """The ends of a set's ranges that its other ranges exclude, to a tenth.
+
+    Each with the nearest that the others leave, and with what the others are at that end.
+    """
+    if not all(published[name] for name in COUNTED):
+        return
+    ends, wide = {}, {}
+    for name in COUNTED:
+        low, _, high = published[name].partition(" to ")
+        ends[name] = float(low), float(high or low)
+        wide[name] = (1 - CLOSE) * ends[name][0], (1 + CLOSE) * ends[name][1]
+    for name in COUNTED:
+        for word, end in zip(("least", "most"), ends[name], strict=True):
+            nearest = between(end, possible(name, wide))
+            if abs(nearest - end) <= CLOSE * end:
+                continue
+            row = {"set": published["set"], "end": f"{word} {name}", "published": f"{end:g}"}
+            row["nearest"] = f"{nearest:.3g}"
+            there = wide | {name: ((1 - CLOSE) * end, (1 + CLOSE) * end)}
+            for other in COUNTED:
+                least, most = possible(other, there)
+                row[f"or {other}"] = ""
+                if other != name:
+                    below = most < ends[other][0]
+                    row[f"or {other}"] = f"at most {most:.3g}" if below else f"at least {least:.3g}"
+            yield row
+
+
+def possible(name: str, wide: dict[str, tuple[float, float]]) -> tuple[float, float]:
+    """The least and the largest of a figure where the two others are within bounds."""
+    (n, most_n), (nc, most_nc), (density, most_density) = (wide[other] for other in COUNTED)
+    n, most_n, nc, most_nc = math.ceil(n), math.floor(most_n), math.ceil(nc), math.floor(most_nc)
+    if name == "density":
+        return 3 * nc / most_n, 3 * most_nc / n
+    if name == "contacts":
+        return math.ceil(density * n / 3), math.floor(most_density * most_n / 3)
+    return math.ceil(3 * nc / most_density), math.floor(3 * most_nc / density)
+
+
+def between(value: float, bounds: tuple[float, float]) -> float:
+    """The value within bounds that is nearest to another."""
+    return min(max(value, bounds[0]), bounds[1])
+
+
 def line(
     name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any], verdict: str = ""
 ) -> dict[str, str]:
@@ -128,11 +183,35 @@ def line(
 def main() -> None:
     """Print the table: each published set, then ours beside it; then those that stand alone."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("folders", type=Path, nargs="+")
+    parser.add_argument("folders", type=Path, nargs="*")
     parser.add_argument("--sample", type=int, default=8)
     parser.add_argument("--limit", type=int, default=3000)
+    parser.add_argument("--exclusions", action="store_true", help="of the published ranges alone")
     _results.add_option(parser)
     arguments = parser.parse_args()
+    table: list[dict[str, str]] = []
+
+    def show(row: dict[str, str]) -> None:
+        if not table:
+            print("| " + " | ".join(row) + " |")
+            print("|" + "---|" * len(row))
+        table.append(row)
+        print("| " + " | ".join(row.values()) + " |", flush=True)
+
+    with PUBLISHED.open(newline="") as file:
+        published = list(csv.DictReader(file))
+    if arguments.exclusions:
+        for row in published:
+            for found in exclusions(row):
+                show(found)
+        if arguments.results:
+            _results.store(
+                arguments.results,
+                table,
+                title="Ends of published ranges that the other ranges of the set exclude",
+                note="All to a tenth, as in the comparison.",
+            )
+        return
     families: dict[str, list[dict[str, Any]]] = defaultdict(list)
     where: dict[str, Path] = {}
     for folder in arguments.folders:
@@ -140,26 +219,18 @@ def main() -> None:
             name = f"{row['collection']}/{row['family']}"
             if where.setdefault(name, folder) == folder:
                 families[name].append(row)
-    table: list[dict[str, str]] = []
-
-    def show(row: dict[str, str]) -> None:
-        table.append(row)
-        print("| " + " | ".join(row.values()) + " |", flush=True)
 
     def ours(name: str, published: dict[str, str] | None = None) -> None:
         rows = families.pop(name)
-        figures = spectra(where[name], rows, arguments.sample, arguments.limit)
-        show(line(name, rows, figures, within(published, rows, figures) if published else ""))
+        found = spectra(where[name], rows, arguments.sample, arguments.limit)
+        show(line(name, rows, found, within(published, rows, found) if published else ""))
 
-    print("| " + " | ".join(HEAD) + " |")
-    print("|" + "---|" * len(HEAD), flush=True)
-    with PUBLISHED.open(newline="") as file:
-        for row in csv.DictReader(file):
-            beside = row.pop("ours")
-            cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
-            show(dict(zip(HEAD, cells, strict=True)))
-            if beside in families:
-                ours(beside, row)
+    for row in published:
+        beside = row.pop("ours")
+        cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
+        show(dict(zip(HEAD, cells, strict=True)))
+        if beside in families:
+            ours(beside, row)
     for name in sorted(families):
         ours(name)
     if arguments.results:
@@ -167,8 +238,8 @@ def main() -> None:
             arguments.results,
             table,
             title="Published sets (in italics) and ours",
-            note=f"Rank ratio and conditioning are of {arguments.sample} problems of a family, of"
-            f" at most {arguments.limit} contact components.",
+            note=f"Rank ratio and conditioning are of at most {arguments.sample} problems of a"
+            f" family, evenly spread, of at most {arguments.limit} contact components.",
         )
 
 

@@ -6,14 +6,15 @@ Each scene is simulated by nonsmooth Gauss-Seidel to 1e-3, as packings of thousa
 minutes a step where more is asked: a stored state is what a step begins from, and how it came about
 is no part of its problem. Or its states are those of a stored trajectory, under another law. Of the
 steps whose contacts are as many as published (published_sets.csv), some are kept, evenly spread by
-their number of contacts.
+their number of contacts. Where other figures choose too, a step has all of them as published, to a
+tenth, as collection_table.py compares them; the steps are then spread by each figure in turn.
 
 States in which a body is more than DEEPEST in another are left out.
 
 With the name ChuteLocalProblems it writes OUT/chute_local_problems.json from the stored states.
 
-Writes OUT/rr9118/FAMILY-1.trajectory and OUT/rr9118.json, the list of what was chosen, which go to
-`collection/` and to `python/fclib/collections/data/`. Half an hour of CPU.
+Writes OUT/rr9118/FAMILY-VERSION.trajectory and OUT/rr9118.json, the list of what was chosen, which
+go to `collection/` and to `python/fclib/collections/data/`. An hour of CPU.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ import csv
 import json
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import collection_table
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 import fclib
 from fclib import _digest, scenes
@@ -39,8 +40,9 @@ from fclib.collections.known import Choice
 from fclib.collections.plan import Simulation
 from fclib.simulate import Contacts, Model, model_of, problem_at, scheme_of, simulate
 
+LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
 DEEPEST = 0.02  # penetration of a state that is kept, of the smallest body's diameter
-SET, VERSION = "rr9118", "1"
+SET = "rr9118"
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 WAY = Simulation(solver="nsgs", tol=1e-3, options={"max_iterations": 100})
 EXACT = Simulation(solver="auto", tol=1e-8)
@@ -56,7 +58,8 @@ class Regime:
     steps: int = 0  # of the simulation
     way: Simulation = field(default_factory=lambda: WAY)
     states: str = ""  # SET/FAMILY of a stored trajectory whose states are taken, instead
-    conditioning: bool = False  # whether it chooses too
+    by: tuple[str, ...] = ()  # columns of published_sets.csv that choose beside the contacts
+    version: str = "1"  # of the trajectory
 
 
 STEEL = {"young": 2e11, "density": 7800.0, "time_step": 0.0125}
@@ -64,9 +67,13 @@ CHUTE = {"hexahedra": True, "gaps": True, "spheres": 0.0, "slope": 0.6}
 REGIMES: dict[str, Regime] = {
     "Chute1000": Regime(
         "Chute_1000",
-        CHUTE | {"layers": 8, "time_step": 2e-3, "grains": 930},
-        keep=24,
+        CHUTE
+        | {"layers": 8, "time_step": 1.5e-3, "grains": 930}
+        | {"thinnest": 0.35, "tilt": 0.1, "margin": 0.01},
+        keep=32,
         steps=440,
+        by=("dof", "density", "rank_ratio"),
+        version="2",
     ),
     "Chute4000": Regime(
         "Chute_4000",
@@ -89,9 +96,11 @@ REGIMES: dict[str, Regime] = {
     ),
     "PeriodicBox": Regime(
         "100_PR_Periobox",
-        {"hexahedra": True, "spread": 0.1, "margin": 0.6, "radius": 3.7, "time_step": 4e-3},
-        keep=20,
+        {"hexahedra": True, "spread": 0.1, "margin": 0.7, "radius": 3.7, "time_step": 4e-3},
+        keep=40,
         steps=440,
+        by=("dof", "rank_ratio", "conditioning"),
+        version="2",
     ),
     "Capsules": Regime(
         "Capsules",
@@ -105,15 +114,42 @@ REGIMES: dict[str, Regime] = {
         keep=12,
         steps=180,
         way=EXACT,
-        conditioning=True,
+        by=("rank_ratio", "conditioning"),
     ),
-    "Chain": Regime("Chain", {}, keep=60, states="rt444/Chain", conditioning=True),
+    "Chain": Regime(
+        "Chain",
+        {"loose": 1, "begin": 0.0, "gap": 0.01, "rods_above": 2, "rods_below": 2, "offset": 0.02},
+        keep=100,
+        steps=1000,
+        way=EXACT,
+        by=("dof", "density", "rank_ratio", "conditioning"),
+        version="2",
+    ),
     "CubesH8": Regime(
         "Cubes_H8_5",
         STEEL | {"push": 8e4, "pressure": 1e4, "rise": 0.05, "bed": 1e11},
         keep=12,
         steps=36,
         way=EXACT,
+    ),
+    "CubesH8x2": Regime(
+        "Cubes_H8_2",
+        STEEL
+        | {"young": 8e7, "poisson": 0.499, "density": 1100.0, "yaw": 1.57}
+        | {"push": 7e3, "pressure": 1e4, "rise": 0.05, "bed": 1e11},
+        keep=60,
+        steps=60,
+        way=EXACT,
+        by=("conditioning",),
+        version="2",
+    ),
+    "LowWallFEM": Regime(
+        "LowWall_FEM",
+        {"mu": 0.83, "joint": 4e-3, "time_step": 1e-3},
+        keep=24,
+        steps=75,
+        by=("density",),
+        version="2",
     ),
     "CubesH8x20": Regime("Cubes_H8_20", STEEL | {"upper": 1.0}, keep=1, steps=1, way=EXACT),
 }
@@ -127,10 +163,16 @@ class Row:
     step: int
     position: Any
     velocity: Any
-    n: int
-    nc: int
+    dof: int
+    contacts: int
     depth: float  # largest penetration, of the smallest body's diameter
-    conditioning: float  # of W; NaN where nobody asks
+    rank_ratio: float  # of W, as its conditioning; NaN where it is large, or nobody asks
+    conditioning: float
+
+    @property
+    def density(self) -> float:
+        """Contact components for each degree of freedom."""
+        return 3 * self.contacts / self.dof
 
 
 def depth(contacts: Contacts, model: Model) -> float:
@@ -139,34 +181,32 @@ def depth(contacts: Contacts, model: Model) -> float:
     return -float(contacts.gap.min(initial=0.0)) / (2 * size) if size else 0.0
 
 
-def conditioning_of(problem: Any) -> float:
-    """Of W, dense: its largest singular value over the smallest that is not zero."""
-    W = problem.H.T @ splu(sp.csc_array(problem.M)).solve(problem.H.toarray())
-    values = np.linalg.svd(W, compute_uv=False)
-    return float(values[0] / values[values > 1e-12 * values[0]][-1])
-
-
 def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
-    """The steps of a regime that have a contact; of a simulation, as it goes."""
+    """The steps of a regime that have a contact; of a simulation, as it goes.
+
+    Their figures are those of the states as they are stored.
+    """
+    model = model_of(scene)
+    scheme = scheme_of(model)
+    exponent = trajectory.exponent_of(model)
+    spectra = {"rank_ratio", "conditioning"} & set(regime.by)
+
+    def row(number: int, step: int, position: Any, velocity: Any) -> Row:
+        position, velocity = (trajectory.rounded(x, exponent) for x in (position, velocity))
+        part = problem_at(model, scheme, position, velocity)
+        ratio, conditioning = np.nan, np.nan
+        if spectra and part.problem.m <= LIMIT:
+            ratio, conditioning = collection_table.figures(part.problem)
+        sizes = part.problem.n, part.problem.nc, depth(part.contacts, model)
+        return Row(number, step, position, velocity, *sizes, ratio, conditioning)
+
     if regime.states:
         path = published.path_of(regime.states, published.versions(regime.states)[-1])
         assert path is not None
         stored = trajectory.read(path)
-        model = model_of(scene)
-        scheme = scheme_of(model)
         for k in range(len(stored)):
-            part = problem_at(model, scheme, stored.position[k], stored.velocity[k])
-            problem = part.problem
-            yield Row(
-                int(stored.number[k]),
-                int(stored.step[k]),
-                stored.position[k],
-                stored.velocity[k],
-                problem.n,
-                problem.nc,
-                depth(part.contacts, model),
-                conditioning_of(problem) if regime.conditioning else np.nan,
-            )
+            place = int(stored.number[k]), int(stored.step[k])
+            yield row(*place, stored.position[k], stored.velocity[k])
         return
     number, start = 0, time.process_time()
     first = int(np.ceil(scene.begin / (scene.time_step or 1.0) - 1e-6))
@@ -181,46 +221,43 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
                 flush=True,
             )
         if step.index >= first and step.problem.nc:
-            yield Row(
-                number,
-                step.index,
-                step.start.position,
-                step.start.velocity,
-                step.problem.n,
-                step.problem.nc,
-                depth(step.contacts, step.model),
-                conditioning_of(step.problem) if regime.conditioning else np.nan,
-            )
+            yield row(number, step.index, step.start.position, step.start.velocity)
             number += 1
 
 
 def chosen(found: list[Row], regime: Regime) -> list[Row]:
     """Those of as many contacts as published, evenly spread by that number.
 
-    Where the conditioning chooses too: of those that are conditioned as published, half are spread
-    by the logarithm of their conditioning.
+    Where other figures choose too, of those that have them as published, evenly spread by each.
     """
     with PUBLISHED.open(newline="") as file:
-        row = next(row for row in csv.DictReader(file) if row["set"] == regime.published)
+        published = next(row for row in csv.DictReader(file) if row["set"] == regime.published)
 
     def bounds(name: str) -> tuple[float, float]:
-        low, _, high = row[name].partition(" to ")
+        low, _, high = published[name].partition(" to ")
         return float(low), float(high or low)
 
-    low, high = bounds("contacts")
-    inside = [r for r in found if low <= r.nc <= high and r.depth <= DEEPEST]
-    measures: list[Callable[[Row], float]] = [lambda r: float(r.nc)]
-    if regime.conditioning:
-        # to 10 % of the exponent, as the table compares
-        low, high = bounds("conditioning")
-        low, high = low**0.9, high**1.1
-        inside = [r for r in inside if low <= r.conditioning <= high]
-        measures.append(lambda r: math.log(r.conditioning))
+    names = ("contacts", *regime.by)
+
+    def measure(row: Row, name: str) -> float:
+        value = float(getattr(row, name))
+        return math.log(value) if name == "conditioning" else value
+
+    inside = [row for row in found if row.depth <= DEEPEST]
+    for name in names:
+        low, high = bounds(name)
+        if name == "conditioning":
+            low, high = math.log(low), math.log(high)
+        share = collection_table.CLOSE if regime.by else 0.0
+        low, high = (1 - share) * low, (1 + share) * high
+        # one that is not known is no reason to leave it out
+        inside = [r for r in inside if not (measure(r, name) < low or measure(r, name) > high)]
     kept: dict[int, Row] = {}
-    for measure in measures if inside else ():
-        values = [measure(r) for r in inside]
-        for wanted in np.linspace(min(values), max(values), regime.keep // len(measures)):
-            place = int(np.argmin(np.abs(np.array(values) - wanted)))
+    for name in names if inside else ():
+        values = np.array([measure(row, name) for row in inside])
+        ends = np.nanmin(values), np.nanmax(values)
+        for wanted in np.linspace(*ends, regime.keep // len(names)):
+            place = int(np.nanargmin(np.abs(values - wanted)))
             kept[inside[place].number] = inside[place]
     return [kept[number] for number in sorted(kept)]
 
@@ -233,11 +270,9 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     model = model_of(scene)
     scheme = scheme_of(model)
     exponent = trajectory.exponent_of(model)
-    problems = []
-    positions = [trajectory.rounded(row.position, exponent) for row in kept]
-    velocities = [trajectory.rounded(row.velocity, exponent) for row in kept]
-    for q, v in zip(positions, velocities, strict=True):
-        problems.append(problem_at(model, scheme, q, v).problem)
+    problems: list[Any] = [
+        problem_at(model, scheme, row.position, row.velocity).problem for row in kept
+    ]
     settings: dict[str, Any] = {"fclib": fclib.__version__, **regime.way.record()}
     if regime.states:
         path = published.path_of(regime.states, published.versions(regime.states)[-1])
@@ -245,15 +280,15 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
         origin = trajectory.read(path).origin
         settings = dict(origin["settings"]) | {"states": f"{regime.states}, {origin['version']}"}
     trajectory.write(
-        out / published.file_name(f"{SET}/{name}", VERSION),
+        out / published.file_name(f"{SET}/{name}", regime.version),
         trajectory.Trajectory(
             scene=scene,
-            origin={"collection": SET, "version": VERSION, "settings": settings},
+            origin={"collection": SET, "version": regime.version, "settings": settings},
             exponent=exponent,
             number=np.array([row.number for row in kept]),
             step=np.array([row.step for row in kept]),
-            position=np.array(positions),
-            velocity=np.array(velocities),
+            position=np.array([row.position for row in kept]),
+            velocity=np.array([row.velocity for row in kept]),
             digest=tuple(_digest.digest(problem) for problem in problems),
             structure=tuple(_digest.structure(problem) for problem in problems),
             sketch=np.array([_digest.sketch(problem) for problem in problems]),
@@ -268,10 +303,10 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
 def one_contacts(out: Path) -> None:
     """Write the problems of one contact of the chute, the others' reactions being a solution's.
 
-    At equal distances, of the contacts that carry a reaction and whose W is conditioned as
-    published.
+    Of the contacts that carry a reaction and whose W is conditioned as published, at equal
+    distances in the order of their conditioning.
     """
-    path = published.path_of(f"{SET}/Chute1000", VERSION)
+    path = published.path_of(f"{SET}/Chute1000", REGIMES["Chute1000"].version)
     assert path is not None
     states = trajectory.read(path)
     found = []
@@ -285,15 +320,18 @@ def one_contacts(out: Path) -> None:
         for c in np.flatnonzero(r[:, 0] > 1e-3 * r[:, 0].max()):
             part = slice(3 * c, 3 * c + 3)
             W = (H[:, part].T @ weighted[:, part]).toarray()
-            if np.linalg.cond(W) <= 4.66:
+            conditioning = np.linalg.cond(W)
+            if conditioning <= 4.66:
                 q = u[c] - W @ r[c]
-                found.append((f"rr9118/Chute1000/{states.number[place]:04d}, contact {c}", W, q))
+                origin = f"rr9118/Chute1000/{states.number[place]:04d}, contact {c}"
+                found.append((conditioning, origin, W, q))
+    found.sort(key=lambda one: one[:2])
     chosen = np.unique(np.linspace(0, len(found) - 1, 834).round().astype(int))
     lines = ",\n".join(
         json.dumps(
             {
-                **{"spacedim": 3, "mu": 1.0, "mu_r": None, "origin": found[k][0]},
-                **{"W": found[k][1].tolist(), "q": found[k][2].tolist()},
+                **{"spacedim": 3, "mu": 1.0, "mu_r": None, "origin": found[k][1]},
+                **{"W": found[k][2].tolist(), "q": found[k][3].tolist()},
             }
         )
         for k in chosen

@@ -64,7 +64,7 @@ class ChuteLocalProblems(LocalProblems):
     """One contact each, all of one chute: the contacts of rr9118/Chute1000 that carry a reaction.
 
     As many as in Chute_local_problems of V. Acary, M. Bremond and O. Huber, 2018, mu = 1, those
-    with a conditioning of W up to 4.66. They are taken at equal distances, not chosen as hard.
+    with a conditioning of W up to 4.66. They are spread by it, not chosen as hard.
     """
 
     title: ClassVar[str] = "One contact of a chute"

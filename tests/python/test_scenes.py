@@ -179,6 +179,14 @@ def test_chain_hangs() -> None:
     assert last.contacts.gap.min() > -0.1 * family.thickness
 
 
+def test_links_far_from_the_middle_lie_against_a_side() -> None:
+    scene = scenes.get("Chain")(loose=0, offset=0.03, begin=0.0).scene(seed=0)
+    (step,) = simulate(scene, 1)
+    # each joint touches where it hangs, and some a side too
+    assert len(step.contacts) > 10
+    assert -2e-6 < step.contacts.gap.min() <= step.contacts.gap.max() < 1e-4
+
+
 def test_chain_begins_with_links_alike_that_touch() -> None:
     scene = scenes.get("Chain")().scene(seed=0)
     m = MujocoModel(scene).model
@@ -365,6 +373,8 @@ def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
         ("SpheresInABox", {"spread": 1.0}),
         ("Chute", {"slope": 2.0}),
         ("Chute", {"spheres": 1.5}),
+        ("Chute", {"thinnest": 0.5}),  # of hexahedra alone, as tilt
+        ("Chute", {"tilt": 1.5, "hexahedra": True}),
         ("RollingChute", {"mu_r": -1.0}),
         ("RollingSoup", {"mu_r": -1.0}),
         ("PrimitiveSoup", {"bodies": 0}),
@@ -383,6 +393,16 @@ def test_grains_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
 def test_chute_has_the_published_sizes(grains: int) -> None:
     scene = scenes.get(f"Chute{grains}")().scene(seed=0)
     assert scene.xml.count("<freejoint/>") == grains
+
+
+def test_grains_that_are_not_tilted_land_on_their_faces() -> None:
+    small = {"grains": 9, "across": 3, "layers": 1, "shapes": 5, "hexahedra": True, "spheres": 0.0}
+    scene = scenes.get("Chute")(**small, gaps=True, tilt=0.0, thinnest=0.5).scene(seed=0)
+    for step in simulate(scene, 60, solver="nsgs", tol=1e-3):
+        if step.problem.nc:
+            break
+    # the four corners of each
+    assert step.problem.nc == 4 * step.problem.n / 6
 
 
 def test_polyhedra_are_convex_and_neither_flat_nor_needles() -> None:

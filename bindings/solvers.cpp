@@ -438,7 +438,9 @@ void bind_solvers(nb::module_& m) {
           "y >= 0 (nc) which proves that there is no solution, where the status is infeasible, on\n"
           "the problem as it was given: -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and\n"
           "y . q_N + z . s < 0, or H E y + G z = 0 and y . w_N + z . b < 0, with E y the vector\n"
-          "whose normal parts are y. Else None.")
+          "whose normal parts are y. Else None. Of a global problem these sums may vanish for "
+          "real\n"
+          "numbers next to y and z instead: fclib.analysis.check_arrays gives them.")
       .def_prop_ro(
           "certificate_z",
           [](nb::handle self) -> nb::object {

@@ -396,7 +396,8 @@ int fclib_solve_local_rolling(const struct fclib_local_rolling* problem, const c
  *    local    -(W^T E y + V z) is in K*,  V^T E y + R^T z = 0,  y . q_N + z . s < 0
  *    global   H E y + G z = 0,                                  y . w_N + z . b < 0
  *
- *  (Farkas' lemma; docs/mathematics.md). All sums are exact. */
+ *  (Farkas' lemma; docs/mathematics.md). All sums are exact; of a global problem it is enough that
+ *  real numbers next to y and z are a proof. */
 double fclib_certificate_global(const struct fclib_global* problem, const double* y,
                                 const double* z);
 double fclib_certificate_local(const struct fclib_local* problem, const double* y, const double* z);

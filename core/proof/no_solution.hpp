@@ -10,9 +10,13 @@
 // For a global problem M and f do not matter: no motion that the joints allow keeps the contacts
 // from closing. (More is never needed where M is symmetric positive definite.)
 //
-// All sums are exact (linalg/exact_sum.hpp), and a proof holds for the doubles that the data are. A
-// W that was condensed carries the rounding of that, so that W E y does not vanish although it did
-// before. Such a y is accepted only for a local problem without bilateral constraints, where
+// All sums are exact (linalg/exact_sum.hpp), and a proof holds for the doubles that the data are.
+// Doubles are too coarse for a y whose sums vanish where normals are at any angle. Of a global
+// problem it is enough, then, that real numbers next to y and z are a proof, which bounds of all
+// rounding show: fclib.analysis finds them as rational numbers.
+//
+// A W that was condensed carries the rounding of that, so that W E y does not vanish although it
+// did before. Such a y is accepted only for a local problem without bilateral constraints, where
 //
 //   - what is left of W^T E y is not more than the last digits of W (its terms' rounding), and
 //   - y . W_NN y < 0: this W is not positive semidefinite, so it is a rounded one. For any W that
@@ -45,7 +49,7 @@ struct NoSolution {
   [[nodiscard]] bool exact() const { return bound == std::numeric_limits<double>::infinity(); }
 };
 
-/// What y and z prove as they are; nothing where they do not fit.
+/// What y and z, or real numbers next to them, prove; nothing where they do not fit.
 NoSolution check_no_solution(const LocalProblem& problem, const Vector& y, const Vector& z = {});
 NoSolution check_no_solution(const LocalRollingProblem& problem, const Vector& y,
                              const Vector& z = {});

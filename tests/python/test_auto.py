@@ -17,6 +17,7 @@ import scipy.sparse as sp
 from hypothesis import strategies as st
 
 import fclib
+from fclib import analysis
 from fclib.scenes.packing import Packing
 from helpers import (
     auto_chain,
@@ -280,6 +281,67 @@ def test_a_body_between_closing_walls_has_no_solution(
     assert isinstance(local, fclib.LocalProblem)
     assert_proven(local, fclib.solve(local))
     assert fclib.solve(problem).status == "infeasible"
+
+
+def walls_around(
+    normals: Array, speeds: Array, scale: float, rng: np.random.Generator
+) -> fclib.GlobalProblem:
+    """A body of one point between walls that close; frames and their normals are at any angle."""
+    count, d = normals.shape
+    H = np.zeros((d, d * count))
+    for a, normal in enumerate(normals):
+        frame, _ = np.linalg.qr(np.column_stack([normal, rng.standard_normal((d, d - 1))]))
+        H[:, d * a : d * (a + 1)] = scale * frame * np.sign(frame[:, 0] @ normal)
+    w = np.zeros(d * count)
+    w[::d] = -scale * speeds
+    return fclib.GlobalProblem(
+        spacedim=d, M=np.eye(d), H=H, f=rng.standard_normal(d), w=w, mu=rng.uniform(0, 1, count)
+    )
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e6])
+def test_walls_at_any_angle_have_no_solution(d: int, scale: float) -> None:
+    # no y of doubles makes H E y vanish: real numbers next to the certificate do
+    rng = np.random.default_rng([d, int(np.log10(scale)) + 9])
+    for count in [d + 1] * 4 + [2 * d + 1] * 2:
+        normals = rng.standard_normal((count, d))
+        normals[-1] = -rng.uniform(0.3, 1, count - 1) @ normals[:-1]
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        problem = walls_around(normals, rng.uniform(0.5, 2, count), scale, rng)
+        result = fclib.solve(problem)
+        assert result.status == "infeasible"
+        assert result.certificate_bound == np.inf
+        y = result.certificate
+        assert y is not None
+        rest = problem.H[:, ::d] @ y
+        assert abs(rest).max() <= 1e-12 * scale * y.max()
+        proof = analysis.check_arrays(problem, y)
+        assert proof.exact
+        assert proof.y is not None
+        np.testing.assert_allclose(proof.y, y, rtol=1e-9)
+        # walls that go away leave room
+        assert fclib.solve(problem.replace(w=-np.asarray(problem.w))).converged
+
+
+def test_walls_that_rounding_takes_out_of_their_plane_are_no_proof() -> None:
+    # three normals in a plane at an angle: as doubles they are independent, and a motion opens all
+    rng = np.random.default_rng(3)
+    claimed = 0
+    for _ in range(20):
+        turn, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+        angles = 2 * np.pi * np.arange(3) / 3 + rng.uniform(0, 1)
+        normals = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(3)]) @ turn.T
+        problem = walls_around(normals, np.ones(3), 1.0, rng)
+        independent = abs(np.linalg.det(problem.H[:, ::3])) > 0
+        result = fclib.solve(problem, time_limit=20)
+        if result.status == "infeasible":
+            claimed += 1
+            assert result.certificate is not None
+            assert analysis.check_arrays(problem, result.certificate).exact
+        elif result.converged:
+            assert independent
+    assert claimed < 20
 
 
 def test_what_is_pressed_but_not_closing_is_not_refused() -> None:

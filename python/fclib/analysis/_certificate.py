@@ -32,6 +32,7 @@ from fclib.analysis._data import Array
 LAST_DIGITS = 8  # of W's last digits, how many times their rounding may be left
 LEAST_GAIN = Fraction(1, 10**8)  # below this part of its terms a gain is rounding
 LEAST_SPEED = 1e-6  # of ||q||: what closes more slowly is within the tolerance of solutions
+NEAREST = 1e-9  # of each y, how far that of an exact proof may be
 MOST = 60  # unknowns up to which a kernel is found in rational arithmetic
 FORMAT = "fclib certificate 1"
 
@@ -267,11 +268,23 @@ def check(
 def check_arrays(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate:
     """`check` of y (nc,) and z (p,) as arrays, as `fclib.Result` has them.
 
+    Where doubles are too coarse for sums that vanish, it is the proof next to them, in rational
+    numbers.
+
     Raises:
         CertificateError: they prove nothing.
     """
     by_constraint = {} if z is None else dict(enumerate(z.tolist()))
-    return check(problem, dict(enumerate(y.tolist())), by_constraint)
+    try:
+        return check(problem, dict(enumerate(y.tolist())), by_constraint)
+    except CertificateError:
+        own = {int(a): Fraction(float(y[a])) for a in np.flatnonzero(y)}
+        near = {k: value for k, value in by_constraint.items() if value}
+        if len(own) + problem.p > MOST or (exact := _completed(problem, own, near, "zero")) is None:
+            raise
+        if any(abs(value - own[a]) > NEAREST * own[a] for a, value in exact[0].items()):
+            raise
+        return check(problem, *exact)
 
 
 def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dict[int, Fraction]:
@@ -317,11 +330,8 @@ def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None
                 return found
     best = None
     if core := _core.prove_no_solution(problem, y):
-        other = {int(a): float(core[0][a]) for a in np.flatnonzero(core[0])}
         try:
-            best = check(
-                problem, other, {int(k): float(core[1][k]) for k in np.flatnonzero(core[1])}
-            )
+            best = check_arrays(problem, core[0], core[1] if p else None)
         except CertificateError:
             best = None
         if best is not None and best.exact:

@@ -32,9 +32,7 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
     both.leftCols(m) = h;
     both.rightCols(p) = to_eigen(problem.G);
   }
-  const auto store = [](const SparseColumns& a) {
-    return converted(Matrix::from_eigen(a), Storage::csr);
-  };
+  const auto store = Matrix::from_eigen;
   const std::optional<SparseColumns> product = mass_.gram(both, *deadline);
   if (!product) return;
   const SparseColumns& gram = *product;
@@ -63,10 +61,16 @@ Solution Condensation::expand(const Solution& local) const {
   return result;
 }
 
-LocalProblem condense(const GlobalProblem& problem) { return Condensation(problem).local(); }
+LocalProblem condense(const GlobalProblem& problem) {
+  LocalProblem local = Condensation(problem).local();
+  for (Matrix* a : {&local.W, &local.V, &local.R}) {
+    if (!a->empty()) *a = converted(*a, Storage::csr);
+  }
+  return local;
+}
 
 LocalRollingProblem condense(const GlobalRollingProblem& problem) {
-  return {Condensation(problem).local(), problem.mu_r};
+  return {condense(static_cast<const GlobalProblem&>(problem)), problem.mu_r};
 }
 
 }  // namespace fclib

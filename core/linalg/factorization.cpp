@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "error.hpp"
@@ -29,19 +30,29 @@ const Deadline never(std::numeric_limits<double>::infinity());
 
 /// The symmetric matrix of which this is the lower triangle.
 SparseColumns mirrored(const SparseColumns& lower) {
-  const SparseColumns upper = lower.transpose();
-  SparseColumns result(lower.rows(), lower.cols());
-  result.reserve(2 * lower.nonZeros());
-  for (Eigen::Index col = 0; col < lower.cols(); ++col) {
-    result.startVec(col);
-    for (SparseColumns::InnerIterator entry(upper, col); entry; ++entry) {
-      if (entry.row() < col) result.insertBack(entry.row(), col) = entry.value();
-    }
+  const auto n = static_cast<Index>(lower.cols());
+  SparseColumns result(n, n);
+  Index* const first = result.outerIndexPtr();
+  for (Index col = 0; col < n; ++col) {
     for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
-      result.insertBack(entry.row(), col) = entry.value();
+      ++first[col + 1];
+      if (entry.row() != col) ++first[entry.row() + 1];
     }
   }
-  result.finalize();
+  std::partial_sum(first, first + n + 1, first);
+  result.resizeNonZeros(first[n]);
+  // what is above the diagonal of a column comes from the columns before it
+  std::vector<Index> next(first, first + n);
+  const auto put = [&](Index row, Index col, double value) {
+    result.innerIndexPtr()[next[col]] = row;
+    result.valuePtr()[next[col]++] = value;
+  };
+  for (Index col = 0; col < n; ++col) {
+    for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
+      put(entry.row(), col, entry.value());
+      if (entry.row() != col) put(col, entry.row(), entry.value());
+    }
+  }
   return result;
 }
 
@@ -129,7 +140,12 @@ std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& dead
       const Index count = rows.outerIndexPtr()[k + 1] - first;
       if (bits) {
         bits->add(static_cast<Index>(k), col);
-        for (Index at = 0; at < count; ++at) sum[row[at]] += value[at] * entry.value();
+        if (row[count - 1] - row[0] == count - 1) {  // without gaps
+          Eigen::Map<Vector>(&sum[row[0]], count) +=
+              entry.value() * Eigen::Map<const Vector>(value, count);
+        } else {
+          for (Index at = 0; at < count; ++at) sum[row[at]] += value[at] * entry.value();
+        }
         continue;
       }
       for (Index at = 0; at < count; ++at) {

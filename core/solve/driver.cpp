@@ -1,6 +1,7 @@
 #include "solve/driver.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <functional>
 #include <limits>
 #include <utility>
@@ -30,6 +31,22 @@ double rounding_of_product(const Matrix& a, const Vector& x) {
     sizes[row] += std::abs(value) * std::abs(x[col]);
   });
   return std::numeric_limits<double>::epsilon() * sizes.stableNorm();
+}
+
+/// By how much the last digit of r may change the natural map, over this scale: that of r itself,
+/// and that of W r, given || |W| |r| || eps.
+double last_digit(const Vector& r, double product, double scale) {
+  const double eps = std::numeric_limits<double>::epsilon();
+  return (eps * r.stableNorm() + 0.5 * product) / scale;
+}
+
+std::string too_coarse(double digit) {
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "doubles are too coarse for the tolerance: the last digit of these reactions "
+                "changes the error by up to %.2g",
+                digit);
+  return text;
 }
 
 struct Request {
@@ -149,6 +166,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
       result.certificate = {};
       return result;
     }
+    const double product = rounding_of_product(plain.W, r);
     // a correction may end worse than what it was to better
     const bool better = result.error < 0.5 * least;
     if (result.error < least) {
@@ -160,9 +178,14 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
         result.error = least;
         result.solution = best;
       }
+      const double digit = last_digit(r, product, reduced.scale);
+      const bool reached = digit > request.settings.tolerance && result.error <= digit;
+      if (reached && result.status != Status::infeasible && result.message.empty()) {
+        result.message = too_coarse(digit);
+      }
       return result;
     };
-    const double rounding = rounding_of_product(plain.W, r) / reduced.scale;
+    const double rounding = product / reduced.scale;
     const bool rounded = rounding > rounding_in_tolerance * request.settings.tolerance;
     const bool hidden = result.status == Status::stalled && rounded && better &&
                         result.error < rounding_in_error * rounding;

@@ -554,6 +554,8 @@ def test_collection_is_a_lazy_sequence(tmp_path: Path, monkeypatch: pytest.Monke
         fclib.load("small/BoxesStack/0009")
     with pytest.raises(KeyError, match="SET/FAMILY/NUMBER"):
         fclib.load("BoxesStack")
+    with pytest.raises(KeyError, match=r"fclib\.read reads a file"):
+        fclib.load(tmp_path / "a.hdf5")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="form"):
         fclib.load("small/BoxesStack/0001", form="dual")
 

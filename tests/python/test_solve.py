@@ -219,6 +219,26 @@ def test_problems_in_any_unit_of_mass_are_solved(mass: float) -> None:
         assert_solved(other, fclib.solve(other, tol=tol), tol)
 
 
+@pytest.mark.parametrize("mass", [1e11, 1e13])
+def test_where_doubles_are_too_coarse_the_digit_is_said(mass: float) -> None:
+    for seed in range(3):
+        problem = planted_local(seed, nc=10).problem
+        assert isinstance(problem, fclib.LocalProblem)
+        other = scaled(problem, mass, 1)
+        result = fclib.solve(other)
+        assert result.status == "stalled"
+        assert "too coarse" in result.message
+        most = float(result.message.split()[-1])
+        assert result.error <= most
+        # by the sizes of what is added up, and as it is: one digit of each reaction, up or down
+        r = np.asarray(result.solution.r)
+        signs = np.random.default_rng(seed).choice([-1, 1], r.size)
+        moved = fclib.Solution(r=np.nextafter(r, signs * np.inf))
+        assert 1e-3 * most < judge(other, moved).error < 2 * most
+        assert fclib.solve(problem).message == ""
+        assert fclib.solve(other, max_iterations=1, solver="nsgs").message == ""
+
+
 # ---- limits, callback, warm start
 
 

@@ -254,9 +254,11 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
     """
     if form not in (None, *FORMS):
         raise ValueError(f'the form is "global" or "local", not {form!r}')
-    parts = name.split("/")
+    parts = str(name).split("/")
     if len(parts) != 3:
-        raise KeyError(f"a problem is named SET/FAMILY/NUMBER, not {name!r}")
+        raise KeyError(
+            f"a problem is named SET/FAMILY/NUMBER, not {str(name)!r}; fclib.read reads a file"
+        )
     if parts[0] in known.SHIPPED:
         # needs nothing that reads catalogues
         for own in (form,) if form else FORMS:

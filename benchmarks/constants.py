@@ -12,10 +12,11 @@ other pages have larger numbers):
     random      small ones that come to the stages "pivoting" or "random starts" of `auto`
     linked      some without a solution, which an open contact links to one island
     no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
+    jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
 
 A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
-times; of digits the least of three runs. A FILE has a limit of --seconds of CPU, as much as a
-failure counts.
+times; of digits the least of three runs. A FILE or a packing has a limit of --seconds of CPU, as
+much as a failure counts.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ import sys
 import sysconfig
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,16 +89,54 @@ class Rules:
     """Other rules of a stage of the chain; none: without it."""
 
     stage: str
-    which: int  # of that name
+    which: int | None  # of that name; None: all of them
     rules: tuple[dict[str, object], ...]
+    problems: str = "random"
+
+
+HELD = "held bodies"
+
+
+def doubled(*names: str) -> list[Rules]:
+    """Half and double of the default of rules of the stages that hold bodies."""
+    (method,) = (m for m in fclib.chain_methods() if m.name == "held_bodies")
+    found = []
+    for name in names:
+        (value,) = (rule.default for rule in method.rules if rule.name == name)
+        assert not isinstance(value, str)
+        half = value // 2 if isinstance(value, int) else value / 2
+        found.append(
+            Rules(HELD, None, ({name: f"{half:g}"}, {name: f"{2 * value:g}"}), problems="jammed")
+        )
+    return found
 
 
 RULES = [
     Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
+    *(Rules(HELD, k, ({},), "jammed") for k in range(3)),
+    *doubled("patience", "rest", "change", "stuck", "accuracy", "convex_limit", "inner"),
+    Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
+    *(Rules(HELD, k, ({"doubt": 0.5}, {"doubt": 2}), "jammed") for k in range(2)),
+    Rules(HELD, 0, ({"interior_above": 5e-4}, {"interior_above": 2e-3}), "jammed"),
+    Rules(HELD, 1, ({"interior_above": 5e-4}, {"interior_above": 2e-3}), "jammed"),
+    Rules(HELD, 2, ({"interior_above": 0.015}, {"interior_above": 0.06}), "jammed"),
+    *doubled("sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"),
+    Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
+    *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
 ]
 
+
+# the stages whose problems count
+LATE: dict[str, set[str]] = defaultdict(set, random={"pivoting", "random starts"}, jammed={HELD})
+LIMITED = {"no memory", "jammed"}
+PACKINGS = [  # contacts, push, seed
+    f"{contacts} {push:g} {seed}"
+    for contacts in (800,)
+    for push in (0.0, 1.0)
+    for seed in range(100, 104)
+]
 
 # ---- the problems
 
@@ -149,6 +189,12 @@ def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[s
         for file in given:
             yield file, fclib.read(Path(file)), None
         return
+    if kind == "jammed":
+        family: Any = fclib.scenes.assemblies()["Packing"]()
+        for name in given:
+            contacts, push, seed = name.split()
+            yield name, family.of_size(int(contacts), float(push), int(seed)), None
+        return
     if kind == "linked":
         for number in range(count // 80):
             yield str(number), linked(number), None
@@ -185,11 +231,11 @@ def measure(job: dict[str, Any]) -> dict[str, Any]:
             )
             least = min(least, time.process_time() - before)
         answer = result.status == "infeasible" if kind == "linked" else result.converged
-        if {"pivoting", "random starts"} & {stage.name for stage in result.stages}:
+        if LATE[kind] & {stage.name for stage in result.stages}:
             late.append(name)
         problems += 1
         solved += answer
-        spent += least if answer or kind != "no memory" else max(least, seconds)
+        spent += least if answer or kind not in LIMITED else max(least, seconds)
     return {"problems": problems, "solved": solved, "CPU [s]": spent, "late": late}
 
 
@@ -275,26 +321,32 @@ def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
                     own["repeats"] = REPEATS
                 found = measured(Path(folder), own)
             yield row(constant.name, value, k == 0, constant.problems, found)
-    if not any(wanted(rules.stage) for rules in RULES):
-        return
     lines = choose_auto.table()
-    job["kind"] = "random"
-    job["given"] = measured(ROOT / "python", job)["late"]
-    found = measured(ROOT / "python", job)
-    yield row("the chain", "as it is", True, "random", found)
-    for rules in RULES:
-        if not wanted(rules.stage):
+    for kind, given in (("random", []), ("jammed", PACKINGS)):
+        own = {**job, "kind": kind, "given": given}
+        asked = [rules for rules in RULES if rules.problems == kind and wanted(rules.stage)]
+        if not asked:
             continue
-        place = choose_auto.place(lines, rules.stage, rules.which)
-        for own_rules in rules.rules:
-            change: Callable[[list[str]], list[str]] = (
-                choose_auto.with_rules(place, **own_rules)
-                if own_rules
-                else choose_auto.without(place)
-            )
-            found = measured(ROOT / "python", {**job, "chain": "\n".join(change(lines))})
-            word = " ".join(f"{key}={value}" for key, value in own_rules.items()) or "without"
-            yield row(f"{rules.stage} {rules.which + 1}", word, False, "random", found)
+        own["given"] = measured(ROOT / "python", own)["late"]
+        found = measured(ROOT / "python", own)
+        yield row("the chain", "as it is", True, kind, found)
+        for rules in asked:
+            for own_rules in rules.rules:
+                chain = "\n".join(changed(lines, rules, own_rules))
+                found = measured(ROOT / "python", {**own, "chain": chain})
+                word = " ".join(f"{key}={value}" for key, value in own_rules.items()) or "without"
+                number = "" if rules.which is None else f" {rules.which + 1}"
+                yield row(f"{rules.stage}{number}", word, False, kind, found)
+
+
+def changed(lines: list[str], rules: Rules, own: dict[str, object]) -> list[str]:
+    """The table with other rules of a stage, or of all of its name; or without it."""
+    places = [k for k, line in enumerate(lines) if choose_auto.name_of(line) == rules.stage]
+    if rules.which is not None:
+        places = [places[rules.which]]
+    if not own:
+        return [line for k, line in enumerate(lines) if k not in places]
+    return [choose_auto.ruled(line, **own) if k in places else line for k, line in enumerate(lines)]
 
 
 def row(
@@ -308,6 +360,22 @@ def row(
         "problems of": kind,
         **{key: found[key] for key in ("problems", "solved", "CPU [s]")},
     }
+
+
+def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
+    """What a reader of the table must know."""
+    count, seconds = arguments.count, f"{arguments.seconds:g} s"
+    told = {
+        "digits": f"Planted problems: of the numbers 0 to {count - 1}.",
+        "random": f"Random ones: of the numbers 0 to {count - 1} that come to these stages.",
+        "linked": f"Linked ones: the first {count // 80}.",
+        "no memory": f"A file that is not solved to {_results.power(LOOSE)} counts as {seconds}.",
+        "jammed": "Jammed ones: packings of about 800 contacts, at rest and pushed, of the "
+        "seeds 100 to 103, that come to the stages. One that is not solved "
+        f"counts as {seconds}. A rule without a number is that of all stages of the "
+        "name.",
+    }
+    return " ".join(text for kind, text in told.items() if kind in kinds)
 
 
 def main() -> None:
@@ -328,9 +396,7 @@ def main() -> None:
             arguments.results,
             rows,
             title="Other values of constants",
-            note=f"Planted problems of the numbers 0 to {arguments.count - 1}, the first "
-            f"{arguments.count // 80} of linked ones. A file counts as {arguments.seconds:g} s "
-            f"where it is not solved to {_results.power(LOOSE)}.",
+            note=note(arguments, {str(one["problems of"]) for one in rows}),
         )
 
 

@@ -126,8 +126,7 @@ HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
 template <int D>
 void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,
                           FunctionRef<bool()> count) {
-  constexpr double inner = 0.1;  // of the tolerance
-  constexpr double stuck = 0.9;  // of the last error
+  const double enough = rules.inner * tolerance;
   const double size = problem_.q.template lpNorm<Eigen::Infinity>();
   shift_ = Vector::Zero(problem_.nc());
   r_ = Vector::Zero(problem_.m());
@@ -152,14 +151,14 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     }
     Vector r = part.problem.known_r;
     double left = 0;
-    if (!solve_part(rules, part, error > rules.interior_above, inner * tolerance, r, left, count)) {
+    if (!solve_part(rules, part, error > rules.interior_above, enough, r, left, count)) {
       return;
     }
     // too many were held, or too few
-    const bool solved = left <= inner * tolerance;
+    const bool solved = left <= enough;
     if (!solved) {
       creep = std::min(creep * rules.change, rules.creep);
-    } else if (error > stuck * last) {
+    } else if (error > rules.stuck * last) {
       creep /= rules.change;
     }
     last = error;
@@ -218,27 +217,28 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
     return (ended = count()) || error <= tolerance;
   };
   const auto run = [&] {
-    if (far) {
-      if (sweep()) return;
-      // as the first stages of `auto`
-      if (interior(
-              {.tau = std::clamp(4 * error, 0.03, 1.0), .max_iterations = rules.interior_limit},
-              Vector(r)) ||
-          proximal({.kappa = 10, .max_factorisations = rules.proximal})) {
-        return;
+    const ProximalRules short_steps{.kappa = rules.kappa, .max_factorisations = rules.proximal};
+    if (!far) {
+      if (!proximal({.kappa = rules.near_kappa,
+                     .easy = rules.near_easy,
+                     .hard = rules.near_hard,
+                     .max_factorisations = rules.near_proximal})) {
+        proximal(short_steps);
       }
-      if (interior(
-              {.tau = 10, .step_cap = 0.8, .delta = 1e-3, .max_iterations = rules.interior_limit},
-              Vector::Zero(r.size()))) {
-        return;
-      }
-    } else if (proximal({.kappa = 1000,
-                         .easy = 10,
-                         .hard = 0.2,
-                         .max_factorisations = rules.proximal / 2})) {
       return;
     }
-    proximal({.kappa = 10, .max_factorisations = rules.proximal});
+    if (sweep()) return;
+    const double tau = std::clamp(rules.follow * error, rules.least_tau, 1.0);
+    if (interior({.tau = tau, .max_iterations = rules.interior_limit}, Vector(r))) return;
+    if (proximal(short_steps)) return;
+    if (interior({.tau = rules.tau,
+                  .step_cap = rules.step_cap,
+                  .delta = rules.delta,
+                  .max_iterations = rules.interior_limit},
+                 Vector::Zero(r.size()))) {
+      return;
+    }
+    proximal(short_steps);
   };
   run();
   factorisations_ += system.factorisations();

@@ -33,18 +33,33 @@
 namespace fclib {
 
 struct HeldBodiesRules {
-  int rounds = 40;               ///< of both, at most
-  int patience = 15;             ///< rounds in which the error must halve
-  double rest = 1e-6;            ///< speed of a body that rests, over ||q||_inf ...
-  double creep = 0.1;            ///< ... and over the error of 1 and ||q||
-  double change = 3;             ///< of `creep`: less where 2 was solved and 1 got no better
-  double doubt = 1;              ///< slip of a contact that sticks, over the error of 2 and ||q||
-  double accuracy = 1e-11;       ///< of the convex problem: complementarity and residual
-  int convex_limit = 100;        ///< iterations on a convex problem
-  double interior_above = 1e-3;  ///< error of 1 over which 2 begins with interior points
-  int sweeps = 40;               ///< of Gauss-Seidel before these
-  int interior_limit = 60;       ///< iterations of each
-  std::int64_t proximal = 80;    ///< factorisations of the proximal point after each
+  int rounds = 40;          ///< of both, at most
+  int patience = 5;         ///< rounds in which the error must halve
+  double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
+  double creep = 0.1;       ///< ... and over the error of 1 and ||q||
+  double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
+  double stuck = 0.9;       ///< share of its last error at which 1 got no better
+  double doubt = 1;         ///< slip of a contact that sticks, over the error of 2 and ||q||
+  double accuracy = 1e-14;  ///< of the convex problem: complementarity and residual
+  int convex_limit = 100;   ///< iterations on a convex problem
+  double inner = 0.1;       ///< tolerance of 2, over that of the whole
+  // 2 from far away, as the first stages of `auto`: sweeps, an interior point from what they have,
+  // a proximal point; then both again, from r = 0
+  double interior_above = 1e-3;  ///< error of 1 over which it is far away
+  int sweeps = 40;               ///< of Gauss-Seidel
+  double follow = 4;  ///< complementarity at first of the first interior point, over the error
+  double least_tau = 0.03;     ///< ... and the least
+  double tau = 10;             ///< ... and of the second
+  double step_cap = 0.8;       ///< of the second
+  double delta = 1e-3;         ///< of the second
+  int interior_limit = 60;     ///< iterations of each
+  double kappa = 10;           ///< of the proximal points at first
+  std::int64_t proximal = 80;  ///< factorisations of each
+  // from nearby, with long steps at first
+  double near_kappa = 1000;         ///< of a first proximal point
+  double near_easy = 10;            ///< its factor on kappa after few Newton steps
+  double near_hard = 0.2;           ///< ... and after a failure
+  std::int64_t near_proximal = 40;  ///< its factorisations
 };
 
 /// The coordinates of some contacts, with all that M links to them, and these contacts.

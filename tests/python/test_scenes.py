@@ -373,6 +373,8 @@ def test_energy_of_grains_does_not_grow(landed: tuple[str, list[Step]]) -> None:
         ("SpheresInABox", {"spread": 1.0}),
         ("Chute", {"slope": 2.0}),
         ("Chute", {"spheres": 1.5}),
+        ("PeriodicBox", {"lift": -0.5}),
+        ("Bridge", {"activation": -1.0}),
         ("Chute", {"thinnest": 0.5}),  # of hexahedra alone, as tilt
         ("Chute", {"tilt": 1.5, "hexahedra": True}),
         ("RollingChute", {"mu_r": -1.0}),
@@ -393,6 +395,14 @@ def test_grains_refuse_nonsense(name: str, wrong: dict[str, Any]) -> None:
 def test_chute_has_the_published_sizes(grains: int) -> None:
     scene = scenes.get(f"Chute{grains}")().scene(seed=0)
     assert scene.xml.count("<freejoint/>") == grains
+
+
+@pytest.mark.parametrize(("lift", "bodies"), [(0.0, 9), (0.5, 0)])
+def test_hexahedra_without_lift_begin_on_the_floor(lift: float, bodies: int) -> None:
+    scene = scenes.get("PeriodicBox")(hexahedra=True, polyhedra=9, lift=lift).scene(seed=0)
+    (step,) = simulate(scene, 1)
+    # the four corners of each
+    assert step.problem.nc == 4 * bodies
 
 
 def test_grains_that_are_not_tilted_land_on_their_faces() -> None:

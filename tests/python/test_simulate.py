@@ -80,9 +80,12 @@ def start(qpos: str, qvel: str) -> str:
     return f'<keyframe><key name="start" qpos="{qpos}" qvel="{qvel}"/></keyframe>'
 
 
+SCENE = ("restitution", "law", "ignore", "all_bodies")  # options of `run`, beside those of simulate
+
+
 # a step's arrays are optional in general, and all there in these tests: hence list[Any]
 def run(xml: str, steps: int, **options: Any) -> list[Any]:
-    scene_options = {k: options.pop(k) for k in ("restitution", "law", "ignore") if k in options}
+    scene_options = {k: options.pop(k) for k in SCENE if k in options}
     scene = Scene(name="test", xml=xml, **scene_options)
     return list(simulate(scene, steps, **{"tol": 1e-10, **options}))
 
@@ -1039,6 +1042,19 @@ def test_free_bodies_are_left_out_of_the_problem() -> None:
         assert step.problem.M.shape == (6, 6)
         np.testing.assert_allclose(step.velocity[6:9], [0, 0, -G * H * (step.index + 1)])
         np.testing.assert_array_equal(step.velocity[:6], step.result.solution.v)
+
+
+def test_problems_with_all_bodies_have_the_free_ones_too() -> None:
+    bodies = SPHERE.replace("{z}", "0.0999") + SPHERE.replace('"0 0 {z}"', '"1 0 5"')
+    some = run(mjcf(bodies), 5)
+    every = run(mjcf(bodies), 5, all_bodies=True)
+    for step, larger in zip(some, every, strict=True):
+        np.testing.assert_array_equal(larger.dofs, np.arange(12))
+        np.testing.assert_array_equal(larger.problem.H.toarray()[:6], step.problem.H.toarray())
+        assert not larger.problem.H.toarray()[6:].any()
+        np.testing.assert_allclose(larger.velocity, step.velocity, rtol=0, atol=1e-12)
+        assert '"all_bodies": true' in larger.problem.info.description
+        assert "all_bodies" not in step.problem.info.description
 
 
 def test_free_bodies_keep_their_bilateral_constraints() -> None:

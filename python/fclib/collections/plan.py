@@ -204,6 +204,7 @@ def origin(scene: Source) -> dict[str, Any]:
         "begin": scene.begin,
         "theta": scene.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),
+        **({"all_bodies": True} if scene.all_bodies else {}),
         "time_step": scene.time_step,
         "ignore": list(scene.ignore),
         "planar": scene.planar,

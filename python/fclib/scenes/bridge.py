@@ -52,6 +52,10 @@ class Bridge:
     arris: float = parameter(
         0.01, "m", "cut off the stones' edges, so that diagonal ones are apart"
     )
+    activation: float = parameter(0.0, "m", "gap of a corner that counts as closed")
+    all_bodies: bool = parameter(
+        False, "1", "whether problems have the stones that nothing touches too"
+    )
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(5e-3, "s", "time step h")
 
@@ -69,7 +73,7 @@ class Bridge:
                 "density",
                 "time_step",
             ),
-            non_negative=("mu", "load", "speed", "spread", "lap"),
+            non_negative=("mu", "load", "speed", "spread", "lap", "activation"),
             at_least={"voussoirs": 3, "slabs": 1},
         )
         if self.opening > math.pi or self.thickness >= self.radius:

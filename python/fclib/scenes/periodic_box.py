@@ -45,7 +45,13 @@ class PeriodicBox:
     hexahedra: bool = parameter(
         False, "1", "whether polyhedra have six flat faces, on one of which each begins"
     )
+    lift: float = parameter(
+        0.2, "1", "hexahedra begin higher than their layer, by up to this share of a layer"
+    )
     margin: float = parameter(0.0, "m", "a gap up to this is a contact too")
+    all_bodies: bool = parameter(
+        False, "1", "whether problems have the polyhedra that nothing touches too"
+    )
     gravity: float = parameter(9.81, "m/s^2", "acceleration of gravity, downwards")
     time_step: float = parameter(0.02, "s", "time step h")
 
@@ -53,7 +59,7 @@ class PeriodicBox:
         mjcf.check(
             self,
             positive=("radius", "density", "time_step"),
-            non_negative=("mu", "spread", "margin"),
+            non_negative=("mu", "spread", "lift", "margin"),
             at_least={"polyhedra": 1, "shapes": 1, "period": 4.2 * self.radius},
         )
         if self.restitution:
@@ -68,7 +74,7 @@ class PeriodicBox:
         corners *= self.radius * (1 - self.spread * random.uniform(size=(self.shapes, 1, 1)))
         kinds = random.integers(self.shapes, size=self.polyhedra)
         turned = mjcf.rotations(random, self.polyhedra)
-        lift = random.uniform(size=self.polyhedra)
+        lifts = self.lift * random.uniform(size=self.polyhedra)
         if self.hexahedra:
             # about the vertical only, and little, so that they lie close to each other
             half = 0.1 * turned[:, 3]
@@ -85,7 +91,7 @@ class PeriodicBox:
             # on a face, each a little higher than its layer
             z = height * (layer + 0.5)
             if self.hexahedra:
-                z = 1.2 * rise * layer + depth[kinds[i]] + 0.2 * rise * lift[i]
+                z = (1 + self.lift) * rise * layer + depth[kinds[i]] + lifts[i] * rise
             bodies.append(
                 mjcf.grain(
                     f"polyhedron{i}",

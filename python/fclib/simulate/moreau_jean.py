@@ -48,7 +48,8 @@ In the plane a contact has two, N and T, and with rolling friction a third, R, a
 the plane.
 
 A problem holds what the contacts move: bodies that no chain of contacts, bilateral constraints and
-inertia links to a contact go their own way, M v' = M v + h F + G lambda.
+inertia links to a contact go their own way, M v' = M v + h F + G lambda. With `all_bodies` it holds
+these too.
 
 J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in Nonsmooth
   Mechanics and Applications, CISM 302, Springer, 1988.
@@ -243,6 +244,7 @@ class MoreauJean:
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
     activation: float = 0.0  # [m], of the velocity law: points of a pair that touches, within this
+    all_bodies: bool = False  # whether problems have those that nothing touches too
 
     def __post_init__(self) -> None:
         if not self.h > 0:
@@ -300,7 +302,10 @@ class MoreauJean:
                 system.dry, h, M, H, G, f, w, contacts, tree
             )
 
-        inside, rows = linked(tree, M, H, G)
+        if self.all_bodies:
+            inside, rows = np.arange(len(f)), np.arange(len(b))
+        else:
+            inside, rows = linked(tree, M, H, G)
         whole = len(inside) == len(f) and len(rows) == len(b)
         # auxiliary degrees of freedom have contacts
         apart = rows[:0] if whole else np.setdiff1d(np.arange(len(v)), inside)

@@ -124,6 +124,7 @@ def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
         stabilization=stabilization,
         theta=scene.theta,
         activation=scene.activation,
+        all_bodies=scene.all_bodies,
     )
 
 
@@ -282,6 +283,7 @@ def descriptions(
         **({"activation": scheme.activation} if scheme.activation else {}),
         "theta": scheme.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),
+        **({"all_bodies": True} if scene.all_bodies else {}),
         "stabilization": scheme.stabilization,
         **settings,
     }

@@ -40,6 +40,7 @@ class Scene:
     begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     gyroscopic: bool = False  # their derivative is part of M, which is then not symmetric
+    all_bodies: bool = False  # its problems have those that nothing touches too
     parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
     seed: int | None = None
     title: str = ""
@@ -70,6 +71,7 @@ class Scene:
             activation=getattr(family, "activation", 0.0),
             begin=getattr(family, "begin", 0.0),
             gyroscopic=getattr(family, "gyroscopic", False),
+            all_bodies=getattr(family, "all_bodies", False),
             parameters=asdict(family),
             seed=seed,
             title=family.title,
@@ -284,8 +286,8 @@ class Assembly(Described, Protocol):
 class Family(Described, Protocol):
     """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
 
-    Where it has parameters `activation` [m], `begin` [s] and `gyroscopic`, they are those of its
-    scenes.
+    Where it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
+    those of its scenes.
 
     Where the default scene takes long, `small` holds parameters of a quick one of the kind.
     """

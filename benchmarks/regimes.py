@@ -96,11 +96,12 @@ REGIMES: dict[str, Regime] = {
     ),
     "PeriodicBox": Regime(
         "100_PR_Periobox",
-        {"hexahedra": True, "spread": 0.1, "margin": 0.7, "radius": 3.7, "time_step": 4e-3},
-        keep=40,
-        steps=440,
-        by=("dof", "rank_ratio", "conditioning"),
-        version="2",
+        {"hexahedra": True, "spread": 0.7, "margin": 0.65, "radius": 3.76, "time_step": 4e-3}
+        | {"lift": 0.5, "all_bodies": True},
+        keep=80,
+        steps=1000,
+        by=("density", "rank_ratio", "conditioning"),
+        version="3",
     ),
     "Capsules": Regime(
         "Capsules",
@@ -110,11 +111,12 @@ REGIMES: dict[str, Regime] = {
     ),
     "Bridge": Regime(
         "Bridge_PR",
-        {"load": 0.0, "slabs": 3, "spread": 1.0},
-        keep=12,
-        steps=180,
+        {"load": 0.0, "slabs": 3, "spread": 5.0, "activation": 5e-3, "all_bodies": True},
+        keep=80,
+        steps=100,
         way=EXACT,
-        by=("rank_ratio", "conditioning"),
+        by=("density", "rank_ratio", "conditioning"),
+        version="3",
     ),
     "Chain": Regime(
         "Chain",

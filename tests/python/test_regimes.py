@@ -49,7 +49,7 @@ NOT_MET = {
     "rr9118/CubesH8": ("density",),
     "rr9118/CubesH8x2": ("density",),
     "rr9118/Chain": ("contacts",),
-    "rr9118/PeriodicBox": ("contacts", "density"),
+    "rr9118/PeriodicBox": ("contacts",),
 }
 
 

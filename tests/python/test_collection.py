@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 import functools
 import http.server
+import json
 import signal
 import subprocess
 import sys
@@ -593,6 +594,18 @@ ROBOT = """
 
 def invoke(*arguments: object) -> Any:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_a_set_counts_its_families_without_states_too() -> None:
+    def lines(*arguments: str) -> list[Any]:
+        return [json.loads(line) for line in invoke("collection", *arguments).output.splitlines()]
+
+    listed = {row["set"]: row["problems"] for row in lines("list", "--sets", "--json")}
+    for folder, problems in (("rr9118/ChuteLocalProblems", 834), ("standard/BoxesStack", 5)):
+        name = folder.partition("/")[0]
+        shown = {row["folder"]: row["problems"] for row in lines("show", name, "--json")}
+        assert shown[folder] == problems
+        assert listed[name] == sum(shown.values())
 
 
 def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:

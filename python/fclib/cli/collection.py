@@ -76,14 +76,12 @@ def list_families(
     report = Report(as_json)
     if of_sets:
         for name, folders in collections.sets().items():
-            chosen = len(choices(name))
-            total = sum(map(problems_of, folders))
             report.add(
                 {
                     "set": name,
                     "version": collections.version(name),
                     "families": len(folders),
-                    "problems": chosen or total,
+                    "problems": sum(map(problems_of, folders)),
                     "what": KNOWN[name][1] if name in KNOWN else "",
                 }
             )
@@ -172,13 +170,12 @@ def show_set(name: str, as_json: bool) -> None:
     for folder in collections.sets()[name]:
         family = folder.partition("/")[2]
         numbers = sorted(choice.number for choice in chosen if choice.family == family)
-        count = len(numbers) if chosen else problems_of(folder)
         record: dict[str, Any] = {
             "folder": folder,
             "version": collections.version(name),
-            "problems": count,
+            "problems": problems_of(folder),
         }
-        if chosen:
+        if numbers:
             record["numbers"] = ", ".join(map(str, numbers))
         report.add(record)
     if not as_json:

@@ -99,9 +99,11 @@ def stored_version(folder: str, wanted: str | None) -> str:
 
 
 def problems_of(folder: str) -> int:
-    """How many problems SET/FAMILY has: those that are stored, or as many as its family says."""
+    """How many SET/FAMILY has: those that were chosen or are stored, or as its family says."""
+    name, _, family = folder.partition("/")
+    chosen = sum(choice.family == family for choice in choices(name))
     stored = published.digests(folder, version_of(folder))
-    return len(stored) or families()[folder.partition("/")[2]].problems
+    return chosen or len(stored) or families()[family].problems
 
 
 def sets() -> dict[str, list[str]]:

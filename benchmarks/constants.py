@@ -115,14 +115,12 @@ RULES = [
     Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
-    *(Rules(HELD, k, ({},), "jammed") for k in range(3)),
+    *(Rules(HELD, k, ({},), "jammed") for k in range(2)),
     *doubled("patience", "rest", "change", "stuck", "accuracy", "convex_limit", "inner"),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
-    *(Rules(HELD, k, ({"doubt": 0.5}, {"doubt": 2}), "jammed") for k in range(2)),
-    Rules(HELD, 0, ({"interior_above": 5e-4}, {"interior_above": 2e-3}), "jammed"),
-    Rules(HELD, 1, ({"interior_above": 5e-4}, {"interior_above": 2e-3}), "jammed"),
-    Rules(HELD, 2, ({"interior_above": 0.015}, {"interior_above": 0.06}), "jammed"),
-    *doubled("sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"),
+    *doubled(
+        "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"
+    ),
     Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
     *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
 ]

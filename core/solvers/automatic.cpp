@@ -38,10 +38,9 @@ gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows
 no solution?                    : no_solution                                          limit=60
 # where most bodies rest: reactions that hold them are found by convex problems. With all that creep,
-# without most of them, and last with all that slide too, however little
+# then without most of them
 held bodies                     : held_bodies         at_least=100                     creep=0
 held bodies                     : held_bodies         at_least=100
-held bodies                     : held_bodies         at_least=100                     creep=0 doubt=0 interior_above=0.03
 interior point, smoothed        : interior_point      from=swept                       smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 associated                      : associated
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts

@@ -274,12 +274,12 @@ def check_arrays(problem: _solve.Problem, y: Array, z: Array | None = None) -> C
     Raises:
         CertificateError: they prove nothing.
     """
+    own = _rationals(dict(enumerate(y.tolist())), problem.nc, "y", "contact")
     by_constraint = {} if z is None else dict(enumerate(z.tolist()))
+    near = _rationals(by_constraint, problem.p, "z", "bilateral constraint")
     try:
-        return check(problem, dict(enumerate(y.tolist())), by_constraint)
+        return check(problem, own, near)
     except CertificateError:
-        own = {int(a): Fraction(float(y[a])) for a in np.flatnonzero(y)}
-        near = {k: value for k, value in by_constraint.items() if value}
         if len(own) + problem.p > MOST or (exact := _completed(problem, own, near, "zero")) is None:
             raise
         if any(abs(value - own[a]) > NEAREST * own[a] for a, value in exact[0].items()):
@@ -319,7 +319,11 @@ def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None
     if not np.isfinite(y).all() or (y < 0).any() or not y.any():
         return None
     own = {int(a): Fraction(float(y[a])) for a in np.flatnonzero(y)}
-    near = {} if z is None else {int(k): float(z[k]) for k in np.flatnonzero(z) if isfinite(z[k])}
+    near = {
+        int(k): Fraction(float(z[k]))
+        for k in ([] if z is None else np.flatnonzero(z))
+        if isfinite(z[k])
+    }
     if z is not None or p == 0:
         try:
             found = check(problem, own, near)
@@ -351,7 +355,7 @@ def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None
 
 
 def _completed(
-    problem: _solve.Problem, y: Numbers, z: Mapping[int, float], which: str
+    problem: _solve.Problem, y: Numbers, z: Numbers, which: str
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]] | None:
     """Y and z moved so that the sums vanish exactly: those that must, or all of them."""
     nc, p = problem.nc, problem.p
@@ -394,7 +398,7 @@ def _completed(
                 (value * x[one] for one, value in pivots[k].items() if one != k), Fraction()
             )
         else:
-            x[k] = y[k] if k in y else Fraction(z.get(k - nc, 0.0))
+            x[k] = y[k] if k in y else z.get(k - nc, Fraction())
     return {a: x[a] for a in y}, {k: x[nc + k] for k in range(p)}
 
 

@@ -1,7 +1,7 @@
 """Which stages and thresholds of `auto` pay: each change of its table, on problems of two halves.
 
     .venv/bin/python benchmarks/choose_auto.py FILE... [--problems 12] [--seconds 10] [--tol 1e-8]
-        [--only NAME...] [--results auto-stages]
+        [--half choose] [--only NAME...] [--results auto-stages]
     .venv/bin/python benchmarks/choose_auto.py FILE... --against OTHER_PYTHON [--limits 1 10 60]
         [--tols 1e-4 1e-8 1e-12] [--jobs 1] [--other NAME] [--results auto-judged]
 
@@ -46,6 +46,7 @@ import fclib
 from fclib import scenes
 
 CHOOSING = {"BoxesStack", "Capsules", "Bridge", "Chute", "LowWall", "Packing", "Wall"}
+HALVES = ("choose", "judge")
 TOLERANCE = 1e-8
 CHARGE = 2.0  # limits, for a failure
 SHIFT = 1e-3  # [s] of the geometric mean
@@ -173,6 +174,16 @@ def inserted_before(number: int, line: str) -> Callable[[list[str]], list[str]]:
     return lambda lines: [*lines[:number], line, *lines[number:]]
 
 
+def moved(number: int, before: int, **rules: object) -> Callable[[list[str]], list[str]]:
+    """The change that takes a stage to the place of an earlier one, with other rules."""
+    return lambda lines: [
+        *lines[:before],
+        ruled(lines[number], **rules),
+        *lines[before:number],
+        *lines[number + 1 :],
+    ]
+
+
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
     """The change that puts a stage before all others of islands."""
     return lambda lines: [
@@ -244,12 +255,17 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"proximal newton: below={below}", first, with_rules(polish, below=below))
         )
     middle = place(lines, "proximal point")
-    for value in (100, 350):
+    for value in (100, 350, 600):
         result.append(
             Change(
                 f"proximal point: limit={value}", "proximal point", with_rules(middle, limit=value)
             )
         )
+    for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):
+        for value in (200, 400):
+            change = moved(middle, place(lines, earlier), limit=value)
+            name = f"proximal point before {earlier}: limit={value}"
+            result.append(Change(name, earlier, change))
     return result
 
 
@@ -385,8 +401,8 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     """All changes on both halves."""
     lines = table()
     worker = Worker(tol=arguments.tol)
-    found = {p: worker.run(p.file, arguments.seconds) for p in problems}
-    for half in ("choose", "judge"):
+    found = {p: worker.run(p.file, arguments.seconds) for p in problems if p.half in arguments.half}
+    for half in arguments.half:
         own = [run for p, run in found.items() if p.half == half]
         print(f"{half}: {len(own)} problems, {sum(run.solved for run in own)} solved")
     print(f"{'change':46} {'half':7} entered there  solved   lost  won  CPU ratio")
@@ -394,7 +410,7 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     for change in changes(lines):
         if arguments.only and not any(word in change.name for word in arguments.only):
             continue
-        for half in ("choose", "judge"):
+        for half in arguments.half:
             row = measured(change, half, found, lines, arguments.seconds, worker)
             if row is None:
                 continue
@@ -538,6 +554,7 @@ def main() -> None:
     parser.add_argument("--problems", type=int, default=12, help="of a family at most")
     parser.add_argument("--seconds", type=float, default=10, help="limit of a solve")
     parser.add_argument("--tol", type=float, default=TOLERANCE)
+    parser.add_argument("--half", nargs="+", choices=HALVES, default=HALVES, help="both by default")
     parser.add_argument("--only", nargs="+", help="changes whose names have one of these in them")
     _results.add_option(parser)
     parser.add_argument("--against", help="the Python of another fclib")

@@ -13,6 +13,7 @@ other pages have larger numbers):
     linked      some without a solution, which an open contact links to one island
     no memory   the FILEs to 1e-4, with no memory for factors: those of the families to choose on
     jammed      packings that come to the stage "held bodies", of other seeds than packings.py has
+    crowded     the FILEs of the families to choose on that come to this stage: most bodies move
 
 A row says how many are solved (of linked ones: proven to have no solution), and the sum of CPU
 times; of digits the least of three runs. A FILE or a packing has a limit of --seconds of CPU, as
@@ -115,20 +116,23 @@ RULES = [
     Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
-    *(Rules(HELD, k, ({},), "jammed") for k in range(2)),
-    *doubled("patience", "rest", "change", "stuck", "accuracy", "convex_limit", "inner"),
+    *(Rules(HELD, k, ({},), kind) for kind in ("jammed", "crowded") for k in range(2)),
+    *doubled("patience", "rest", "most", "change", "stuck", "accuracy", "convex_limit", "inner"),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
     *doubled(
         "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"
     ),
     Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
+    Rules(HELD, None, ({"most": 0.25}, {"most": 1}), "crowded"),
     *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
 ]
 
 
 # the stages whose problems count
-LATE: dict[str, set[str]] = defaultdict(set, random={"pivoting", "random starts"}, jammed={HELD})
-LIMITED = {"no memory", "jammed"}
+LATE: dict[str, set[str]] = defaultdict(
+    set, random={"pivoting", "random starts"}, jammed={HELD}, crowded={HELD}
+)
+LIMITED = {"no memory", "jammed", "crowded"}
 PACKINGS = [  # contacts, push, seed
     f"{contacts} {push:g} {seed}"
     for contacts in (800,)
@@ -183,7 +187,7 @@ def holds(problem: Any, solution: fclib.Solution) -> bool:
 
 def problems_of(kind: str, given: Sequence[str], count: int) -> Iterator[tuple[str, Any, Any]]:
     """Names, problems and guesses; `given` are files, or numbers that were picked."""
-    if kind == "no memory":
+    if kind in {"no memory", "crowded"}:
         for file in given:
             yield file, fclib.read(Path(file)), None
         return
@@ -320,10 +324,10 @@ def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
                 found = measured(Path(folder), own)
             yield row(constant.name, value, k == 0, constant.problems, found)
     lines = choose_auto.table()
-    for kind, given in (("random", []), ("jammed", PACKINGS)):
+    for kind, given in (("random", []), ("jammed", PACKINGS), ("crowded", files)):
         own = {**job, "kind": kind, "given": given}
         asked = [rules for rules in RULES if rules.problems == kind and wanted(rules.stage)]
-        if not asked:
+        if not asked or (kind == "crowded" and not files):
             continue
         own["given"] = measured(ROOT / "python", own)["late"]
         found = measured(ROOT / "python", own)
@@ -372,6 +376,7 @@ def note(arguments: argparse.Namespace, kinds: set[str]) -> str:
         "seeds 100 to 103, that come to the stages. One that is not solved "
         f"counts as {seconds}. A rule without a number is that of all stages of the "
         "name.",
+        "crowded": "Crowded ones: files of the families to choose on that come to these stages.",
     }
     return " ".join(text for kind, text in told.items() if kind in kinds)
 

@@ -550,6 +550,13 @@ struct HeldBodiesStage : HeldBodiesRules {
                 .unit = "||q||_inf",
                 .doc = "speed of a body, at one of its contacts, up to which it is held",
                 .lowest = 0},
+            OptionField<O, double>{
+                .name = "most",
+                .member = &O::most,
+                .unit = "1",
+                .doc = "share of the contacts that feel a body which moves, over which it is given "
+                       "up where these are not solved at once",
+                .lowest = 0},
             OptionField<O, double>{.name = "creep",
                                    .member = &O::creep,
                                    .unit = "error ||q||",

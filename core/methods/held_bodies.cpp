@@ -156,6 +156,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     }
     // too many were held, or too few
     const bool solved = left <= enough;
+    if (!solved && static_cast<double>(part.contacts.size()) > rules.most * problem_.nc()) return;
     if (!solved) {
       creep = std::min(creep * rules.change, rules.creep);
     } else if (error > rules.stuck * last) {

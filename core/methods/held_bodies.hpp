@@ -33,11 +33,10 @@
 namespace fclib {
 
 struct HeldBodiesRules {
-  int rounds = 40;     ///< of both, at most
-  int patience = 5;    ///< rounds in which the error must halve
-  double rest = 1e-6;  ///< speed of a body that rests, over ||q||_inf ...
-  double most =
-      0.5;  ///< share of the contacts that bodies which move have, over which 2 must be solved
+  int rounds = 40;          ///< of both, at most
+  int patience = 5;         ///< rounds in which the error must halve
+  double most = 0.5;        ///< share of the contacts in 2, over which it must be solved at once
+  double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
   double creep = 0.1;       ///< ... and over the error of 1 and ||q||
   double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
   double stuck = 0.9;       ///< share of its last error at which 1 got no better

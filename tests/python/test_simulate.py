@@ -467,6 +467,28 @@ def test_springs_and_dampers_are_the_derivatives_of_the_force() -> None:
     np.testing.assert_allclose(system.K.toarray()[elbow, elbow], 3 + 5 * 2**2)
 
 
+@pytest.mark.parametrize("flag", ["spring", "damper", "actuation", "group"])
+def test_what_the_scene_disables_is_not_there(flag: str) -> None:
+    bodies = ARM.replace('name="elbow"', 'name="elbow" stiffness="3" damping="0.4"')
+    rest = '<actuator><position joint="elbow" kp="5" kv="0.2" group="1"/></actuator>'
+    option = f'><flag {flag}="disable"/></option>'
+    if flag == "group":
+        option = ' actuatorgroupdisable="1"/>'
+    xml = mjcf(bodies, floor=False, rest=rest + f"<option{option}")
+    system = moving_model(xml).assemble(H)
+    damping = {"spring": 0.6, "damper": 0.2}.get(flag, 0.4)
+    stiffness = {"spring": 5, "damper": 8}.get(flag, 3)
+    np.testing.assert_allclose([system.C.sum(), system.K.sum()], [damping, stiffness])
+
+
+def test_controls_of_delayed_actuators_act_at_once() -> None:
+    rest = '<actuator><motor joint="elbow" delay="0.1" nsample="20"/></actuator>'
+    model = moving_model(mjcf(ARM, floor=False, rest=rest))
+    before = model.assemble(H).force
+    model.data.ctrl[:] = 2
+    np.testing.assert_allclose((model.assemble(H).force - before).sum(), 2, rtol=1e-9)
+
+
 def test_stiff_damper_does_not_blow_up() -> None:
     """Damping worth 1e3 times the inertia in a step: an explicit scheme would diverge."""
     stiff = '<body><joint axis="0 0 1" damping="1e3"/><geom size="0.1" mass="1"/></body>'
@@ -724,6 +746,15 @@ LIMITED = ARM.replace('name="elbow"', 'name="elbow" limited="true" range="-1 1"'
             "states of actuators",
         ),
         (mjcf(SPHERE, more='solref="0.01 1"'), "solref"),
+        (mjcf(SPHERE, more='margin="0.1" gap="0.05"'), "margins"),
+        (mjcf(ARM.replace('name="elbow"', 'name="elbow" range="-1 1" margin="0.1"')), "margins"),
+        (
+            mjcf(
+                ARM,
+                rest='<actuator><motor joint="elbow" delay="0.1" nsample="20"/></actuator>',
+            ),
+            "delays",
+        ),
     ],
 )
 def test_what_is_left_out_is_said_and_strictly_refused(xml: str, message: str) -> None:

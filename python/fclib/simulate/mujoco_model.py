@@ -107,6 +107,8 @@ class MujocoModel:
         m.pair_gap[:] = 0
         m.jnt_margin[:] = REACH
         m.tendon_margin[:] = REACH
+        # MuJoCo's own step keeps the controls that came before
+        m.actuator_delay[:] = 0
 
         self._gait = Gait.of(scene, m)
         self.controlled = False  # from outside: controls are part of the configuration
@@ -350,8 +352,10 @@ def crossed(a: Vector, b: Vector) -> Vector:
 def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
     """Damping and stiffness (n x n) of joints and of actuators that feed back their own state.
 
-    Both symmetric and positive semidefinite: what would push the body on stays explicit.
+    Both symmetric and positive semidefinite: what would push the body on stays explicit. What the
+    scene disables is not there.
     """
+    disabled, bits = m.opt.disableflags, mujoco.mjtDisableBit
     # springs of hinges and slides; those of balls and free bodies turn with the frame
     plain = np.isin(m.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
     springs = np.zeros(m.nv)
@@ -359,6 +363,16 @@ def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
     # the actuator of each output
     owner = np.repeat(np.arange(len(m.actuator_outnum)), m.actuator_outnum)
     affine = m.actuator_biastype[owner] == mujoco.mjtBias.mjBIAS_AFFINE
+    group = m.actuator_group[owner]  # those from 0 to 30 can be disabled
+    off = (m.opt.disableactuator >> np.clip(group, 0, 30)) & 1
+    affine &= (off == 0) | (group < 0) | (group > 30)
+    if disabled & bits.mjDSBL_ACTUATION:
+        affine[:] = False
+    damping = m.dof_damping
+    if disabled & bits.mjDSBL_SPRING:
+        springs[:] = 0
+    if disabled & bits.mjDSBL_DAMPER:
+        damping = np.zeros(m.nv)
 
     n = m.nv
 
@@ -379,7 +393,7 @@ def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
 
     # the bias of an actuator is p0 + p1 length + p2 velocity
     bias = m.actuator_biasprm[owner]
-    return linear(m.dof_damping, bias[:, 2]), linear(springs, bias[:, 1])
+    return linear(damping, bias[:, 2]), linear(springs, bias[:, 1])
 
 
 def advance_actuators(m: Any, d: Any, h: float) -> None:

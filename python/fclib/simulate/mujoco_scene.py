@@ -112,10 +112,15 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
         lost.append("anisotropic friction (the mean of two coefficients)")
     if softened(m, collides):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
+    # a family whose parameter it is says itself what it is for
+    if widened(m, collides) and "margin" not in scene.parameters:
+        lost.append("margins (bodies touch where their surfaces do, limits act where they are)")
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
         lost.append("the integrator RK4 (Moreau and Jean's scheme)")
     if not np.isin(m.actuator_dyntype, DYNAMICS).all() and "activation" not in scene.ignore:
         lost.append("states of actuators other than filters and muscles (they stay as they are)")
+    if (m.actuator_delay > 0).any():
+        lost.append("delays of actuators (controls act at once)")
     if m.nflex:
         lost.append("contacts of deformable bodies (flex)")
     if m.flg_surfacevel:
@@ -134,10 +139,22 @@ def softened(m: Any, collides: Any) -> bool:
         np.hstack((m.geom_solref, m.geom_solimp))[collides],
         np.hstack((m.pair_solref, m.pair_solimp)),
         np.hstack((m.jnt_solref, m.jnt_solimp))[limited],
+        np.hstack((m.tendon_solref_lim, m.tendon_solimp_lim))[m.tendon_limited.astype(bool)],
         np.hstack((m.eq_solref, m.eq_solimp))[tied],
     )
     usual = (0.02, 1, 0.9, 0.95, 0.001, 0.5, 2)
     return any(bool((own != usual).any()) for own in rows)
+
+
+def widened(m: Any, collides: Any) -> bool:
+    """Whether MuJoCo would hold bodies apart, or stop joints, before they touch or reach limits."""
+    limited, tight = m.jnt_limited.astype(bool), m.tendon_limited.astype(bool)
+    return bool(
+        (m.geom_margin > m.geom_gap)[collides].any()
+        or (m.pair_margin > m.pair_gap).any()
+        or m.jnt_margin[limited].any()
+        or m.tendon_margin[tight].any()
+    )
 
 
 def refuse_unknown(scene: Scene, lost: tuple[str, ...]) -> None:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -519,6 +522,23 @@ def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fcli
     q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)
     d = q.size // mu.size if mu.size else 3
     return fclib.LocalProblem(spacedim=d, W=sp.csr_array(np.asarray(W, float)), q=q, mu=mu)
+
+
+def benchmark(name: str) -> Any:
+    """A script of benchmarks/ as a module, None in a source distribution; it imports its like."""
+    path = Path(__file__).parents[1] / "benchmarks" / f"{name}.py"
+    if not path.is_file():
+        return None
+    sys.path.insert(0, str(path.parent))
+    try:
+        spec = importlib.util.spec_from_file_location(name, path)
+        assert spec is not None
+        assert spec.loader is not None
+        module = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(path.parent))
+    return module
 
 
 def dense(a: Any) -> Array:

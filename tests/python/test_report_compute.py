@@ -114,13 +114,19 @@ def test_a_site_is_served_until_an_interrupt(site: Path) -> None:
     assert types == {"wasm": "application/wasm", "mjs": "text/javascript", "js": "text/javascript"}
 
 
+@pytest.fixture(scope="module")
+def window() -> Iterator[Any]:
+    with chromium() as started:
+        yield started
+
+
 @contextmanager
-def opened(address: str, width: int = 390) -> Iterator[Any]:
+def opened(window: Any, address: str, width: int = 390) -> Iterator[Any]:
     """A page of this machine in Chromium: no error on its console, no request to another host."""
     host = re.match(r"http://127\.0\.0\.1:\d+/", address)
     assert host is not None
-    with chromium() as window:
-        page = window.new_page(viewport={"width": width, "height": 800})
+    # of a context of its own, which it closes
+    with window.new_page(viewport={"width": width, "height": 800}) as page:
         page.set_default_timeout(20_000)
         wrong: list[str] = []
         # Chromium warns of the speed of its own drawing, where a page has WebGL
@@ -143,8 +149,7 @@ def opened(address: str, width: int = 390) -> Iterator[Any]:
         )
         page.goto(address)
         yield page
-        window.close()
-        assert not wrong
+    assert not wrong
 
 
 @contextmanager
@@ -158,9 +163,9 @@ def served(folder: Path) -> Iterator[str]:
 
 
 @pytest.fixture
-def page(site: Path) -> Iterator[Any]:
+def page(site: Path, window: Any) -> Iterator[Any]:
     """The tower's page, as wide as a phone."""
-    with served(site) as address, opened(address + TOWER) as page:
+    with served(site) as address, opened(window, address + TOWER) as page:
         yield page
 
 
@@ -541,7 +546,7 @@ def between_walls() -> Any:
 
 @pytest.mark.slow
 def test_a_stored_certificate_is_checked_on_its_page(
-    catalogue: Path, module: Path, tmp_path: Path
+    catalogue: Path, module: Path, window: Any, tmp_path: Path
 ) -> None:
     """Where a store has the proof of one of a catalogue's problems."""
     from pyarrow import parquet
@@ -578,7 +583,7 @@ def test_a_stored_certificate_is_checked_on_its_page(
     assert result.certificate is not None
     assert run["certificate"]["y"] == {"0": result.certificate[0], "1": result.certificate[1]}
 
-    with served(site) as address, opened(address + TOWER) as page:
+    with served(site) as address, opened(window, address + TOWER) as page:
         page.get_by_text("the global form has no solution. It was checked").wait_for()
         page.get_by_role("button", name="Check the certificate").click()
         rows = page.locator("table", has_text="The stored certificate").locator("tbody tr")
@@ -601,7 +606,7 @@ def test_a_stored_certificate_is_checked_on_its_page(
 
 
 @pytest.mark.slow
-def test_a_view_that_is_served_checks_and_solves(site: Path, tmp_path: Path) -> None:
+def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path) -> None:
     """One problem of a file that has two: its own solution, options, sliders."""
     file = tmp_path / "a tower#1.hdf5"
     shutil.copy(golden_work.TINY / "KaplasTower" / "0030-global.hdf5", file)
@@ -613,7 +618,7 @@ def test_a_view_that_is_served_checks_and_solves(site: Path, tmp_path: Path) -> 
         found = re.match(r"(http://127\.0\.0\.1:\d+/) ", process.stdout.readline())
         assert found is not None
         try:
-            with opened(found[1]) as page:
+            with opened(window, found[1]) as page:
                 page.get_by_text(
                     "127.0.0.1, where this page is served, is this machine alone"
                 ).wait_for()
@@ -638,7 +643,7 @@ def test_a_view_that_is_served_checks_and_solves(site: Path, tmp_path: Path) -> 
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     (tmp_path / "none").mkdir()
-    with served(tmp_path) as address, opened(address + "none/") as page:
+    with served(tmp_path) as address, opened(window, address + "none/") as page:
         page.goto(out.as_uri())
         page.get_by_text(f"fclib view '{file}' --serve").wait_for()
         assert page.get_by_role("button", name="Check it here").count() == 0

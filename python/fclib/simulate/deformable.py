@@ -28,6 +28,7 @@ O. C. Zienkiewicz, R. L. Taylor, J. Z. Zhu, The Finite Element Method: Its Basis
 
 from __future__ import annotations
 
+import functools
 import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -83,15 +84,13 @@ class DeformableModel:
         self.left_out: tuple[str, ...] = ()
         self.time_step = float(scene.time_step)
 
-        known: dict[Any, tuple[Vector, Vector]] = {}
         M, K, self.meshes = [], [], []
         first = 0
         for block in self.solids.blocks:
             mesh = mesh_of(skfem, block, first)
-            key = (block.size, block.elements, block.young, block.poisson, block.density)
-            if key not in known:
-                known[key] = element_matrices(skfem, block)
-            mass, stiffness = known[key]
+            mass, stiffness = element_matrices(
+                block.size, block.elements, block.young, block.poisson, block.density
+            )
             turn = np.kron(np.eye(8), rotation(block.yaw))
             M.append(assembled(mesh, first, mass))
             K.append(assembled(mesh, first, turn @ stiffness @ turn.T))
@@ -266,14 +265,25 @@ def mesh_of(skfem: Any, block: Block, first: int) -> Mesh:
     )
 
 
-def element_matrices(skfem: Any, block: Block) -> tuple[Vector, Vector]:
-    """Consistent mass and stiffness (24 x 24) of one element: all of a block are equal."""
+@functools.lru_cache(maxsize=256)
+def element_matrices(
+    size: tuple[float, float, float],
+    elements: tuple[int, int, int],
+    young: float,
+    poisson: float,
+    density: float,
+) -> tuple[Vector, Vector]:
+    """Consistent mass and stiffness (24 x 24) of one element of a block, in which all are equal.
+
+    Not to be changed: models share them, for scikit-fem takes longer than all else of a model.
+    """
+    skfem = _skfem.load()
     elasticity = importlib.import_module("skfem.models.elasticity")
-    edges = np.divide(block.size, block.elements)
+    edges = np.divide(size, elements)
     one = skfem.MeshHex.init_tensor(*[np.array([0.0, edge]) for edge in edges])
     basis = skfem.Basis(one, skfem.ElementVector(skfem.ElementHex1()))
-    stress = elasticity.linear_elasticity(*elasticity.lame_parameters(block.young, block.poisson))
-    inertia = skfem.BilinearForm(lambda u, v, _: block.density * (u * v).sum(axis=0))
+    stress = elasticity.linear_elasticity(*elasticity.lame_parameters(young, poisson))
+    inertia = skfem.BilinearForm(lambda u, v, _: density * (u * v).sum(axis=0))
     order = basis.nodal_dofs[:, one.t[:, 0]].T.ravel()
     mass, stiffness = (form.assemble(basis).toarray() for form in (inertia, stress))
     return mass[np.ix_(order, order)], stiffness[np.ix_(order, order)]

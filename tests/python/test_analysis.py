@@ -352,6 +352,24 @@ def test_what_proves_nothing_is_no_proof() -> None:
         analysis.farkas(problem, np.ones(3))
 
 
+@pytest.mark.parametrize(
+    ("y", "message"),
+    [
+        ('{"0": "1e5000"}', "too large for doubles"),
+        ("[1e308, 1e308, 1e308, 1e308]", "too large for doubles"),
+        ('{"0": "1e9999999999"}', "is no number"),  # would fill the memory
+    ],
+)
+def test_a_certificate_of_huge_numbers_is_refused(tmp_path: Path, y: str, message: str) -> None:
+    problem = squeezed(3, 0.4, 2).condense()
+    fclib.write(tmp_path / "squeezed.hdf5", problem)
+    (tmp_path / "y.json").write_text(f'{{"y": {y}}}')
+    done = run("check", tmp_path / "squeezed.hdf5", "--certificate", tmp_path / "y.json")
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 # ---- problems with a solution
 
 

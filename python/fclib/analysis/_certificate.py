@@ -17,6 +17,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from fractions import Fraction
 from math import inf, isfinite, nextafter, sqrt
 from pathlib import Path
@@ -34,6 +35,7 @@ LEAST_GAIN = Fraction(1, 10**8)  # below this part of its terms a gain is roundi
 LEAST_SPEED = 1e-6  # of ||q||: what closes more slowly is within the tolerance of solutions
 NEAREST = 1e-9  # of each y, how far that of an exact proof may be
 MOST = 60  # unknowns up to which a kernel is found in rational arithmetic
+DIGITS = 5000  # of a number in a file, at most
 FORMAT = "fclib certificate 1"
 
 Numbers = Mapping[int, Fraction]
@@ -198,9 +200,18 @@ def check(
     Raises:
         CertificateError: it proves nothing, with the contact or the constraint that breaks it.
     """
+    exact_y = _rationals(y, problem.nc, "y", "contact")
+    exact_z = _rationals(z or {}, problem.p, "z", "bilateral constraint")
+    try:
+        return _check(problem, exact_y, exact_z)
+    except OverflowError:
+        raise CertificateError(
+            "its sums are too large for doubles: any positive multiple of y and z proves the same"
+        ) from None
+
+
+def _check(problem: _solve.Problem, exact_y: Numbers, exact_z: Numbers) -> Certificate:
     nc, p = problem.nc, problem.p
-    exact_y = _rationals(y, nc, "y", "contact")
-    exact_z = _rationals(z or {}, p, "z", "bilateral constraint")
     for a, value in exact_y.items():
         if value < 0:
             raise CertificateError(f"y: contact {a}: {float(value):.3g} is negative")
@@ -293,8 +304,11 @@ def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dic
         if not 0 <= key < count:
             raise CertificateError(f"{name}: there is no {of} {key}, the problem has {count}")
         try:
+            # what such a text stands for would fill the memory
+            if isinstance(value, str) and abs(Decimal(value.partition("/")[0]).adjusted()) > DIGITS:
+                raise ValueError
             number = Fraction(value)
-        except (ValueError, TypeError, OverflowError, ZeroDivisionError):
+        except (ArithmeticError, ValueError, TypeError):
             raise CertificateError(f"{name}: {of} {key}: {value!r} is no number") from None
         if number:
             result[key] = number

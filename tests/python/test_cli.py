@@ -445,6 +445,24 @@ def test_brackets_and_colons_of_a_path_are_printed_as_they_are(tmp_path: Path) -
     assert all(f"no{name}: " in line for name, line in zip(names, errors, strict=True))
 
 
+def test_what_a_file_says_does_not_steer_the_terminal(tmp_path: Path) -> None:
+    problem = planted_local(1, nc=2).problem
+    problem = fclib.LocalProblem(
+        W=problem.W,
+        q=problem.q,
+        mu=problem.mu,
+        info=fclib.ProblemInfo(title="a\x1b[31mb\x07\u202ec"),
+    )
+    fclib.write(tmp_path / "title.hdf5", problem)
+    assert "a [31mb  c" in run("info", tmp_path / "title.hdf5").stdout
+
+
+def test_an_error_of_the_system_is_said_without_its_number(tmp_path: Path) -> None:
+    missing = tmp_path / "none.xml"
+    expected = f"fclib: {missing}: No such file or directory\n"
+    assert run("simulate", missing, "--out", tmp_path / "out").stderr == expected
+
+
 def test_there_is_no_progress_bar_in_a_pipe(files: list[Path]) -> None:
     for command in ("info", "solve", "check"):
         result = start(command, *files)

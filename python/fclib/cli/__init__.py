@@ -25,7 +25,7 @@ import typer
 from typer.core import TyperGroup
 
 import fclib
-from fclib.cli._output import fail, interrupted, print_version
+from fclib.cli._output import fail, interrupted, print_version, words_of
 
 COMMANDS = (
     "info",
@@ -125,4 +125,4 @@ def main(imported: Callable[[], Any] | None = None) -> None:
     except fclib.Error as error:
         fail(str(error))
     except OSError as error:
-        fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        fail(words_of(error))

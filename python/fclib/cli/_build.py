@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from fclib import collections, scenes
-from fclib.cli._output import Report, err, fail, make_table, out
+from fclib.cli._output import Report, err, fail, make_table, out, words_of
 from fclib.cli._progress import many_bars
 from fclib.collections.build import BuildError
 
@@ -64,7 +64,7 @@ def build_plans(
                 pictures=pictures,
             )
     except (BuildError, ImportError, FloatingPointError, ValueError, MemoryError, OSError) as error:
-        fail(str(error))
+        fail(words_of(error))
     mine = {plan.name for plan in plans}
     rows = [row for row in table.to_pylist() if f"{row['collection']}/{row['family']}" in mine]
     report = Report(as_json)

@@ -91,6 +91,13 @@ def interrupted(message: str = "interrupted") -> NoReturn:
     raise SystemExit(130)
 
 
+def words_of(error: Exception) -> str:
+    """Of an error of the system the file and the reason, without its number."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
+
+
 def usage_error(error: Exception) -> NoReturn:
     """End the command with the message and exit status 2."""
     raise typer.BadParameter(str(error)) from None
@@ -152,7 +159,8 @@ def format_value(value: object) -> str:
         return "; ".join(parts) or "-"
     if isinstance(value, float):
         return f"{value:.1e}" if value and not 1e-2 <= abs(value) < 1e4 else f"{value:.4g}"
-    return str(value)
+    # what a stranger's file says must not steer the terminal
+    return "".join(one if one.isprintable() or one == "\n" else " " for one in str(value))
 
 
 def format_known(values: dict[str, object]) -> str:

@@ -28,7 +28,17 @@ from fclib.cli._build import (
     ranges_of,
     simulated,
 )
-from fclib.cli._output import Json, Report, err, fail, make_table, out, progress_bar, usage_error
+from fclib.cli._output import (
+    Json,
+    Report,
+    err,
+    fail,
+    make_table,
+    out,
+    progress_bar,
+    usage_error,
+    words_of,
+)
 from fclib.cli._progress import many_bars
 from fclib.collections import standing
 from fclib.collections.archives import FetchError
@@ -312,7 +322,7 @@ def simulate(
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
-        fail(str(error))
+        fail(words_of(error))
     if not as_json:
         out.print(make_table(report.records))
         out.print(f"fclib collection build {' '.join(names)} --from {folder} takes them")

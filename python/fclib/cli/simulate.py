@@ -18,7 +18,7 @@ from fclib.cli._build import (
     SelectOption,
     build_plans,
 )
-from fclib.cli._output import Json, err, fail
+from fclib.cli._output import Json, err, fail, words_of
 from fclib.collections.plan import ON_DEMAND
 
 
@@ -124,7 +124,7 @@ def command(
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")
     except (OSError, ValueError) as error:
-        fail(str(error))
+        fail(words_of(error))
     for line in model.left_out:
         err.print(f"Left out: {line}", highlight=False)
     if model.keyframe:

@@ -29,6 +29,7 @@ from fclib import collections
 from fclib.collections import archives, catalog
 from fclib.collections.build import BuildError
 from fclib.collections.plan import Plan
+from fclib.simulate import control_of
 
 FAMILIES = collections.families()
 
@@ -627,6 +628,7 @@ def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:
     [
         ("<mujoco><nonsense/></mujoco>", "MuJoCo refuses the MJCF"),
         (b"\xff\xfe\x00", "is no text"),
+        ('<mujoco><option gravity="0 0 nan"/></mujoco>', "gravity at the start is not finite"),
     ],
 )
 def test_simulate_refuses_in_a_line(tmp_path: Path, content: str | bytes, message: str) -> None:
@@ -694,6 +696,29 @@ def test_simulate_with_controls_and_a_keyframe(
         assert failed.exit_code == 1
         assert message in " ".join(failed.output.split())
         assert not (tmp_path / "wrong").exists()
+
+
+def test_simulate_goes_on_where_a_wrong_option_was_put_right(tmp_path: Path) -> None:
+    path, out = tmp_path / "legs.xml", tmp_path / "out"
+    path.write_text(ROBOT.format(loss=1), encoding="utf-8")
+    (tmp_path / "rows.csv").write_text("1,2\n", encoding="utf-8")
+    command = ("simulate", path, "--steps", 3, "--no-pictures", "--out", out)
+    for wrong, message in (
+        (("--ctrl", tmp_path / "rows.csv"), "it has no actuators"),
+        (("--time-step", "1e300"), "the time step must be positive, and 1e+09 s at most"),
+    ):
+        failed = invoke(*command, *wrong)
+        assert failed.exit_code == 1
+        assert message in " ".join(failed.output.split())
+    done = invoke(*command)
+    assert done.exit_code == 0, done.output
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_empty_table_of_controls_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "rows.csv").touch()
+    with pytest.raises(ValueError, match=r"rows\.csv: is no table of controls"):
+        control_of(str(tmp_path / "rows.csv"))
 
 
 def test_simulate_finds_the_packages_of_a_urdf(tmp_path: Path) -> None:

@@ -140,7 +140,9 @@ def is_finished(plan: Plan, out: Path) -> bool:
     part, state = folder / catalog.FILE, folder / STATE
     if part.is_file():
         found = catalog.read_catalog(part).schema.metadata.get(catalog.FINGERPRINT, b"").decode()
-    elif (state / "plan.json").is_file():
+    elif (state / "plan.json").is_file() and (
+        (folder / trajectory.OWN).is_file() or len(list(state.iterdir())) > 1
+    ):
         found = (state / "plan.json").read_text(encoding="utf-8")
     else:
         return False

@@ -41,7 +41,8 @@ def read_rows(path: Path) -> np.ndarray:
         if path.suffix == ".npy":
             rows = np.atleast_2d(np.asarray(np.load(path, allow_pickle=False), dtype=float))
         else:
-            rows = np.loadtxt(path, delimiter=",", ndmin=2)
+            lines = path.read_text(encoding="utf-8").splitlines()
+            rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, 0))
     except (ValueError, EOFError) as error:
         raise ValueError(f"{path}: is no table of controls, steps x nu: {error}") from None
     if rows.ndim != 2 or not rows.size:

@@ -86,6 +86,8 @@ from fclib.simulate.arrays import (
 
 __all__ = ["Sparse", "Vector"]
 
+LONGEST = 1e9  # [s] of a step: what is made of h^2 stays finite
+
 
 @dataclass(frozen=True)
 class Contacts:
@@ -247,8 +249,10 @@ class MoreauJean:
     all_bodies: bool = False  # whether problems have those that nothing touches too
 
     def __post_init__(self) -> None:
-        if not self.h > 0:
-            raise ValueError(f"the time step must be positive, not {self.h}")
+        if not 0 < self.h <= LONGEST:
+            raise ValueError(
+                f"the time step must be positive, and {LONGEST:g} s at most, not {self.h}"
+            )
         if not 0 <= self.restitution <= 1:
             raise ValueError(f"restitution must be in [0, 1], not {self.restitution}")
         if not 0 <= self.stabilization <= 1:

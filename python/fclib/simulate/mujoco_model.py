@@ -115,6 +115,11 @@ class MujocoModel:
         self.keyframe = keyframe_of(scene, m)
         if self.keyframe:
             mujoco.mj_resetDataKeyframe(m, self.data, m.key(self.keyframe).id)
+        start = (self.data.qpos, self.data.qvel, m.opt.gravity)
+        if not all(np.isfinite(part).all() for part in start):
+            raise ValueError(
+                f"{scene.name}: a position, a velocity or gravity at the start is not finite"
+            )
         if m.na:
             # of the rates of actuators
             m.opt.timestep = self.time_step

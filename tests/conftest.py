@@ -1,8 +1,10 @@
 """What all tests share: the folder of real problems, and the settings of Hypothesis."""
 
+import gc
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import hypothesis
@@ -55,6 +57,17 @@ def pytest_configure(config: pytest.Config) -> None:
     # files side by side are begun in the order of below, not with those of most tests
     if getattr(config.option, "loadscopereorder", False):
         config.option.loadscopereorder = False
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Thousands of tests and what they import stay: nobody need look whether they are garbage."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

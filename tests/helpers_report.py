@@ -3,6 +3,7 @@
 import base64
 import gzip
 import hashlib
+import importlib.util
 import json
 import random
 from collections.abc import Sequence
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 import fclib
 from fclib.bench import Job, Limits, ProblemFacts, Record, SolverChoice, Store
@@ -18,6 +20,16 @@ from fclib.bench.problems import look
 LABELS = ["auto", "nsgs", "under_score", "rare"]
 NAMES = {"auto": "auto", "under_score": "nsn-ac"}
 TOLERANCES = (1e-4, 1e-8)
+
+
+def skip_without_libraries() -> None:
+    """Skips a file where the packages with the JavaScript of pages are not installed.
+
+    They are looked up as the report does, and not imported: itables imports pandas.
+    """
+    for name in ("plotly", "itables"):
+        if importlib.util.find_spec(name) is None:
+            pytest.skip(f"{name} is not installed", allow_module_level=True)
 
 
 def make_collection(folder: Path, analyze: bool = False) -> Path:

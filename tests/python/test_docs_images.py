@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from fclib.collections import families
+from helpers_report import skip_without_libraries
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
-pytest.importorskip("plotly")
-pytest.importorskip("itables")
+skip_without_libraries()
 pytest.importorskip("PIL")
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -42,6 +42,14 @@ def maps(pid: int) -> str:
     return ""
 
 
+RUN = "from fclib_command import main; main()"
+# a state is kept at each step, not every five seconds
+EAGER = (
+    "import importlib, sys; importlib.import_module('fclib.collections.record');"
+    f" sys.modules['fclib.collections.record'].CHECKPOINT = 0; {RUN}"
+)
+
+
 class Running:
     """A command in a session of its own, as a terminal has it."""
 
@@ -49,7 +57,7 @@ class Running:
         self.folder = folder
         self.mark = f"{MARK}={folder}"
         self.process = subprocess.Popen(
-            [sys.executable, "-c", "from fclib_command import main; main()", *arguments],
+            [sys.executable, "-c", EAGER if arguments[0] == "simulate" else RUN, *arguments],
             env=os.environ | dict([self.mark.split("=", 1)]),
             cwd=folder,
             stdout=subprocess.PIPE,

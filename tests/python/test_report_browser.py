@@ -20,13 +20,19 @@ from fclib.bench import profiles
 from fclib.collections import known, trajectory
 from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers_browser import chromium
-from helpers_report import LABELS, make_collection, make_store, periodic_step, read_data
+from helpers_report import (
+    LABELS,
+    make_collection,
+    make_store,
+    periodic_step,
+    read_data,
+    skip_without_libraries,
+)
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
-pytest.importorskip("plotly")
+skip_without_libraries()
 image = pytest.importorskip("matplotlib.image")
-pytest.importorskip("itables")
 # what they give is of one kind here
 read: Any = fclib.read
 read_solution: Any = fclib.read_solution

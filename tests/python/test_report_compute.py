@@ -36,11 +36,10 @@ from fclib.report.solids import solids_of
 from fclib.report.view import view_of
 from helpers import planted_global, planted_local
 from helpers_browser import chromium
-from helpers_report import read_data
+from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("pyarrow")
-pytest.importorskip("plotly")
-pytest.importorskip("itables")
+skip_without_libraries()
 TOWER = "#/problem/tiny/KaplasTower/0030"
 
 

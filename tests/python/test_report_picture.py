@@ -9,12 +9,11 @@ import pytest
 from fclib.collections import known, trajectory
 from fclib.report import build_site, picture
 from fclib.report.solids import Solids, solids_of, unit
-from helpers_report import read_data
+from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
-pytest.importorskip("plotly")
-pytest.importorskip("itables")
+skip_without_libraries()
 Image = pytest.importorskip("PIL.Image")
 BOX = 5
 

@@ -17,12 +17,11 @@ from fclib import _registry, collections
 from fclib.cli import app
 from fclib.report import build_site, citing
 from fclib.report.recipes import recipes
-from helpers_report import read_data
+from helpers_report import read_data, skip_without_libraries
 
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
-pytest.importorskip("plotly")
-pytest.importorskip("itables")
+skip_without_libraries()
 NAME = "standard/SliderCrank"
 read: Any = fclib.read
 

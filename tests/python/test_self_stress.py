@@ -134,3 +134,18 @@ def test_bounds_hold_in_exact_arithmetic() -> None:
     assert lower_bound(sp.csr_array(np.ones((3, 3)))) <= 0
     for x in (Fraction(2), Fraction(1, 3), Fraction(10) ** 400, Fraction(0)):
         assert root_above(x) ** 2 >= x
+
+
+@pytest.mark.parametrize("size", [1e-308, 1e-30, 1e200, 1e308])
+@pytest.mark.parametrize("stiffness", [1e-308, 1.0, 1e200, 1e308])
+@pytest.mark.parametrize("friction", [0.5, 1e300])
+def test_numbers_at_the_ends_of_doubles_give_a_verdict(
+    size: float, stiffness: float, friction: float
+) -> None:
+    """Nothing overflows where a proof is looked for."""
+    q = [-size, 0.1 * size, size, size]
+    problem = fclib.LocalProblem(spacedim=2, W=np.eye(4) * stiffness, q=q, mu=[0.3, friction])
+    with np.errstate(all="ignore"):
+        found = analysis.analyze(problem, time_limit=2)
+    assert found.existence.verdict == analysis.EXISTS_SLATER
+    assert found.self_stress.verdict in (analysis.SOLVABLE, analysis.OPEN)

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import inf, isfinite, nextafter, sqrt
+from math import hypot, inf, isfinite, nextafter, sqrt
 from typing import Any
 
 import numpy as np
@@ -105,6 +105,8 @@ def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
         assert velocity is not None
         whole = sp.vstack([A, B])
         x = lsmr(whole, np.concatenate([velocity - c, e]), atol=1e-15, btol=1e-15, conlim=0)[0]
+    if not np.isfinite(x).all():
+        return None, "its numbers are too large or too small for doubles"
     off, delta, size = 0.0, 0.0, 0.0
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         M = data.matrices["M"]
@@ -198,7 +200,7 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
     margins, forces = np.zeros(nc), np.zeros(nc)
     for a in range(nc):
         u = [_dot(rows[d * a + k], exact) + Fraction(float(constant[d * a + k])) for k in range(d)]
-        steep, left = 1.0, u[0]
+        steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), whose squares may be beyond doubles
         if off:
             left -= Fraction(off) * _size(rows[d * a])
         for mu, part in data.friction:
@@ -208,10 +210,10 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
                     (_size(row) for row in rows[d * a : d * a + d][part]), Fraction()
                 )
             left -= Fraction(float(mu[a])) * friction
-            steep += float(mu[a]) ** 2
+            steep = hypot(steep, float(mu[a]))
         margin = _below(left)
         margins[a] = margin
-        forces[a] = margin / (sqrt(steep) * (1 + 1e-15))
+        forces[a] = margin / (steep * (1 + 1e-15))
     return margins, forces
 
 
@@ -220,7 +222,10 @@ def _size(row: dict[int, Fraction]) -> Fraction:
 
 
 def _below(x: Fraction) -> float:
-    return nextafter(float(x), -inf)
+    try:
+        return nextafter(float(x), -inf)
+    except OverflowError:
+        return float(np.finfo(float).max) if x > 0 else -inf
 
 
 def root_above(x: Fraction) -> Fraction:

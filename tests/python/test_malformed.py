@@ -286,6 +286,11 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
         store(f"{ROOT}/W/p", chunks=True, scaleoffset=0),
         f"{ROOT}/W/p: is packed",
     ),
+    # h5py brings its own copy of HDF5, and this filter
+    "numbers by a filter that is not installed": (
+        store(f"{ROOT}/W/i", chunks=True, compression="lzf"),
+        f"{ROOT}/W/i: is packed by a filter that is not installed (lzf",
+    ),
     "numbers in another file": (
         store(
             f"{ROOT}/vectors/q", data=None, shape=(18,), dtype="<f8", external=[("data", 0, 144)]

@@ -1,6 +1,7 @@
 #include "io/hdf5/read_objects.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 namespace fclib::hdf5 {
@@ -61,11 +62,28 @@ void require_chunks(const Handle& properties, hid_t dataset, double entries, dou
   }
 }
 
+/// Why HDF5 could not read a dataset.
+std::string reason_of(const Numbers& dataset) {
+  const Handle properties(H5Dget_create_plist(dataset.id.id()), H5Pclose);
+  for (int k = 0; k < H5Pget_nfilters(properties.id()); ++k) {
+    std::size_t values = 0;
+    std::array<char, 64> name{};
+    const H5Z_filter_t filter =
+        H5Pget_filter2(properties.id(), static_cast<unsigned>(k), nullptr, &values, nullptr,
+                       name.size() - 1, name.data(), nullptr);
+    if (filter >= 0 && H5Zfilter_avail(filter) <= 0) {
+      return "is packed by a filter that is not installed (" + std::string(name.data()) +
+             ", number " + std::to_string(filter) + ")";
+    }
+  }
+  return "cannot be read (the file is damaged or cut short)";
+}
+
 void read_as(const Numbers& dataset, hid_t memory, void* values) {
   if (dataset.size > 0 &&
       !read_chunks(dataset.id.id(), dataset.packing, memory, dataset.size, values) &&
       H5Dread(dataset.id.id(), memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) < 0) {
-    fail(dataset.path, "cannot be read (the file is damaged or cut short)");
+    fail(dataset.path, reason_of(dataset));
   }
 }
 

@@ -123,7 +123,7 @@ RULES = [
         "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"
     ),
     Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
-    Rules(HELD, None, ({"most": 0.25}, {"most": 1}), "crowded"),
+    Rules(HELD, None, ({"most": 0.5}, {"most": 0.8}, {"most": 1}), "crowded"),
     *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
 ]
 

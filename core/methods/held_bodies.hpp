@@ -35,7 +35,7 @@ namespace fclib {
 struct HeldBodiesRules {
   int rounds = 40;          ///< of both, at most
   int patience = 5;         ///< rounds in which the error must halve
-  double most = 0.5;        ///< share of the contacts in 2, over which it must be solved at once
+  double most = 0.65;       ///< share of the contacts in 2, over which it must be solved at once
   double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
   double creep = 0.1;       ///< ... and over the error of 1 and ||q||
   double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better

@@ -18,6 +18,7 @@ const largest = 2 ** 31 - 1;
 const longest = 2n ** 63n - 1n;
 const best_compression = 1100; // deflate cannot shrink data further than this
 const small_dataset = 2 ** 20;
+const filters_read = new Set([1, 2, 3]); // deflate, shuffle and Fletcher's checksum
 const filters_not_read = new Set([5, 6]); // n-bit and scale-offset trust what they read
 
 /** A group of a file, and where it is. */
@@ -103,6 +104,12 @@ class Group {
     try {
       if (dataset.filters.some(({ id }) => filters_not_read.has(id))) {
         fail(path, "is packed by a filter that is not read (n-bit or scale-offset)");
+      }
+      // h5wasm gives what memory held before where it has no filter
+      const other = dataset.filters.find(({ id }) => !filters_read.has(id));
+      if (other && size > 0) {
+        const { id, name } = other;
+        fail(path, `is packed by a filter that is not installed (${name}, number ${id})`);
       }
       values = size === 0 ? [] : dataset.value;
     } catch (error) {

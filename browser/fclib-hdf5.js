@@ -105,7 +105,6 @@ class Group {
       if (dataset.filters.some(({ id }) => filters_not_read.has(id))) {
         fail(path, "is packed by a filter that is not read (n-bit or scale-offset)");
       }
-      // h5wasm gives what memory held before where it has no filter
       const other = dataset.filters.find(({ id }) => !filters_read.has(id));
       if (other && size > 0) {
         const { id, name } = other;
@@ -290,14 +289,28 @@ function silence(files) {
   stderr.stream_ops = { ...stderr.stream_ops, write: (stream, buffer, offset, length) => length };
 }
 
+let checked = null;
+
+/** Lets reads throw that HDF5 could not do: h5wasm gives what memory held before. */
+function check_reads(module) {
+  if (module === checked) return;
+  checked = module;
+  const read = module.get_dataset_data;
+  module.get_dataset_data = (...where) => {
+    if (read(...where) < 0) throw new Error("HDF5 could not read a dataset");
+  };
+}
+
 let count = 0;
 
 /** What an FCLIB file holds: { problem, solution, guesses, contacts, bodies }. */
 export async function read_hdf5(fclib, bytes, kind = "") {
   if (!is_hdf5(bytes)) fail("", "is not an HDF5 file");
   const library = await import("./hdf5_hl.js");
-  const { FS } = await library.ready;
+  const module = await library.ready;
+  const { FS } = module;
   silence(FS);
+  check_reads(module);
   const name = `fclib-${count++}.hdf5`;
   FS.writeFile(name, bytes);
   let file;

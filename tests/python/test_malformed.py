@@ -96,6 +96,18 @@ def store(name: str, **layout: Any) -> Spoil:
     return spoil
 
 
+def store_with_wrong_checksums(name: str) -> Spoil:
+    """Numbers that changed after HDF5 had summed them up."""
+
+    def spoil(file: h5py.File) -> None:
+        values = file[name][()]
+        store(name, chunks=values.shape, fletcher32=True)(file)
+        _, chunk = file[name].id.read_direct_chunk((0,))
+        file[name].id.write_direct_chunk((0,), bytes([chunk[0] ^ 1, *chunk[1:]]))
+
+    return spoil
+
+
 def store_elsewhere(file: h5py.File) -> None:
     """A dataset whose numbers are those of other datasets."""
     layout = h5py.VirtualLayout(shape=(18,), dtype="<f8")
@@ -285,6 +297,10 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
     "numbers by their offsets": (
         store(f"{ROOT}/W/p", chunks=True, scaleoffset=0),
         f"{ROOT}/W/p: is packed",
+    ),
+    "numbers that their checksum denies": (
+        store_with_wrong_checksums(f"{ROOT}/vectors/q"),
+        f"{ROOT}/vectors/q: cannot be read",
     ),
     # h5py brings its own copy of HDF5, and this filter
     "numbers by a filter that is not installed": (

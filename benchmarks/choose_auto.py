@@ -222,7 +222,11 @@ def changes(lines: list[str]) -> list[Change]:
         result.append(
             Change(f"proximal point after the first, below {gate}", first, inserted(first, line))
         )
-    tried: dict[str, tuple[float, ...]] = {"far": (1, 16), "tau": (0.003, 0.3), "limit": (30, 120)}
+    tried: dict[str, tuple[float, ...]] = {
+        "far": (1, 16),
+        "tau": (0.003, 0.1, 0.3, 1),
+        "limit": (30, 120),
+    }
     for key, values in tried.items():
         result += [
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))

@@ -447,6 +447,7 @@ def test_brackets_and_colons_of_a_path_are_printed_as_they_are(tmp_path: Path) -
 
 def test_what_a_file_says_does_not_steer_the_terminal(tmp_path: Path) -> None:
     problem = planted_local(1, nc=2).problem
+    assert isinstance(problem, fclib.LocalProblem)
     problem = fclib.LocalProblem(
         W=problem.W,
         q=problem.q,

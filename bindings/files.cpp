@@ -12,6 +12,7 @@
 
 #include "convert/complete.hpp"
 #include "io/hdf5/hdf5.hpp"
+#include "io/replace_file.hpp"
 #include "io/siconos/siconos.hpp"
 #include "merit/merit.hpp"
 #include "module.hpp"
@@ -74,6 +75,10 @@ std::vector<Solution> complete(const P& problem, const std::vector<Solution>& gu
 }
 
 void bind_hdf5(nb::module_& m) {
+  m.def(
+      "sync_files", [](const fs::path& folder) { sync_files(folder.string()); }, "folder"_a,
+      nb::sig("def sync_files(folder: str | os.PathLike[str]) -> None"), nb::call_guard<Unlocked>(),
+      "Flushes all files on the file system of a folder. Raises FileError.");
   m.def(
       "read",
       [](const fs::path& path, const std::optional<std::string>& kind) {
@@ -221,13 +226,15 @@ void bind_hdf5(nb::module_& m) {
     m.def(
         "write",
         [](const fs::path& path, const P& problem, const nb::object& given,
-           const nb::object& given_guesses, const std::string& mode, int compression, bool dense) {
+           const nb::object& given_guesses, const std::string& mode, int compression, bool dense,
+           bool sync) {
           const bool solved = !given.is_none();
           const Solution solution = solved ? solution_from(given, "solution") : Solution{};
           const std::vector<Solution> guesses = solutions_from(given_guesses, "guesses");
           const Unlocked unlocked;
           WriteOptions options = options_of(mode, {"overwrite", "add", "replace"}, compression);
           options.dense = dense;
+          options.sync = sync;
           if (!solved && guesses.empty()) {
             write_file(path.string(), &problem, nullptr, {}, options);
             return;
@@ -239,13 +246,13 @@ void bind_hdf5(nb::module_& m) {
         },
         "path"_a, "problem"_a, "solution"_a.none() = nb::none(), "guesses"_a = nb::tuple(),
         nb::kw_only(), "mode"_a = "overwrite", "compression"_a = WriteOptions{}.compression,
-        "dense"_a = false,
+        "dense"_a = false, "sync"_a = true,
         nb::sig(signature("write",
                           ", problem: " + class_name(P::kind) + ", solution: " + solution_type +
                               " | None = None, " + guesses_type +
                               " = (), *, mode: typing.Literal['overwrite', 'add', 'replace'] = "
                               "'overwrite', " +
-                              compression_type + ", dense: bool = False",
+                              compression_type + ", dense: bool = False, sync: bool = True",
                           "None")
                     .c_str()),
         "Writes an FCLIB file, atomically. What the solution and the guesses lack of v and u is "
@@ -255,7 +262,8 @@ void bind_hdf5(nb::module_& m) {
         "solution and its guesses (\"replace\"). In a file of several problems solution and "
         "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
         "9. Dense matrices are written by rows, which every reader takes; dense keeps those of a "
-        "local problem as they are.\n\n"
+        "local problem as they are. Without sync a new file is not flushed: whoever writes many calls "
+        "sync_files after them.\n\n"
         "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
         "mode or a compression outside 0..9.");
   });

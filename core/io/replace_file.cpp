@@ -144,7 +144,9 @@ class Temporary {
   [[nodiscard]] bool ok() const { return file_.id() >= 0; }
   [[nodiscard]] int id() const { return file_.id(); }
 
-  void take_the_place() {
+  /// `fresh`: the target was not there.
+  void take_the_place(bool fresh) {
+    if (!named_ && fresh && link_as(target_)) return;
     if (!named_) give_name();
     if (::rename(name_.c_str(), target_.c_str()) != 0) fail_in_system(path_, "cannot be written");
     named_ = false;
@@ -170,10 +172,14 @@ class Temporary {
     static std::atomic<unsigned> count{0};
     do {
       name_ = target_ + "." + std::to_string(::getpid()) + "-" + std::to_string(++count);
-      named_ = ::linkat(AT_FDCWD, link_to(id()).c_str(), AT_FDCWD, name_.c_str(),
-                        AT_SYMLINK_FOLLOW) == 0;
+      named_ = link_as(name_);
     } while (!named_ && errno == EEXIST);
     if (!named_) fail_in_system(path_, "cannot be written");
+  }
+
+  [[nodiscard]] bool link_as(const std::string& name) const {
+    const std::string own = link_to(id());
+    return ::linkat(AT_FDCWD, own.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
   }
 
   static std::string link_to(int id) { return "/proc/self/fd/" + std::to_string(id); }
@@ -349,7 +355,7 @@ void replace_file(const std::string& path, std::string_view bytes) {
   replace_file(path, Pieces(&bytes, 1));
 }
 
-void replace_file(const std::string& path, Pieces pieces) {
+void replace_file(const std::string& path, Pieces pieces, bool sync) {
   const std::string target = resolve_links(path);
   const std::optional<struct stat> old = status_of(path, target);
   // a file of several names stays the one that they name
@@ -363,8 +369,19 @@ void replace_file(const std::string& path, Pieces pieces) {
   if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, pieces);
   if (!old) ::fchmod(file.id(), mode_of_new_files());
   write_all(file.id(), pieces, path);
-  if (::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");
-  file.take_the_place();
+  // the old file is not given up for one that may be lost
+  if ((sync || old) && ::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");
+  file.take_the_place(!old);
+}
+
+void sync_files(const std::string& folder) {
+#ifdef __linux__
+  const Descriptor file(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (file.id() < 0 || ::syncfs(file.id()) != 0) fail_in_system(folder, "cannot be flushed");
+#else
+  static_cast<void>(folder);
+  ::sync();
+#endif
 }
 
 }  // namespace fclib

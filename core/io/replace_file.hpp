@@ -25,8 +25,13 @@ std::string read_file(const std::string& path);
 /// (file) that names the file.
 void replace_file(const std::string& path, std::string_view bytes);
 
-/// The same of bytes that lie in pieces, one after another.
-void replace_file(const std::string& path, std::span<const std::string_view> pieces);
+/// The same of bytes that lie in pieces, one after another. Without `sync` a new file is not flushed:
+/// a crash of the machine may lose it, until sync_files() was called.
+void replace_file(const std::string& path, std::span<const std::string_view> pieces,
+                  bool sync = true);
+
+/// Flushes all files on the file system of this folder.
+void sync_files(const std::string& folder);
 
 /// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
 /// since the file itself is replaced; it goes with the process that holds it. Where the file system

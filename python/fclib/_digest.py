@@ -33,10 +33,10 @@ def digest(problem: Any) -> str:
         else:
             sha.update(f" {name} {part.shape[0]}x{part.shape[1]} {part.nnz} ".encode())
             # int64 and little-endian on every machine
-            sha.update(part.indptr.astype("<i8").tobytes())
-            sha.update(part.indices.astype("<i8").tobytes())
+            sha.update(part.indptr.astype("<i8"))
+            sha.update(part.indices.astype("<i8"))
             numbers = part.data
-        sha.update((numbers.astype("<f8") + 0.0).tobytes())
+        sha.update(numbers.astype("<f8", copy=False) + 0.0)
     return sha.hexdigest()
 
 
@@ -118,9 +118,14 @@ def parts(problem: Any) -> dict[str, Any]:
         if value is None:
             continue
         if sp.issparse(value) or np.ndim(value) == 2:
-            matrix = sp.csc_array(value, copy=True)
-            matrix.sum_duplicates()
-            matrix.eliminate_zeros()
+            if getattr(value, "format", "") == "csc" and value.has_canonical_format:
+                matrix = value
+            else:
+                matrix = sp.csc_array(value, copy=True)
+                matrix.sum_duplicates()
+            if not matrix.data.all():
+                matrix = matrix.copy()
+                matrix.eliminate_zeros()
             found[name] = matrix
         else:
             found[name] = np.asarray(value, dtype=float)

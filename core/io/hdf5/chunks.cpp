@@ -121,15 +121,14 @@ constexpr std::uint32_t without_deflate(bool shuffled) { return shuffled ? 2 : 1
 
 }  // namespace
 
-bool write_chunks(hid_t dataset, const Bytes& numbers, const Packing& packing, int level,
-                  const std::string& name) {
-  const auto& [data, size, width] = numbers;
+bool pack(const Bytes& numbers, const Packing& packing, int level, const TakeChunk& take) {
+  const auto [data, size, width] = numbers;
   libdeflate_compressor* const compressor = compressor_of(level);
   if (!little_endian || compressor == nullptr || (width != 4 && width != 8)) return false;
   const std::size_t bytes = packing.chunk * width;
   const auto edge = room(size % packing.chunk == 0 ? 0 : bytes);
   const auto shuffled = room(packing.shuffled ? bytes : 0);
-  const auto packed = room(bytes);
+  const auto deflated = room(bytes);
   for (std::size_t at = 0; at < size; at += packing.chunk) {
     const char* chunk = data + at * width;
     if (size - at < packing.chunk) {  // HDF5 has whole chunks alone
@@ -142,11 +141,12 @@ bool write_chunks(hid_t dataset, const Bytes& numbers, const Packing& packing, i
       chunk = shuffled.get();
     }
     const std::size_t taken =
-        libdeflate_zlib_compress(compressor, chunk, bytes, packed.get(), bytes - 1);
-    const hsize_t offset = at;
-    check(H5Dwrite_chunk(dataset, H5P_DEFAULT, taken > 0 ? 0 : without_deflate(packing.shuffled),
-                         &offset, taken > 0 ? taken : bytes, taken > 0 ? packed.get() : chunk),
-          name);
+        libdeflate_zlib_compress(compressor, chunk, bytes, deflated.get(), bytes - 1);
+    if (taken > 0) {
+      take({deflated.get(), taken}, 0);
+    } else {
+      take({chunk, bytes}, without_deflate(packing.shuffled));
+    }
   }
   return true;
 }
@@ -202,7 +202,7 @@ bool read_chunks(hid_t dataset, const Packing& packing, hid_t memory, std::size_
 
 namespace fclib::hdf5 {
 
-bool write_chunks(hid_t, const Bytes&, const Packing&, int, const std::string&) { return false; }
+bool pack(const Bytes&, const Packing&, int, const TakeChunk&) { return false; }
 bool read_chunks(hid_t, const Packing&, hid_t, std::size_t, void*) { return false; }
 
 }  // namespace fclib::hdf5

@@ -5,7 +5,9 @@
 #include <hdf5.h>
 
 #include <cstddef>
-#include <string>
+#include <cstdint>
+#include <functional>
+#include <string_view>
 
 namespace fclib::hdf5 {
 
@@ -25,10 +27,12 @@ struct Packing {
 /// The packing that a dataset's properties ask for.
 Packing packing_of(hid_t properties);
 
-/// Writes all of a new dataset, at a level of deflate from 1 to 9; false: it is left to HDF5. Under
-/// the library's lock.
-bool write_chunks(hid_t dataset, const Bytes& numbers, const Packing& packing, int level,
-                  const std::string& name);
+/// Is given a chunk, and the mask of the filters that were passed over.
+using TakeChunk = std::function<void(std::string_view bytes, std::uint32_t mask)>;
+
+/// Packs numbers, chunk by chunk, at a level of deflate from 1 to 9; false: it is left to HDF5.
+/// Under the library's lock.
+bool pack(const Bytes& numbers, const Packing& packing, int level, const TakeChunk& take);
 
 /// Reads all of a dataset of so many numbers of the type `memory`; false: it is left to HDF5, which
 /// knows other layouts, and says what is wrong with a damaged file. Under the library's lock.

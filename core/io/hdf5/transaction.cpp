@@ -32,7 +32,7 @@ void require_level(int compression) {
 }  // namespace
 
 void change_file(const std::string& path, Start start, int compression,
-                 const std::function<void(const Target& root)>& change) {
+                 const std::function<void(const Target& root)>& change, bool sync) {
   require_level(compression);
   const Session session;
   in_file(path, [&] {
@@ -50,7 +50,7 @@ void change_file(const std::string& path, Start start, int compression,
       write_text_attribute(root, "generator", "fclib " + std::string(version));
     }
     change(root);
-    replace_file(path, file.finish());
+    replace_file(path, file.finish(), sync);
   });
 }
 

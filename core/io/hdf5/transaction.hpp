@@ -12,8 +12,8 @@ namespace fclib::hdf5 {
 enum class Start { existing, empty, existing_or_empty };
 
 /// Changes a file: change(root) writes into a copy, which then takes the place of the file. Changes
-/// of one file take turns. `compression` is the level of deflate.
+/// of one file take turns. `compression` is the level of deflate; see replace_file() for `sync`.
 void change_file(const std::string& path, Start start, int compression,
-                 const std::function<void(const Target& root)>& change);
+                 const std::function<void(const Target& root)>& change, bool sync = true);
 
 }  // namespace fclib::hdf5

@@ -169,7 +169,7 @@ void require_owner(const Group& root, const std::string& kind, bool owned_before
 void write_view(const std::string& path, const ProblemView& problem, const Solution* solution,
                 const std::vector<Solution>& guesses, const WriteOptions& options) {
   const Start start = options.append ? Start::existing_or_empty : Start::empty;
-  change_file(path, start, options.compression, [&](const Target& root) {
+  const auto change = [&](const Target& root) {
     const std::string& kind = problem.kind;
     const std::string group = "fclib_" + kind;
     const std::vector<std::string> before = kinds_of(root);
@@ -198,7 +198,8 @@ void write_view(const std::string& path, const ProblemView& problem, const Solut
       make_room(root, "guesses", options.replace);
       write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
     }
-  });
+  };
+  change_file(path, start, options.compression, change, options.sync);
 }
 
 }  // namespace

@@ -17,6 +17,7 @@ struct WriteOptions {
   bool dense = false;    ///< false: a dense matrix goes in by rows, since 3.1 reads no dense ones;
                          ///< without validation all stays as it is
   int compression = 6;   ///< level of deflate, 0 (none) to 9
+  bool sync = true;      ///< false: a new file is left to the next sync_files()
 };
 
 /// Writes a new file, or replaces the old one whole; or adds to it (WriteOptions::append), where a

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <list>
 #include <utility>
 #include <vector>
 
@@ -38,7 +39,8 @@ struct Array {
   const void* data;
   std::size_t size;
 
-  [[nodiscard]] std::size_t bytes() const { return size * H5Tget_size(stored); }
+  [[nodiscard]] std::size_t width() const { return H5Tget_size(stored); }
+  [[nodiscard]] std::size_t bytes() const { return size * width(); }
 };
 
 Handle dataset_properties() {
@@ -125,32 +127,131 @@ Filter likely_filter(const Array& array) {
   return plain < shuffled ? Filter::deflate : Filter::shuffle_and_deflate;
 }
 
-/// Packs an array with this filter, at a level from 1 on.
-void write_packed(const Target& group, const std::string& name, const Array& array, Filter filter) {
-  const std::size_t width = H5Tget_size(array.stored);
-  const Packing packing{.chunk = std::min(array.size, chunk_bytes / width),
-                        .shuffled = filter == Filter::shuffle_and_deflate};
-  const int level = group.style->compression;
-  const Handle layout = dataset_properties();
-  const hsize_t chunk = packing.chunk;
-  H5Pset_chunk(layout.id(), 1, &chunk);
-  if (packing.shuffled) H5Pset_shuffle(layout.id());
-  H5Pset_deflate(layout.id(), static_cast<unsigned>(level));
-  const Handle dataset = create_dataset(group, name, array, layout);
-  const Bytes bytes{static_cast<const char*>(array.data), array.size, width};
-  if (!write_chunks(dataset.id(), bytes, packing, level, group.child(name))) {
-    write_all(dataset, array, group.child(name));
+/// How an array is packed, and what that makes of it.
+struct Packed {
+  struct Chunk {
+    std::string bytes;
+    std::uint32_t mask;
+  };
+  Filter filter;
+  std::vector<Chunk> chunks;  // none: HDF5 makes them, or there is no filter
+};
+
+/// The numbers of a chunk of an array.
+hsize_t chunk_of(const Array& array) { return std::min(array.size, chunk_bytes / array.width()); }
+
+bool pack_array(const Array& array, Filter filter, int level, const TakeChunk& take) {
+  return pack({static_cast<const char*>(array.data), array.size, array.width()},
+              {chunk_of(array), filter == Filter::shuffle_and_deflate}, level, take);
+}
+
+/// What arrays were packed to lately. The files of a sequence have many in common, the shapes of
+/// bodies and the patterns of matrices; the two forms of a problem all that is of its contacts.
+class Recent {
+ public:
+  static constexpr std::size_t most_bytes = std::size_t{1} << 23;
+  static constexpr std::size_t largest = most_bytes / 4;  // of an array
+
+  /// It stays until the next call.
+  const Packed& of(const Array& array, int level) {
+    const std::size_t bytes = array.bytes();
+    const auto* data = static_cast<const char*>(array.data);
+    const Key key{bytes, array.width(), static_cast<std::size_t>(level), sampled(data, bytes)};
+    for (auto one = known_.begin(); one != known_.end(); ++one) {
+      if (one->key != key || std::memcmp(one->raw.data(), data, bytes) != 0) continue;
+      known_.splice(known_.begin(), known_, one);
+      return one->packed;
+    }
+    Packed packed{likely_filter(array), {}};
+    if (packed.filter != Filter::none) {
+      pack_array(array, packed.filter, level, [&](std::string_view chunk, std::uint32_t mask) {
+        packed.chunks.push_back({std::string(chunk), mask});
+      });
+    }
+    known_.push_front({key, std::string(data, bytes), std::move(packed)});
+    bytes_ += bytes;
+    while (bytes_ > most_bytes || known_.size() > most_arrays) {
+      bytes_ -= known_.back().raw.size();
+      known_.pop_back();
+    }
+    return known_.front().packed;
   }
+
+ private:
+  using Key = std::array<std::size_t, 4>;
+  struct Known {
+    Key key;
+    std::string raw;
+    Packed packed;
+  };
+  static constexpr std::size_t most_arrays = 128;
+
+  /// A hash of some of the bytes, which tells most arrays apart.
+  static std::size_t sampled(const char* data, std::size_t bytes) {
+    constexpr std::size_t samples = 64;
+    const std::size_t words = bytes / sizeof(std::uint64_t);
+    const std::size_t stride = std::max<std::size_t>(words / samples, 1);
+    std::uint64_t hash = 0;
+    for (std::size_t k = 0; k < words; k += stride) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, data + k * sizeof word, sizeof word);
+      hash = (hash ^ word) * 0x9E3779B97F4A7C15U;
+      hash ^= hash >> 32U;
+    }
+    return hash;
+  }
+
+  std::list<Known> known_;  // the latest first
+  std::size_t bytes_ = 0;   // of the arrays
+};
+
+/// Under the library's lock, as all of this is.
+Recent& recent() {
+  static Recent made;
+  return made;
+}
+
+/// A new dataset in chunks; `fill` writes them by its function, or says that HDF5 is to.
+template <class Fill>
+void write_packed(const Target& group, const std::string& name, const Array& array, Filter filter,
+                  const Fill& fill) {
+  const Style& style = *group.style;
+  const Handle& layout = filter == Filter::deflate ? style.deflated : style.shuffled;
+  const hsize_t chunk = chunk_of(array);
+  H5Pset_chunk(layout.id(), 1, &chunk);
+  const Handle dataset = create_dataset(group, name, array, layout);
+  hsize_t offset = 0;
+  const auto write = [&](std::string_view bytes, std::uint32_t mask) {
+    check(H5Dwrite_chunk(dataset.id(), H5P_DEFAULT, mask, &offset, bytes.size(), bytes.data()),
+          group.child(name));
+    offset += chunk;
+  };
+  if (!fill(write)) write_all(dataset, array, group.child(name));
+}
+
+/// Whether an array was written in chunks: one that filters make smaller.
+bool write_smaller(const Target& group, const std::string& name, const Array& array) {
+  const int level = group.style->compression;
+  if (array.size < chunked_from || level == 0) return false;
+  if (array.bytes() > Recent::largest) {
+    const Filter filter = likely_filter(array);
+    if (filter == Filter::none) return false;
+    write_packed(group, name, array, filter,
+                 [&](const auto& write) { return pack_array(array, filter, level, write); });
+    return true;
+  }
+  const Packed& packed = recent().of(array, level);
+  if (packed.filter == Filter::none) return false;
+  write_packed(group, name, array, packed.filter, [&](const auto& write) {
+    for (const auto& [bytes, mask] : packed.chunks) write(bytes, mask);
+    return !packed.chunks.empty();
+  });
+  return true;
 }
 
 void write_array(const Target& group, const std::string& name, const Array& array) {
+  if (write_smaller(group, name, array)) return;
   const Style& style = *group.style;
-  const bool packable = array.size >= chunked_from && style.compression > 0;
-  const Filter filter = packable ? likely_filter(array) : Filter::none;
-  if (filter != Filter::none) {
-    write_packed(group, name, array, filter);
-    return;
-  }
   const Handle& layout = array.bytes() <= compact_bytes ? style.compact : style.plain;
   const Handle dataset = create_dataset(group, name, array, layout);
   if (array.size > 0) write_all(dataset, array, group.child(name));
@@ -174,6 +275,13 @@ Handle compact_properties() {
   return properties;
 }
 
+Handle packed_properties(int level, bool shuffled) {
+  Handle properties = dataset_properties();
+  if (shuffled) H5Pset_shuffle(properties.id());
+  H5Pset_deflate(properties.id(), static_cast<unsigned>(level));
+  return properties;
+}
+
 }  // namespace
 
 Style::Style(int level, std::function<void(const void* data, std::size_t size)> lend_of)
@@ -181,7 +289,9 @@ Style::Style(int level, std::function<void(const void* data, std::size_t size)> 
       lend(std::move(lend_of)),
       group(group_properties()),
       plain(dataset_properties()),
-      compact(compact_properties()) {}
+      compact(compact_properties()),
+      deflated(packed_properties(level, false)),
+      shuffled(packed_properties(level, true)) {}
 
 void keep_small(hid_t properties) {
   check(H5Pset_link_phase_change(properties, compact_links, compact_links), "");

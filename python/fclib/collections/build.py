@@ -19,13 +19,13 @@ import json
 import multiprocessing
 import os
 import shutil
+import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass, field, replace
 from multiprocessing import connection
-from multiprocessing.managers import SyncManager
 from pathlib import Path
 from queue import Empty
 from typing import Any
@@ -40,6 +40,7 @@ from fclib.collections.record import record
 
 COMPRESSION = 1  # 2 % more bytes than 6, two thirds of the time
 CHECKPOINT = 5.0  # seconds between two checkpoints
+TOLD = 0.1  # seconds between two messages of progress
 STATE = ".state"
 
 Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, of how many
@@ -95,16 +96,13 @@ def build_in_processes(
 ) -> None:
     """Build each plan in a process of a pool."""
     context = multiprocessing.get_context("spawn")
-    manager = SyncManager(ctx=context)
-    manager.start(end_with_parent)
-    with (
-        manager,
-        ProcessPoolExecutor(jobs, mp_context=context, initializer=end_with_parent) as pool,
-    ):
-        messages = manager.Queue()
+    messages = context.Queue()
+    with ProcessPoolExecutor(
+        jobs, mp_context=context, initializer=begin_in_pool, initargs=(messages,)
+    ) as pool:
         # the long ones first
         ordered = sorted(plans, key=lambda plan: -plan.total)
-        waiting = {pool.submit(build_and_tell, plan, out, messages, pictures) for plan in ordered}
+        waiting = {pool.submit(build_and_tell, plan, out, pictures) for plan in ordered}
         while waiting:
             done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
             try:
@@ -116,22 +114,40 @@ def build_in_processes(
                 future.result()
 
 
-def end_with_parent() -> None:
-    """End this process where the build is killed: nobody would take its results."""
+_messages: Any = None  # in a process of the pool: where progress goes
+
+
+def begin_in_pool(messages: Any) -> None:
+    """Of a process of the pool: where its progress goes, and that it ends with the build."""
+    global _messages
+    _messages = messages
+    messages.cancel_join_thread()  # what nobody reads holds no process
+    # pyarrow loads it to ask whether our rows are its: half a second
+    sys.modules.setdefault("pandas", None)  # type: ignore[arg-type]
     parent = multiprocessing.parent_process()
     if parent is None:
         return
 
     def watch() -> None:
+        # where the build is killed nobody takes the results
         connection.wait([parent.sentinel])
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 
 
-def build_and_tell(plan: Plan, out: Path, messages: Any, pictures: bool) -> None:
-    """Build in a process of the pool; progress goes back as messages."""
-    build_scene(plan, out, lambda *progress: messages.put(progress), pictures)
+def build_and_tell(plan: Plan, out: Path, pictures: bool) -> None:
+    """Build in a process of the pool; progress goes back as messages, a few each second."""
+    last = 0.0
+
+    def tell(name: str, done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if done == total or now - last > TOLD:
+            last = now
+            _messages.put((name, done, total))
+
+    build_scene(plan, out, tell, pictures)
 
 
 def is_finished(plan: Plan, out: Path) -> bool:
@@ -302,6 +318,7 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
         if states is not None:
             figures.draw_scene(states.model, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
+    _core.sync_files(folder)
     catalog.write_catalog(
         folder / catalog.FILE,
         list(kept.rows.values()),
@@ -371,6 +388,7 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         row |= judged(item.problem, result) | {"tol": plan.tol}
     words, known = known_of(plan, item.problem, local, row)
     several = several_of(plan, item.problem)
+    info = rights.stamped(item.problem.info, plan, kept.looked, words)
     for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = item.problem if form == "global" else local
@@ -378,7 +396,7 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         if solution is not None and form == "local":
             solution = _core.Solution(r=solution.r, u=solution.u, l=solution.l)
         stamped = problem.replace(
-            info=rights.stamped(problem.info, plan, kept.looked, words),
+            info=info,
             matrix_info={
                 name: info
                 for name, info in (known | dict(problem.matrix_info)).items()
@@ -386,7 +404,7 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
             },
         )
         own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
-        _core.write(out / path, stamped, solution, own, compression=COMPRESSION)
+        _core.write(out / path, stamped, solution, own, compression=COMPRESSION, sync=False)
         if len(several) > 1:
             _core.write_solutions(out / path, several, compression=COMPRESSION)
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
@@ -488,6 +506,7 @@ def nnz(matrix: Any) -> int:
 
 def write_checkpoint(folder: Path, kept: Kept) -> None:
     """Store where to go on: the problems that were looked at, and what was kept of them."""
+    _core.sync_files(folder)
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
     write_text(folder / "kept.json", known)
 

@@ -33,7 +33,7 @@ import json
 import math
 import os
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
@@ -49,6 +49,7 @@ from fclib.scenes import Scene
 from fclib.scenes.shared.solids import Bed, Block, Load, Solids
 
 if TYPE_CHECKING:
+    from fclib._core import ProblemInfo
     from fclib.simulate import Model
     from fclib.simulate.moreau_jean import MoreauJean, StepProblem
 
@@ -109,6 +110,15 @@ class Trajectory:
 
         return scheme_of(self.model, self.origin["settings"]["stabilization"])
 
+    @cached_property
+    def words(self) -> Callable[..., ProblemInfo]:
+        """What gives the info of a problem, by its step and number."""
+        from fclib.simulate import descriptions
+
+        known = {name: self.origin[name] for name in ("collection", "version")}
+        settings = self.origin["settings"] | known
+        return descriptions(self.scene, self.scheme, settings, self.model.left_out)
+
     def index(self, number: int) -> int:
         """The place of a problem's number. KeyError where there is no such problem."""
         place = int(np.searchsorted(self.number, number))
@@ -126,13 +136,9 @@ class Trajectory:
 
         Raises as `fclib.simulate.simulate` does where the scene cannot be assembled.
         """
-        from fclib.simulate import describe, geometry_of, problem_at
+        from fclib.simulate import geometry_of, problem_at
 
-        known = {name: self.origin[name] for name in ("collection", "version")}
-        settings = self.origin["settings"] | known | {"number": int(self.number[place])}
-        info = describe(
-            self.scene, self.scheme, settings, int(self.step[place]), self.model.left_out
-        )
+        info = self.words(int(self.step[place]), number=int(self.number[place]))
         state = self.position[place], self.velocity[place]
         part = problem_at(self.model, self.scheme, *state, info)
         contacts, bodies = geometry_of(self.model, part.contacts)

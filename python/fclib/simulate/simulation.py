@@ -247,24 +247,14 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
     return _geometry.turned(state.r, source, state.frame, contacts.frame, contacts.parts, limits)
 
 
-def describe(
-    scene: Scene,
-    scheme: MoreauJean,
-    settings: dict[str, Any],
-    index: int,
-    left_out: Sequence[str] = (),
-) -> _core.ProblemInfo:
-    """What travels with a problem: its name, its mathematics, and all that regenerates it.
-
-    The last line of the description is JSON, which `provenance` reads back.
-    """
-    return descriptions(scene, scheme, settings, left_out)(index)
-
-
 def descriptions(
     scene: Scene, scheme: MoreauJean, settings: dict[str, Any], left_out: Sequence[str] = ()
-) -> Callable[[int], _core.ProblemInfo]:
-    """What gives `describe` of each step: most of the words are the same."""
+) -> Callable[..., _core.ProblemInfo]:
+    """What gives the info of each step, by its number and further settings of its own.
+
+    It travels with a problem: its name, its mathematics, and all that regenerates it. The last line
+    of the description is JSON, which `provenance` reads back. Most of it is the same for all steps.
+    """
     origin = {
         "generator": "fclib.simulate",
         "fclib": _core.version,
@@ -316,8 +306,8 @@ def descriptions(
         " r_R in N m s, mu_r in m)"
     )
 
-    def of_step(index: int) -> _core.ProblemInfo:
-        place = json.dumps({"step": index, "time": index * scheme.h})[1:-1]
+    def of_step(index: int, **own: Any) -> _core.ProblemInfo:
+        place = json.dumps({**own, "step": index, "time": index * scheme.h})[1:-1]
         return _core.ProblemInfo(
             title=f"{title}{index}",
             description=f"{before}, {place}, {after}",

@@ -19,7 +19,6 @@ import json
 import multiprocessing
 import os
 import shutil
-import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -122,8 +121,6 @@ def begin_in_pool(messages: Any) -> None:
     global _messages
     _messages = messages
     messages.cancel_join_thread()  # what nobody reads holds no process
-    # pyarrow loads it to ask whether our rows are its: half a second
-    sys.modules.setdefault("pandas", None)  # type: ignore[arg-type]
     parent = multiprocessing.parent_process()
     if parent is None:
         return

@@ -127,26 +127,26 @@ def features(
 ) -> npt.NDArray[np.int64]:
     """Where on its two shapes (nc x 2) each contact lies, as a number (nc); different in a pair."""
     m, d = model.model, model.data
-    static = shapes_of(model)
-    code = np.zeros(len(contacts), np.int64)
-    local = np.zeros((len(contacts), 3))
-    for side in (0, 1):
-        which = geom[:, side]
-        arm = contacts.point - d.geom_xpos[which]
-        if model.scene.period is not None:
-            edges = np.array(model.scene.period)
-            arm[:, :2] -= edges * np.rint(arm[:, :2] / edges)
-        local = np.einsum("cji,cj->ci", d.geom_xmat[which].reshape(-1, 3, 3), arm)
-        box = m.geom_aabb[which]
-        # a third of the half width and more is an end of its own
-        place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
-        third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
-        part = np.where(static.divided[which], third, 1).astype(np.int64)
-        code = PARTS**3 * code + part @ np.array((1, PARTS, PARTS**2))
+    count = len(contacts)
+    # both sides at once, the second shapes after the first ones
+    which = geom.T.ravel()
+    arm = np.concatenate((contacts.point, contacts.point)) - d.geom_xpos[which]
+    if model.scene.period is not None:
+        edges = np.array(model.scene.period)
+        arm[:, :2] -= edges * np.rint(arm[:, :2] / edges)
+    local = np.einsum("cji,cj->ci", d.geom_xmat[which].reshape(-1, 3, 3), arm)
+    box = m.geom_aabb[which]
+    # a third of the half width and more is an end of its own
+    place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
+    third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
+    part = np.where(shapes_of(model).divided[which], third, 1)
+    digits = part[:, 0] + PARTS * part[:, 1] + PARTS**2 * part[:, 2]
+    code = PARTS**3 * digits[:count] + digits[count:]
+    local = local[count:]
     # several in one part, in the order of their places on the second shape
     order = np.lexsort((*np.round(local, 6).T, code, geom[:, 1], geom[:, 0]))
     key = np.column_stack((geom, code))[order]
-    number = np.zeros(len(contacts), np.int64)
+    number = np.zeros(count, np.int64)
     number[order] = repeated_in_order(key)
     return code + PARTS**6 * number
 

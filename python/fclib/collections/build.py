@@ -84,7 +84,7 @@ def build(
             report(plan.name, plan.total, plan.total)
     if jobs <= 1 or len(todo) <= 1:
         for plan in todo:
-            build_scene(plan, out, report, pictures)
+            finish(plan, out, build_scene(plan, out, report, pictures))
     else:
         build_in_processes(todo, out, jobs, report, pictures)
     return catalog.gather(out)
@@ -93,15 +93,17 @@ def build(
 def build_in_processes(
     plans: Sequence[Plan], out: Path, jobs: int, report: Progress, pictures: bool
 ) -> None:
-    """Build each plan in a process of a pool."""
+    """Build each plan in a process of a pool; one that fails leaves the others."""
     context = multiprocessing.get_context("spawn")
     messages = context.Queue()
+    failed: BaseException | None = None
     with ProcessPoolExecutor(
         jobs, mp_context=context, initializer=begin_in_pool, initargs=(messages,)
     ) as pool:
         # the long ones first
         ordered = sorted(plans, key=lambda plan: -plan.total)
-        waiting = {pool.submit(build_and_tell, plan, out, pictures) for plan in ordered}
+        plan_of = {pool.submit(build_and_tell, plan, out, pictures): plan for plan in ordered}
+        waiting = set(plan_of)
         while waiting:
             done, waiting = wait(waiting, timeout=0.2, return_when=FIRST_COMPLETED)
             try:
@@ -110,7 +112,12 @@ def build_in_processes(
             except Empty:
                 pass
             for future in done:
-                future.result()
+                error = future.exception()
+                if error is None:
+                    finish(plan_of[future], out, future.result())
+                failed = failed or error
+    if failed is not None:
+        raise failed
 
 
 _messages: Any = None  # in a process of the pool: where progress goes
@@ -133,7 +140,7 @@ def begin_in_pool(messages: Any) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def build_and_tell(plan: Plan, out: Path, pictures: bool) -> None:
+def build_and_tell(plan: Plan, out: Path, pictures: bool) -> list[dict[str, Any]]:
     """Build in a process of the pool; progress goes back as messages, a few each second."""
     last = 0.0
 
@@ -144,7 +151,7 @@ def build_and_tell(plan: Plan, out: Path, pictures: bool) -> None:
             last = now
             _messages.put((name, done, total))
 
-    build_scene(plan, out, tell, pictures)
+    return build_scene(plan, out, tell, pictures)
 
 
 def is_finished(plan: Plan, out: Path) -> bool:
@@ -281,8 +288,13 @@ def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> It
     )
 
 
-def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False) -> None:
-    """Make the problems of a plan and store them; go on where a build before was interrupted."""
+def build_scene(
+    plan: Plan, out: Path, report: Progress, pictures: bool = False
+) -> list[dict[str, Any]]:
+    """Make the problems of a plan and store them; go on where a build before was interrupted.
+
+    Their rows of the catalogue.
+    """
     folder = out / plan.name
     state_folder = folder / STATE
     state_folder.mkdir(parents=True, exist_ok=True)
@@ -316,12 +328,15 @@ def build_scene(plan: Plan, out: Path, report: Progress, pictures: bool = False)
             figures.draw_scene(states.model, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
     _core.sync_files(folder)
-    catalog.write_catalog(
-        folder / catalog.FILE,
-        list(kept.rows.values()),
-        {catalog.FINGERPRINT: plan.fingerprint().encode()},
-    )
-    shutil.rmtree(state_folder)
+    return list(kept.rows.values())
+
+
+def finish(plan: Plan, out: Path, rows: list[dict[str, Any]]) -> None:
+    """Write the part of the catalogue that says that a plan is built."""
+    folder = out / plan.name
+    fingerprint = {catalog.FINGERPRINT: plan.fingerprint().encode()}
+    catalog.write_catalog(folder / catalog.FILE, rows, fingerprint)
+    shutil.rmtree(folder / STATE)
 
 
 def reference(plan: Plan, problem: Any) -> _core.Result | None:

@@ -345,14 +345,29 @@ def turned(
     """
     found = (source >= 0).nonzero()[0]
     source = source.take(found)
-    given = r.take(source, axis=0)
-    old, new = before.take(source, axis=0), now.take(found, axis=0)
-    carried = np.zeros_like(given)
+    result = np.zeros((len(now), r.shape[1]))
+    result[found] = rotated(
+        r.take(source, axis=0),
+        before.take(source, axis=0),
+        now.take(found, axis=0),
+        parts,
+        limits.take(found),
+    )
+    return result.ravel()
+
+
+def rotated(
+    r: Numbers,
+    before: Numbers,
+    now: Numbers,
+    parts: Sequence[tuple[slice, slice]],
+    limits: npt.NDArray[np.bool_],
+) -> Numbers:
+    """The same row by row (k x d), where each contact was there."""
+    carried = np.zeros_like(r)
     for part, axes in parts:
         if part.start >= r.shape[1]:  # no rolling
             continue
-        world = np.einsum("cij,ci->cj", old[:, axes], given[:, part])
-        carried[:, part] = np.einsum("cij,cj->ci", new[:, axes], world)
-    result = np.zeros((len(now), r.shape[1]))
-    result[found] = np.where(limits.take(found)[:, None], given, carried)
-    return result.ravel()
+        world = np.einsum("cij,ci->cj", before[:, axes], r[:, part])
+        carried[:, part] = np.einsum("cij,cj->ci", now[:, axes], world)
+    return np.where(limits[:, None], r, carried)

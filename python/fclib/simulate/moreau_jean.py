@@ -107,12 +107,12 @@ class Contacts:
 
     def __getitem__(self, which: npt.NDArray[Any]) -> Contacts:
         return Contacts(
-            self.pair[which],
-            self.point[which],
-            self.frame[which],
-            self.gap[which],
-            self.mu[which],
-            None if self.mu_r is None else self.mu_r[which],
+            self.pair.take(which, axis=0),
+            self.point.take(which, axis=0),
+            self.frame.take(which, axis=0),
+            self.gap.take(which),
+            self.mu.take(which),
+            None if self.mu_r is None else self.mu_r.take(which),
             self.planar,
         )
 

@@ -92,6 +92,9 @@ class MujocoModel:
         # of each geometry
         self._body = m.geom_bodyid.astype(np.intp)
         self._root = m.body_rootid[self._body].astype(np.intp)
+        # geometries follow each other body by body
+        self._owners = np.flatnonzero(m.body_geomnum)
+        self._first = m.body_geomadr[self._owners].astype(np.intp)
         self._pattern = mass_pattern(m)
         self._ties = Equalities(m)
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
@@ -306,7 +309,8 @@ class MujocoModel:
         margin = np.maximum(self._margin, reach)
         m.geom_margin[:] = margin
         m.body_margin[:] = 0
-        np.maximum.at(m.body_margin, self._body, margin)
+        if len(margin):
+            m.body_margin[self._owners] = np.maximum.reduceat(margin, self._first)
         if m.npair:
             pair = np.column_stack((m.pair_geom1, m.pair_geom2))
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
@@ -519,8 +523,10 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     # a body of a mocap, or one whose joints do not move the point, has rows without entries
     starts = rows.indptr
     moves = starts.take(address + 3, mode="clip") > starts.take(address, mode="clip")
-    rigid = geom.min(axis=1, initial=0) >= 0
-    which = ((address >= 0) & rigid & moves).nonzero()[0]
+    given = (address >= 0) & moves
+    if source.model.nflex:
+        given &= geom.min(axis=1, initial=0) >= 0
+    which = given.nonzero()[0]
     address = address.take(which)
     dim = contact.dim.take(which)
     friction = contact.friction.take(which, axis=0)

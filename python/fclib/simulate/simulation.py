@@ -233,8 +233,8 @@ def carry_over(state: State, contacts: Contacts) -> Vector:
     """
     limits = contacts.pair[:, 0] < 0
     if np.array_equal(state.pair, contacts.pair):
-        every = np.arange(len(contacts))
-        return _geometry.turned(state.r, every, state.frame, contacts.frame, contacts.parts, limits)
+        own = _geometry.rotated(state.r, state.frame, contacts.frame, contacts.parts, limits)
+        return own.ravel()
     known: dict[tuple[int, int], list[int]] = {}
     for i, (first, second) in enumerate(state.pair.tolist()):
         known.setdefault((first, second), []).append(i)
@@ -307,7 +307,9 @@ def descriptions(
     )
 
     def of_step(index: int, **own: Any) -> _core.ProblemInfo:
-        place = json.dumps({**own, "step": index, "time": index * scheme.h})[1:-1]
+        place = f'"step": {index}, "time": {index * scheme.h!r}'
+        if own:
+            place = f"{json.dumps(own)[1:-1]}, {place}"
         return _core.ProblemInfo(
             title=f"{title}{index}",
             description=f"{before}, {place}, {after}",

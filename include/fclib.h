@@ -35,7 +35,7 @@
  * Files
  *
  *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
- *   system has no files without a name, it leaves NAME.XXXXXX too.) A new file takes the place of
+ *   system has no files without a name, it leaves NAME.PID-1 too.) A new file takes the place of
  *   the old one, with its owner, permissions and extended attributes. A file of several names, or
  *   one that cannot be replaced so, is rewritten in place: a process that is killed while it does
  *   leaves NAME.fclib-journal, or one in $TMPDIR where the folder cannot be written, from which the

@@ -189,10 +189,11 @@ int fclib_write_guesses_with(int number_of_guesses, const fclib_solution* guesse
 
 fclib_solution* fclib_read_solution(const char* path) {
   return guarded<fclib_solution*>(nullptr, [&] {
-    auto solution = read_solution(&given(path, "path"));
+    Problem outline;
+    auto solution = read_solution(&given(path, "path"), &outline);
     if (!solution) throw Error(ErrorKind::file, "holds no solution", "/", path);
     Owned<fclib_solution> c(allocate<fclib_solution>(1));
-    to_c(*solution, read_outline(path), std::string(path) + ": /solution", *c);
+    to_c(*solution, outline, std::string(path) + ": /solution", *c);
     return c.release();
   });
 }
@@ -201,9 +202,9 @@ fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses) {
   if (number_of_guesses != nullptr) *number_of_guesses = 0;
   return guarded<fclib_solution*>(nullptr, [&] {
     int& number = given(number_of_guesses, "number_of_guesses");
-    auto guesses = read_guesses(&given(path, "path"));
+    Problem outline;
+    auto guesses = read_guesses(&given(path, "path"), &outline);
     if (guesses.empty()) return static_cast<fclib_solution*>(nullptr);  // silently, as 3.1
-    const Problem outline = read_outline(path);
     const int count = static_cast<int>(guesses.size());
     const auto release = [&](fclib_solution* array) { fclib_delete_solutions(array, count); };
     std::unique_ptr<fclib_solution, decltype(release)> array(

@@ -55,9 +55,9 @@ int solve(fclib_workspace* workspace, const fclib_local* c, const size_t* contac
     LocalView view;
     view.spacedim = problem.spacedim;
     if (view.spacedim != 2 && view.spacedim != 3) fail("problem->spacedim", "is neither 2 nor 3");
-    if (problem.R != nullptr && problem.R->m > 0) {
-      fail("problem->R", "there are bilateral constraints, which a workspace does not take");
-    }
+    const bool joints =
+        (problem.V != nullptr && problem.V->n > 0) || (problem.R != nullptr && problem.R->m > 0);
+    if (joints) fail("problem", "has bilateral constraints, which a workspace does not take");
     view.W = view_of(given(problem.W, "problem->W"));
     const auto m = static_cast<std::size_t>(view.W.rows);
     const std::size_t nc = m / static_cast<std::size_t>(view.spacedim);

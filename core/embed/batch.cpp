@@ -288,16 +288,17 @@ class Runner {
   std::int64_t failed_ = 0;
 };
 
-void require(bool holds, const char* where, const std::string& message) {
-  if (!holds) throw Error(ErrorKind::problem, message, where);
+[[noreturn]] void refuse(const char* where, const std::string& message) {
+  throw Error(ErrorKind::problem, message, where);
 }
 
 }  // namespace
 
 BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
-  require(batch.spacedim == 2 || batch.spacedim == 3, "spacedim",
-          "is " + std::to_string(batch.spacedim) + ", expected 2 or 3");
-  require(batch.count >= 0, "count", "is negative");
+  if (batch.spacedim != 2 && batch.spacedim != 3) {
+    refuse("spacedim", "is " + std::to_string(batch.spacedim) + ", expected 2 or 3");
+  }
+  if (batch.count < 0) refuse("count", "is negative");
   if (!(settings.tolerance >= 0)) {
     throw Error(ErrorKind::option, "is not a number that is not negative", "tolerance");
   }
@@ -305,9 +306,9 @@ BatchOutcome solve_batch(const Batch& batch, const BatchSettings& settings) {
   // a dense matrix of the core counts its entries by 32 bits
   constexpr std::int32_t most = 15000;
   const auto check_count = [&](std::int32_t nc, std::int64_t k) {
-    require(nc >= 0 && nc <= most, "nc",
-            "problem " + std::to_string(k) + " has " + std::to_string(nc) + ", expected 0 to " +
-                std::to_string(most));
+    if (nc >= 0 && nc <= most) return;
+    refuse("nc", "problem " + std::to_string(k) + " has " + std::to_string(nc) +
+                     ", expected 0 to " + std::to_string(most));
   };
   if (batch.nc == nullptr) check_count(batch.nc_each, 0);
   for (std::int64_t k = 0; batch.nc != nullptr && k < batch.count; ++k) check_count(batch.nc[k], k);

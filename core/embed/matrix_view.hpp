@@ -57,6 +57,7 @@ struct MatrixView {
     }
     const bool by_columns = storage == Storage::csc;
     const Index outer = by_columns ? cols : rows;
+    if (outer == 0 && nnz == 0) return nullptr;  // which needs no pointers
     if (p[0] != 0 || p[outer] != nnz) return "has pointers that do not agree with its entries";
     for (Index k = 0; k < outer; ++k) {
       if (p[k] > p[k + 1] || p[k + 1] > nnz) return "has pointers that are not in order";

@@ -63,12 +63,6 @@ std::optional<struct stat> status_of(const std::string& path, const std::string&
   return status;
 }
 
-mode_t mode_of_new_files() {
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  return 0666U & ~mask;
-}
-
 /// Gives a new file the owner, the permissions and the extended attributes of the old one. False
 /// where one of these cannot be given.
 bool take_over(int file, const std::string& target, const struct stat& old) {
@@ -130,11 +124,12 @@ std::string read_all(int file, std::size_t size, const std::string& path) {
   return bytes;
 }
 
-/// A new file beside the target, to be renamed over it.
+/// A new file beside the target, to be renamed over it. The process may have other threads: its
+/// umask is for the system to apply.
 class Temporary {
  public:
-  Temporary(const std::string& path, const std::string& target)
-      : path_(path), target_(target), name_(target + ".XXXXXX"), file_(open()) {}
+  Temporary(const std::string& path, const std::string& target, mode_t mode)
+      : path_(path), target_(target), file_(open(mode)) {}
   ~Temporary() {
     if (named_) ::unlink(name_.c_str());
   }
@@ -154,27 +149,35 @@ class Temporary {
 
  private:
   /// Without a name, if that can be: such a file goes with its process.
-  Descriptor open() {
+  Descriptor open(mode_t mode) {
 #ifdef O_TMPFILE
     const fs::path folder = fs::path(target_).parent_path();
-    const int id = ::open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC,
-                          S_IRUSR | S_IWUSR);
+    const int id =
+        ::open(folder.empty() ? "." : folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, mode);
     if (id >= 0 && ::access(link_to(id).c_str(), F_OK) == 0) return Descriptor(id);
     if (id >= 0) ::close(id);
 #endif
-    Descriptor file(::mkstemp(name_.data()));
-    named_ = file.id() >= 0;
-    return file;
+    int named = -1;
+    take_a_name([&] {
+      named = ::open(name_.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, mode);
+      return named >= 0;
+    });
+    return Descriptor(named);
   }
 
-  /// A name that no file has, since a link replaces none.
   void give_name() {
+    take_a_name([&] { return link_as(name_); });
+    if (!named_) fail_in_system(path_, "cannot be written");
+  }
+
+  /// A name that no file has: take() replaces none.
+  template <class Take>
+  void take_a_name(const Take& take) {
     static std::atomic<unsigned> count{0};
     do {
       name_ = target_ + "." + std::to_string(::getpid()) + "-" + std::to_string(++count);
-      named_ = link_as(name_);
+      named_ = take();
     } while (!named_ && errno == EEXIST);
-    if (!named_) fail_in_system(path_, "cannot be written");
   }
 
   [[nodiscard]] bool link_as(const std::string& name) const {
@@ -234,6 +237,28 @@ void put_in_place(const std::string& target, Pieces pieces, const std::string& p
   }
 }
 
+/// Makes a file that is to grow as long as it is to be, so that a full disk is found while all of
+/// its bytes are there.
+void make_room(const std::string& target, std::size_t size, const std::string& path) {
+#ifdef __linux__
+  const Descriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
+  struct stat status{};
+  if (file.id() < 0 || ::fstat(file.id(), &status) != 0) fail_in_system(path, "cannot be written");
+  const auto end = static_cast<off_t>(size);
+  if (end <= status.st_size) return;
+  int error = 0;
+  do {
+    error = ::posix_fallocate(file.id(), status.st_size, end - status.st_size);
+  } while (error == EINTR);
+  if (error != ENOSPC && error != EDQUOT && error != EFBIG) return;
+  if (::ftruncate(file.id(), status.st_size) != 0) return;
+  errno = error;
+  fail_in_system(path, "cannot be written");
+#else
+  static_cast<void>(target), static_cast<void>(size), static_cast<void>(path);
+#endif
+}
+
 void sync_folder_of(const std::string& name) {
   const fs::path folder = fs::path(name).parent_path();
   const Descriptor file(
@@ -264,6 +289,7 @@ void rewrite(const std::string& path, const std::string& target, Pieces pieces) 
       write_all(opened.id(), std::string_view(reinterpret_cast<const char*>(&end), sizeof end),
                 path);
       if (::fsync(opened.id()) != 0) fail_in_system(path, "cannot be written");
+      make_room(target, end.size, path);
     } catch (...) {
       ::unlink(place.c_str());
       throw;
@@ -360,14 +386,15 @@ void replace_file(const std::string& path, Pieces pieces, bool sync) {
   const std::optional<struct stat> old = status_of(path, target);
   // a file of several names stays the one that they name
   if (old && old->st_nlink > 1) return rewrite(path, target, pieces);
-  Temporary file(path, target);
+  const mode_t own = S_IRUSR | S_IWUSR;
+  const mode_t all = own | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH;
+  Temporary file(path, target, old ? own : all);
   if (!file.ok()) {
     const bool forbidden = errno == EACCES || errno == EPERM || errno == EROFS;
     if (old && forbidden) return rewrite(path, target, pieces);
     fail_in_system(path, "cannot be written");
   }
   if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, pieces);
-  if (!old) ::fchmod(file.id(), mode_of_new_files());
   write_all(file.id(), pieces, path);
   // the old file is not given up for one that may be lost
   if ((sync || old) && ::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");

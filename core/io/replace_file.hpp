@@ -16,7 +16,7 @@ std::string read_file(const std::string& path);
 /// Puts the bytes in the place of the file, all or none: they go into a file beside it, which is
 /// flushed and renamed over it. A process that is killed leaves nothing of that file, but for the
 /// instant between its naming and its renaming; where the system has no files without a name, it
-/// leaves NAME.XXXXXX. Links are followed; owner, permissions and extended attributes kept.
+/// leaves NAME.PID-1. Links are followed; owner, permissions and extended attributes kept.
 ///
 /// A file of several names, one whose owner or attributes a new file cannot be given, and one in a
 /// folder that cannot be written, are rewritten in place: the bytes go into a journal beside it, or

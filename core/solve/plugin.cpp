@@ -17,6 +17,12 @@
 #include <dlfcn.h>
 #define FCLIB_LOADS_PLUGINS
 #endif
+#ifdef __linux__
+#include <link.h>
+
+#include <cstring>
+#include <fstream>
+#endif
 
 namespace fclib {
 
@@ -179,10 +185,35 @@ Exported exported(void* handle, const char* name) {
   return reinterpret_cast<Exported>(dlsym(handle, name));
 }
 
+/// Whether a shared object has less than it says, half a copy: what loads it would end the process.
+bool is_cut_short(const std::filesystem::path& path) {
+#ifdef __linux__
+  std::ifstream file(path, std::ios::binary);
+  const auto read = [&](auto& data) {
+    return static_cast<bool>(file.read(reinterpret_cast<char*>(&data), sizeof data));
+  };
+  ElfW(Ehdr) header{};
+  if (!read(header) || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0) return false;
+  std::error_code failed;
+  const std::uintmax_t size = std::filesystem::file_size(path, failed);
+  file.seekg(static_cast<std::streamoff>(header.e_phoff));
+  for (int k = 0; k < header.e_phnum; ++k) {
+    ElfW(Phdr) part{};
+    if (!read(part)) return true;
+    const bool beyond = part.p_offset > size || part.p_filesz > size - part.p_offset;
+    if (part.p_type == PT_LOAD && beyond) return true;
+  }
+#else
+  static_cast<void>(path);
+#endif
+  return false;
+}
+
 void* opened(std::string_view name) {
   const std::filesystem::path path(name.substr(plugin_prefix.size()));
   std::error_code failed;
   if (!std::filesystem::is_regular_file(path, failed)) bad_plugin(name, "there is no such file");
+  if (is_cut_short(path)) bad_plugin(name, "cannot be loaded: the file is cut short");
   const auto whole = std::filesystem::absolute(path, failed);
   void* handle = dlopen(whole.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (handle == nullptr) bad_plugin(name, "cannot be loaded: " + text_of(dlerror()));

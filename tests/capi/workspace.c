@@ -47,6 +47,32 @@ int main(int argc, char** argv) {
   }
   CHECK(fabs(u[1] - (1 - 0.003 * steps)) < 1e-9);
 
+  { /* nothing touches: in any storage, with pointers or without */
+    struct fclib_matrix nothing = W;
+    int start[1] = {0}, storage;
+    nothing.nzmax = nothing.m = nothing.n = 0;
+    nothing.i = NULL;
+    nothing.x = NULL;
+    problem.W = &nothing;
+    for (storage = -3; storage <= 0; ++storage) {
+      nothing.nz = storage;
+      nothing.p = start;
+      CHECK(fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, &status, &error));
+      CHECK(status == FCLIB_CONVERGED && error == 0);
+      nothing.p = NULL;
+      CHECK(fclib_workspace_solve(workspace, &problem, NULL, 0, NULL, NULL, &status, &error));
+    }
+    problem.W = &W;
+  }
+  { /* joints are not for it */
+    struct fclib_matrix joint = W;
+    joint.n = 1;
+    problem.V = &joint;
+    CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
+    CHECK(strstr(fclib_last_error(), "bilateral constraints"));
+    problem.V = NULL;
+  }
+
   i[2] = 3;
   CHECK(!fclib_workspace_solve(workspace, &problem, NULL, 0, r, u, NULL, NULL));
   CHECK(strstr(fclib_last_error(), "W: "));

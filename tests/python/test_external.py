@@ -667,7 +667,7 @@ int fclib_plugin_solve(const struct fclib_plugin_problem* p, double* r) {
 
 @pytest.fixture(scope="module")
 def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Plugins: the example, as C++ too, one that refuses, and one without the function."""
+    """Plugins: the example, as C++ too, one that refuses, one cut short, and others."""
     folder = tmp_path_factory.mktemp("plugins")
     (folder / "pgs.cpp").write_text((ROOT / "examples/plugin/pgs.c").read_text())
     (folder / "refuse.c").write_text(
@@ -707,6 +707,7 @@ def shared_objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
         options = ["-O2", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", f"-I{HEADERS}"]
         target = folder / f"lib{name}.so"
         subprocess.run([tool, *options, str(source), "-o", str(target), "-lm"], check=True)
+    (folder / "libcut.so").write_bytes((folder / "libpgs.so").read_bytes()[:9000])
     return folder
 
 
@@ -780,6 +781,7 @@ def test_shared_objects_that_are_wrong(shared_objects: Path) -> None:
     for name, error in {
         "libnone.so": "no such file",
         "pgs.cpp": "cannot be loaded",
+        "libcut.so": "the file is cut short",
         "libother.so": "has no function fclib_plugin_solve",
         "libwrong.so": "its default is wrong: option count: 'two' is not an integer",
         "libunsized.so": "fclib_plugin_describe returned no struct fclib_plugin_about with",

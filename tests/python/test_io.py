@@ -1,9 +1,11 @@
 """Files keep every number, in the layout of libfclib 3.1, and are never left half written."""
 
+import errno
 import fcntl
 import gc
 import os
 import pickle
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -626,6 +628,29 @@ def test_a_solution_never_comes_to_belong_to_another_problem(tmp_path: Path) -> 
         assert path.read_bytes() == before
 
 
+def test_a_problem_that_is_replaced_leaves_no_hole(tmp_path: Path) -> None:
+    path, fresh = tmp_path / "step.hdf5", tmp_path / "fresh.hdf5"
+    for nc in (40, 5, 30, 8, 40):
+        planted = planted_local(1, nc=nc)
+        fclib.write(path, planted.problem, mode="replace")
+        fclib.write(fresh, planted.problem)
+        assert path.read_bytes() == fresh.read_bytes()
+        fclib.write_solution(path, planted.solution)
+    # what is another's stays
+    with h5py.File(path, "a") as file:
+        file["mine"] = 3
+    fclib.write(path, planted_local(2).problem, mode="replace")
+    assert fclib.contents(path) == ["local"]
+    with h5py.File(path, "a") as file:
+        assert file["mine"][()] == 3
+        del file["mine"]
+        file.attrs["mine"] = 4
+    fclib.write(path, planted_local(3).problem, mode="replace")
+    assert_same(planted_local(3).problem, fclib.read(path))
+    with h5py.File(path) as file:
+        assert file.attrs["mine"] == 4
+
+
 MODES: list[Literal["add", "replace"]] = ["add", "replace"]
 
 
@@ -979,6 +1004,42 @@ def test_a_file_of_two_names_stays_one(tmp_path: Path) -> None:
     assert path.samefile(other)
     assert fclib.read(other).m == 2
     assert sorted(tmp_path.iterdir()) == [path, other]
+
+
+FULL_DISK = """
+import os, sys, numpy as np, fclib
+rng = np.random.default_rng(1)
+def problem(m):
+    W = rng.normal(size=(m, m))
+    return fclib.LocalProblem(spacedim=2, W=W, q=np.ones(m), mu=np.ones(m // 2))
+path, other = sys.argv[1] + "/a.hdf5", sys.argv[1] + "/b.hdf5"
+fclib.write(path, problem(160), compression=0)
+os.link(path, other)
+try:  # there is room for its journal, and not for the file to grow
+    fclib.write(path, problem(232), compression=0)
+except fclib.FileError as error:
+    print(error)
+print(fclib.read(other).m, sorted(os.listdir(sys.argv[1])), os.path.samefile(path, other))
+fclib.write(path, problem(10))
+print(fclib.read(other).m)
+"""
+
+
+def test_a_full_disk_leaves_a_file_of_two_names(tmp_path: Path) -> None:
+    """On a small file system that goes with its process."""
+    disk = ["sh", "-c", 'mount -t tmpfs -o size=1m none "$0" && exec "$@"', str(tmp_path)]
+    apart = ["unshare", "--mount", "--map-root-user"]
+    if not shutil.which("unshare") or subprocess.run([*apart, *disk, "true"]).returncode:
+        pytest.skip("no file system can be mounted")
+    run = subprocess.run(
+        [*apart, *disk, sys.executable, "-c", FULL_DISK, tmp_path], capture_output=True, text=True
+    )
+    assert (run.returncode, run.stderr) == (0, "")
+    assert run.stdout.splitlines() == [
+        f"{tmp_path}/a.hdf5: cannot be written: {os.strerror(errno.ENOSPC)}",
+        "160 ['a.hdf5', 'b.hdf5'] True",
+        "10",
+    ]
 
 
 @pytest.mark.skipif(not hasattr(os, "setxattr"), reason="extended attributes are Linux's")

@@ -43,6 +43,8 @@ herr_t follow_to_files_alone(const char* from, const char*, const char* to, cons
   return 0;
 }
 
+Session* current = nullptr;  // under the lock
+
 /// Whether a program has a file open to write it: HDF5 locks it meanwhile.
 bool is_being_written(const std::string& path) {
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -66,22 +68,34 @@ Session::Session() : lock_(library_mutex()) {
   require_same_version();
   H5Eget_auto2(H5E_DEFAULT, &function_, &data_);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  current = this;
 }
 
-Session::~Session() { H5Eset_auto2(H5E_DEFAULT, function_, data_); }
+Session::~Session() {
+  current = nullptr;
+  H5Eset_auto2(H5E_DEFAULT, function_, data_);
+}
+
+hid_t Session::link_access() {
+  std::optional<Handle>& made = current->link_access_;
+  if (!made) {
+    made.emplace(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
+    H5Pset_elink_cb(made->id(), follow_to_files_alone, nullptr);
+  }
+  return made->id();
+}
 
 std::string Group::child(std::string_view name) const {
   return (path == "/" ? "/" : path + "/") + std::string(name);
 }
 
 bool Group::has(const std::string& name) const {
-  const htri_t linked = H5Lexists(id, name.c_str(), H5P_DEFAULT);
+  if (H5Oexists_by_name(id, name.c_str(), Session::link_access()) > 0) return true;
   // what cannot be looked up is not what is not there
-  if (linked < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
-  if (linked == 0) return false;
-  const Handle access(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
-  H5Pset_elink_cb(access.id(), follow_to_files_alone, nullptr);
-  return H5Oexists_by_name(id, name.c_str(), access.id()) > 0;
+  if (H5Lexists(id, name.c_str(), H5P_DEFAULT) < 0) {
+    fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+  }
+  return false;
 }
 
 Handle open_group(const Group& parent, const std::string& name) {

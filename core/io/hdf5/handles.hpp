@@ -9,6 +9,7 @@
 
 #include <mutex>
 #include <new>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -23,21 +24,6 @@ namespace fclib::hdf5 {
 
 /// Fails where HDF5 could not write.
 void check(herr_t status, const std::string& where);
-
-/// Holds the library's lock, and keeps HDF5 from printing its error stack to the host's stderr.
-/// Fails where another version of HDF5 is loaded than this was compiled with.
-class Session {
- public:
-  Session();
-  ~Session();
-  Session(const Session&) = delete;
-  Session& operator=(const Session&) = delete;
-
- private:
-  std::lock_guard<std::mutex> lock_;
-  H5E_auto2_t function_ = nullptr;
-  void* data_ = nullptr;
-};
 
 /// An HDF5 identifier that closes itself.
 class Handle {
@@ -57,6 +43,25 @@ class Handle {
  private:
   hid_t id_;
   Close close_;
+};
+
+/// Holds the library's lock, and keeps HDF5 from printing its error stack to the host's stderr.
+/// Fails where another version of HDF5 is loaded than this was compiled with.
+class Session {
+ public:
+  Session();
+  ~Session();
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// How the session that holds the lock follows links.
+  static hid_t link_access();
+
+ private:
+  std::lock_guard<std::mutex> lock_;
+  std::optional<Handle> link_access_;  // made at its first use: to make one takes long
+  H5E_auto2_t function_ = nullptr;
+  void* data_ = nullptr;
 };
 
 /// A group of an open file and its path, which every message names.

@@ -229,9 +229,10 @@ RawProblem read_raw_problem(const std::string& path, std::string_view kind) {
   });
 }
 
-std::optional<Solution> read_solution(const std::string& path) {
-  return read_from(path, [](const Group& root) -> std::optional<Solution> {
+std::optional<Solution> read_solution(const std::string& path, Problem* outline) {
+  return read_from(path, [&](const Group& root) -> std::optional<Solution> {
     if (!root.has("solution")) return std::nullopt;
+    if (outline != nullptr) *outline = outline_of(root);
     return read_solution_group(root, "solution");
   });
 }
@@ -239,11 +240,12 @@ std::optional<Solution> read_solution(const std::string& path) {
 namespace {
 
 std::vector<Solution> read_list(const std::string& path, const Numbered& list,
-                                Index Contents::* how_many) {
+                                Index Contents::* how_many, Problem* outline = nullptr) {
   return read_from(path, [&](const Group& root) {
     std::vector<Solution> found;
     const Index count = contents_of(root).*how_many;
     if (count == 0) return found;
+    if (outline != nullptr) *outline = outline_of(root);
     const Handle handle = open_group(root, list.group);
     const Group group{handle.id(), root.child(list.group)};
     for (Index k = 1; k <= count; ++k) {
@@ -255,8 +257,8 @@ std::vector<Solution> read_list(const std::string& path, const Numbered& list,
 
 }  // namespace
 
-std::vector<Solution> read_guesses(const std::string& path) {
-  return read_list(path, guesses_list, &Contents::guesses);
+std::vector<Solution> read_guesses(const std::string& path, Problem* outline) {
+  return read_list(path, guesses_list, &Contents::guesses, outline);
 }
 
 std::vector<Solution> read_solutions(const std::string& path) {

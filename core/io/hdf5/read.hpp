@@ -28,11 +28,12 @@ Problem read_problem(const std::string& path, std::string_view kind = {});
 Problem read_outline(const std::string& path);
 
 /// The stored solution, or nothing where the file has none. Its sizes are not checked against a
-/// problem: merit() and solve() do.
-std::optional<Solution> read_solution(const std::string& path);
+/// problem: merit() and solve() do. Where there is one, `outline` (or null) becomes that of its
+/// problem, as read_outline() has it, of the file as it was then: others may replace it.
+std::optional<Solution> read_solution(const std::string& path, Problem* outline = nullptr);
 
 /// The stored guesses, as read_solution.
-std::vector<Solution> read_guesses(const std::string& path);
+std::vector<Solution> read_guesses(const std::string& path, Problem* outline = nullptr);
 
 /// All solutions that are known of the problem, where it has several.
 std::vector<Solution> read_solutions(const std::string& path);

@@ -32,16 +32,23 @@ void require_level(int compression) {
 }  // namespace
 
 void change_file(const std::string& path, Start start, int compression,
-                 const std::function<void(const Target& root)>& change, bool sync) {
+                 const std::function<void(const Target& root)>& change,
+                 const std::function<bool(const Group& root)>& all_goes, bool sync) {
   require_level(compression);
   const Session session;
   in_file(path, [&] {
     const Turn turn(path);
     std::error_code error;
     finish_rewrite(path);
-    const bool existing =
+    bool existing =
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
-    MemoryFile file = existing ? copy_of(path) : MemoryFile();
+    MemoryFile file = [&] {
+      if (!existing) return MemoryFile();
+      MemoryFile there = copy_of(path);
+      if (!all_goes || !all_goes(Group{there.id(), "/"})) return there;
+      existing = false;
+      return MemoryFile();
+    }();
     const Style style(compression,
                       [&](const void* data, std::size_t size) { file.lend(data, size); });
     const Target root{{file.id(), "/"}, &style};

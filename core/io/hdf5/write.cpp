@@ -3,6 +3,7 @@
 #include <list>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <utility>
 #include <variant>
 
@@ -166,6 +167,23 @@ void require_owner(const Group& root, const std::string& kind, bool owned_before
   }
 }
 
+herr_t stop_at_foreign(hid_t, const char* name, const H5A_info_t*, void*) {
+  const std::string_view known(name);
+  return known == "format" || known == "generator" ? 0 : 1;
+}
+
+/// Whether a file has nothing but a problem of this kind and what goes with it.
+bool has_nothing_but(const Group& root, const std::string& kind) {
+  hsize_t known = 0;
+  for (const std::string& name : {"fclib_" + kind, std::string("solution"), std::string("guesses"),
+                                  std::string("solutions")}) {
+    known += root.has(name) ? 1U : 0U;
+  }
+  H5G_info_t info;
+  return root.has("fclib_" + kind) && H5Gget_info(root.id, &info) >= 0 && info.nlinks == known &&
+         H5Aiterate2(root.id, H5_INDEX_NAME, H5_ITER_INC, nullptr, stop_at_foreign, nullptr) == 0;
+}
+
 void write_view(const std::string& path, const ProblemView& problem, const Solution* solution,
                 const std::vector<Solution>& guesses, const WriteOptions& options) {
   const Start start = options.append ? Start::existing_or_empty : Start::empty;
@@ -199,7 +217,10 @@ void write_view(const std::string& path, const ProblemView& problem, const Solut
       write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
     }
   };
-  change_file(path, start, options.compression, change, options.sync);
+  const auto all_goes = [&](const Group& root) {
+    return options.replace && has_nothing_but(root, problem.kind);
+  };
+  change_file(path, start, options.compression, change, all_goes, options.sync);
 }
 
 }  // namespace

@@ -25,6 +25,8 @@ std::atomic<long> count{0};
 }
 long allocations() { return count.load(); }
 
+// seen by the shared libraries too, the standard library of C++ above all
+#pragma GCC visibility push(default)
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
@@ -53,6 +55,7 @@ int posix_memalign(void** result, std::size_t alignment, std::size_t size) {
   return *result == nullptr ? 12 : 0;
 }
 }
+#pragma GCC visibility pop
 
 #endif
 

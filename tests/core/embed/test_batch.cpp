@@ -95,7 +95,10 @@ TEST(Batch, IsTheSameOnThreads) {
 }
 
 TEST(Batch, AllocatesNothingForAProblem) {
-  if (testing::allocations() < 0) GTEST_SKIP() << "a sanitizer has malloc";
+  const long start = testing::allocations();
+  if (start < 0) GTEST_SKIP() << "a sanitizer has malloc";
+  ::operator delete(::operator new(1));
+  ASSERT_EQ(testing::allocations(), start + 1) << "new is counted too";
   Problems problems(3, 400, 7, 1);
   const BatchOutcome first = solve_batch(problems.batch);
   ASSERT_EQ(first.by_auto, 0);

@@ -32,6 +32,7 @@ AS_THEY_ARE = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "architecture.md",
     "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
     "CHANGELOG.md": "changelog.md",
 }
 MODULE = ROOT / "build" / "wasm" / "fclib"
@@ -73,6 +74,7 @@ MENU = {
         "architecture",
         "contributing",
         "testing",
+        "security",
         "changelog",
     ],
 }

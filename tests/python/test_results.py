@@ -37,12 +37,14 @@ READ_FIRST = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELO
 # pages that are about results: no part of them has a figure of its own
 WHOLE = ("choosing.md", "measurement.md", "solvers.md", "speed.md")
 
-# code, links, names of a program or standard with its version, tolerances, dimensions, years, and two
-# definitions: what a failure costs, and what an interval covers
+# code, links, names of a program or standard with its version, tolerances, dimensions, years, and
+# two definitions: what a failure costs, and what an interval covers
 NO_FIGURE = re.compile(
     r"""```.*?```|<!--.*?-->|`[^`]*`|\]\([^)]*\)|^\[Table:[^\n]*$|\{\{[^{}]*\}\}|^(?:\ {4}[^\n]*\n)+
-    |^\d+\.\ |\b1e-\d+\b|\b[23]D\b|\bRT-\d+\b|\b(?:19|20)\d\d\b|\b(?:ten|10)\stimes\sthe\slimit\b|\b95\s%
-    |\b(?:libfclib|Siconos|Debian|Python|MuJoCo|GCC|HDF5|Drake|Pinocchio|Newton|C\+\+|Clarabel)\s\d[\d.]*|\bHDF5\b
+    |^\d+\.\ |\b1e-\d+\b|\b[23]D\b|\bRT-\d+\b|\b(?:19|20)\d\d\b
+    |\b(?:ten|10)\stimes\sthe\slimit\b|\b95\s%
+    |\b(?:libfclib|Siconos|Debian|Python|MuJoCo|GCC|HDF5|Drake|Pinocchio|Newton|C\+\+|Clarabel)\s\d[\d.]*
+    |\bHDF5\b
     """,
     re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
@@ -65,6 +67,7 @@ MEASURE = re.compile(
     """,
     re.VERBOSE,
 )
+EITHER = re.compile(f"{FIGURE.pattern}|{MEASURE.pattern}", re.VERBOSE)
 # before a block (a paragraph, a list, a table) whose figures are not measured: set by us, or known
 SET = re.compile(r"<!-- figures: (?P<why>.*?) -->\n\n?(?P<block>(?:[^\n]+\n)+)", re.DOTALL)
 
@@ -95,9 +98,7 @@ def wrong_on(name: str, text: str) -> list[str]:
     return [
         f"{name}, {(part.splitlines() or [''])[0]}: line {line}"
         for part in sections(text)
-        for line in typed_figures(
-            part, FIGURE if name in WHOLE or is_of_results(part) else MEASURE
-        )
+        for line in typed_figures(part, EITHER if name in WHOLE or is_of_results(part) else MEASURE)
     ]
 
 

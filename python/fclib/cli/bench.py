@@ -21,10 +21,10 @@ from fclib.bench.store import Status
 from fclib.cli._output import (
     Json,
     Report,
+    Rows,
     err,
     fail,
     interrupted,
-    make_table,
     out,
     parse_options,
     usage_error,
@@ -201,7 +201,7 @@ def run(
     report = Report(as_json)
     report.add(record)
     if not as_json:
-        out.print(make_table([record]))
+        out.print(Rows([record]))
         out.print(f"fclib profile {path}", highlight=False)
     if progress.not_run:
         causes = ", ".join(f"{n} {name}" for name, n in progress.not_run.most_common())
@@ -263,7 +263,7 @@ def show_status(path: Path, as_json: bool) -> None:
     for record in records:
         others = ", ".join(f"{n} {name}" for name, n in record["others"].items())
         record["others"] = Text(others or "-")
-    out.print(make_table(records))
+    out.print(Rows(records))
 
 
 @app.command("merge")

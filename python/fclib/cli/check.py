@@ -16,10 +16,10 @@ from fclib.cli._output import (
     Merit,
     MeritKind,
     Report,
+    Rows,
     Tolerance,
     each_file,
     err,
-    make_table,
     out,
 )
 
@@ -140,6 +140,6 @@ def command(
         if as_json and contacts:
             record["contacts"] = rows
         elif rows:
-            out.print(make_table(rows, title=path.name))
+            out.print(Rows(rows, title=path.name))
         report.add(record, good)
     report.finish()

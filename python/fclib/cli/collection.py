@@ -31,9 +31,9 @@ from fclib.cli._build import (
 from fclib.cli._output import (
     Json,
     Report,
+    Rows,
     err,
     fail,
-    make_table,
     out,
     progress_bar,
     usage_error,
@@ -96,7 +96,7 @@ def list_families(
                 }
             )
         if not as_json:
-            out.print(make_table(report.records))
+            out.print(Rows(report.records))
         return
     for name, family in collections.families().items():
         report.add(
@@ -109,7 +109,7 @@ def list_families(
             }
         )
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -167,10 +167,10 @@ def show(
         out.print(f"{key:12}{value}", highlight=False)
     if parameters:
         out.print()
-        out.print(make_table(parameters))
+        out.print(Rows(parameters))
     if ranges:
         out.print()
-        out.print(make_table(ranges))
+        out.print(Rows(ranges))
 
 
 def show_set(name: str, as_json: bool) -> None:
@@ -189,7 +189,7 @@ def show_set(name: str, as_json: bool) -> None:
             record["numbers"] = ", ".join(map(str, numbers))
         report.add(record)
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -324,7 +324,7 @@ def simulate(
     except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
         fail(words_of(error))
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         out.print(f"fclib collection build {' '.join(names)} --from {folder} takes them")
 
 
@@ -370,7 +370,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         fail(str(error))
     if not as_json:
         if report.records:
-            out.print(make_table(report.records))
+            out.print(Rows(report.records))
         out.print(
             f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
         )
@@ -441,7 +441,7 @@ def status(
     out.print(f"Classes {basis}", highlight=False)
     if only is not None or every:
         if wanted:
-            out.print(make_table([record_of(row) for row in wanted]))
+            out.print(Rows([record_of(row) for row in wanted]))
         else:
             out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
         return
@@ -451,7 +451,7 @@ def status(
     families["all"] = sum(families.values(), Counter())
     columns = [*standing.CLASSES, *(["not run"] if families["all"]["not run"] else [])]
     out.print(
-        make_table(
+        Rows(
             [
                 {"family": family, **{column: counts[column] for column in columns}}
                 for family, counts in families.items()
@@ -461,7 +461,7 @@ def status(
     open_ones = [row for row in rows if row.rating == "open"]
     if open_ones:
         out.print()
-        out.print(make_table([record_of(row) for row in open_ones], title="Open"))
+        out.print(Rows([record_of(row) for row in open_ones], title="Open"))
         out.print(
             f"fclib collection status {open_ones[0].id} --out FILE writes what is known of one"
         )
@@ -497,7 +497,7 @@ def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
     report = Report(as_json)
     report.add(record_of(found[0]))
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -526,7 +526,7 @@ def take(
             continue
         report.add({"problem": taken, "taken": True, "error": error, "before": before})
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
     raise typer.Exit(int(report.failed))
 
 
@@ -579,7 +579,7 @@ def add(
     for refusal in refused:
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         unsolved = [row for row in rows if row["status"] not in (None, "converged")]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
@@ -603,7 +603,7 @@ def publish(
     for path in files:
         report.add({"file": path.name, "bytes": path.stat().st_size})
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         out.print(f"Serve {site}, then: fclib collection get NAME --from URL")
 
 
@@ -634,4 +634,4 @@ def get(
         fail(str(error))
     rows = collections.read_catalog(folder).to_pylist()
     own = [row for row in rows if f"{row['collection']}/{row['family']}" in fetched]
-    out.print(make_table(ranges_of(own)))
+    out.print(Rows(ranges_of(own)))

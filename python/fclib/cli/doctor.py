@@ -49,6 +49,8 @@ def command(as_json: Json = False) -> None:
     if broken:
         out.print(f"\n{broken} broken: do what its arrow says, then run fclib doctor again.")
     else:
-        rest = f"; {absent} optional, not here" if absent else ""
+        rest = (
+            f"; {absent} optional {'is' if absent == 1 else 'are'} not installed" if absent else ""
+        )
         out.print(f"\nNothing is broken{rest}.", highlight=False)
     raise typer.Exit(int(broken > 0))

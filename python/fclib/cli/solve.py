@@ -15,10 +15,10 @@ from fclib.cli._output import (
     Merit,
     MeritKind,
     Report,
+    Rows,
     Tolerance,
     each_file,
     err,
-    make_table,
     parse_options,
     usage_error,
 )
@@ -45,7 +45,7 @@ class Trace:
     def finish(self, stages: list[dict[str, Any]]) -> None:
         """The stages: how often each was entered, and how often it solved."""
         if stages:
-            err.print(make_table(stages))
+            err.print(Rows(stages))
 
 
 def command(

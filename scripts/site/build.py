@@ -100,6 +100,8 @@ article .align-right { margin: 0 0 1em 1.5em; }
 @media (max-width: 46em) {
   article .align-right { float: none; margin: 1em 0; }
   article table:has(img) td:last-child { min-width: 14em; }
+  article table:has(td:nth-child(4)) { width: max-content; max-width: none; }
+  article table:has(td:nth-child(4)) td { max-width: 13em; }
 }
 """
 

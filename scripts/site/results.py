@@ -74,7 +74,9 @@ class Results:
                     raise ValueError(f"{name}.csv has no row with {value.strip()}")
             else:
                 raise ValueError(f"{name}.csv: columns or where, not {part!r}")
-        rules = ("---:|" if all(NUMBER.fullmatch(row[c]) for row in rows) else "---|" for c in columns)
+        rules = (
+            "---:|" if all(NUMBER.fullmatch(row[c]) for row in rows) else "---|" for c in columns
+        )
         lines = ["| " + " | ".join(columns) + " |", "|" + "".join(rules)]
         lines += [
             "| " + " | ".join(row[column].replace("|", "\\|") for column in columns) + " |"

@@ -36,10 +36,11 @@ Count = Annotated[
 ]
 FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
 SelectOption = Annotated[
-    Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
+    Select, typer.Option(help="With --count: evenly spread, or those that take nsgs most sweeps.")
 ]
 Analyze = Annotated[
-    bool, typer.Option("--analyze", help="Ranks, conditioning, existence whatever they cost.")
+    bool,
+    typer.Option("--analyze", help="Find ranks, conditioning and existence, whatever they cost."),
 ]
 Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
 

@@ -97,7 +97,7 @@ def command(
 ) -> None:
     """Judge the stored solutions from the data alone.
 
-    Of several problems in a file, it is the global one's. The last columns count the contacts that
+    If a file has several problems, the global one is taken. The last columns count the contacts that
     are open, stick and slide.
     """
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))

@@ -73,7 +73,7 @@ def command(
 ) -> None:
     """Solve problems, and judge the solutions.
 
-    Of several problems in a file it is the global one.
+    If a file has several problems, the global one is taken.
     """
     if kind is not None and write:
         # the one solution of a file is that of its global problem

@@ -97,8 +97,8 @@ def command(
 ) -> None:
     """Judge the stored solutions from the data alone.
 
-    If a file has several problems, the global one is taken. The last columns count the contacts that
-    are open, stick and slide.
+    If a file has several problems, the global one is taken. The last columns count the contacts
+    that are open, stick and slide.
     """
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))
     for path in each_file(files, "checking"):

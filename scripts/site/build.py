@@ -88,6 +88,7 @@ div.math math { margin: 0.4em 0; }
 article img { max-width: 100%; height: auto; }
 article table { font-size: 0.85em; }
 article table img { max-width: none; }
+article td:first-child code { white-space: nowrap; }
 article .align-right { margin: 0 0 1em 1.5em; }
 .contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
 .contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }

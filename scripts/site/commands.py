@@ -16,10 +16,10 @@ def pages() -> Iterator[tuple[str, str]]:
     lines = [
         "# The command line",
         "",
-        "Results go to the standard output: as a table, or with `--json` as one JSON object a line. "
-        "Errors and progress go to the standard error. The exit status is 0 only if all went well. "
-        "It is 1 if something failed, and 2 for a usage error. `fclib COMMAND --help` says the same "
-        "as this page.",
+        "Results go to the standard output: as a table, or with `--json` as one JSON object a "
+        "line. Errors and progress go to the standard error. The exit status is 0 only if all went "
+        "well. It is 1 if something failed, and 2 for a usage error. `fclib COMMAND --help` says "
+        "the same as this page.",
         "",
     ]
     command: Any = typer.main.get_command(app)

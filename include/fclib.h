@@ -20,29 +20,29 @@
  *
  * Errors
  *
- *   No function ends the process or throws. An int result is 1 on success and 0 on failure, a
- *   pointer is NULL on failure, a merit is NaN; fclib_last_error() then has the reason, and the
- *   handler of fclib_set_error_handler() has been called with it: at first, one that prints a line
- *   on the standard error. A NULL argument is an error of this kind, except for what is marked "or
- *   NULL".
+ *   No function ends the process or throws. An int result is 1 on success and 0 on failure. On
+ *   failure a pointer is NULL, and a merit is NaN. fclib_last_error() then has the reason. The
+ *   handler of fclib_set_error_handler() has been called with it. The first handler prints a line
+ *   on the standard error. A NULL argument is an error, except for what is marked "or NULL".
  *
  * Ownership
  *
- *   What a read returns is the caller's. Its parts come from malloc: fclib_delete_local() and its
- *   like free the members, and then free() the struct itself; fclib_delete_solutions() frees the
- *   members and the array. What a write takes stays the caller's, and is not changed.
+ *   What a read returns is the caller's. Its parts come from malloc. fclib_delete_local() and its
+ *   like free the members; the caller then calls free() on the struct. fclib_delete_solutions()
+ *   frees the members and the array. What a write takes stays the caller's, and is not changed.
  *
  * Files
  *
  *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
  *   system has no files without a name, it leaves NAME.PID-1 too.) A new file takes the place of
- *   the old one, with its owner, permissions and extended attributes. A file of several names, or
- *   one that cannot be replaced so, is rewritten in place: a process that is killed while it does
- *   leaves NAME.fclib-journal, or one in $TMPDIR where the folder cannot be written, from which the
- *   next read or write by that name goes on. A file may hold one problem of
- *   each kind, then one solution and any number of guesses; these belong to the global problem
- *   where there are several. What is there already is replaced only if
- *   fclib_set_write_mode() says so.
+ *   the old one, with its owner, permissions and extended attributes. A file with several names,
+ *   or one that cannot be replaced so, is rewritten in place. A process that is killed meanwhile leaves
+ *   NAME.fclib-journal, or one in $TMPDIR if the folder cannot be written. The next read or write
+ *   by that name completes what the journal says.
+ *
+ *   A file may hold one problem of each kind, one solution, and any number of guesses. If it has
+ *   several problems, the solution and the guesses belong to the global one. What is there already
+ *   is replaced only if fclib_set_write_mode() says so.
  *
  * Threads
  *
@@ -114,7 +114,7 @@ struct FCLIB_APICOMPILE fclib_matrix_info {
  *  by columns, without their zeros, unless fclib_keep_dense() says otherwise.
  */
 struct FCLIB_APICOMPILE fclib_matrix {
-  int nzmax; /**< room for entries; in what is read, the length of x */
+  int nzmax; /**< how many entries fit; after a read, the length of x */
   int m;     /**< rows */
   int n;     /**< columns */
   int* p;
@@ -196,9 +196,9 @@ int fclib_write_global_rolling(struct fclib_global_rolling* problem, const char*
 int fclib_write_local_rolling(struct fclib_local_rolling* problem, const char* path);   /* new */
 
 /** Adds the solution of the problem that is in the file. Its arrays must have the lengths of that
- *  problem. Each may be NULL: u and v then follow from r (and l, where p > 0) by the problem, or
- *  are zeros where r is not given either or the problem is not valid; r and l are zeros. Returns 1,
- *  or 0. */
+ *  problem. Each may be NULL. If u or v is NULL, it follows from r (and l, where p > 0) by the
+ *  problem. If r is NULL too, or the problem is not valid, u and v are zeros. If r or l is NULL, it
+ *  is zeros. Returns 1, or 0. */
 int fclib_write_solution(struct fclib_solution* solution, const char* path);
 
 /** Adds guesses for the problem that is in the file (number_of_guesses structs), whose arrays may
@@ -233,24 +233,24 @@ const char* fclib_problem_kind(const char* path);
  *  local problem), components of the contacts, bilateral constraints, contacts. Returns 1, or 0. */
 int fclib_problem_sizes(const char* path, int* n, int* m, int* p, int* nc);
 
-/** New. What a write does where the file already holds such a thing. */
+/** New. What a write does if the file already holds such a thing. */
 enum fclib_write_mode {
-  FCLIB_WRITE_ADD,    /**< it fails; as 3.1 does, and the default */
-  FCLIB_WRITE_REPLACE /**< it puts the new in the place of the old; a problem takes its solution and
-                           its guesses with it */
+  FCLIB_WRITE_ADD,    /**< it fails, as in 3.1; the default */
+  FCLIB_WRITE_REPLACE /**< it replaces the old one; with a problem, its solution and its guesses go
+                           too */
 };
 
 /** New. Sets the mode of all writes of the process. Returns 1, or 0 for an unknown mode. */
 int fclib_set_write_mode(enum fclib_write_mode mode);
 
-/** New. Sets the level of compression of all writes of the process: 0 (none), as 3.1 has it, which
- * it is at first unless the environment's FCLIB_COMPRESSION says 0 to 9; or 1 to 9, of which 6 is
- * for archives. The filters are those that every HDF5 has. Returns 1, or 0 for a level outside.
- */
+/** New. Sets the level of compression of all writes of the process: 0 (none, as in 3.1) to 9. Level
+ *  1 is for programs that write each step, 6 for archives. The default is 0, or what
+ *  FCLIB_COMPRESSION in the environment says. Every HDF5 has the filters. Returns 1, or 0 for
+ *  another level. */
 int fclib_set_compression(int level);
 
 /** New. Whether all reads of the process hand out dense matrices as they are (nz = -3), or by
- *  columns (keep = 0, at first). Returns 1. */
+ *  columns (keep = 0, the default). Returns 1. */
 int fclib_keep_dense(int keep);
 
 /* ---- deleting -------------------------------------------------------------------------------- */
@@ -310,14 +310,15 @@ int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* prob
 /** How wrong a solution is. u is always recomputed: W r + V l + q, or H^T v + w.
  *
  *  MERIT_1   ||F|| / (1 + sqrt(||q||)) + ||V^T r + R l + s|| / (1 + ||s||) with the natural map
- *            F = r - P_K(r - u^), in double precision: the number of 3.1, which has it for matrices
- *            by columns and d = 3 alone, and here is the same thing for all. For a global problem
- *            q = H^T M^-1 f + w, the second term is ||G^T v + b|| / (1 + ||b||), and a third one
+ *            F = r - P_K(r - u^), in double precision. It is the number of 3.1, which has it only
+ *            for matrices by columns and d = 3. For a global problem q = H^T M^-1 f + w, the second
+ *            term is ||G^T v + b|| / (1 + ||b||), and there is a third one,
  *            ||M v - H r - G l - f|| / (1 + ||f||).
- *  MERIT_2   the relative error that every tolerance of this library bounds (3.1 returns 0): the
- *            largest of ||F|| / ||q||, of the same with rho u^ and rho q, rho = 1 / mean |W_kk|,
- * which does not change with the units, and of the errors of the stored v, u and l, each component
- * relative to its own velocity. What rounding leaves of the terms is no error.
+ *  MERIT_2   the relative error that every tolerance of this library bounds (3.1 returns 0). It is
+ *            the largest of ||F|| / ||q||, of the same with rho u^ and rho q, where
+ *            rho = 1 / mean |W_kk| (this does not change with the units), and of the errors of the
+ *            stored v, u and l, each component relative to its own velocity. What rounding leaves
+ *            of the terms does not count.
  */
 enum FCLIB_APICOMPILE fclib_merit { MERIT_1, MERIT_2 };
 
@@ -355,7 +356,7 @@ enum fclib_status {
   FCLIB_ITERATION_LIMIT, /**< stopped at max_iterations */
   FCLIB_TIME_LIMIT,      /**< stopped at time_limit */
   FCLIB_DIVERGED,        /**< an iterate was not finite */
-  FCLIB_INACCURATE,      /**< the solver was content, MERIT_2 is not */
+  FCLIB_INACCURATE,      /**< the solver said it was done, but MERIT_2 is above the tolerance */
   FCLIB_INTERRUPTED,
   FCLIB_STALLED,   /**< the solver has nothing left to try; its best iterate is returned */
   FCLIB_INFEASIBLE /**< there is no solution, which the solver has proven */
@@ -414,8 +415,8 @@ const char* fclib_status_name(enum fclib_status status);
 
 /* ---- by name --------------------------------------------------------------------------------- */
 
-/** New. Settings by name, which may become more: a program has only a pointer. One may be used by
- *  many calls, in several threads at once as long as none changes it.
+/** New. Settings by name. Later versions may have more of them. A program has only a pointer. Many
+ *  calls may use one, in several threads at once, as long as none changes it.
  *
  *  a solve   "solver" ("auto"), "tolerance" (1e-8), "max_iterations" (0: the solver's own),
  *            "time_limit" ([s], 0: none), "merit" ("both", or "natural": without the scaled map),
@@ -429,8 +430,8 @@ struct fclib_options;
 struct fclib_options* fclib_options_create(void);
 void fclib_options_delete(struct fclib_options* options); /* or NULL */
 
-/** New. Sets one thing, whose old value goes; text, number and array are copied. Any setting may be
- *  given as a text. Return 1, or 0. */
+/** New. Sets one thing, and replaces its old value. Text, number and array are copied. Any setting
+ *  may be given as a text. Return 1, or 0. */
 int fclib_options_set_text(struct fclib_options* options, const char* name, const char* value);
 int fclib_options_set_number(struct fclib_options* options, const char* name, double value);
 int fclib_options_set_array(struct fclib_options* options, const char* name, const double* values,
@@ -561,10 +562,10 @@ struct fclib_batch {
   int* iterations;           /**< (count) */
 };
 
-/** New. Solves all problems of a batch: small ones by a way of their own, which allocates nothing
- *  for a problem once its thread has seen the largest, and what that does not finish by the solver
- *  "auto". Returns 1 where all were tried, however they ended, and 0 for invalid data, which names
- *  the problem: answers of the others are there all the same. */
+/** New. Solves all problems of a batch. Small ones have a method of their own, which allocates
+ *  nothing once its thread has seen the largest problem. What this does not solve is given to the
+ *  solver "auto". Returns 1 if all were tried, however they ended. Returns 0 for invalid data; the
+ *  message names the problem, and the other problems have their answers all the same. */
 int fclib_solve_batch(const struct fclib_batch* batch);
 
 /* ---- one solve after another ----------------------------------------------------------------- */

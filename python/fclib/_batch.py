@@ -27,7 +27,8 @@ class BatchResult(Same):
         error: (count,) Merit.error of each.
         iterations: (count,) sweeps and Newton steps; those of ``auto`` where it was asked.
         offsets: (count + 1,) where the parts of r and u begin, where contacts vary; else None.
-        by_auto: problems that the fast way did not finish, which the solver auto then had.
+        by_auto: number of problems that were given to the solver auto, because the fast method did
+            not solve them.
     """
 
     r: Floats
@@ -70,8 +71,8 @@ def solve_batch(
 ) -> BatchResult:
     """Solve many local problems, u = W r + q with Coulomb's law, without Python between them.
 
-    Small problems take a way of their own, without a word of memory allocated for each; what it
-    does not finish, the solver ``auto`` does. The lock of Python is released.
+    Small problems have a method of their own, which allocates no memory for each. What it does not
+    solve is given to the solver ``auto``. The lock of Python is released.
 
     Args:
         W: (count, m, m) matrices, m = spacedim * nc. Where ``contacts`` is given all entries one

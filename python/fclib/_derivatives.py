@@ -42,7 +42,7 @@ class Tangent(Same):
         l: (p,) where there are bilateral constraints, else None.
         degenerate: (nc,) contacts on a border between two statuses.
         unique: whether the changes are determined; else those of r and l are the least ones.
-        error: ``Merit.error`` of the solution; where it is not one, nothing here means anything.
+        error: ``Merit.error`` of the solution; if it is large, the numbers here mean nothing.
     """
 
     r: Array
@@ -66,8 +66,8 @@ class Gradient(Same):
         q, W, s: of a local problem.
         f, w, M, H, b: of a global one.
         degenerate: (nc,) contacts on a border between two statuses.
-        unique: whether it is determined; else it belongs to the least change of r and l.
-        error: ``Merit.error`` of the solution; where it is not one, nothing here means anything.
+        unique: whether the derivative is unique; if not, it belongs to the least change of r and l.
+        error: ``Merit.error`` of the solution; if it is large, the numbers here mean nothing.
     """
 
     mu: Array

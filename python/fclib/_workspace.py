@@ -15,8 +15,9 @@ from fclib._solve import Problem, solve
 class Workspace:
     """What a simulation keeps between its solves: memory, and the reactions of its contacts.
 
-    Local problems of Coulomb's law go a way that allocates nothing once it has seen the largest
-    of them; all others are solved by ``fclib.solve``, from the same guesses. For one thread.
+    Local problems of Coulomb's law are solved without allocating memory, once the workspace has
+    seen the largest of them. Problems of other formulations are solved by ``fclib.solve``, from the
+    same guesses. A workspace is for one thread.
 
     >>> workspace = fclib.Workspace(tol=1e-8)
     >>> result = workspace.solve(problem, contacts=names)

@@ -32,6 +32,7 @@ AS_THEY_ARE = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "architecture.md",
     "CONTRIBUTING.md": "contributing.md",
+    "SECURITY.md": "security.md",
     "CHANGELOG.md": "changelog.md",
 }
 MODULE = ROOT / "build" / "wasm" / "fclib"
@@ -73,6 +74,7 @@ MENU = {
         "architecture",
         "contributing",
         "testing",
+        "security",
         "changelog",
     ],
 }
@@ -86,6 +88,7 @@ div.math math { margin: 0.4em 0; }
 article img { max-width: 100%; height: auto; }
 article table { font-size: 0.85em; }
 article table img { max-width: none; }
+article td:first-child code { white-space: nowrap; }
 article .align-right { margin: 0 0 1em 1.5em; }
 .contact-pictures { display: flex; flex-wrap: wrap; gap: 0.5em; }
 .contact-pictures svg { flex: 1 1 18em; min-width: 0; max-width: 40em; cursor: default; }
@@ -98,6 +101,8 @@ article .align-right { margin: 0 0 1em 1.5em; }
 @media (max-width: 46em) {
   article .align-right { float: none; margin: 1em 0; }
   article table:has(img) td:last-child { min-width: 14em; }
+  article table:has(td:nth-child(4)) { width: max-content; max-width: none; }
+  article table:has(td:nth-child(4)) td { max-width: 13em; }
 }
 """
 

@@ -16,9 +16,10 @@ def pages() -> Iterator[tuple[str, str]]:
     lines = [
         "# The command line",
         "",
-        "Results go to the standard output, as a table or with `--json` as one object a line; "
-        "errors and progress go to the standard error. The exit status is 0 only if all went well, "
-        "1 if not, 2 for a usage error. `fclib COMMAND --help` says the same as this page.",
+        "Results go to the standard output: as a table, or with `--json` as one JSON object a "
+        "line. Errors and progress go to the standard error. The exit status is 0 only if all went "
+        "well. It is 1 if something failed, and 2 for a usage error. `fclib COMMAND --help` says "
+        "the same as this page.",
         "",
     ]
     command: Any = typer.main.get_command(app)
@@ -33,7 +34,7 @@ def described(command: Any, path: str) -> list[str]:
         lines += [f"## {path}", "", inspect.cleandoc(command.help or ""), ""]
         shown = [item for item in command.params if not getattr(item, "hidden", False)]
         if shown:
-            lines += ["| | default | |", "|---|---|---|"]
+            lines += ["| option | default | meaning |", "|---|---|---|"]
             lines += [row(item) for item in shown]
             lines.append("")
     for name, inner in getattr(command, "commands", {}).items():

@@ -69,7 +69,7 @@ def described(definition: Definition) -> list[str]:
     members = [node for node in definition.body if isinstance(node, ast.FunctionDef)]
     values = [node for node in members if decorated(node, "property")]
     if values:
-        lines += ["| | type | |", "|---|---|---|"]
+        lines += ["| name | type | meaning |", "|---|---|---|"]
         lines += [
             f"| `{node.name}` | {cell(ast.unparse(node.returns) if node.returns else '')} "
             f"| {cell(ast.get_docstring(node) or '')} |"

@@ -18,6 +18,8 @@ from pathlib import Path
 
 TABLE = re.compile(r'^\[Table: ([^\]]+)\]\(results/([\w-]+)\.csv(?: "([^"]*)")?\)$', re.MULTILINE)
 ENTRY = re.compile(r"(?<!`)\{\{([\w-]+): *([^,{}]+), *([^{}]+?) *\}\}")
+# columns of these are put to the right
+NUMBER = re.compile(r"[-+]?[\d.,]*(?:e[-+]?\d+)?(?: ?%)?")
 ABOUT = ("title", "command", "version", "commit", "date", "machine", "note")
 
 
@@ -72,7 +74,10 @@ class Results:
                     raise ValueError(f"{name}.csv has no row with {value.strip()}")
             else:
                 raise ValueError(f"{name}.csv: columns or where, not {part!r}")
-        lines = ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+        rules = (
+            "---:|" if all(NUMBER.fullmatch(row[c]) for row in rows) else "---|" for c in columns
+        )
+        lines = ["| " + " | ".join(columns) + " |", "|" + "".join(rules)]
         lines += [
             "| " + " | ".join(row[column].replace("|", "\\|") for column in columns) + " |"
             for row in rows

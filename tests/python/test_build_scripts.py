@@ -3,6 +3,7 @@
 import hashlib
 import importlib.util
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -294,3 +295,27 @@ def test_a_release_has_checksums_and_a_list_of_parts(
     (dist / "libfclib0.deb").unlink()
     with pytest.raises(SystemExit, match=r"has no \*.deb"):
         release.finish(dist)
+
+
+# ---- what says what there is
+
+
+def test_the_readme_of_the_scripts_has_a_line_on_each(root: Path) -> None:
+    text = (root / "scripts" / "README.md").read_text()
+    named = re.findall(r"^\| `([\w./-]+)` \|", text, re.MULTILINE)
+    kept = subprocess.run(
+        ["git", "-C", str(root), "ls-files", "scripts"], capture_output=True, text=True
+    ).stdout.split()
+    if not kept:
+        pytest.skip("this is no repository")
+    first = {Path(path).parts[1] + "/" * (len(Path(path).parts) > 2) for path in kept}
+    assert named == sorted(named)
+    assert set(named) == first - {"README.md"}
+
+
+def test_make_help_shows_every_verb(root: Path) -> None:
+    text = (root / "Makefile").read_text()
+    verbs = re.findall(r"^\.PHONY: (.*?[^\\])$", text, re.MULTILINE | re.DOTALL)
+    shown = subprocess.run(["make", "help"], cwd=root, capture_output=True, text=True).stdout
+    for verb in verbs[0].replace("\\", " ").split():
+        assert verb == "help" or re.search(rf"^make {verb} ", shown, re.MULTILINE), verb

@@ -1,5 +1,6 @@
 """The commands: what they print, what they write, and their exit status."""
 
+import io
 import json
 import os
 import subprocess
@@ -11,10 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 import typer
+from rich.console import Console
 from typer.testing import CliRunner
 
 import fclib
 from fclib import cli
+from fclib.cli._output import Rows
 from helpers import judge, planted_global, planted_local
 from helpers_cli import run
 
@@ -483,3 +486,50 @@ def test_a_closed_pipe_is_no_traceback(files: list[Path]) -> None:
         process.stdout.readline()
         process.stdout.close()
         assert "Traceback" not in process.stderr.read()
+
+
+# ---- tables
+
+
+def shown(rows: Rows, width: int) -> list[str]:
+    console = Console(width=width, file=io.StringIO())
+    console.print(rows)
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    return [line.rstrip() for line in text.splitlines()]
+
+
+def test_a_table_that_is_too_wide_is_printed_in_parts() -> None:
+    rows = Rows(
+        [
+            {"problem": "tower.hdf5", "nc": 144, "status": "ok", "error": 8.9e-9, "slide": 0},
+            {"problem": "b.hdf5", "nc": 2, "status": "wrong", "error": 0.01317, "slide": 3},
+        ],
+        title="Judged",
+    )
+    assert shown(rows, 80) == [
+        "Judged",
+        "problem      nc  status    error  slide",
+        "tower.hdf5  144  ok      8.9e-09      0",
+        "b.hdf5        2  wrong   0.01317      3",
+    ]
+    # no number loses a digit, and each part names its rows
+    assert shown(rows, 30) == [
+        "Judged",
+        "problem      nc  status",
+        "tower.hdf5  144  ok",
+        "b.hdf5        2  wrong",
+        "",
+        "problem       error  slide",
+        "tower.hdf5  8.9e-09      0",
+        "b.hdf5      0.01317      3",
+    ]
+
+
+def test_a_long_text_of_a_table_is_folded() -> None:
+    rows = Rows([{"set": "rt444", "what": "the four families of the report RT-0444", "v": 5}])
+    lines = shown(rows, 40)
+    assert lines[0].split() == ["set", "what", "v"]
+    assert all(len(line) <= 40 for line in lines)
+    assert (
+        " ".join(" ".join(lines[1:]).split()) == "rt444 the four families of the 5 report RT-0444"
+    )

@@ -189,4 +189,4 @@ def test_the_table_is_for_people(
     with pytest.raises(typer.Exit) as stop:
         command()
     assert stop.value.exit_code == 0
-    assert "Nothing is broken; 1 optional, not here." in capsys.readouterr().out
+    assert "Nothing is broken; 1 optional is not installed." in capsys.readouterr().out

@@ -33,17 +33,43 @@ _results = module("benchmarks/_results.py")
 FOLDER = ROOT / "docs" / "results"
 TABLES = sorted(FOLDER.glob("*.csv"))
 PAGES = sorted((ROOT / "docs").glob("*.md"))
+READ_FIRST = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
 # pages that are about results: no part of them has a figure of its own
-WHOLE = ("choosing.md", "solvers.md", "speed.md")
+WHOLE = ("choosing.md", "measurement.md", "solvers.md", "speed.md")
 
-# code, links, names of a program or standard with its version, tolerances, dimensions, years
+# code, links, names of a program or standard with its version, tolerances, dimensions, years, and
+# two definitions: what a failure costs, and what an interval covers
 NO_FIGURE = re.compile(
     r"""```.*?```|<!--.*?-->|`[^`]*`|\]\([^)]*\)|^\[Table:[^\n]*$|\{\{[^{}]*\}\}|^(?:\ {4}[^\n]*\n)+
     |^\d+\.\ |\b1e-\d+\b|\b[23]D\b|\bRT-\d+\b|\b(?:19|20)\d\d\b
+    |\b(?:ten|10)\stimes\sthe\slimit\b|\b95\s%
     |\b(?:libfclib|Siconos|Debian|Python|MuJoCo|GCC|HDF5|Drake|Pinocchio|Newton|C\+\+|Clarabel)\s\d[\d.]*
+    |\bHDF5\b
     """,
     re.VERBOSE | re.DOTALL | re.MULTILINE,
 )
+# numbers that are written as words; smaller ones count things on the page
+WORD = (
+    r"(?i:(?:thir|four|fif|six|seven|eigh|nine)teen|eleven|twelve|(?:twen|thir|for|fif|six|seven|"
+    r"eigh|nine)ty|hundreds?|thousands?|millions?)"
+)
+SMALL = r"(?i:two|three|four|five|six|seven|eight|nine|ten|half|third|quarter|fifth|tenth)"
+NUMBER = rf"(?:\d|\b{WORD}\b|\b{SMALL}\b)"
+FIGURE = re.compile(rf"\d|\b{WORD}\b")
+# a number of what is measured: a time, a memory, a share, a ratio, how many were solved
+MEASURE = re.compile(
+    rf"""{NUMBER}(?:\s|\sof\san?\s|-)?(?:%|‰|per\scent\b|(?:nano|micro|milli)?seconds?\b|minutes?\b|hours?\b
+    |(?:[nmµu]?s|min|h|[kKMG]i?B|[kMG]?bytes?)\b|times\b|-?fold\b|orders\sof\b)
+    |(?:(?<![\d.])\d[\d,]*|\b{WORD})\s(?:problems?|runs|solves|packings)\b
+    |(?:\d|\b{WORD}|\b{SMALL})\sof\s(?:the\s|all\s)?(?:\d|{WORD}|{SMALL}|problems|runs|solves|packings)\b
+    |\bratio\sof\s\d
+    |\b(?:solve[sd]?|loses?|lost|fails?\son)\s(?:only\s)?{NUMBER}(?!-)
+    """,
+    re.VERBOSE,
+)
+EITHER = re.compile(f"{FIGURE.pattern}|{MEASURE.pattern}", re.VERBOSE)
+# before a block (a paragraph, a list, a table) whose figures are not measured: set by us, or known
+SET = re.compile(r"<!-- figures: (?P<why>.*?) -->\n\n?(?P<block>(?:[^\n]+\n)+)", re.DOTALL)
 
 
 def is_of_results(text: str) -> bool:
@@ -51,14 +77,15 @@ def is_of_results(text: str) -> bool:
     return bool(results.TABLE.search(text) or results.ENTRY.search(text))
 
 
-def typed_figures(text: str) -> list[str]:
+def typed_figures(text: str, figure: re.Pattern[str] = FIGURE) -> list[str]:
     """The lines of a page on which a figure is typed by hand."""
 
     def blank(match: re.Match[str]) -> str:
         return "\n" * match[0].count("\n")
 
-    left = NO_FIGURE.sub(blank, text)
-    return [f"{k}: {line}" for k, line in enumerate(left.splitlines(), 1) if re.search(r"\d", line)]
+    left = NO_FIGURE.sub(blank, SET.sub(blank, text))
+    lines = sorted({left.count("\n", 0, match.start()) for match in figure.finditer(left)})
+    return [f"{k + 1}: {left.splitlines()[k]}" for k in lines]
 
 
 def sections(text: str) -> list[str]:
@@ -66,20 +93,66 @@ def sections(text: str) -> list[str]:
     return re.split(r"^(?=#{1,6} )", text, flags=re.MULTILINE)
 
 
-def test_no_figure_is_typed_beside_a_stored_table() -> None:
-    wrong = [
-        f"{page.name}, {part.splitlines()[0]}: line {line}"
-        for page in PAGES
-        for part in sections(page.read_text(encoding="utf-8"))
-        if page.name in WHOLE or is_of_results(part)
-        for line in typed_figures(part)
+def wrong_on(name: str, text: str) -> list[str]:
+    """What is typed on a page: beside a stored table any figure, elsewhere one of a measurement."""
+    return [
+        f"{name}, {(part.splitlines() or [''])[0]}: line {line}"
+        for part in sections(text)
+        for line in typed_figures(part, EITHER if name in WHOLE or is_of_results(part) else MEASURE)
     ]
+
+
+@pytest.mark.parametrize("page", [*PAGES, *READ_FIRST], ids=lambda page: page.name)
+def test_no_figure_is_typed(page: Path) -> None:
+    wrong = wrong_on(page.name, page.read_text(encoding="utf-8"))
     assert not wrong, "figures belong into docs/results:\n" + "\n".join(wrong)
+
+
+@pytest.mark.parametrize("page", [*PAGES, *READ_FIRST], ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "It takes 3.7 s.",
+        "A solve takes some 40 microseconds.",
+        "That is 12 % more.",
+        "The file has 4.8 MB.",
+        "It is three times as fast.",
+        "It solves 29 of 30 there.",
+        "Of these it loses two.",
+        "It fails on five problems.",
+        "| auto | 0.4 s |",
+    ],
+)
+def test_a_figure_that_is_put_into_a_page_is_found(page: Path, text: str) -> None:
+    """At the end of each of its parts, whether a table is there or not."""
+    for part in sections(page.read_text(encoding="utf-8")):
+        name, fresh = page.name, wrong_on(page.name, f"{part}\n\n{text}\n")
+        assert len(fresh) == 1, f"{name}: {text} is not found in\n{part[:200]}"
+
+
+def test_figures_that_are_set_say_why() -> None:
+    reasons = [
+        match["why"]
+        for page in [*PAGES, *READ_FIRST]
+        for match in SET.finditer(page.read_text(encoding="utf-8"))
+    ]
+    assert reasons
+    for reason in reasons:
+        assert len(reason) > 10, reason
+        for name in re.findall(r"\btests/[\w/]+\.py", reason):
+            assert (ROOT / name).is_file(), f"a page names {name}, which is not there"
 
 
 @pytest.mark.parametrize(
     "text",
-    ["`auto` solves 29 of 30 there.", "takes 0.4 s", "| a | 12 |", "a ratio of 1.5\n", "3 times"],
+    [
+        "`auto` solves 29 of 30 there.",
+        "takes 0.4 s",
+        "| a | 12 |",
+        "a ratio of 1.5\n",
+        "3 times",
+        "beside twelve other solvers",
+    ],
 )
 def test_a_figure_that_is_typed_is_found(text: str) -> None:
     (found,) = typed_figures("A page.\n\n" + text)
@@ -87,9 +160,15 @@ def test_a_figure_that_is_typed_is_found(text: str) -> None:
 
 
 def test_a_figure_after_code_is_found() -> None:
-    page = "## One\n\n[Table: T](results/a.csv)\n\n    code 7\n\ntakes 8 s\n\n## Two\n\ntakes 9 s\n"
-    found = [typed_figures(part) for part in sections(page) if is_of_results(part)]
-    assert found == [["7: takes 8 s"]]
+    page = "## One\n\n[Table: T](results/a.csv)\n\n    code 7\n\ntakes 8\n\n## Two\n\ntakes 9\n"
+    assert wrong_on("a.md", page) == ["a.md, ## One: line 7: takes 8"]
+    assert len(wrong_on("a.md", page.replace("9", "9 s"))) == 2
+    assert len(wrong_on("speed.md", page)) == 2
+
+
+def test_a_block_that_is_set_ends_with_it() -> None:
+    page = "## One\n\n<!-- figures: a limit that the code has -->\n\nat most 5 s\n\ntakes 3 s\n"
+    assert wrong_on("a.md", page) == ["a.md, ## One: line 7: takes 3 s"]
 
 
 @pytest.mark.parametrize(
@@ -105,6 +184,11 @@ def test_a_figure_after_code_is_found() -> None:
 )
 def test_what_is_no_figure_is_left_alone(text: str) -> None:
     assert typed_figures(text) == []
+
+
+def test_a_figure_is_found_over_the_end_of_a_line() -> None:
+    assert typed_figures("of these 11\nproblems\n", MEASURE) == ["1: of these 11"]
+    assert typed_figures("velocity [m/s], 3.1 runs it, H^T M^-1 H, four groups\n", MEASURE) == []
 
 
 def test_every_table_says_what_made_it_and_is_on_a_page() -> None:

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from fclib import collections, scenes
-from fclib.cli._output import Report, err, fail, make_table, out, words_of
+from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
 from fclib.collections.build import BuildError
 
@@ -36,10 +36,11 @@ Count = Annotated[
 ]
 FormOption = Annotated[Form, typer.Option(help="Forms that are written.")]
 SelectOption = Annotated[
-    Select, typer.Option(help="With --count: evenly, or those that cost NSGS most.")
+    Select, typer.Option(help="With --count: evenly spread, or those that take nsgs most sweeps.")
 ]
 Analyze = Annotated[
-    bool, typer.Option("--analyze", help="Ranks, conditioning, existence whatever they cost.")
+    bool,
+    typer.Option("--analyze", help="Find ranks, conditioning and existence, whatever they cost."),
 ]
 Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distribution.")]
 
@@ -72,7 +73,7 @@ def build_plans(
         report.add(row, row["solved"] in ("", row["problems"]))
     if not as_json:
         if report.records:
-            out.print(make_table(report.records))
+            out.print(Rows(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
         unsolved = [row for row in rows if row["status"] not in (None, "converged")]

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
+from rich.cells import cell_len
+from rich.console import Console, ConsoleOptions
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -49,8 +50,11 @@ WRAPPED = (
     "problem",
     "title",
     "meaning",
+    "what",
     "matrix_info",
 )  # columns that may be folded to fit the terminal
+FOLDED = 24  # characters that such a column has at least, where its entries are as long
+GAP = 2  # between columns
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
@@ -168,24 +172,63 @@ def format_known(values: dict[str, object]) -> str:
     return ", ".join(f"{key} {format_value(value)}" for key, value in values.items() if value)
 
 
-def make_table(records: Sequence[dict[str, Any]], title: str | None = None) -> Table:
-    """A table with a column a key; statuses and verdicts in colour."""
-    table = Table(title=title, title_justify="left", box=None, header_style="bold", pad_edge=False)
-    for key, first in records[0].items():
-        numeric = isinstance(first, (int, float)) and not isinstance(first, bool)
-        table.add_column(
-            key,
-            justify="right" if numeric else "left",
-            no_wrap=key not in WRAPPED,
-            overflow="fold",
+@dataclass(frozen=True)
+class Rows:
+    """A table with a column a key; statuses and verdicts in colour.
+
+    Where the terminal is too narrow for all columns, they are printed in several parts, each with
+    the first column: no number is cut.
+    """
+
+    records: Sequence[dict[str, Any]]
+    title: str | None = None
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Any]:
+        for k, keys in enumerate(self.parts(options.max_width)):
+            if k:
+                yield ""
+            yield self.table(keys, None if k else self.title)
+
+    def parts(self, width: int) -> Iterator[list[str]]:
+        """The columns of each part."""
+        first, *others = self.records[0]
+        part, used = [first], self.least(first)
+        for key in others:
+            if len(part) > 1 and used + GAP + self.least(key) > width:
+                yield part
+                part, used = [first], self.least(first)
+            part.append(key)
+            used += GAP + self.least(key)
+        yield part
+
+    def least(self, key: str) -> int:
+        """The width that a column needs."""
+        texts = [key, *(format_value(record[key]) for record in self.records)]
+        width = max(cell_len(line) for text in texts for line in text.splitlines() or [""])
+        return min(width, FOLDED) if key in WRAPPED else width
+
+    def table(self, keys: list[str], title: str | None) -> Table:
+        """One part."""
+        table = Table(
+            title=title, title_justify="left", box=None, header_style="bold", pad_edge=False
         )
-    for record in records:
-        cells = [Text(format_value(value)) for value in record.values()]
-        for key, cell in zip(record, cells, strict=True):
-            if key == "status":
-                cell.stylize("green" if cell.plain in ("converged", "ok") else "red")
-        table.add_row(*cells)
-    return table
+        for key in keys:
+            first = self.records[0][key]
+            numeric = isinstance(first, (int, float)) and not isinstance(first, bool)
+            table.add_column(
+                key,
+                justify="right" if numeric else "left",
+                no_wrap=key not in WRAPPED,
+                overflow="fold",
+                min_width=self.least(key),
+            )
+        for record in self.records:
+            cells = [Text(format_value(record[key])) for key in keys]
+            for key, cell in zip(keys, cells, strict=True):
+                if key == "status":
+                    cell.stylize("green" if cell.plain in ("converged", "ok") else "red")
+            table.add_row(*cells)
+        return table
 
 
 def finite(value: Any) -> Any:
@@ -228,7 +271,7 @@ class Report:
             # the folder is left out where the name says enough
             shortest = names if len(set(names)) == len(set(paths)) else paths
             out.print(
-                make_table(
+                Rows(
                     [
                         {key: value for key, value in record.items() if key not in self.hidden}
                         | {"problem": name}

@@ -13,7 +13,7 @@ import numpy as np
 from fclib.bench import MeritKind, profiles
 from fclib.bench.campaign import published_means
 from fclib.bench.store import Store
-from fclib.cli._output import Report, err, make_table, out
+from fclib.cli._output import Report, Rows, err, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
 
@@ -126,7 +126,7 @@ def show(
         shown_rows = marked if name == "summary" else tables[name]
         if shown_rows:
             out.print()
-            out.print(make_table(shown_rows, title))
+            out.print(Rows(shown_rows, title))
         if name == "summary" and unsteady:
             out.print(
                 f"{profiles.MARK}: repeats differ by more than {100 * profiles.SPREAD:.0f} %"
@@ -155,7 +155,7 @@ def show(
             }
             for pair in shown
         ]
-        out.print(make_table(records, f"Geometric means of ratios to {best}, where both solve"))
+        out.print(Rows(records, f"Geometric means of ratios to {best}, where both solve"))
 
 
 def draw(

@@ -78,7 +78,8 @@ def command(
     write: Annotated[
         bool,
         typer.Option(
-            "--write", help="Store it in the files: MATRIX_INFO, MATH_INFO, attributes of info."
+            "--write",
+            help="Store what was found in the files: MATRIX_INFO, MATH_INFO, attributes of info.",
         ),
     ] = False,
     solve: Annotated[
@@ -90,14 +91,14 @@ def command(
     ] = False,
     tol: Tolerance = 1e-8,
     time_limit: Annotated[
-        float, typer.Option(help="Of each solver and conic program, in seconds.", min=0.001)
+        float, typer.Option(help="Limit of each solver and conic program [s].", min=0.001)
     ] = 20.0,
     as_json: Json = False,
 ) -> None:
     """Find ranks, units, existence with its proof, and uniqueness.
 
-    Of several problems in a file it is the global one. The exit status is 1 where a problem could
-    not be analysed, or a reference solution not be certified.
+    If a file has several problems, the global one is taken. The exit status is 1 if a problem
+    cannot be analysed, or a reference solution cannot be certified.
     """
     from fclib import analysis
 

@@ -21,10 +21,10 @@ from fclib.bench.store import Status
 from fclib.cli._output import (
     Json,
     Report,
+    Rows,
     err,
     fail,
     interrupted,
-    make_table,
     out,
     parse_options,
     usage_error,
@@ -59,7 +59,7 @@ def run(
         str | None, typer.Argument(help="A TOML file, or a published campaign.", show_default=False)
     ] = None,
     store: Annotated[
-        Path | None, typer.Option(help="Where the runs go.  [default: NAME.sqlite]")
+        Path | None, typer.Option(help="Store that the runs go into.  [default: NAME.sqlite]")
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", help="Runs at once.", min=1)] = 1,
     problems: Annotated[
@@ -71,15 +71,17 @@ def run(
     ] = None,
     tol: Annotated[list[float] | None, typer.Option(help="Tolerances.")] = None,
     time_limit: Annotated[
-        float | None, typer.Option(help="[s] of CPU time a run.", min=0.0)
+        float | None, typer.Option(help="Limit of CPU time of a run [s].", min=0.0)
     ] = None,
     wall_limit: Annotated[
-        float | None, typer.Option(help="[s] of wall clock a run.", min=0.0)
+        float | None, typer.Option(help="Limit of wall clock of a run [s].", min=0.0)
     ] = None,
-    memory: Annotated[float | None, typer.Option(help="[MB] a run.", min=0.0)] = None,
-    repeats: Annotated[int | None, typer.Option(help="Times each run is done.", min=1)] = None,
+    memory: Annotated[
+        float | None, typer.Option(help="Limit of memory of a run [MB].", min=0.0)
+    ] = None,
+    repeats: Annotated[int | None, typer.Option(help="How often each run is done.", min=1)] = None,
     sample: Annotated[
-        int | None, typer.Option(help="So many problems of each group.", min=1)
+        int | None, typer.Option(help="How many problems of each group are taken.", min=1)
     ] = None,
     history: Annotated[
         bool, typer.Option("--history", help="Store how the error falls in each run.")
@@ -91,10 +93,14 @@ def run(
         str | None, typer.Option(help='For all runs together: "90min", "2h".')
     ] = None,
     retry: Annotated[
-        list[str] | None, typer.Option(help="Do runs again that ended with this status.")
+        list[str] | None, typer.Option(help="Repeat the runs that ended with this status.")
     ] = None,
     retries: Annotated[
-        int, typer.Option(help="Of a run that something from outside has spoilt.", min=0)
+        int,
+        typer.Option(
+            help="How often a run is tried again that failed for a reason outside the solver.",
+            min=0,
+        ),
     ] = RETRIES,
     scheduler: Annotated[
         str | None, typer.Option(help="Run on the Dask cluster of this address.")
@@ -104,7 +110,8 @@ def run(
         typer.Option(help='Run on Slurm: "workers=8 queue=short cores=16 memory=64GB ...".'),
     ] = None,
     send: Annotated[
-        bool, typer.Option("--send", help="Send the problems: no folder is shared.")
+        bool,
+        typer.Option("--send", help="Send the problems to the workers, which share no folder."),
     ] = False,
     status: Annotated[
         Path | None, typer.Option(help="Show how far the campaigns of a store are.")
@@ -201,7 +208,7 @@ def run(
     report = Report(as_json)
     report.add(record)
     if not as_json:
-        out.print(make_table([record]))
+        out.print(Rows([record]))
         out.print(f"fclib profile {path}", highlight=False)
     if progress.not_run:
         causes = ", ".join(f"{n} {name}" for name, n in progress.not_run.most_common())
@@ -263,7 +270,7 @@ def show_status(path: Path, as_json: bool) -> None:
     for record in records:
         others = ", ".join(f"{n} {name}" for name, n in record["others"].items())
         record["others"] = Text(others or "-")
-    out.print(make_table(records))
+    out.print(Rows(records))
 
 
 @app.command("merge")

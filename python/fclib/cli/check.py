@@ -16,10 +16,10 @@ from fclib.cli._output import (
     Merit,
     MeritKind,
     Report,
+    Rows,
     Tolerance,
     each_file,
     err,
-    make_table,
     out,
 )
 
@@ -97,8 +97,8 @@ def command(
 ) -> None:
     """Judge the stored solutions from the data alone.
 
-    Of several problems in a file, it is the global one's. The last columns count the contacts that
-    are open, stick and slide.
+    If a file has several problems, the global one is taken. The last columns count the contacts
+    that are open, stick and slide.
     """
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))
     for path in each_file(files, "checking"):
@@ -140,6 +140,6 @@ def command(
         if as_json and contacts:
             record["contacts"] = rows
         elif rows:
-            out.print(make_table(rows, title=path.name))
+            out.print(Rows(rows, title=path.name))
         report.add(record, good)
     report.finish()

@@ -26,7 +26,7 @@ List = Annotated[Path, typer.Option("--out", help="The list that is written, JSO
 States = Annotated[
     Path | None, typer.Option(help="Folder that the chosen states are written into.")
 ]
-Version = Annotated[str, typer.Option(help="Of the states that are written.")]
+Version = Annotated[str, typer.Option(help="Version of the states that are written.")]
 PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", min=1)]
 
 
@@ -37,13 +37,13 @@ def choose_hard(
     target: List,
     tol: Annotated[float, typer.Option(help="Tolerance of the runs that count.")] = 1e-8,
     share: Annotated[
-        float, typer.Option(help="Of the solvers that must have failed.", min=0.0, max=1.0)
+        float, typer.Option(help="Share of the solvers that must have failed.", min=0.0, max=1.0)
     ] = 0.5,
     per_family: PerFamily = 5,
     states: States = None,
     version: Version = "1",
 ) -> None:
-    """What most solvers fail on, from campaigns over the global files of a collection."""
+    """Choose the problems that most solvers fail on, from campaigns."""
     runs = []
     try:
         for path in stores:
@@ -79,9 +79,11 @@ def choose_standard(
         typer.Option("--keep", help="A list that stays; problems of other families come to it."),
     ] = None,
     problems: Annotated[int, typer.Option(help="That are chosen.", min=1)] = select.Rule.problems,
-    clusters: Annotated[int, typer.Option(help="Of like problems.", min=1)] = select.Rule.clusters,
+    clusters: Annotated[
+        int, typer.Option(help="Number of clusters of like problems.", min=1)
+    ] = select.Rule.clusters,
 ) -> None:
-    """Problems of all families, few of a kind: by their features and what solvers make of them.
+    """Choose few problems of each kind, from all families.
 
     Goes on after a kill. Families that changed, or are new, are simulated; of others the features
     are read from the table where it is there. A problem of a list that is kept stays as it is,
@@ -129,9 +131,11 @@ def choose_local(
     sample: Annotated[int, typer.Option(help="Problems of a family that are looked at.")] = 200,
     per_family: PerFamily = 4,
     spins: Annotated[int, typer.Option(help="Spinning bodies that are drawn.", min=0)] = 2000,
-    asymmetric: Annotated[int, typer.Option(help="Of them, those that are taken.", min=0)] = 16,
+    asymmetric: Annotated[
+        int, typer.Option(help="How many asymmetric ones are taken.", min=0)
+    ] = 16,
 ) -> None:
-    """The contacts that one-contact solvers find hardest, from the local files of a collection."""
+    """Choose the contacts that one-contact solvers find hardest."""
     try:
         with many_bars() as bars:
             found = choose.local(
@@ -158,7 +162,7 @@ def choose_local(
 
 @app.command("tiny")
 def choose_tiny(target: List) -> None:
-    """One problem of each kind: simulated anew, with the digests of its data."""
+    """Simulate one problem of each kind, and list them."""
     try:
         chosen = choose.tiny()
     except (ImportError, ValueError, FloatingPointError) as error:

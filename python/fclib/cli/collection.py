@@ -31,9 +31,9 @@ from fclib.cli._build import (
 from fclib.cli._output import (
     Json,
     Report,
+    Rows,
     err,
     fail,
-    make_table,
     out,
     progress_bar,
     usage_error,
@@ -82,7 +82,7 @@ def list_families(
     of_sets: Annotated[bool, typer.Option("--sets", help="The sets instead.")] = False,
     as_json: Json = False,
 ) -> None:
-    """The families, with their sets and numbers of problems; or the sets, with their versions."""
+    """List the families with their numbers of problems, or the sets."""
     report = Report(as_json)
     if of_sets:
         for name, folders in collections.sets().items():
@@ -96,7 +96,7 @@ def list_families(
                 }
             )
         if not as_json:
-            out.print(make_table(report.records))
+            out.print(Rows(report.records))
         return
     for name, family in collections.families().items():
         report.add(
@@ -109,7 +109,7 @@ def list_families(
             }
         )
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -120,7 +120,7 @@ def show(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """A family: what it is, its parameters, and what a build gave; or what a set has."""
+    """Show a family with its parameters, or what a set has."""
     if name in collections.sets():
         show_set(name, as_json)
         return
@@ -167,10 +167,10 @@ def show(
         out.print(f"{key:12}{value}", highlight=False)
     if parameters:
         out.print()
-        out.print(make_table(parameters))
+        out.print(Rows(parameters))
     if ranges:
         out.print()
-        out.print(make_table(ranges))
+        out.print(Rows(ranges))
 
 
 def show_set(name: str, as_json: bool) -> None:
@@ -189,7 +189,7 @@ def show_set(name: str, as_json: bool) -> None:
             record["numbers"] = ", ".join(map(str, numbers))
         report.add(record)
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -217,16 +217,17 @@ def build(
         typer.Option("--from", help="Folder of trajectories, as fclib collection simulate writes."),
     ] = None,
     simulate: Annotated[
-        bool, typer.Option(help="Simulate what no trajectory is stored of; else an error.")
+        bool,
+        typer.Option(help="Simulate families without stored states; otherwise that is an error."),
     ] = True,
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Assemble the problems of families from their stored trajectories, and solve them.
+    """Build the problems of families from their stored states.
 
-    Problems, reference solutions and catalogue are stored; goes on after a kill. Families without
-    a stored trajectory are simulated first.
+    Problems, reference solutions and catalogue are stored. After a kill, the same command goes on.
+    Families without stored states are simulated first.
     """
     names = named(names, listed)
     if every == bool(names):
@@ -277,8 +278,8 @@ def simulate(
         str,
         typer.Option(help="Name of the version; a published one is a number, higher than before."),
     ] = "own",
-    solver: Annotated[str, typer.Option(help="Solves each step.")] = "auto",
-    tol: Annotated[float, typer.Option(help="Of each step, relative.", min=0.0)] = 1e-12,
+    solver: Annotated[str, typer.Option(help="Solver of each step.")] = "auto",
+    tol: Annotated[float, typer.Option(help="Bound on the error of each step.", min=0.0)] = 1e-12,
     seed: Annotated[int, typer.Option(help="Seed of the scenes.", min=0)] = 0,
     count: Annotated[
         int | None,
@@ -286,9 +287,10 @@ def simulate(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Make new trajectories of families, for fclib collection build --from; goes on after a kill.
+    """Simulate new states of families, for build --from.
 
-    A file SET/FAMILY-VERSION.trajectory is never rewritten: another one is another version.
+    After a kill, the same command goes on. A file SET/FAMILY-VERSION.trajectory is never rewritten:
+    other states need another version.
     """
     report = Report(as_json)
     try:
@@ -324,7 +326,7 @@ def simulate(
     except (ImportError, OSError, ValueError, FloatingPointError, MemoryError) as error:
         fail(words_of(error))
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         out.print(f"fclib collection build {' '.join(names)} --from {folder} takes them")
 
 
@@ -339,10 +341,11 @@ def thinned(plan: collections.Plan, count: int | None) -> collections.Plan:
 
 @app.command()
 def verify(folder: Folder, as_json: Json = False) -> None:
-    """Hash all files again, judge their solutions from the data alone, and tell what is published.
+    """Check all files, their solutions, and what is published.
 
-    A problem whose data differ from the published ones is named, with the relative difference of
-    each matrix: of rounding alone on another machine, of more where it is another problem.
+    All files are hashed again. All solutions are judged again, from the data alone. A problem whose
+    data differ from the published ones is named, with the relative difference of each matrix. A
+    small difference is rounding on another machine. A larger one is another problem.
     """
     report = Report(as_json)
     origins: Counter[str] = Counter()
@@ -370,7 +373,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         fail(str(error))
     if not as_json:
         if report.records:
-            out.print(make_table(report.records))
+            out.print(Rows(report.records))
         out.print(
             f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
         )
@@ -399,13 +402,14 @@ def status(
     ] = None,
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Of a problem: write it with the best solution known."),
+        typer.Option("--out", help="Write the problem with the best solution known."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Which problems are easy, hard or open; of open ones the best error known, and by whom.
+    """Show which problems are easy, hard or open.
 
-    Classes follow from the stored runs of campaigns; the first line says which.
+    The classes follow from stored runs of campaigns, which the first line names. Of open problems
+    the command shows the best error known, and who found it.
     """
     try:
         if name.count("/") == 2:
@@ -441,7 +445,7 @@ def status(
     out.print(f"Classes {basis}", highlight=False)
     if only is not None or every:
         if wanted:
-            out.print(make_table([record_of(row) for row in wanted]))
+            out.print(Rows([record_of(row) for row in wanted]))
         else:
             out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
         return
@@ -451,7 +455,7 @@ def status(
     families["all"] = sum(families.values(), Counter())
     columns = [*standing.CLASSES, *(["not run"] if families["all"]["not run"] else [])]
     out.print(
-        make_table(
+        Rows(
             [
                 {"family": family, **{column: counts[column] for column in columns}}
                 for family, counts in families.items()
@@ -461,7 +465,7 @@ def status(
     open_ones = [row for row in rows if row.rating == "open"]
     if open_ones:
         out.print()
-        out.print(make_table([record_of(row) for row in open_ones], title="Open"))
+        out.print(Rows([record_of(row) for row in open_ones], title="Open"))
         out.print(
             f"fclib collection status {open_ones[0].id} --out FILE writes what is known of one"
         )
@@ -497,7 +501,7 @@ def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
     report = Report(as_json)
     report.add(record_of(found[0]))
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
 
 
 @app.command()
@@ -510,10 +514,10 @@ def take(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Take in a solution of an open problem that is better than the best one known.
+    """Take in a better solution of an open problem.
 
-    It is judged on the collection's own problem; the table and the solution's file are stored in
-    the package of trajectories, to be committed with it.
+    It is judged on the collection's own problem. It must be better than the best solution known. It
+    is stored in the package of stored states, with a row in its table: commit both.
     """
     report = Report(as_json)
     for path in files:
@@ -526,7 +530,7 @@ def take(
             continue
         report.add({"problem": taken, "taken": True, "error": error, "before": before})
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
     raise typer.Exit(int(report.failed))
 
 
@@ -534,27 +538,32 @@ def take(
 def add(
     source: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with FCLIB files.")],
     name: Annotated[
-        str | None, typer.Option(help="Of the set; by default the folder's.", show_default=False)
+        str | None,
+        typer.Option(help="Name of the set; by default that of the folder.", show_default=False),
     ] = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
         "collection"
     ),
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
-    tol: Annotated[float, typer.Option(help="Of these, relative.", min=0.0)] = 1e-8,
-    time_limit: Annotated[float, typer.Option(help="[s] of each.", min=0.001)] = 20.0,
+    tol: Annotated[
+        float, typer.Option(help="Bound on the error of a solution in a file.", min=0.0)
+    ] = 1e-8,
+    time_limit: Annotated[
+        float, typer.Option(help="Time limit of each solve [s].", min=0.001)
+    ] = 20.0,
     license_: Annotated[
-        str | None, typer.Option("--license", help="Of the data, for the catalogue.")
+        str | None, typer.Option("--license", help="Licence of the data, for the catalogue.")
     ] = None,
     citation: Annotated[
         str | None, typer.Option(help="How to name the data, for the catalogue.")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Take files that are already there into a collection, as a set of it.
+    """Make a set of your own FCLIB files.
 
-    They are copied, never written; their folders are the families. A solution in a file stays where
-    it is good to --tol, or better than the one found. What holds no valid problem is named and left
-    out, with exit status 1.
+    The files are copied, and never changed. Each folder becomes a family. A solution in a file
+    stays if its error is at most --tol, or if it is better than the one found. A file without a
+    valid problem is named and left out, and the exit status is 1.
     """
     rules = collections.Rules(
         references=references,
@@ -579,7 +588,7 @@ def add(
     for refusal in refused:
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         unsolved = [row for row in rows if row["status"] not in (None, "converged")]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
@@ -594,7 +603,7 @@ def publish(
     site: Annotated[Path, typer.Option("--out", help="Folder that a web server serves.")],
     as_json: Json = False,
 ) -> None:
-    """Make an archive of each family, and the registry of their SHA-256."""
+    """Make an archive of each family, and their checksums."""
     try:
         files = collections.publish(folder, site)
     except (collections.CatalogError, FetchError, ImportError) as error:
@@ -603,7 +612,7 @@ def publish(
     for path in files:
         report.add({"file": path.name, "bytes": path.stat().st_size})
     if not as_json:
-        out.print(make_table(report.records))
+        out.print(Rows(report.records))
         out.print(f"Serve {site}, then: fclib collection get NAME --from URL")
 
 
@@ -620,7 +629,7 @@ def get(
         "collection"
     ),
 ) -> None:
-    """Fetch published families, check them and unpack them; goes on where it broke off."""
+    """Fetch published families, check them and unpack them."""
     # an archive holds a family
     names = list(dict.fromkeys(re.sub(r"/[0-9]+$", "", name) for name in named(names, listed)))
     if not names:
@@ -634,4 +643,4 @@ def get(
         fail(str(error))
     rows = collections.read_catalog(folder).to_pylist()
     own = [row for row in rows if f"{row['collection']}/{row['family']}" in fetched]
-    out.print(make_table(ranges_of(own)))
+    out.print(Rows(ranges_of(own)))

@@ -232,7 +232,7 @@ def command(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="An input and an output, or inputs alone where --out is given.",
+            help="An input and an output; with --out, inputs alone.",
             metavar="INPUT OUTPUT | INPUT...",
             show_default=False,
         ),
@@ -247,7 +247,7 @@ def command(
         ),
     ] = None,
     storage: Annotated[
-        Storage | None, typer.Option(help="Storage of all matrices, that of the input by default.")
+        Storage | None, typer.Option(help="Storage of all matrices; by default that of the input.")
     ] = None,
     output: Annotated[
         Format | None,
@@ -268,9 +268,9 @@ def command(
 ) -> None:
     """Convert files to other formulations, storages, Siconos' texts.
 
-    What an input is in, its content says. Solutions, guesses and what is known of the matrices go
-    with the problem as far as they hold for what it becomes. Siconos' texts have no place for
-    them, nor for bilateral constraints and titles.
+    The format of an input follows from its content. Solutions, guesses and what is known of the
+    matrices are kept if they hold for the new problem. Siconos' texts cannot hold them, nor
+    bilateral constraints, nor titles.
     """
     try:
         sources, targets, chosen = targets_of(files, out_dir, output)

@@ -12,11 +12,11 @@ from fclib import bench, demo
 from fclib.cli._output import (
     Json,
     Report,
+    Rows,
     Tolerance,
     each_file,
     err,
     fail,
-    make_table,
     out,
     progress_bar,
 )
@@ -109,9 +109,9 @@ def command(
         starts = list(range(0, len(touching), group))
         shown = [run for k in starts[::-1][::stride][::-1] for run in touching[k : k + group]]
         out.print()
-        out.print(make_table([run.record for run in shown or runs[:TABLE_ROWS]]))
+        out.print(Rows([run.record for run in shown or runs[:TABLE_ROWS]]))
         out.print()
-        out.print(make_table(summarize(runs)))
+        out.print(Rows(summarize(runs)))
         out.print()
         out.print(f"All {len(runs)} runs:  {table}")
         out.print(f"The problems:  {out_dir}/stack-*.hdf5  (try: fclib check {paths[-1]})")

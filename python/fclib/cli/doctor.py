@@ -27,9 +27,9 @@ def show(finding: doctor.Finding) -> None:
 
 
 def command(as_json: Json = False) -> None:
-    """Look at the installation: what there is, lacks or is broken.
+    """Look at the installation: what is there, missing or broken.
 
-    Exits with 0 unless something is broken; an optional part that is not there is not.
+    The exit status is 0 unless something is broken. An optional part that is missing is not broken.
     """
     with progress_bar(1) as show_progress:
         show_progress("looking")
@@ -49,6 +49,8 @@ def command(as_json: Json = False) -> None:
     if broken:
         out.print(f"\n{broken} broken: do what its arrow says, then run fclib doctor again.")
     else:
-        rest = f"; {absent} optional, not here" if absent else ""
+        rest = (
+            f"; {absent} optional {'is' if absent == 1 else 'are'} not installed" if absent else ""
+        )
         out.print(f"\nNothing is broken{rest}.", highlight=False)
     raise typer.Exit(int(broken > 0))

@@ -51,7 +51,8 @@ def describe(path: Path, kind: str | None, contents: Contents) -> dict[str, Any]
 def command(files: Files, as_json: Json = False) -> None:
     """Print the formulation, sizes and friction of problems.
 
-    And what else their files hold: solutions, guesses, titles, what is known of matrices.
+    Also print what else the files hold: solutions, guesses, titles, and what is known of the
+    matrices.
     """
     report = Report(as_json, hidden=("nnz_of", "description", "math_info", "spacedim", "m"))
     for path in each_file(files, "reading"):

@@ -41,23 +41,26 @@ def command(
         float, typer.Option(help="A failure counts as so many times the limit.", min=1.0)
     ] = profiles.PENALTY,
     shift: Annotated[
-        float, typer.Option(help="Of the geometric means, in the unit of the metric.", min=1e-12)
+        float,
+        typer.Option(help="Shift of the geometric means, in the unit of the metric.", min=1e-12),
     ] = profiles.SHIFT,
     count_unsuitable: Annotated[
         bool,
         typer.Option(
-            "--count-unsuitable", help="What a solver does not take is a failure, not left out."
+            "--count-unsuitable", help="Count a problem that a solver does not take as a failure."
         ),
     ] = False,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and CSV.")
     ] = None,
-    formats: Annotated[str, typer.Option("--format", help="Of the pictures.")] = "pdf,svg,png",
+    formats: Annotated[
+        str, typer.Option("--format", help="Formats of the pictures.")
+    ] = "pdf,svg,png",
     as_json: Json = False,
 ) -> None:
     """Compare the solvers of a store: profiles, means, ratios.
 
-    As tables, and with --out as pictures.
+    Prints tables. With --out it draws pictures too.
     """
     try:
         print_profile(

@@ -19,7 +19,7 @@ def command(
     ],
     script: Annotated[Path, typer.Argument(help="A Python script.", show_default=False)],
     arguments: Annotated[
-        list[str] | None, typer.Argument(help="Of the script.", show_default=False)
+        list[str] | None, typer.Argument(help="Arguments of the script.", show_default=False)
     ] = None,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the problems.")] = Path(
         "recorded"

@@ -49,10 +49,16 @@ def command(
     ] = None,
     views: Annotated[
         int | None,
-        typer.Option(help="Problems with a picture to turn, those with runs first; all.", min=0),
+        typer.Option(
+            help="How many problems have a picture to turn, those with runs first; by default all.",
+            min=0,
+        ),
     ] = None,
     with_files: Annotated[
-        bool, typer.Option("--with-files", help="The problems too, with solutions and pictures.")
+        bool,
+        typer.Option(
+            "--with-files", help="Put the problems into the site too, with solutions and pictures."
+        ),
     ] = False,
     files_at: Annotated[
         str, typer.Option(help="Address where the collection's folder is served, for links to it.")
@@ -69,14 +75,14 @@ def command(
         typer.Option("--serve", help="Then serve the site to this machine alone, until Ctrl-C."),
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(help="Processes that draw; one a core.", min=1)
+        int | None, typer.Option(help="Processes that draw; by default one a core.", min=1)
     ] = None,
-    title: Annotated[str, typer.Option(help="Of the site.")] = "",
+    title: Annotated[str, typer.Option(help="Title of the site.")] = "",
 ) -> None:
     """Make a site to browse from stores and a catalogue.
 
-    Open its index.html; no server is needed, but for pages that check and solve problems
-    (--with-files): --serve alone serves a site that is there.
+    Open its index.html. Only pages that check and solve problems (--with-files) need a server:
+    --serve. Without stores and catalogue, --serve serves a site that is there already.
     """
     if serve and pdf:
         raise typer.BadParameter("--serve serves a site, and --pdf makes none")

@@ -77,11 +77,11 @@ def command(
 ) -> None:
     """Simulate an MJCF file, and store the problem of each step.
 
-    A URDF file is taken too. What no problem can hold is left out, and said in a line each, in the
-    catalogue and in each file's description.
+    The scene may also be a URDF file. What no problem can hold is left out. The command prints a
+    line about each such thing; the catalogue and the description of each file have it too.
 
-    The scheme is that of Moreau and Jean; the solutions are stored too. Steps without contact give
-    no problem. What is stored is a collection: fclib collection verify and publish take it.
+    The scheme is that of Moreau and Jean. The solutions are stored too. Steps without contact give
+    no problem. What is stored is a collection, which fclib collection verify and publish take.
     """
     if law not in ("velocity", "gap"):
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')

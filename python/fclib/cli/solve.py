@@ -15,10 +15,10 @@ from fclib.cli._output import (
     Merit,
     MeritKind,
     Report,
+    Rows,
     Tolerance,
     each_file,
     err,
-    make_table,
     parse_options,
     usage_error,
 )
@@ -45,7 +45,7 @@ class Trace:
     def finish(self, stages: list[dict[str, Any]]) -> None:
         """The stages: how often each was entered, and how often it solved."""
         if stages:
-            err.print(make_table(stages))
+            err.print(Rows(stages))
 
 
 def command(
@@ -73,7 +73,7 @@ def command(
 ) -> None:
     """Solve problems, and judge the solutions.
 
-    Of several problems in a file it is the global one.
+    If a file has several problems, the global one is taken.
     """
     if kind is not None and write:
         # the one solution of a file is that of its global problem

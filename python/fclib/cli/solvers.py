@@ -12,7 +12,7 @@ from rich.text import Text
 
 import fclib
 from fclib import external
-from fclib.cli._output import Json, Report, make_table, out, usage_error
+from fclib.cli._output import Json, Report, Rows, out, usage_error
 
 DEFAULT = inspect.signature(fclib.solve).parameters["solver"].default
 
@@ -159,7 +159,7 @@ def command(
         }
         for solver in chosen
     ]
-    out.print(make_table(rows))
+    out.print(Rows(rows))
     out.print("\nfclib solvers NAME... shows them with their options and citations.")
     out.print("Any program is one, too: cmd:PROGRAM {input} {output}", highlight=False)
     for absent in external.absent():

@@ -33,8 +33,8 @@ def command(
 ) -> None:
     """Show the network of contacts of a problem in the browser.
 
-    Bodies, contact points, normals and reactions, to turn and to zoom. Served, the page also checks
-    the stored solution, solves the problem and changes it.
+    The page shows bodies, contact points, normals and reactions, to turn and to zoom. With --serve
+    it also checks the stored solution, solves the problem and changes it.
     """
     if serve and target is not None:
         raise typer.BadParameter("--serve serves the page, and --out writes it")

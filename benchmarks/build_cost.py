@@ -5,9 +5,9 @@
 
 NAMES are sets or families; by default all that have stored states, and those that are assembled,
 but the ladder. Each family is built by a process of its own, `fclib collection build` with --jobs 1
-and without pictures. Time and memory are those that the kernel tells of that process and of all that it
-waited for; memory is the largest of one process. A family that OUT has is not built again: it has
-no row. One that runs into --limit has what it took until then, and says so.
+and without pictures. Time and memory are those that the kernel tells of that process and of all
+that it waited for; memory is the largest of one process. A family that OUT has is not built again:
+it has no row. One that runs into --limit has what it took until then, and says so.
 """
 
 from __future__ import annotations

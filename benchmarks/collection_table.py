@@ -170,7 +170,7 @@ def between(value: float, bounds: tuple[float, float]) -> float:
     return min(max(value, bounds[0]), bounds[1])
 
 
-def growth(name: str, limit: int) -> Iterator[dict[str, Any]]:
+def growth(name: str, limit: int) -> Iterator[dict[str, str]]:
     """Problems of SET/FAMILY of growing size, and the last of all; all that have a spectrum."""
     path = stored.path_of(name, versions.version_of(name))
     if path is None:
@@ -187,8 +187,8 @@ def growth(name: str, limit: int) -> Iterator[dict[str, Any]]:
         ratio, conditioning = figures(problem)
         yield {
             "set": name,
-            "dof": problem.n,
-            "contacts": problem.nc,
+            "dof": str(problem.n),
+            "contacts": str(problem.nc),
             "density": f"{problem.m / problem.n:.3g}",
             "rank ratio": f"{ratio:.3g}",
             "conditioning": span([conditioning]),

@@ -3,6 +3,7 @@
     .venv/bin/python benchmarks/collection_table.py FOLDER... [--sample 8] [--limit 3000]
         [--results NAME]
     .venv/bin/python benchmarks/collection_table.py --exclusions [--results NAME]
+    .venv/bin/python benchmarks/collection_table.py --growth rt444/BoxesStack [--results NAME]
 
 Sizes and density, contact components for a degree of freedom, are those of the catalogues. The rank
 ratio (contact components over the rank of W) and the conditioning of W (its largest singular value
@@ -16,6 +17,9 @@ is off.
 
 With --exclusions, the ends that no problem can have within the published ranges of the other
 figures, to the same tenth: density is three components of a contact over the degrees of freedom.
+
+With --growth, of the stored states of families those that have a quarter more degrees of freedom
+than the one before: how the conditioning grows with the size.
 
 published_sets.csv has the figures of the published sets: V. Acary, M. Bremond, O. Huber, On solving
 contact problems with Coulomb friction: formulations and numerical comparisons, 2018, table
@@ -40,6 +44,10 @@ from fclib import collections
 from fclib.analysis._brief import spectrum_of_W
 from fclib.analysis._data import Data, asymmetry
 from fclib.analysis._spectrum import spectrum
+from fclib.collections import known as versions
+from fclib.collections import published as stored
+from fclib.collections import trajectory
+from fclib.simulate import problem_at
 
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
 HEAD = (
@@ -162,6 +170,31 @@ def between(value: float, bounds: tuple[float, float]) -> float:
     return min(max(value, bounds[0]), bounds[1])
 
 
+def growth(name: str, limit: int) -> Iterator[dict[str, str]]:
+    """Problems of SET/FAMILY of growing size, and the last of all; all that have a spectrum."""
+    path = stored.path_of(name, versions.version_of(name))
+    if path is None:
+        raise SystemExit(f"{name}: no states are stored")
+    states = trajectory.read(path)
+    least = 0.0
+    for k in range(len(states)):
+        position, velocity = states.position[k], states.velocity[k]
+        problem = problem_at(states.model, states.scheme, position, velocity).problem
+        last = k == len(states) - 1
+        if not (problem.n >= least or last) or problem.m > limit:
+            continue
+        least = 1.25 * problem.n
+        ratio, conditioning = figures(problem)
+        yield {
+            "set": name,
+            "dof": str(problem.n),
+            "contacts": str(problem.nc),
+            "density": f"{problem.m / problem.n:.3g}",
+            "rank ratio": f"{ratio:.3g}",
+            "conditioning": span([conditioning]),
+        }
+
+
 def line(
     name: str, rows: Sequence[dict[str, Any]], figures: Sequence[Any], verdict: str = ""
 ) -> dict[str, str]:
@@ -187,6 +220,7 @@ def main() -> None:
     parser.add_argument("--sample", type=int, default=8)
     parser.add_argument("--limit", type=int, default=3000)
     parser.add_argument("--exclusions", action="store_true", help="of the published ranges alone")
+    parser.add_argument("--growth", nargs="+", metavar="FAMILY", help="of stored families alone")
     _results.add_option(parser)
     arguments = parser.parse_args()
     table: list[dict[str, str]] = []
@@ -198,10 +232,22 @@ def main() -> None:
         table.append(row)
         print("| " + " | ".join(row.values()) + " |", flush=True)
 
+    if arguments.growth:
+        for name in arguments.growth:
+            for found in growth(name, arguments.limit):
+                show(found)
+        if arguments.results:
+            _results.store(
+                arguments.results,
+                table,
+                title="How W changes with the size",
+                note="Of the stored states, each at least a quarter larger than the one before.",
+            )
+        return
     with PUBLISHED.open(newline="") as file:
-        published = list(csv.DictReader(file))
+        theirs = list(csv.DictReader(file))
     if arguments.exclusions:
-        for row in published:
+        for row in theirs:
             for found in exclusions(row):
                 show(found)
         if arguments.results:
@@ -225,7 +271,7 @@ def main() -> None:
         found = spectra(where[name], rows, arguments.sample, arguments.limit)
         show(line(name, rows, found, within(published, rows, found) if published else ""))
 
-    for row in published:
+    for row in theirs:
         beside = row.pop("ours")
         cells = [f"*{row['set']}*", *list(row.values())[1:], ""]
         show(dict(zip(HEAD, cells, strict=True)))

@@ -1,6 +1,11 @@
 """The packings of the family Jammed: compiles jammed.cpp, runs it for each size, and stores them.
 
     .venv/bin/python benchmarks/jammed_packings.py OUT/jammed.npz
+    .venv/bin/python benchmarks/jammed_packings.py --table [--results jammed]
+
+With --table, nothing is made: of each stored packing the contacts, the proof and its margins. The
+margin is w^T y for the reactions y of the proof, whose largest is 1: what is below 0 has no
+solution.
 
 Minutes of CPU. The file goes to `python/fclib/scenes/`. Another compiler gives other last digits,
 and in the end other packings: problems are made from the stored ones.
@@ -14,20 +19,56 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import _results
 import numpy as np
 
-from fclib.scenes.jammed import OVERLAPS, SIZES
+from fclib.scenes.jammed import OVERLAPS, RELEASED, SIZES, Jammed
 
 SOURCE = Path(__file__).with_name("jammed.cpp")
 COMPILE = ("c++", "-O2", "-std=c++20", "-ffp-contract=off", "-o")
 
 
+def row(count: int) -> dict[str, Any]:
+    """Of a stored packing."""
+    family = Jammed()
+    problem = family.of_size(count, 0.0)
+    y = family.proof(problem, count)
+    margins = {
+        f"margin, {released:g} released": float(np.asarray(family.of_size(count, released).w) @ y)
+        for released in RELEASED
+    }
+    return {
+        "spheres": count,
+        "contacts": problem.nc,
+        "pressing": np.count_nonzero(y),
+        "largest of H y": float(np.abs(problem.H @ y).max()),
+        **margins,
+    }
+
+
 def main() -> None:
     """Write the file: of each size the largest radius, places and radii."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("out", type=Path)
+    parser.add_argument("out", type=Path, nargs="?")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--table", action="store_true", help="of the stored packings")
+    _results.add_option(parser)
     arguments = parser.parse_args()
+    if arguments.table:
+        rows = [row(count) for count in SIZES]
+        for one in rows:
+            print(*one.values(), sep="  ")
+        if arguments.results:
+            _results.store(
+                arguments.results,
+                rows,
+                title="Jammed packings: contacts, proofs and margins",
+                note="Pressing are the contacts that overlap. The margin is w^T y, with and without"
+                " the growth that is taken back; below 0 there is no solution.",
+            )
+        return
+    if arguments.out is None:
+        parser.error("OUT is missing")
     arrays: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         program = Path(folder) / "jammed"

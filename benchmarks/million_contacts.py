@@ -1,6 +1,7 @@
 """A wall of a million contacts: assembled, written, read in pieces, judged.
 
-    .venv/bin/python benchmarks/million_contacts.py FOLDER [--contacts 1000000] [--piece 100000]
+    .venv/bin/python benchmarks/million_contacts.py FOLDER [--contacts 1000000] [--piece 1000000]
+        [--results million-contacts]
 
 The wall is in running bond, at rest (`fclib.scenes`, family Wall), in its global form: M, H, f, w
 and mu in one HDF5 file, whose datasets are chunked. It is read again whole, and once more with h5py
@@ -19,23 +20,28 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import _results
 import h5py
 import numpy as np
 
 import fclib
 from fclib.scenes.shared import assembly
 
+ROWS: list[dict[str, str]] = []
+
 
 def timed(what: str, act: Callable[[], Any]) -> Any:
-    """Do it, and say what it took."""
+    """Do it, say what it took, and keep it as a row."""
     wall, cpu = time.perf_counter(), time.process_time()
     result = act()
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
     print(
         f"{what:28} {time.perf_counter() - wall:7.1f} s wall {time.process_time() - cpu:7.1f} s CPU"
         f" {peak:6.2f} GB",
         flush=True,
     )
+    seconds = f"{time.process_time() - cpu:.1f}"
+    ROWS.append({"act": what, "CPU [s]": seconds, "memory until then [GB]": f"{peak:.2f}"})
     return result
 
 
@@ -59,6 +65,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--contacts", type=int, default=1_000_000)
     parser.add_argument("--piece", type=int, default=1_000_000)
+    _results.add_option(parser)
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     path = arguments.folder / f"wall-{arguments.contacts}.hdf5"
@@ -70,7 +77,8 @@ def main() -> None:
     r[0::3] = bodies.masses[bodies.second] * assembly.GRAVITY * assembly.STEP / r[0::3]
     path.unlink(missing_ok=True)
     timed("written", lambda: fclib.write(path, problem))
-    print(f"{path.stat().st_size / 2**20:.0f} MB", flush=True)
+    size = f"{path.stat().st_size / 1e6:.0f} MB"
+    print(size, flush=True)
     del problem
     problem = timed("read", lambda: fclib.read(path))
     v = np.ones(problem.n)
@@ -78,7 +86,17 @@ def main() -> None:
     whole = float(np.abs(problem.H.T @ v).max())
     print(f"largest velocity {worst:.6g}, from the whole {whole:.6g}", flush=True)
     merit = timed("judged", lambda: fclib.merit(problem, fclib.Solution(r=r)))
-    print(f"natural error {merit.error_by('natural'):.3g}", flush=True)
+    error = f"{merit.error_by('natural'):.3g}"
+    print(f"natural error {error}", flush=True)
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            ROWS,
+            title="A wall of a million contacts",
+            note=f"{problem.nc} contacts, {problem.n} degrees of freedom, a file of {size}, pieces"
+            f" of {arguments.piece} entries. Of the reactions that are judged, each block's own"
+            f" weight, the natural error is {error}.",
+        )
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ minutes a step where more is asked: a stored state is what a step begins from, a
 is no part of its problem. Or its states are those of a stored trajectory, under another law. Of the
 steps whose contacts are as many as published (published_sets.csv), some are kept, evenly spread by
 their number of contacts. Where other figures choose too, a step has all of them as published, to a
-tenth, as collection_table.py compares them; the steps are then spread by each figure in turn.
+tenth, as collection_table.py compares them; the steps are then spread by each figure in turn. A
+regime that is as long as published is filled up to the published number by further steps, evenly
+spread in time.
 
 States in which a body is more than DEEPEST in another are left out.
 
@@ -37,7 +39,7 @@ import fclib
 from fclib import _digest, scenes
 from fclib.collections import known, published, trajectory
 from fclib.collections.known import Choice
-from fclib.collections.plan import Simulation
+from fclib.collections.plan import Simulation, evenly
 from fclib.simulate import Contacts, Model, model_of, problem_at, scheme_of, simulate
 
 LIMIT = 1900  # contact components of a problem whose rank ratio and conditioning choose too
@@ -59,6 +61,8 @@ class Regime:
     way: Simulation = field(default_factory=lambda: WAY)
     states: str = ""  # SET/FAMILY of a stored trajectory whose states are taken, instead
     by: tuple[str, ...] = ()  # columns of published_sets.csv that choose beside the contacts
+    fill: bool = False  # to as many problems as published
+    every: int = 1  # of so many steps one is looked at
     version: str = "1"  # of the trajectory
 
 
@@ -101,22 +105,28 @@ REGIMES: dict[str, Regime] = {
         keep=80,
         steps=1000,
         by=("density", "rank_ratio", "conditioning"),
-        version="3",
+        fill=True,
+        every=5,  # W has up to 1700 rows
+        version="4",
     ),
     "Capsules": Regime(
         "Capsules",
         {"gaps": True, "activation": 0.0, "margin": 0.04, "gyroscopic": True},
         keep=40,
         states="rt444/Capsules",
+        fill=True,
+        version="2",
     ),
     "Bridge": Regime(
         "Bridge_PR",
-        {"load": 0.0, "slabs": 3, "spread": 5.0, "activation": 5e-3, "all_bodies": True},
-        keep=80,
-        steps=100,
+        {"load": 0.0, "slabs": 3, "spread": 5.0, "activation": 5e-3, "all_bodies": True}
+        | {"time_step": 1.5e-3},
+        keep=60,
+        steps=500,
         way=EXACT,
         by=("density", "rank_ratio", "conditioning"),
-        version="3",
+        fill=True,
+        version="4",
     ),
     "Chain": Regime(
         "Chain",
@@ -125,14 +135,27 @@ REGIMES: dict[str, Regime] = {
         steps=1000,
         way=EXACT,
         by=("dof", "density", "rank_ratio", "conditioning"),
-        version="2",
+        fill=True,
+        version="3",
+    ),
+    "KaplasTower": Regime(
+        "KaplasTower",
+        {"levels": 11},
+        keep=20,
+        steps=240,
+        way=EXACT,
+        by=("dof",),
+        fill=True,
     ),
     "CubesH8": Regime(
         "Cubes_H8_5",
-        STEEL | {"push": 8e4, "pressure": 1e4, "rise": 0.05, "bed": 1e11},
+        STEEL | {"push": 7e4, "pressure": 1e4, "rise": 0.2, "bed": 1e11},
         keep=12,
-        steps=36,
+        steps=100,
         way=EXACT,
+        by=("density",),
+        fill=True,
+        version="2",
     ),
     "CubesH8x2": Regime(
         "Cubes_H8_2",
@@ -143,7 +166,8 @@ REGIMES: dict[str, Regime] = {
         steps=60,
         way=EXACT,
         by=("conditioning",),
-        version="2",
+        fill=True,
+        version="3",
     ),
     "LowWallFEM": Regime(
         "LowWall_FEM",
@@ -223,7 +247,8 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
                 flush=True,
             )
         if step.index >= first and step.problem.nc:
-            yield row(number, step.index, step.start.position, step.start.velocity)
+            if number % regime.every == 0:
+                yield row(number, step.index, step.start.position, step.start.velocity)
             number += 1
 
 
@@ -254,14 +279,17 @@ def chosen(found: list[Row], regime: Regime) -> list[Row]:
         low, high = (1 - share) * low, (1 + share) * high
         # one that is not known is no reason to leave it out
         inside = [r for r in inside if not (measure(r, name) < low or measure(r, name) > high)]
-    kept: dict[int, Row] = {}
+    kept: set[int] = set()  # places
     for name in names if inside else ():
         values = np.array([measure(row, name) for row in inside])
         ends = np.nanmin(values), np.nanmax(values)
         for wanted in np.linspace(*ends, regime.keep // len(names)):
-            place = int(np.nanargmin(np.abs(values - wanted)))
-            kept[inside[place].number] = inside[place]
-    return [kept[number] for number in sorted(kept)]
+            kept.add(int(np.nanargmin(np.abs(values - wanted))))
+    others = [place for place in range(len(inside)) if place not in kept]
+    missing = int(published["problems"]) - len(kept)
+    if regime.fill and missing > 0 and others:
+        kept.update(others[k] for k in evenly(len(others), missing))
+    return [inside[place] for place in sorted(kept)]
 
 
 def make(name: str, regime: Regime, out: Path) -> list[Choice]:

@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 
 import fclib
 from fclib import scenes
 from fclib.scenes import Assembled
+from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
 
 FAMILIES: dict[str, Any] = dict(scenes.assemblies())
@@ -68,6 +70,37 @@ def test_wall_at_rest_stays_on_the_ground() -> None:
     ground = assembly.running_bond(assembly.SIZES[2], 0).first < 0
     weight = problem.M.diagonal()[::6].sum() * assembly.GRAVITY * assembly.STEP
     np.testing.assert_allclose(normal[ground].sum(), weight, rtol=1e-6)
+
+
+def test_pile_in_a_frame_stands_without_friction_and_the_ground_carries_it() -> None:
+    bodies = Pile().bodies(4)
+    assert len(bodies.masses) == 30
+    assert len(bodies.first) == contacts_of(4, True) == contacts_of(4, False) + 16
+    # nothing is in anything: spheres that touch are a diameter apart, others more
+    distances = pdist(bodies.centres)
+    assert distances.min() > DIAMETER * (1 - 1e-12)
+    assert (distances < DIAMETER * (1 + 1e-12)).sum() == np.count_nonzero(bodies.first >= 0)
+    for mu in (0.0, 0.6):
+        solution = solved(bodies.problem(mu, ""))
+        np.testing.assert_allclose(solution.v, 0, atol=1e-6)
+        normal = solution.r.reshape(-1, 3)[:, 0]
+        ground = (bodies.first < 0) & (bodies.normals[:, 2] == 1)
+        friction = solution.r.reshape(-1, 3)[(bodies.first < 0) & ~ground]
+        weight = bodies.masses.sum() * assembly.GRAVITY * assembly.STEP
+        carried = normal[ground].sum() + np.linalg.norm(friction[:, 1:], axis=1).sum()
+        assert normal[ground].sum() <= weight * (1 + 1e-6)
+        assert carried >= weight * (1 - 1e-6)
+
+
+def test_two_layers_without_a_frame_stand_from_the_tangent_of_an_eighth_of_pi_on() -> None:
+    """The line through both contacts of a lower sphere is as far off their normals."""
+    bodies = Pile().bodies(2, framed=False)
+    speeds = []
+    for factor in (0.99, 1.01):
+        solution = solved(bodies.problem(factor * np.tan(np.pi / 8), ""))
+        speeds.append(np.abs(solution.v).max() / (assembly.GRAVITY * assembly.STEP))
+    assert speeds[0] > 1e-3
+    assert speeds[1] < 1e-6
 
 
 def test_pushed_packing_has_the_impulse() -> None:

@@ -190,15 +190,28 @@ def identity(run: Run) -> tuple[Any, ...]:
 
 
 def members(name: str) -> dict[str, str]:
-    """The digests of the problems of a set, by their names; of a list, or of stored states."""
-    listed = known.choices(name)
-    if listed:
-        return {f"{name}/{c.family}/{c.number:04d}": c.digest for c in listed}
-    found = {}
+    """The digests of the problems of a set, by their names.
+
+    Of a list, of stored states, or of problems that are assembled for it: seconds. A family that
+    would have to be simulated has none.
+    """
+    found = {f"{name}/{c.family}/{c.number:04d}": c.digest for c in known.choices(name)}
+    listed = {own.rpartition("/")[0] for own in found}
     for own in known.folders([name]):
-        for number, digest in published.digests(own, known.version_of(own)).items():
-            found[f"{own}/{number:04d}"] = digest
+        if own not in listed:
+            found |= {f"{own}/{number:04d}": digest for number, digest in digests(own).items()}
     return found
+
+
+def digests(own: str) -> dict[int, str]:
+    """Of the problems of SET/FAMILY, by their numbers."""
+    stored = published.digests(own, known.version_of(own))
+    scene = None if stored else known.plan_of(own).scene
+    if not isinstance(scene, scenes.Assembled):
+        return stored
+    if hasattr(scene.family, "digests"):
+        return dict(enumerate(scene.family.digests()))
+    return {n: _digest.digest(scene.problem(n)) for n in range(scene.family.problems)}
 
 
 def standings(name: str) -> tuple[list[Standing], Basis | None]:

@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 from fclib.scenes.shared import assembly, mjcf
 from fclib.scenes.shared.family import parameter
 
-SIZES = (60, 250, 1000, 5000)  # spheres
-OVERLAPS = (1e-4, 1e-4, 1e-4, 1e-3)  # about, of a radius
+SIZES = (60, 250, 1000, 5000, 6000)  # spheres
+OVERLAPS = (1e-4, 1e-4, 1e-4, 1e-3, 1e-3)  # about, of a radius
 # of the growth that is taken back: at 1 the overlaps sum to nothing, weighted by the forces
 RELEASED = (10.0, 3.0, 1.5, 1.1, 0.9, 0.0)
 STORED = Path(__file__).with_name("jammed.npz")
@@ -29,10 +29,10 @@ class Jammed:
     """Spheres of radii that differ in a closed box, whose radii grow step by step through jamming.
 
     The packings are stored, in equilibrium just above jamming: overlaps are about 1e-4 of a radius
-    (1e-3 in the largest), and as forces y they balance (H y = 0). The law is that of gaps: a step
-    must open all overlaps. With y the sum of forces times gaps is below 0: no velocity does that,
-    there is no solution, and y proves it. The radii are then made smaller. At `released` = 1 this
-    sum is 0: jamming. Above it y proves nothing, and from where all gaps are open there is a
+    (1e-3 in the two largest), and as forces y they balance (H y = 0). The law is that of gaps: a
+    step must open all overlaps. With y the sum of forces times gaps is below 0: no velocity does
+    that, there is no solution, and y proves it. The radii are then made smaller. At `released` = 1
+    this sum is 0: jamming. Above it y proves nothing, and from where all gaps are open there is a
     solution.
 
     Worth having: the contacts are just as many as hold the spheres, so that W is as near to
@@ -130,7 +130,7 @@ class Jammed:
         pressing = np.flatnonzero(y)
         H = sp.csc_array(problem.H)[:, pressing]
         y[pressing] -= lsqr(H, H @ y[pressing], atol=1e-15, btol=1e-15, iter_lim=20000)[0]
-        return y
+        return np.maximum(y, 0.0)  # one that hardly presses may have become a rounding below 0
 
 
 @functools.cache

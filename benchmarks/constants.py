@@ -117,14 +117,16 @@ RULES = [
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
     *(Rules(HELD, k, ({},), kind) for kind in ("jammed", "crowded") for k in range(2)),
-    *doubled("patience", "rest", "most", "change", "stuck", "accuracy", "convex_limit", "inner"),
+    *doubled("patience", "better", "regular", "rest", "most", "change", "stuck", "accuracy", "convex_limit", "inner"),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
     *doubled(
         "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"
     ),
+    Rules(HELD, None, ({"most_tau": 2}, {"most_tau": 4}), "jammed"),
     Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
     Rules(HELD, None, ({"most": 0.5}, {"most": 0.8}, {"most": 1}), "crowded"),
     *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
+    *doubled("wander_kappa", "wander", "smoothing", "path", "path_polish", "path_again"),
 ]
 
 

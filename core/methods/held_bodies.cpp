@@ -4,6 +4,7 @@
 #include <limits>
 #include <numeric>
 
+#include "methods/homotopy.hpp"
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
 #include "reduced/gauss_seidel.hpp"
@@ -81,8 +82,7 @@ Primal selected(const Primal& primal, std::span<const Index> place, Index count,
 }
 
 /// H H^T + eps M, whose eps is small beside H H^T and large beside its rounding.
-SparseColumns squares(const Primal& primal) {
-  constexpr double eps = 1e-9;
+SparseColumns squares(const Primal& primal, double eps) {
   SparseColumns product = primal.H * SparseColumns(primal.H.transpose());
   const double share = eps * product.diagonal().sum() / primal.M.diagonal().sum();
   return product + share * primal.M;
@@ -120,7 +120,6 @@ HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
     : problem_(problem),
       primal_(primal),
       system_(system),
-      squares_(squares(primal), "H H^T"),
       body_(bodies(primal, D)) {}
 
 template <int D>
@@ -128,6 +127,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
                           FunctionRef<bool()> count) {
   const double enough = rules.inner * tolerance;
   const double size = problem_.q.template lpNorm<Eigen::Infinity>();
+  squares_.emplace(squares(primal_, rules.regular), "H H^T");
   shift_ = Vector::Zero(problem_.nc());
   r_ = Vector::Zero(problem_.m());
   double least = std::numeric_limits<double>::infinity();
@@ -138,7 +138,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     if (!convex(rules, count)) return;
     const double error = relative_error<Cone>(problem_, u_, r_);
     if (report(error, r_)) return;
-    if (error < 0.5 * least) {
+    if (error < rules.better * least) {
       least = error;
       since = 0;
     } else if (++since > rules.patience) {
@@ -184,9 +184,8 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
   part.problem.velocity(r, u);
   error = relative_error<Cone>(part.problem, u, r);
   bool ended = false;
-  const auto proximal = [&](ProximalRules own) {
+  const auto proximal = [&](const ProximalRules& own, Vector x) {
     ProximalPoint<Cone> method(part.problem, system);
-    Vector x = r;
     const double found = method.solve(own, tolerance, x, [&](double) { return ended = count(); });
     if (found < error) {
       error = found;
@@ -217,31 +216,48 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
     }
     return (ended = count()) || error <= tolerance;
   };
-  const auto run = [&] {
-    const ProximalRules short_steps{.kappa = rules.kappa, .max_factorisations = rules.proximal};
-    if (!far) {
-      if (!proximal({.kappa = rules.near_kappa,
-                     .easy = rules.near_easy,
-                     .hard = rules.near_hard,
-                     .max_factorisations = rules.near_proximal})) {
-        proximal(short_steps);
-      }
-      return;
-    }
-    if (sweep()) return;
-    const double tau = std::clamp(rules.follow * error, rules.least_tau, 1.0);
-    if (interior({.tau = tau, .max_iterations = rules.interior_limit}, Vector(r))) return;
-    if (proximal(short_steps)) return;
-    if (interior({.tau = rules.tau,
-                  .step_cap = rules.step_cap,
-                  .delta = rules.delta,
-                  .max_iterations = rules.interior_limit},
-                 Vector::Zero(r.size()))) {
-      return;
-    }
-    proximal(short_steps);
+  const ProximalRules short_steps{.kappa = rules.kappa, .max_factorisations = rules.proximal};
+  const ProximalRules long_steps{.kappa = rules.near_kappa,
+                                 .easy = rules.near_easy,
+                                 .hard = rules.near_hard,
+                                 .max_factorisations = rules.near_proximal};
+  const ProximalRules wandering{.kappa = rules.wander_kappa,
+                                .patience = std::numeric_limits<double>::infinity(),
+                                .max_factorisations = rules.wander};
+  const auto path = [&] {
+    Homotopy<Cone> method(part.problem, system);
+    double next = rules.path_polish;
+    Vector last = r;
+    method.solve({.smoothing = rules.smoothing, .max_factorisations = rules.path},
+                 [&](double found, const Vector& x) {
+                   last = x;
+                   if ((ended = count())) return true;
+                   if (found < error) {
+                     error = found;
+                     r = x;
+                   }
+                   if (!(found < next)) return error <= tolerance;
+                   next = rules.path_again * found;
+                   return proximal(long_steps, x);
+                 });
+    return ended || error <= tolerance || proximal(wandering, last);
   };
-  run();
+  const auto quickly = [&] {
+    if (!far) return proximal(long_steps, r) || proximal(short_steps, r);
+    if (sweep()) return true;
+    const double tau = std::clamp(rules.follow * error, rules.least_tau, rules.most_tau);
+    return interior({.tau = tau, .max_iterations = rules.interior_limit}, Vector(r)) ||
+           proximal(short_steps, r) ||
+           interior({.tau = rules.tau,
+                     .step_cap = rules.step_cap,
+                     .delta = rules.delta,
+                     .max_iterations = rules.interior_limit},
+                    Vector::Zero(r.size())) ||
+           proximal(short_steps, r);
+  };
+  // what is nearly as large as the whole is left to the stages for that
+  const auto few = static_cast<double>(part.contacts.size()) <= rules.most * problem_.nc();
+  if (!quickly() && few && !proximal(wandering, r)) path();
   factorisations_ += system.factorisations();
   return !ended;
 }
@@ -270,7 +286,7 @@ bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> cou
 template <int D>
 bool HeldBodies<D>::release(double slow, Part& part) {
   const SparseColumns& H = primal_.H;
-  const Vector v = squares_.solve(Vector(H * u_));
+  const Vector v = squares_->solve(Vector(H * u_));
   part.contacts.clear();
   std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
   const auto each_body = [&](Index a, auto&& f) {

@@ -15,6 +15,10 @@
 // "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
 // may rest in the end, and 2 is far harder with them than without.
 //
+// Where the first methods fail on 2, W of 2 may hardly see some of its reactions either. But 2 is
+// small: a long proximal point, and the path of methods/homotopy.hpp, cost less there than a convex
+// problem on the whole.
+//
 // Let W = H^T M^-1 H, and B what is not held. The problem of 2 is u = W_B r + q_B on the contacts
 // of B, with W_B = H_B^T M_BB^-1 H_B and q_B such that the reactions of 1 give the velocity of 1,
 // but for what the held bodies add to it. A body is a set of coordinates that M links. How fast one
@@ -22,6 +26,7 @@
 // eps M.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,8 +39,10 @@ namespace fclib {
 
 struct HeldBodiesRules {
   int rounds = 40;          ///< of both, at most
-  int patience = 5;         ///< rounds in which the error must halve
+  int patience = 5;         ///< rounds in which the error must get better
+  double better = 0.5;      ///< share of the least error at which it did
   double most = 0.65;       ///< share of the contacts in 2, over which it must be solved at once
+  double regular = 1e-9;    ///< eps of how fast a body is, over the traces of H H^T and M
   double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
   double creep = 0.1;       ///< ... and over the error of 1 and ||q||
   double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
@@ -49,8 +56,9 @@ struct HeldBodiesRules {
   double interior_above = 1e-3;  ///< error of 1 over which it is far away
   int sweeps = 40;               ///< of Gauss-Seidel
   double follow = 4;  ///< complementarity at first of the first interior point, over the error
-  double least_tau = 0.03;     ///< ... and the least
-  double tau = 10;             ///< ... and of the second
+  double least_tau = 0.03;     ///< ... the least
+  double most_tau = 1;         ///< ... and the most
+  double tau = 10;             ///< ... and that of the second
   double step_cap = 0.8;       ///< of the second
   double delta = 1e-3;         ///< of the second
   int interior_limit = 60;     ///< iterations of each
@@ -61,6 +69,13 @@ struct HeldBodiesRules {
   double near_easy = 10;            ///< its factor on kappa after few Newton steps
   double near_hard = 0.2;           ///< ... and after a failure
   std::int64_t near_proximal = 40;  ///< its factorisations
+  // where neither solves 2: a proximal point whose error may rise, and the path from a convex problem
+  double wander_kappa = 100;   ///< of that proximal point at first
+  std::int64_t wander = 300;   ///< its factorisations
+  double smoothing = 1;        ///< of the path
+  std::int64_t path = 1500;    ///< factorisations on it
+  double path_polish = 1e-4;   ///< error under which its points are polished, with long steps
+  double path_again = 0.1;     ///< share of that error at which this is tried again
 };
 
 /// The coordinates of some contacts, with all that M links to them, and these contacts.
@@ -105,7 +120,7 @@ class HeldBodies {
   const ReducedProblem& problem_;
   const Primal& primal_;
   CoupledSystem& system_;
-  Factorization squares_;    // of H H^T + eps M
+  std::optional<Factorization> squares_;  // of H H^T + eps M
   std::vector<Index> body_;  // of each coordinate
   std::int64_t factorisations_ = 0;
   Vector shift_, r_, u_;

@@ -139,20 +139,11 @@ class Runner {
     thread_local SmallSolver<D> solver;
     std::int64_t converged = 0;
     std::int64_t by_auto = 0;
-    double last_poll = polls && settings_.poll ? now({}) : 0;
+    if (polls && settings_.poll) last_poll_ = now({});
     for (;;) {
       const std::int64_t first = next_.fetch_add(chunk, std::memory_order_relaxed);
       if (first >= batch_.count) break;
-      try {
-        if (polls && settings_.poll && now({}) - last_poll > poll_interval) {
-          last_poll = now({});
-          if (!settings_.poll()) stop(Status::interrupted);
-        }
-        if (deadline_.passed()) stop(Status::time_limit);
-      } catch (...) {
-        fail(-1, std::current_exception());
-        stop(Status::interrupted);
-      }
+      go_on(polls);
       Place place;
       if (batch_.nc != nullptr) {
         place = starts_[static_cast<std::size_t>(first / chunk)];
@@ -163,7 +154,7 @@ class Runner {
       const std::int64_t last = std::min(first + chunk, batch_.count);
       for (std::int64_t k = first; k < last; ++k) {
         try {
-          solve_one(k, one(k, place), solver, converged, by_auto);
+          solve_one(k, one(k, place), solver, polls, converged, by_auto);
         } catch (...) {
           fail(k, std::current_exception());
         }
@@ -173,6 +164,21 @@ class Runner {
     const std::lock_guard lock(mutex_);
     converged_ += converged;
     by_auto_ += by_auto;
+  }
+
+  /// Whether nobody has stopped the batch; one of the threads asks the caller.
+  bool go_on(bool polls) {
+    if (polls && settings_.poll && now({}) - last_poll_ > poll_interval) {
+      last_poll_ = now({});
+      try {
+        if (!settings_.poll()) stop(Status::interrupted);
+      } catch (...) {
+        fail(-1, std::current_exception());
+        stop(Status::interrupted);
+      }
+    }
+    if (deadline_.passed()) stop(Status::time_limit);
+    return stopped_.load(std::memory_order_relaxed) < 0;
   }
 
   void stop(Status why) { stopped_.store(static_cast<int>(why), std::memory_order_relaxed); }
@@ -201,8 +207,8 @@ class Runner {
     }
   }
 
-  void solve_one(std::int64_t k, const One& one, SmallSolver<D>& solver, std::int64_t& converged,
-                 std::int64_t& by_auto) {
+  void solve_one(std::int64_t k, const One& one, SmallSolver<D>& solver, bool polls,
+                 std::int64_t& converged, std::int64_t& by_auto) {
     const Index nc = one.nc;
     const Index m = D * nc;
     const auto answer = [&](Status status, double error, std::int64_t iterations) {
@@ -248,13 +254,13 @@ class Runner {
       }
     }
     ++by_auto;
-    const Result result = solve_by_auto(one);
+    const Result result = solve_by_auto(one, polls);
     std::copy_n(result.solution.r.data(), m, one.r);
     if (one.u != nullptr) std::copy_n(result.solution.u.data(), m, one.u);
     answer(result.status, result.error, result.iterations);
   }
 
-  [[nodiscard]] Result solve_by_auto(const One& one) const {
+  [[nodiscard]] Result solve_by_auto(const One& one, bool polls) {
     const Eigen::Index m = D * static_cast<Eigen::Index>(one.nc);
     LocalProblem problem;
     problem.spacedim = D;
@@ -271,6 +277,7 @@ class Runner {
     Settings settings;
     settings.tolerance = settings_.tolerance;
     settings.time_limit = deadline_.left();
+    settings.callback = [this, polls](const Progress&) { return go_on(polls); };
     static const Solver& whole_way = find_solver("auto");
     return solve(problem, whole_way, settings, {}, guess);
   }
@@ -281,6 +288,7 @@ class Runner {
   std::vector<Place> starts_;  // of each chunk, where the numbers of contacts vary
   std::atomic<std::int64_t> next_ = 0;
   std::atomic<int> stopped_ = -1;
+  double last_poll_ = 0;  // of the thread that polls
   std::mutex mutex_;
   std::int64_t converged_ = 0;
   std::int64_t by_auto_ = 0;

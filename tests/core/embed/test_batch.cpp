@@ -133,6 +133,17 @@ TEST(Batch, NamesWhatIsWrongAndSolvesTheRest) {
   EXPECT_THROW(solve_batch(problems.batch), Error);
 }
 
+TEST(Batch, StopsInTheMidstOfWhatTakesLong) {
+  // rank 6, and a q of any rank: most have no solution that sweeps find, and `auto` is long at each
+  Problems problems(3, 32, 3, 6);
+  testing::RandomData random(5);
+  for (double& q : problems.q) q = random.vector(1)[0];
+  const BatchOutcome outcome =
+      solve_batch(problems.batch, {.tolerance = 1e-15, .poll = [] { return false; }});
+  EXPECT_LT(outcome.by_auto, 32);
+  EXPECT_EQ(problems.status.back(), static_cast<std::int32_t>(Status::interrupted));
+}
+
 TEST(Batch, WhatTheFastWayDoesNotFinishGoesToAuto) {
   // W = 0 and an approach that nothing stops: there is no solution
   const std::vector<double> W(9, 0.0);

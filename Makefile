@@ -175,13 +175,16 @@ $(VENV)/.build-tools: $(VENV)/.system pyproject.toml
 	@touch $@
 
 # --no-build-isolation keeps one build folder, so that only what changed is compiled again. The package
-# is imported from python/ (cmake/inplace.cmake): only what its metadata is made of installs it anew.
-$(VENV)/.installed: $(VENV)/.build-tools CMakeLists.txt pyproject.toml
+# is imported from python/ (cmake/inplace.cmake): only what its metadata is made of installs it anew,
+# or a build folder that is gone.
+$(VENV)/.installed: $(VENV)/.build-tools CMakeLists.txt pyproject.toml $(if $(wildcard $(BUILD)/build.ninja),,no-build)
 	@echo "== building fclib and installing it into $(VENV) (minutes of CPU time the first time)"
 	@$(BIN)/pip install --no-build-isolation \
 	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
 	  --editable '.[analysis,collection,bench,report,solvers]'
 	@touch $@
+
+no-build:
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml
 	@echo "== installing the tools of make $*"

@@ -55,13 +55,13 @@ def main() -> None:
     _results.add_option(parser)
     arguments = parser.parse_args()
     if arguments.table:
-        rows = [row(count) for count in SIZES]
-        for one in rows:
+        proofs = [row(count) for count in SIZES]
+        for one in proofs:
             print(*one.values(), sep="  ")
         if arguments.results:
             _results.store(
                 arguments.results,
-                rows,
+                proofs,
                 title="Jammed packings: contacts, proofs and margins",
                 note="Pressing are the contacts that overlap. The margin is w^T y, with and without"
                 " the growth that is taken back; below 0 there is no solution.",

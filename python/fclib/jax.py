@@ -16,6 +16,8 @@ import numpy as np
 
 from fclib import _layer
 
+__all__ = ["solve"]
+
 
 def solve(
     W: Any, q: Any, mu: Any, *, spacedim: int = 3, tol: float = 1e-10, threads: int = 1

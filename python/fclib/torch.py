@@ -14,6 +14,8 @@ from torch.autograd.function import once_differentiable
 
 from fclib import _layer
 
+__all__ = ["solve"]
+
 
 class _Solve(torch.autograd.Function):  # type: ignore[misc]
     """Of tensors whose leading sizes are equal."""

@@ -716,9 +716,39 @@ def test_simulate_goes_on_where_a_wrong_option_was_put_right(tmp_path: Path) -> 
 
 @pytest.mark.filterwarnings("error")
 def test_an_empty_table_of_controls_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "rows.csv").touch()
-    with pytest.raises(ValueError, match=r"rows\.csv: is no table of controls"):
-        control_of(str(tmp_path / "rows.csv"))
+    for content in ("", "\n\n", "# time\n"):
+        (tmp_path / "rows.csv").write_text(content)
+        with pytest.raises(ValueError, match=r"rows\.csv: is no table of controls"):
+            control_of(str(tmp_path / "rows.csv"))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("breaks", "'broken:breaks': in step 0 RuntimeError: out of order, broken.py, line 3"),
+        ("takes_one", "'broken:takes_one': in step 0 TypeError: takes_one() takes 1 positional"),
+        ("none", "legs: has 1 controls, and those given have the shape ()"),
+        ("huge", "legs: controls must be finite, and those given are [inf]"),
+    ],
+)
+def test_a_policy_that_fails_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
+) -> None:
+    path = tmp_path / "legs.xml"
+    text = ROBOT.format(loss=1).replace("<joint", '<joint name="knee"', 1)
+    motor = '<actuator><motor joint="knee"/></actuator></mujoco>'
+    path.write_text(text.replace("</mujoco>", motor), encoding="utf-8")
+    (tmp_path / "broken.py").write_text(
+        "import math\ndef breaks(t, state):\n    raise RuntimeError('out of\\norder')\n"
+        "def takes_one(t):\n    return [0.0]\n"
+        "def none(t, state):\n    pass\n"
+        "def huge(t, state):\n    return [math.inf]\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    sys.modules.pop("broken", None)
+    failed = invoke("simulate", path, "--policy", f"broken:{name}", "--out", tmp_path / "out")
+    assert failed.exit_code == 1
+    assert words in " ".join(failed.output.split())
 
 
 def test_simulate_finds_the_packages_of_a_urdf(tmp_path: Path) -> None:

@@ -860,3 +860,15 @@ def test_what_cannot_be_recorded_is_named(tmp_path: Path) -> None:
         assert done.exit_code == 1
         assert message in " ".join(done.output.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_an_engine_that_is_missing_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "script.py").write_text("import nothing_of_this_name\n")
+    monkeypatch.setitem(sys.modules, "pybullet", None)
+    arguments = ["record", "pybullet", str(tmp_path / "script.py"), "--out", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 1
+    said = " ".join(done.output.split())
+    assert "pybullet is not installed; install it with: pip install 'fclib[recorders]'" in said

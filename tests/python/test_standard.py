@@ -269,6 +269,17 @@ def test_status_tells_classes_and_what_they_rest_on(results: Path, tmp_path: Pat
 
 
 @there
+def test_families_without_states_have_members_too() -> None:
+    """Those that are assembled, as those whose states are stored."""
+    members = standing.members("existence")
+    assert len(members) == 36 + 56 + 30
+    family: Any = scenes.assemblies()["Jammed"]
+    one = scenes.Assembled(family=family(), seed=0).problem(7)
+    assert members["existence/Jammed/0007"] == fclib.digest(one)
+    assert len(standing.members("rr9118")) == len(known.choices("rr9118")) + 834
+
+
+@there
 def test_stored_solutions_have_the_errors_that_are_said() -> None:
     digests = {
         digest[: standing.DIGITS]: name for name, digest in standing.members("standard").items()

@@ -92,8 +92,10 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
         kind.step = original
 
 
-def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], None]:
-    """Run a script while an engine's own functions tell of its steps."""
+def _in_this_process(
+    steps: Any, module: str
+) -> Callable[[Recording, Path, Sequence[str]], None]:
+    """Run a script while the functions of an engine, which is a module, tell of its steps."""
 
     def run(recording: Recording, script: Path, arguments: Sequence[str]) -> None:
         before, path = sys.argv, list(sys.path)
@@ -102,6 +104,12 @@ def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], N
         try:
             with steps(recording):
                 runpy.run_path(str(script), run_name="__main__")
+        except ModuleNotFoundError as error:
+            if error.name != module:
+                raise
+            raise ImportError(
+                f"{module} is not installed; install it with: pip install 'fclib[recorders]'"
+            ) from None
         finally:
             sys.argv, sys.path[:] = before, path
 
@@ -109,9 +117,9 @@ def _in_this_process(steps: Any) -> Callable[[Recording, Path, Sequence[str]], N
 
 
 ENGINES: Final[dict[str, Callable[[Recording, Path, Sequence[str]], None]]] = {
-    "drake": _in_this_process(_steps_of_drake),
-    "newton": _in_this_process(_steps_of_newton),
-    "pybullet": _in_this_process(_steps_of_pybullet),
+    "drake": _in_this_process(_steps_of_drake, "pydrake"),
+    "newton": _in_this_process(_steps_of_newton, "newton"),
+    "pybullet": _in_this_process(_steps_of_pybullet, "pybullet"),
     "siconos": _siconos.record,
 }
 

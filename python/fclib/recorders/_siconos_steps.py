@@ -17,11 +17,14 @@ from typing import Any
 
 del sys.path[0]  # the folder of this file, which has modules of the same names as packages
 
-import numpy as np  # noqa: E402
-import scipy.sparse  # noqa: E402
-import siconos  # noqa: E402
-import siconos.kernel as kernel  # noqa: E402
-import siconos.numerics as numerics  # noqa: E402
+try:
+    import numpy as np
+    import scipy.sparse
+    import siconos
+    import siconos.kernel as kernel
+    import siconos.numerics as numerics
+except ImportError as error:
+    sys.exit(f"{sys.executable}: {error}; to record Siconos it needs siconos, numpy and scipy")
 
 warnings.filterwarnings("ignore", message=".*scipy.sparse.coo")  # of Siconos' own conversions
 NO_INDEX_SET = 999  # of a problem without one, as Siconos numbers it

@@ -98,8 +98,8 @@ class Pile:
             seconds.append(touching)
             normals.append(np.tile(normal, (len(touching), 1)))
             points.append(places[touching] - 0.5 * DIAMETER * normal)
-        masses = DENSITY * np.pi / 6 * DIAMETER**3
-        masses = masses * random.uniform(1 - self.spread, 1 + self.spread, count)
+        weights = random.uniform(1 - self.spread, 1 + self.spread, count)
+        masses = DENSITY * np.pi / 6 * DIAMETER**3 * weights
         return assembly.Bodies(
             masses=masses,
             inertias=np.repeat((0.1 * masses * DIAMETER**2)[:, None], 3, axis=1),

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import importlib
 import sys
+import traceback
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from fclib.simulate.simulation import Control, State
 
@@ -18,7 +20,7 @@ def control_of(source: str) -> Control:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no table of numbers, or there is no such function.
+        ValueError: it is no table of numbers, or there is no such function; later, where that raises.
     """
     if Path(source).suffix in FILES:
         return control_of_rows(read_rows(Path(source)))
@@ -42,6 +44,7 @@ def read_rows(path: Path) -> np.ndarray:
             rows = np.atleast_2d(np.asarray(np.load(path, allow_pickle=False), dtype=float))
         else:
             lines = path.read_text(encoding="utf-8").splitlines()
+            lines = [line for line in lines if line.partition("#")[0].strip()]
             rows = np.loadtxt(lines, delimiter=",", ndmin=2) if lines else np.zeros((0, 0))
     except (ValueError, EOFError) as error:
         raise ValueError(f"{path}: is no table of controls, steps x nu: {error}") from None
@@ -62,8 +65,26 @@ def policy_of(name: str) -> Control:
         found = importlib.import_module(module.removesuffix(".py"))
     except ImportError as error:
         raise ValueError(f"{name!r}: the module cannot be imported: {error}") from None
+    except Exception as error:
+        raise ValueError(f"{name!r}: the module cannot be imported: {raised(error)}") from error
     policy = getattr(found, function, None)
     if not callable(policy):
         raise ValueError(f"{name!r}: {module} has no function {function!r}")
-    chosen: Control = policy
-    return chosen
+
+    def control(time: float, state: State) -> npt.ArrayLike:
+        try:
+            chosen: npt.ArrayLike = policy(time, state)
+        except Exception as error:
+            raise ValueError(f"{name!r}: in step {state.index} {raised(error)}") from error
+        return chosen
+
+    return control
+
+
+def raised(error: Exception) -> str:
+    """What code of others raised, and where, in a line."""
+    last = traceback.extract_tb(error.__traceback__)[-1]
+    # what cannot be called, or read, has no line of its own
+    theirs = last.filename not in (__file__, "<frozen importlib._bootstrap>")
+    place = f", {Path(last.filename).name}, line {last.lineno}" if theirs else ""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}{place}"

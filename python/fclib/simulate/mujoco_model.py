@@ -240,12 +240,19 @@ class MujocoModel:
         return self._ties.of_columns(self.data, jacobian(self.model, self.data))
 
     def control(self, values: Any) -> None:
-        """Set the controls (nu) until they are set again. ValueError for another number of them."""
+        """Set the controls (nu) until they are set again.
+
+        ValueError for another number of them, or where one is not finite.
+        """
         values = np.asarray(values, dtype=float)
-        if values.shape != self.data.ctrl.shape or not np.isfinite(values).all():
+        if values.shape != self.data.ctrl.shape:
             raise ValueError(
-                f"{self.scene.name}: has {self.model.nu} controls, which must be finite;"
-                f" those given: shape {values.shape}"
+                f"{self.scene.name}: has {self.model.nu} controls, and those given have the shape"
+                f" {values.shape}"
+            )
+        if not np.isfinite(values).all():
+            raise ValueError(
+                f"{self.scene.name}: controls must be finite, and those given are {values.tolist()}"
             )
         self.controlled = True
         self.data.ctrl[:] = values

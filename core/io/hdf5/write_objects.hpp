@@ -18,10 +18,10 @@ struct Style {
   int compression;
   std::function<void(const void* data, std::size_t size)> lend;
   Handle group;
-  Handle plain;      ///< a dataset in one piece
-  Handle compact;    ///< a dataset in its own header
-  Handle deflated;   ///< a dataset in chunks, whose size is set for each
-  Handle shuffled;   ///< the same, shuffled before
+  Handle plain;     ///< a dataset in one piece
+  Handle compact;   ///< a dataset in its own header
+  Handle deflated;  ///< a dataset in chunks, whose size is set for each
+  Handle shuffled;  ///< the same, shuffled before
 };
 
 /// A group to write into, and how.

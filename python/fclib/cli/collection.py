@@ -220,6 +220,9 @@ def build(
         bool, typer.Option(help="Simulate what no trajectory is stored of; else an error.")
     ] = True,
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
+    tol: Annotated[float, typer.Option(help="Of these, relative; the best is 1e-12.", min=0.0)] = (
+        collections.Plan.tol
+    ),
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
@@ -246,6 +249,7 @@ def build(
                 select=select.value,
                 analyze=analyze,
                 references=references,
+                tol=tol,
             )
             for own in folders
         ]

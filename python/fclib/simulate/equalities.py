@@ -211,8 +211,8 @@ def are_independent(G: Sparse, violation: Vector, rounding: Vector) -> bool:
 def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vector:
     """What may be left (p) of columns that follow from others, of length one each.
 
-    RANK, what rounding (p) makes of them, whose arms are differences of the same positions, and what
-    the violation (p) does: rows of a closed loop turn as it opens.
+    RANK, what rounding (p) makes of them, whose arms are differences of the same positions, and
+    what the violation (p) does: rows of a closed loop turn as it opens.
     """
     blur = rounding / sizes + TURNED * opening(violation, sizes)
     bounds: Vector = np.clip(blur, RANK, OWN)

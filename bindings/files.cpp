@@ -262,7 +262,8 @@ void bind_hdf5(nb::module_& m) {
         "solution and its guesses (\"replace\"). In a file of several problems solution and "
         "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
         "9. Dense matrices are written by rows, which every reader takes; dense keeps those of a "
-        "local problem as they are. Without sync a new file is not flushed: whoever writes many calls "
+        "local problem as they are. Without sync a new file is not flushed: whoever writes many "
+        "calls "
         "sync_files after them.\n\n"
         "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
         "mode or a compression outside 0..9.");

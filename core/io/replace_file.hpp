@@ -25,8 +25,8 @@ std::string read_file(const std::string& path);
 /// (file) that names the file.
 void replace_file(const std::string& path, std::string_view bytes);
 
-/// The same of bytes that lie in pieces, one after another. Without `sync` a new file is not flushed:
-/// a crash of the machine may lose it, until sync_files() was called.
+/// The same of bytes that lie in pieces, one after another. Without `sync` a new file is not
+/// flushed: a crash of the machine may lose it, until sync_files() was called.
 void replace_file(const std::string& path, std::span<const std::string_view> pieces,
                   bool sync = true);
 

@@ -33,10 +33,10 @@ def digest(problem: Any) -> str:
         else:
             sha.update(f" {name} {part.shape[0]}x{part.shape[1]} {part.nnz} ".encode())
             # int64 and little-endian on every machine
-            sha.update(part.indptr.astype("<i8"))
-            sha.update(part.indices.astype("<i8"))
+            sha.update(part.indptr.astype("<i8").data)
+            sha.update(part.indices.astype("<i8").data)
             numbers = part.data
-        sha.update(numbers.astype("<f8", copy=False) + 0.0)
+        sha.update((numbers.astype("<f8", copy=False) + 0.0).data)
     return sha.hexdigest()
 
 

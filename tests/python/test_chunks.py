@@ -59,6 +59,22 @@ def test_hdf5_reads_our_chunks_and_we_do(tmp_path: Path, kind: str, level: int) 
         np.testing.assert_array_equal(ours, arrays(problem)[name])
 
 
+def test_what_was_packed_lately_is_not_taken_for_another(tmp_path: Path) -> None:
+    """Arrays that differ in one number, whichever that is; the same one has the same bytes."""
+    x = 1 + np.random.default_rng(2).random(900)
+    fclib.write(tmp_path / "first.hdf5", diagonal(x))
+    for place in range(0, x.size, 7):
+        other = x.copy()
+        other[place] += 2
+        fclib.write(tmp_path / "other.hdf5", diagonal(other))
+        read = arrays(fclib.read(tmp_path / "other.hdf5"))
+        np.testing.assert_array_equal(read["x"], other)
+    for level in (9, 6):
+        fclib.write(tmp_path / f"{level}.hdf5", diagonal(x), compression=level)
+    first = (tmp_path / "first.hdf5").read_bytes()
+    assert (tmp_path / "6.hdf5").read_bytes() == first != (tmp_path / "9.hdf5").read_bytes()
+
+
 LAYOUTS: dict[str, dict[str, Any]] = {
     "deflate": {"compression": 4},
     "shuffle and deflate": {"compression": 4, "shuffle": True},

@@ -820,9 +820,12 @@ def test_list_and_show() -> None:
 
 def test_build_verify_and_publish_by_commands(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    done = invoke("collection", "build", "Chain", "--count", 2, "--out", out, "--form", "local")
+    form = ("--form", "local", "--tol", "1e-12")
+    done = invoke("collection", "build", "Chain", "--count", 2, "--out", out, *form)
     assert done.exit_code == 0, done.output
     assert "Chain" in done.output
+    rows = collections.read_catalog(out).to_pylist()
+    assert all(row["tol"] == 1e-12 and row["error"] <= 1e-12 for row in rows)
     assert len(list(out.glob("rt444/Chain/*.hdf5"))) == 2
     assert (out / "rt444/Chain/distribution.svg").is_file()
     assert invoke("collection", "verify", out).exit_code == 0

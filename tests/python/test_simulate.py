@@ -31,6 +31,7 @@ from fclib.simulate import (  # noqa: E402
     simulate,
 )
 from fclib.simulate.arrays import added  # noqa: E402
+from fclib.simulate.equalities import are_independent, dependence  # noqa: E402
 
 G = 9.81  # m/s^2
 H = 5e-3  # s
@@ -261,6 +262,28 @@ def test_a_loop_that_moves_only_since_rows_depend_keeps_moving(
         assert step.result.converged
         assert np.abs(np.asarray(step.result.solution.l)).max() * size < 1
     assert np.abs(step.velocity).max() > 0.1
+
+
+def test_independent_rows_are_told_without_their_factors() -> None:
+    """By the singular values of their products: never where a row follows from others."""
+    rng = np.random.default_rng(0)
+    found = {True: 0, False: 0}
+    for _ in range(400):
+        n = int(rng.integers(3, 60))
+        p = int(rng.integers(2, n + 1))
+        columns = rng.standard_normal((n, p)) * (rng.random((n, p)) < 0.5)
+        follows = columns[:, :-1] @ rng.standard_normal(p - 1)
+        if rng.random() < 0.5:
+            noise = rng.standard_normal(n) * np.linalg.norm(follows)
+            columns[:, -1] = follows + 10 ** rng.uniform(-14, 0) * noise
+        violation = rng.standard_normal(p) * 10 ** rng.uniform(-16, -2)
+        rounding = np.full(p, 10 ** rng.uniform(-17, -8))
+        G = sp.csc_array(columns)
+        others = dependence(columns, violation, rounding)[1]
+        told = are_independent(G, violation, rounding)
+        found[told] += 1
+        assert not (told and len(others))
+    assert min(found.values()) > 50
 
 
 def test_rows_that_are_small_beside_their_rounding_ask_for_no_large_multipliers() -> None:

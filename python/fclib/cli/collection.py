@@ -221,6 +221,9 @@ def build(
         typer.Option(help="Simulate families without stored states; otherwise that is an error."),
     ] = True,
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
+    tol: Annotated[float, typer.Option(help="Of these, relative; the best is 1e-12.", min=0.0)] = (
+        collections.Plan.tol
+    ),
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
@@ -247,6 +250,7 @@ def build(
                 select=select.value,
                 analyze=analyze,
                 references=references,
+                tol=tol,
             )
             for own in folders
         ]

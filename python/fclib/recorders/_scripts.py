@@ -92,9 +92,7 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
         kind.step = original
 
 
-def _in_this_process(
-    steps: Any, module: str
-) -> Callable[[Recording, Path, Sequence[str]], None]:
+def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequence[str]], None]:
     """Run a script while the functions of an engine, which is a module, tell of its steps."""
 
     def run(recording: Recording, script: Path, arguments: Sequence[str]) -> None:

@@ -20,7 +20,7 @@ def control_of(source: str) -> Control:
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no table of numbers, or there is no such function; later, where that raises.
+        ValueError: it is no table of numbers, or there is no such function; later, if it raises.
     """
     if Path(source).suffix in FILES:
         return control_of_rows(read_rows(Path(source)))

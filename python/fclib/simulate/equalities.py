@@ -14,13 +14,24 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib.simulate._mujoco import mujoco
-from fclib.simulate.arrays import Sparse, Vector, columns_of, empty, take, without_zeros
+from fclib.simulate.arrays import (
+    Sparse,
+    Vector,
+    by_columns,
+    columns_of,
+    empty,
+    lengths_of,
+    take,
+    without_zeros,
+)
 
 # benchmarks/loop_rounding.py chose these, docs/results/loop-rounding.csv has what it found
 RANK: Final = 1e-9  # what is left of a row, of length one, after others that it follows from
 OWN: Final = 1e-3  # a row of which more is left is one of its own
 ROUNDING: Final = 2.0  # units in the last place of all that is added that a gap may be
 TURNED: Final = 8.0  # times the angle by which a loop is open, what may be left of a row
+SINGULAR: Final = 1e-6  # singular values that A^T A tells from zero: its rounding is below 1e-13
+FEW: Final = 48  # columns whose products are faster as those of a full matrix
 SEEN: Final = 1e-13  # solvers see that a row follows which does to this: 1e-12 in eliminate.cpp
 
 CONNECT, WELD, JOINT, TENDON = (
@@ -153,6 +164,8 @@ def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, 
     They become the combinations of others that they are but for rounding, which would ask for
     multipliers as large as it is small.
     """
+    if are_independent(G, violation, rounding):
+        return G, violation
     columns = G.toarray()
     first, others, share = found = dependence(columns, violation, rounding)
     if not len(others):
@@ -172,6 +185,48 @@ def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, 
     n, p = columns.shape
     starts = n * np.arange(p + 1)
     return without_zeros(columns.T.ravel(), np.tile(np.arange(n), p), starts, (n, p)), result
+
+
+def are_independent(G: Sparse, violation: Vector, rounding: Vector) -> bool:
+    """Whether `dependence` finds that no column of G (n x p) follows from others, in less time.
+
+    What is left of a column of length one, after others, is at least the smallest singular value of
+    all: more than a bound where A^T A less its square on the diagonal has a Cholesky factor.
+    """
+    n, p = G.shape
+    sizes = np.sqrt(np.bincount(columns_of(G), G.data * G.data, p))
+    if p > n or not sizes.all():
+        return False
+    bound = max(left_of_followers(sizes, violation, rounding).max(initial=0.0), SINGULAR)
+    scaled = by_columns(G.data / sizes.repeat(lengths_of(G.indptr)), G.indices, G.indptr, (n, p))
+    gram = dense_gram(scaled)
+    gram[np.arange(p), np.arange(p)] -= 2 * bound**2
+    try:
+        np.linalg.cholesky(gram)
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vector:
+    """What may be left (p) of columns that follow from others, of length one each.
+
+    RANK, what rounding (p) makes of them, whose arms are differences of the same positions, and
+    what the violation (p) does: rows of a closed loop turn as it opens.
+    """
+    blur = rounding / sizes + TURNED * opening(violation, sizes)
+    bounds: Vector = np.clip(blur, RANK, OWN)
+    return bounds
+
+
+def dense_gram(A: Sparse) -> Vector:
+    """A^T A (p x p); of many columns by their entries, which are few."""
+    if A.shape[1] <= FEW:
+        columns = A.toarray()
+        few: Vector = columns.T @ columns
+        return few
+    many: Vector = (A.T @ A).toarray()
+    return many
 
 
 def gaps_of(
@@ -212,9 +267,8 @@ def dependence(
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Vector]:
     """Independent ones of the columns (n x p), the others, and these as combinations of those.
 
-    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, to RANK, to
-    what rounding (p) makes of them, whose arms are differences of the same positions, and to what
-    the violation (p) does: rows of a closed loop turn as it opens.
+    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, but for what
+    `left_of_followers` says.
     """
     import scipy.linalg as la  # takes a while
 
@@ -223,8 +277,7 @@ def dependence(
     _, triangle, order = la.qr(scaled, mode="economic", pivoting=True)
     left = np.zeros(len(order))
     left[: len(triangle)] = np.abs(np.diag(triangle))
-    blur = rounding / sizes + TURNED * opening(violation, sizes)
-    follows = left <= np.clip(blur, RANK, OWN)[order]
+    follows = left <= left_of_followers(sizes, violation, rounding)[order]
     first, others = order[~follows], order[follows]
     share: Any = np.linalg.lstsq(scaled[:, first], scaled[:, others], rcond=None)[0]
     return first, others, share * sizes[others] / sizes[first][:, None]

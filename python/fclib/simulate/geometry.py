@@ -141,7 +141,7 @@ def features(
     third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
     part = np.where(shapes_of(model).divided[which], third, 1)
     digits = part[:, 0] + PARTS * part[:, 1] + PARTS**2 * part[:, 2]
-    code = PARTS**3 * digits[:count] + digits[count:]
+    code: npt.NDArray[np.int64] = PARTS**3 * digits[:count] + digits[count:]
     local = local[count:]
     # several in one part, in the order of their places on the second shape
     order = np.lexsort((*np.round(local, 6).T, code, geom[:, 1], geom[:, 0]))

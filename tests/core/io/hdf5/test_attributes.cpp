@@ -100,12 +100,17 @@ TEST_F(Attached, WhatFailsLeavesTheFileAsItWas) {
 }
 
 TEST_F(Attached, AFileThatCannotTakeItsNameLeavesNothing) {
-  // the name of the file fits, that of the one beside it does not
+  // the name of the file fits, that of the one beside it does not: a new file needs none
   const std::string longest = path(std::string(255, 'x'));
   const LocalProblem problem = no_contacts();
-  EXPECT_EQ(message_of([&] { write_file(longest, &problem); }),
-            longest + ": cannot be written: File name too long");
-  EXPECT_EQ(files(), 1U);
+  write_file(longest, &problem);
+  EXPECT_EQ(files(), 2U);
+  const std::string too_long = longest + "x";
+  for (const std::string& name : {longest, too_long}) {
+    EXPECT_EQ(message_of([&] { write_file(name, &problem); }),
+              name + ": cannot be written: File name too long");
+    EXPECT_EQ(files(), 2U);
+  }
 }
 
 }  // namespace

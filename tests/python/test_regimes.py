@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import importlib
 from typing import Any
 
 import numpy as np
@@ -58,10 +59,10 @@ def test_problems_of_one_contact_are_conditioned_as_published() -> None:
     assert high / 10**table.CLOSE <= found[-1] <= high
 
 
-def test_a_regime_is_filled_up_to_the_published_number() -> None:
+def test_a_regime_is_filled_up_to_the_published_number(monkeypatch: pytest.MonkeyPatch) -> None:
     """By steps that have all figures as published; the ends of a figure are among them."""
-    regimes = benchmark("regimes")
-    assert regimes is not None
+    monkeypatch.syspath_prepend(table.PUBLISHED.parent)
+    regimes: Any = importlib.import_module("regimes")
     # of the set Chain: 60 degrees of freedom, 8 to 28 contacts, 242 problems
     rows = [regimes.Row(k, k, None, None, 60, 5 + k % 30, 0.0, 1.2, 1e6) for k in range(1000)]
     own = regimes.Regime("Chain", {}, keep=20, by=("density",))

@@ -63,7 +63,8 @@ def write_solved(name: str, store: Path) -> None:
     for family in sorted({row["family"] for row in rows}):
         own = [row for row in rows if row["family"] == family]
         sizes = [row["nc"] for row in own]
-        cells: dict[str, Any] = {"family": family, "contacts": f"{min(sizes)} to {max(sizes)}"}
+        ends = dict.fromkeys((min(sizes), max(sizes)))
+        cells: dict[str, Any] = {"family": family, "contacts": " to ".join(map(str, ends))}
         for solver in solvers:
             runs = [row for row in own if row["solver_name"] == solver]
             solved = sum(row["solved"] for row in runs)

@@ -1,6 +1,8 @@
 """The set rr9118: its problems are what the published sets are. Their sizes: test_trajectory.py."""
 
 import csv
+import dataclasses
+import importlib
 from typing import Any
 
 import numpy as np
@@ -55,3 +57,18 @@ def test_problems_of_one_contact_are_conditioned_as_published() -> None:
     assert found == sorted(found)
     assert low <= found[0] <= low * 10**table.CLOSE
     assert high / 10**table.CLOSE <= found[-1] <= high
+
+
+def test_a_regime_is_filled_up_to_the_published_number(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By steps that have all figures as published; the ends of a figure are among them."""
+    monkeypatch.syspath_prepend(table.PUBLISHED.parent)
+    regimes: Any = importlib.import_module("regimes")
+    # of the set Chain: 60 degrees of freedom, 8 to 28 contacts, 242 problems
+    rows = [regimes.Row(k, k, None, None, 60, 5 + k % 30, 0.0, 1.2, 1e6) for k in range(1000)]
+    own = regimes.Regime("Chain", {}, keep=20, by=("density",))
+    few = regimes.chosen(rows, own)
+    many = regimes.chosen(rows, dataclasses.replace(own, fill=True))
+    assert len(few) <= 20 < len(many) == 242
+    assert {row.number for row in few} < {row.number for row in many}
+    inside = {row.contacts for row in many}
+    assert (min(inside), max(inside)) == (9, 28)

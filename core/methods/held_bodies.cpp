@@ -292,7 +292,8 @@ void HeldBodies<D>::keep(const Part& part, const Vector& u, double slow) {
     const auto at = D * static_cast<Eigen::Index>(k);
     if (!(u.template segment<D>(at).norm() > slow)) continue;
     for (int j = 0; j < D; ++j) {
-      for (SparseColumns::InnerIterator entry(primal_.H, D * part.contacts[k] + j); entry; ++entry) {
+      const Index column = D * part.contacts[k] + j;
+      for (SparseColumns::InnerIterator entry(primal_.H, column); entry; ++entry) {
         const Index body = body_[entry.row()];
         moved_[body] = part.moves[body];
       }

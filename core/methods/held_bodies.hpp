@@ -8,8 +8,9 @@
 //
 //   1. the convex problem, by the interior point: what rests there rests to many digits, and its
 //      reactions are at the centre of those that there are;
-//   2. bodies that hardly move are held at rest, but for those that moved in the last solution of 2. Coulomb's law for the others, from the reactions
-//      of 1, gives s; s = 0 at contacts that hardly slide, and at those of held bodies alone.
+//   2. bodies that hardly move are held at rest, but for those that moved in the last solution of
+//      2. Coulomb's law for the others, from the reactions of 1, gives s; s = 0 at contacts that
+//      hardly slide, and at those of held bodies alone.
 //
 // Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
 // "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
@@ -69,7 +70,8 @@ struct HeldBodiesRules {
   double near_easy = 10;            ///< its factor on kappa after few Newton steps
   double near_hard = 0.2;           ///< ... and after a failure
   std::int64_t near_proximal = 40;  ///< its factorisations
-  // where neither solves 2: a proximal point whose error may rise, and the path from a convex problem
+  // where neither solves 2: a proximal point whose error may rise, and the path from a convex
+  // problem
   double wander_kappa = 100;   ///< of that proximal point at first
   std::int64_t wander = 300;   ///< its factorisations
   double smoothing = 1;        ///< of the path

@@ -435,13 +435,6 @@ def test_bodies_that_move_may_need_a_long_way(push: float) -> None:
     assert not fclib.solve(problem, chain=[HELD + " wander=1 path=1"]).converged
 
 
-def test_bodies_that_moved_move_on() -> None:
-    """In the next round as well, whatever the convex problem says: it takes fewer rounds."""
-    problem = Packing().of_size(700, 1.0, 102)
-    result = fclib.solve(problem, chain=[HELD + " limit=5"], time_limit=60)
-    assert result.converged
-
-
 def test_bodies_of_an_island_are_held() -> None:
     """A packing, and a ball that falls on the ground beside it: an island of its own."""
     packing = Packing().of_size(400, 0.0, 0)

@@ -117,7 +117,18 @@ RULES = [
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
     *(Rules(HELD, k, ({},), kind) for kind in ("jammed", "crowded") for k in range(2)),
-    *doubled("patience", "better", "regular", "rest", "most", "change", "stuck", "accuracy", "convex_limit", "inner"),
+    *doubled(
+        "patience",
+        "better",
+        "regular",
+        "rest",
+        "most",
+        "change",
+        "stuck",
+        "accuracy",
+        "convex_limit",
+        "inner",
+    ),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
     *doubled(
         "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"

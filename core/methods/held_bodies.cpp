@@ -130,6 +130,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
   squares_.emplace(squares(primal_, rules.regular), "H H^T");
   shift_ = Vector::Zero(problem_.nc());
   r_ = Vector::Zero(problem_.m());
+  moved_.assign(body_.size(), 0);
   double least = std::numeric_limits<double>::infinity();
   double last = least;
   double creep = rules.creep;
@@ -165,6 +166,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     last = error;
     Vector u;
     part.problem.velocity(r, u);
+    keep(part, u, std::max(rules.rest * size, rules.doubt * left * problem_.scale));
     shift_.setZero();
     for (std::size_t k = 0; k < part.contacts.size(); ++k) {
       const Index a = part.contacts[k];
@@ -284,11 +286,28 @@ bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> cou
 }
 
 template <int D>
+void HeldBodies<D>::keep(const Part& part, const Vector& u, double slow) {
+  moved_.assign(body_.size(), 0);
+  for (std::size_t k = 0; k < part.contacts.size(); ++k) {
+    const auto at = D * static_cast<Eigen::Index>(k);
+    if (!(u.template segment<D>(at).norm() > slow)) continue;
+    for (int j = 0; j < D; ++j) {
+      const Index column = D * part.contacts[k] + j;
+      for (SparseColumns::InnerIterator entry(primal_.H, column); entry; ++entry) {
+        const Index body = body_[entry.row()];
+        moved_[body] = part.moves[body];
+      }
+    }
+  }
+}
+
+template <int D>
 bool HeldBodies<D>::release(double slow, Part& part) {
   const SparseColumns& H = primal_.H;
   const Vector v = squares_->solve(Vector(H * u_));
   part.contacts.clear();
-  std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
+  std::vector<char>& moves = part.moves;
+  moves = moved_;
   const auto each_body = [&](Index a, auto&& f) {
     Index last = -1;
     for (int k = 0; k < D; ++k) {

@@ -8,8 +8,9 @@
 //
 //   1. the convex problem, by the interior point: what rests there rests to many digits, and its
 //      reactions are at the centre of those that there are;
-//   2. bodies that hardly move are held at rest. Coulomb's law for the others, from the reactions
-//      of 1, gives s; s = 0 at contacts that hardly slide, and at those of held bodies alone.
+//   2. bodies that hardly move are held at rest, but for those that moved in the last solution of
+//      2. Coulomb's law for the others, from the reactions of 1, gives s; s = 0 at contacts that
+//      hardly slide, and at those of held bodies alone.
 //
 // Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
 // "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
@@ -69,7 +70,8 @@ struct HeldBodiesRules {
   double near_easy = 10;            ///< its factor on kappa after few Newton steps
   double near_hard = 0.2;           ///< ... and after a failure
   std::int64_t near_proximal = 40;  ///< its factorisations
-  // where neither solves 2: a proximal point whose error may rise, and the path from a convex problem
+  // where neither solves 2: a proximal point whose error may rise, and the path from a convex
+  // problem
   double wander_kappa = 100;   ///< of that proximal point at first
   std::int64_t wander = 300;   ///< its factorisations
   double smoothing = 1;        ///< of the path
@@ -103,6 +105,7 @@ class HeldBodies {
   /// The bodies that are not held, with their contacts.
   struct Part {
     std::vector<Index> contacts;
+    std::vector<char> moves;  // of the coordinate that names each body
     Primal primal;
     ReducedProblem problem;
   };
@@ -110,8 +113,12 @@ class HeldBodies {
   /// r_ and u_ of the convex problem with s = shift_. False where it was ended.
   bool convex(const HeldBodiesRules& rules, FunctionRef<bool()> count);
 
-  /// The bodies that are faster than `slow`, at one of their contacts. False where none is.
+  /// The bodies that are faster than `slow`, at one of their contacts, and those that moved in the
+  /// last solution of 2. False where there is none.
   bool release(double slow, Part& part);
+
+  /// Bodies of the part at contacts faster than `slow`: they move in the next one too.
+  void keep(const Part& part, const Vector& u, double slow);
 
   /// Improves r, of the part; its error. False where it was ended.
   bool solve_part(const HeldBodiesRules& rules, const Part& part, bool far, double tolerance,
@@ -121,7 +128,8 @@ class HeldBodies {
   const Primal& primal_;
   CoupledSystem& system_;
   std::optional<Factorization> squares_;  // of H H^T + eps M
-  std::vector<Index> body_;  // of each coordinate
+  std::vector<Index> body_;               // of each coordinate
+  std::vector<char> moved_;               // in the last solution of 2, by body
   std::int64_t factorisations_ = 0;
   Vector shift_, r_, u_;
 };

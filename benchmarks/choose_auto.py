@@ -18,9 +18,9 @@ a failure counts as twice the limit. Where both take the same path, they cost th
 where problems are lost without it, or where its interval is above 1.
 
 --rules changes each number of the table instead, and each default that it uses: half and double, a
-tenth and ten times where it is small or large. A second table, NAME-notable, has the rows in which
-a problem is lost or won, or whose interval does not have 1 in it. The rules of "held bodies" are
-tried by constants.py.
+tenth and ten times where it is small or large. The problems are those that the table solves. A
+second table, NAME-notable, has the rows in which a problem is lost, or whose interval does not have
+1 in it. The rules of "held bodies" are tried by constants.py.
 
 --against makes one table on the judging half: this fclib beside another one's (the Python that
 imports it), solved at 1e-4, 1e-8 and 1e-12 within each limit, sum and shifted geometric mean of CPU
@@ -468,6 +468,8 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     lines = table()
     worker = Worker(tol=arguments.tol)
     found = {p: worker.run(p.file, arguments.seconds) for p in problems if p.half in arguments.half}
+    if arguments.rules:
+        found = {problem: run for problem, run in found.items() if run.solved}
     for half in arguments.half:
         own = [run for p, run in found.items() if p.half == half]
         print(f"{half}: {len(own)} problems, {sum(run.solved for run in own)} solved")

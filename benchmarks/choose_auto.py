@@ -1,7 +1,7 @@
 """Which stages and thresholds of `auto` pay: each change of its table, on problems of two halves.
 
     .venv/bin/python benchmarks/choose_auto.py FILE... [--problems 12] [--seconds 10] [--tol 1e-8]
-        [--half choose] [--only NAME...] [--results auto-stages]
+        [--half choose] [--only NAME...] [--rules] [--results auto-stages]
     .venv/bin/python benchmarks/choose_auto.py FILE... --against OTHER_PYTHON [--limits 1 10 60]
         [--tols 1e-4 1e-8 1e-12] [--jobs 1] [--other NAME] [--results auto-judged]
 
@@ -14,8 +14,13 @@ problems that came to the stage, each beside the table as it is, in one process;
 same path. A row says how many problems came to the stage and how many it solved; how many the chain
 solves without the change and with it; and the sum of CPU times with the change over that without
 it, with the 95 % interval of 2,000 bootstrap samples of the problems. The limit is one of CPU time;
-a failure counts as twice the limit. A stage pays where problems are lost without it, or where its
-interval is above 1.
+a failure counts as twice the limit. Where both take the same path, they cost the same. A stage pays
+where problems are lost without it, or where its interval is above 1.
+
+--rules changes each number of the table instead, and each default that it uses: half and double, a
+tenth and ten times where it is small or large. The problems are those that the table solves. A
+second table, NAME-notable, has the rows in which a problem is lost, or whose interval does not have
+1 in it. The rules of "held bodies" are tried by constants.py.
 
 --against makes one table on the judging half: this fclib beside another one's (the Python that
 imports it), solved at 1e-4, 1e-8 and 1e-12 within each limit, sum and shifted geometric mean of CPU
@@ -52,6 +57,7 @@ CHARGE = 2.0  # limits, for a failure
 SHIFT = 1e-3  # [s] of the geometric mean
 SHORT = 0.05  # [s] under which the least of three runs counts
 SAMPLES = 2000
+STAGES_TITLE = "What the stages of auto are worth"
 
 WORKER = """
 import json, sys, time
@@ -64,7 +70,8 @@ for line in sys.stdin:
     try:
         result = fclib.solve(problem, "auto", job["tol"], time_limit=20 * job["limit"],
                              callback=lambda *_: time.process_time() < end, **options)
-        stages = [[s.name, s.calls, s.solved, s.time] for s in result.stages]
+        stages = [[s.name, s.calls, s.solved, s.iterations, s.factorisations]
+                  for s in result.stages]
         answer = [result.status, result.cpu_s, result.setup_s, result.error, stages]
     except fclib.Error as error:
         answer = [type(error).__name__, 0.0, 0.0, None, []]
@@ -80,7 +87,7 @@ class Run:
     cpu_s: float
     setup_s: float
     error: float | None
-    stages: dict[str, tuple[int, int, float]]  # calls, solved, time [s]
+    stages: dict[str, tuple[int, int, int, int]]  # calls, solved, iterations, factorisations
 
     @property
     def solved(self) -> bool:
@@ -95,6 +102,10 @@ class Run:
     def whole(self) -> float:
         """CPU time with conversions [s]."""
         return self.cpu_s + self.setup_s
+
+    def same_path(self, other: Run) -> bool:
+        """Whether the other made the same steps to the same end."""
+        return (self.status, self.error, self.stages) == (other.status, other.error, other.stages)
 
 
 class Worker:
@@ -118,7 +129,7 @@ class Worker:
         if not line:
             raise SystemExit(f"{self._python}: has ended with {self._process.wait()}")
         status, cpu_s, setup_s, error, stages = json.loads(line)
-        return Run(status, cpu_s, setup_s, error, {name: (c, s, t) for name, c, s, t in stages})
+        return Run(status, cpu_s, setup_s, error, {name: tuple(rest) for name, *rest in stages})
 
 
 # ---- the table and its changes
@@ -207,10 +218,9 @@ def changes(lines: list[str]) -> list[Change]:
     result = []
     names = [name_of(line) for line in lines]
     for k, name in enumerate(names):
-        word = name if names.count(name) == 1 else f"{name} {1 + names[:k].count(name)}"
         if lines[k].split(":")[1].split()[0] == "gauss_seidel" and "on=whole" in lines[k]:
             continue  # where every problem starts
-        result.append(Change(f"without {word}", name, without(k)))
+        result.append(Change(f"without {numbered(names, k)}", name, without(k)))
     for gate in ("jointed=0.1", "at_most=10", "at_most=100", "at_least=0"):
         line = f"proximal newton : polish from=nothing {gate} limit=12"
         change = before_islands(line)
@@ -273,6 +283,45 @@ def changes(lines: list[str]) -> list[Change]:
     return result
 
 
+def numbered(names: Sequence[str], k: int) -> str:
+    """The name of a stage, with its number where several have it."""
+    return names[k] if names.count(names[k]) == 1 else f"{names[k]} {1 + names[:k].count(names[k])}"
+
+
+def others(rule: Any, value: float) -> list[float]:
+    """Smaller and larger values of a rule within its bounds; of a share near 1, of what is left."""
+    if 0.5 < value < 1 and rule.highest <= 1:
+        return [1 - 2 * (1 - value), 1 - (1 - value) / 2]
+    factor = 2 if 1e-2 <= value < 1e4 else 10
+    found = [value / factor, value * factor]
+    if rule.type == "int":
+        found = [float(int(number)) for number in found]
+    return [number for number in found if rule.lowest <= number <= rule.highest]
+
+
+def rule_changes(lines: list[str]) -> list[Change]:
+    """Each number of the table, and each default that it uses, made smaller and larger."""
+    methods = {method.name: method.rules for method in fclib.chain_methods()}
+    names = [name_of(line) for line in lines]
+    found = []
+    for k, line in enumerate(lines):
+        method, *words = line.partition(":")[2].split()
+        given = dict(word.split("=") for word in words)
+        if method == "held_bodies":
+            continue
+        for rule in [*methods[""], *methods[method]]:
+            if rule.type not in ("int", "float"):
+                continue
+            value = float(given.get(rule.name, rule.default))
+            where = rule.name in {own.name for own in methods[""]}
+            for other in others(rule, value) if value else []:
+                name = f"{numbered(names, k)}: {rule.name}={value:g} to {other:g}"
+                # another gate lets other problems in
+                stage = "gauss-seidel" if where else names[k]
+                found.append(Change(name, stage, with_rules(k, **{rule.name: f"{other:g}"})))
+    return found
+
+
 # ---- the problems
 
 
@@ -327,6 +376,7 @@ class Row:
     change: str
     half: str
     entered: int  # problems that came to the stage
+    other_path: int  # ... and took another path with the change
     solved_there: int  # ... and were solved by it
     solved: int  # by the table
     solved_changed: int
@@ -342,6 +392,7 @@ class Row:
             "change": self.change,
             "half": self.half,
             "came to the stage": self.entered,
+            "took another path": self.other_path,
             "solved there": self.solved_there,
             "solved": self.solved,
             "solved with the change": self.solved_changed,
@@ -381,16 +432,22 @@ def measured(
     chain = "\n".join(change.apply(lines))
     base, changed = [], []
     for problem in problems:
-        # side by side: the machine is shared
-        base.append(worker.run(problem.file, limit, chain="\n".join(lines)))
-        changed.append(worker.run(problem.file, limit, chain=chain))
+        before, run = found[problem], worker.run(problem.file, limit, chain=chain)
+        same = run.same_path(before)
+        if not same and (before.solved or run.solved):  # side by side: the machine is shared
+            before = worker.run(problem.file, limit, chain="\n".join(lines))
+        base.append(before)
+        changed.append(before if same else run)
     costs = [[cost(run, limit) for run in runs] for runs in (base, changed)]
     low, high = interval(*costs)
     return Row(
         change=change.name,
         half=half,
         entered=len(problems),
-        solved_there=sum(run.stages.get(change.stage, (0, 0, 0))[1] > 0 for run in base),
+        other_path=sum(a is not b for a, b in zip(base, changed, strict=True)),
+        solved_there=sum(
+            change.stage in run.stages and run.stages[change.stage][1] > 0 for run in base
+        ),
         solved=sum(run.solved for run in base),
         solved_changed=sum(run.solved for run in changed),
         lost=sum(a.solved and not b.solved for a, b in zip(base, changed, strict=True)),
@@ -401,17 +458,24 @@ def measured(
     )
 
 
+def notable(row: Row) -> bool:
+    """Whether problems or time were lost or won, beyond what chance explains."""
+    return bool(row.lost or row.won or row.low > 1 or row.high < 1)
+
+
 def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
     """All changes on both halves."""
     lines = table()
     worker = Worker(tol=arguments.tol)
     found = {p: worker.run(p.file, arguments.seconds) for p in problems if p.half in arguments.half}
+    if arguments.rules:
+        found = {problem: run for problem, run in found.items() if run.solved}
     for half in arguments.half:
         own = [run for p, run in found.items() if p.half == half]
         print(f"{half}: {len(own)} problems, {sum(run.solved for run in own)} solved")
     print(f"{'change':46} {'half':7} entered there  solved   lost  won  CPU ratio")
     rows = []
-    for change in changes(lines):
+    for change in rule_changes(lines) if arguments.rules else changes(lines):
         if arguments.only and not any(word in change.name for word in arguments.only):
             continue
         for half in arguments.half:
@@ -426,13 +490,18 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
                 flush=True,
             )
     if arguments.results:
-        _results.store(
-            arguments.results,
-            [row.shown() for row in rows],
-            title="What the stages of auto are worth",
-            note=f"Limit {arguments.seconds:g} s of CPU, tolerance {arguments.tol:g}; at most "
-            f"{arguments.problems} problems of a family.",
+        note = (
+            f"Limit {arguments.seconds:g} s of CPU, tolerance {arguments.tol:g}; at most "
+            f"{arguments.problems} problems of a family."
         )
+        title = "What the rules of auto are worth" if arguments.rules else STAGES_TITLE
+        _results.store(arguments.results, [row.shown() for row in rows], title=title, note=note)
+        chosen = [row.shown() for row in rows if notable(row)]
+        if arguments.rules and chosen:
+            other = sum(row.other_path > 0 for row in rows)
+            note += f" Of {len(rows)} rows {other} have a problem that took another path."
+            name = f"{arguments.results}-notable"
+            _results.store(name, chosen, title="Rules of auto whose change matters", note=note)
 
 
 def shifted_mean(values: Sequence[float]) -> float:
@@ -560,6 +629,7 @@ def main() -> None:
     parser.add_argument("--tol", type=float, default=TOLERANCE)
     parser.add_argument("--half", nargs="+", choices=HALVES, default=HALVES, help="both by default")
     parser.add_argument("--only", nargs="+", help="changes whose names have one of these in them")
+    parser.add_argument("--rules", action="store_true", help="change each number, not the stages")
     _results.add_option(parser)
     parser.add_argument("--against", help="the Python of another fclib")
     parser.add_argument("--other", default="older", help="what tables call it")

@@ -117,10 +117,7 @@ Primal restricted(const Primal& primal, std::span<const Index> contacts, int d) 
 template <int D>
 HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
                           CoupledSystem& system)
-    : problem_(problem),
-      primal_(primal),
-      system_(system),
-      body_(bodies(primal, D)) {}
+    : problem_(problem), primal_(primal), system_(system), body_(bodies(primal, D)) {}
 
 template <int D>
 void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,

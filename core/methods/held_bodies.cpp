@@ -117,10 +117,7 @@ Primal restricted(const Primal& primal, std::span<const Index> contacts, int d) 
 template <int D>
 HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
                           CoupledSystem& system)
-    : problem_(problem),
-      primal_(primal),
-      system_(system),
-      body_(bodies(primal, D)) {}
+    : problem_(problem), primal_(primal), system_(system), body_(bodies(primal, D)) {}
 
 template <int D>
 void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,
@@ -166,7 +163,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     last = error;
     Vector u;
     part.problem.velocity(r, u);
-    keep(part, u, std::max(rules.rest * size, rules.doubt * left * problem_.scale));
+    if (rules.keep) keep(part, u, std::max(rules.rest * size, rules.doubt * left * problem_.scale));
     shift_.setZero();
     for (std::size_t k = 0; k < part.contacts.size(); ++k) {
       const Index a = part.contacts[k];
@@ -242,7 +239,7 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
                    next = rules.path_again * found;
                    return proximal(long_steps, x);
                  });
-    return ended || error <= tolerance || proximal(wandering, last);
+    return ended || error <= tolerance || (rules.wander > 0 && proximal(wandering, last));
   };
   const auto quickly = [&] {
     if (!far) return proximal(long_steps, r) || proximal(short_steps, r);
@@ -259,7 +256,8 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
   };
   // what is nearly as large as the whole is left to the stages for that
   const auto few = static_cast<double>(part.contacts.size()) <= rules.most * problem_.nc();
-  if (!quickly() && few && !proximal(wandering, r)) path();
+  const bool solved = quickly() || !few || (rules.wander > 0 && proximal(wandering, r));
+  if (!solved && rules.path > 0) path();
   factorisations_ += system.factorisations();
   return !ended;
 }

@@ -8,17 +8,17 @@
 //
 //   1. the convex problem, by the interior point: what rests there rests to many digits, and its
 //      reactions are at the centre of those that there are;
-//   2. bodies that hardly move are held at rest, but for those that moved in the last solution of
-//      2. Coulomb's law for the others, from the reactions of 1, gives s; s = 0 at contacts that
-//      hardly slide, and at those of held bodies alone.
+//   2. bodies that hardly move are held at rest; with `keep`, but for those that moved in the last
+//      solution of 2. Coulomb's law for the others, from the reactions of 1, gives s; s = 0 at
+//      contacts that hardly slide, and at those of held bodies alone.
 //
 // Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
 // "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
 // may rest in the end, and 2 is far harder with them than without.
 //
 // Where the first methods fail on 2, W of 2 may hardly see some of its reactions either. But 2 is
-// small: a long proximal point, and the path of methods/homotopy.hpp, cost less there than a convex
-// problem on the whole.
+// small: a long proximal point (`wander`), and the path of methods/homotopy.hpp (`path`), cost less
+// there than a convex problem on the whole.
 //
 // Let W = H^T M^-1 H, and B what is not held. The problem of 2 is u = W_B r + q_B on the contacts
 // of B, with W_B = H_B^T M_BB^-1 H_B and q_B such that the reactions of 1 give the velocity of 1,
@@ -44,6 +44,7 @@ struct HeldBodiesRules {
   double better = 0.5;      ///< share of the least error at which it did
   double most = 0.65;       ///< share of the contacts in 2, over which it must be solved at once
   double regular = 1e-9;    ///< eps of how fast a body is, over the traces of H H^T and M
+  bool keep = false;        ///< what moved in the last solution of 2 moves on
   double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
   double creep = 0.1;       ///< ... and over the error of 1 and ||q||
   double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
@@ -72,12 +73,12 @@ struct HeldBodiesRules {
   std::int64_t near_proximal = 40;  ///< its factorisations
   // where neither solves 2: a proximal point whose error may rise, and the path from a convex
   // problem
-  double wander_kappa = 100;   ///< of that proximal point at first
-  std::int64_t wander = 300;   ///< its factorisations
-  double smoothing = 1;        ///< of the path
-  std::int64_t path = 1500;    ///< factorisations on it
-  double path_polish = 1e-4;   ///< error under which its points are polished, with long steps
-  double path_again = 0.1;     ///< share of that error at which this is tried again
+  double wander_kappa = 100;  ///< of that proximal point at first
+  std::int64_t wander = 0;    ///< its factorisations
+  double smoothing = 1;       ///< of the path
+  std::int64_t path = 0;      ///< factorisations on it
+  double path_polish = 1e-4;  ///< error under which its points are polished, with long steps
+  double path_again = 0.1;    ///< share of that error at which this is tried again
 };
 
 /// The coordinates of some contacts, with all that M links to them, and these contacts.

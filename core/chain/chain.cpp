@@ -17,6 +17,7 @@
 #include "linalg/cpu_time.hpp"
 #include "linalg/memory.hpp"
 #include "methods/pivoting.hpp"
+#include "methods/rolling_interior_point.hpp"
 #include "reduced/gauss_seidel.hpp"
 #include "reduced/no_solution.hpp"
 #include "reduced/relative_error.hpp"
@@ -238,6 +239,7 @@ class Island {
     if (when.below > 0 && !(error_ < when.below)) return false;
     if (when.guessed && !guessed_) return false;
     if ((when.law == Law::coulomb || coulomb_alone(rule.method)) && !coulomb) return false;
+    if (when.law == Law::rolling && coulomb) return false;
     if (when.jointed > 0 && !(jointed() > when.jointed)) return false;
     return when.bodies == Bodies::any ||
            (when.bodies == Bodies::fewer) == CoupledSystem::bodies_are_fewer(problem_);
@@ -548,19 +550,19 @@ class Island {
   };
 
   void run(const InteriorPointStage& stage) {
-    if constexpr (std::is_same_v<Cone, Coulomb<D>>) {
-      InteriorPointRules rules = stage;
-      if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
-      InteriorPoint<D> method(problem_, system());
-      Polisher polish(*this, stage.polish, stage.again);
-      // the last steps to a loose tolerance are its own
-      const double near = tolerance_ > stage.own_accuracy ? stage.again * tolerance_ : 0;
-      method.solve(rules, start_of(stage.from), [&](double error, const Vector& r) {
-        if (take(1, error, r)) return true;
-        if (error > near) polish(error, r);
-        return done();
-      });
-    }
+    using Path = std::conditional_t<std::is_same_v<Cone, Coulomb<D>>, InteriorPoint<D>,
+                                    RollingInteriorPoint<D == 2 ? 3 : D>>;
+    InteriorPointRules rules = stage;
+    if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
+    Path method(problem_, system());
+    Polisher polish(*this, stage.polish, stage.again);
+    // the last steps to a loose tolerance are its own
+    const double near = tolerance_ > stage.own_accuracy ? stage.again * tolerance_ : 0;
+    method.solve(rules, start_of(stage.from), [&](double error, const Vector& r) {
+      if (take(1, error, r)) return true;
+      if (error > near) polish(error, r);
+      return done();
+    });
   }
 
   void run(const HeldBodiesStage& rules) {

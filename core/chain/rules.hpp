@@ -38,8 +38,8 @@ namespace fclib::chain {
 enum class On { whole, islands };
 inline constexpr std::array<std::string_view, 2> on_names{"whole", "islands"};
 
-enum class Law { any, coulomb };
-inline constexpr std::array<std::string_view, 2> law_names{"any", "coulomb"};
+enum class Law { any, coulomb, rolling };
+inline constexpr std::array<std::string_view, 3> law_names{"any", "coulomb", "rolling"};
 
 enum class Bodies { any, fewer, more };
 inline constexpr std::array<std::string_view, 3> bodies_names{"any", "fewer", "more"};
@@ -93,7 +93,7 @@ struct When {
                                .choices = bodies_names},
         OptionField<O, Law>{.name = "law",
                             .member = &O::law,
-                            .doc = "Coulomb's cone alone, or rolling ones too",
+                            .doc = "Coulomb's cone alone, rolling ones alone, or both",
                             .choices = law_names},
     };
   }
@@ -418,7 +418,8 @@ struct InteriorPointStage : InteriorPointRules {
   // what it reaches is polished by the proximal point
   static constexpr std::string_view families = "interior point, newton, proximal point";
   static constexpr std::string_view doc =
-      "the interior point with de Saxce's term in Newton's system, polished as it comes near";
+      "the interior point with de Saxce's term in Newton's system, polished as it comes near; "
+      "without smoothing for rolling contacts";
   Start from = Start::swept;
   double far = 0;
   double polish = 1e-5;
@@ -870,8 +871,7 @@ using Table = std::vector<StageRule>;
 
 /// Whether a method takes Coulomb's cone alone.
 inline bool coulomb_alone(const Method& method) {
-  return std::holds_alternative<InteriorPointStage>(method) ||
-         std::holds_alternative<AssociatedStage>(method) ||
+  return std::holds_alternative<AssociatedStage>(method) ||
          std::holds_alternative<HeldBodiesStage>(method);
 }
 

@@ -97,7 +97,44 @@ void BlockMatrix::fill(const Matrix& a) {
   }
 }
 
-void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y) const {
+template <int D>
+void BlockMatrix::multiply_rows(Index first, Index last, const Vector& x, const Vector& q,
+                                Vector& y) const {
+  y.segment(Eigen::Index{D} * first, Eigen::Index{D} * (last - first)) =
+      q.segment(Eigen::Index{D} * first, Eigen::Index{D} * (last - first));
+  for (Index contact = 0; contact < nc_; ++contact) {
+    std::size_t begin = column_[contact];
+    std::size_t end = column_[contact + 1];
+    if (row_[end - 1] < first || row_[begin] >= last) continue;
+    double part[D];
+    bool zero = true;
+    for (int c = 0; c < D; ++c) {
+      part[c] = x[Eigen::Index{D} * contact + c];
+      zero = zero && part[c] == 0;
+    }
+    if (zero) continue;
+    while (row_[begin] < first) ++begin;
+    while (row_[end - 1] >= last) --end;
+    add_blocks<D>(begin, end, part, y.data());
+  }
+}
+
+void BlockMatrix::multiply_add(const Vector& x, const Vector& q, Vector& y,
+                               Workers* workers) const {
+  if (workers != nullptr && !dense_) {
+    y.resize(q.size());
+    return in_parts(workers, nc_, [&](std::int64_t from, std::int64_t to) {
+      const auto first = static_cast<Index>(from);
+      const auto last = static_cast<Index>(to);
+      if (d_ == 2) {
+        multiply_rows<2>(first, last, x, q, y);
+      } else if (d_ == 3) {
+        multiply_rows<3>(first, last, x, q, y);
+      } else {
+        multiply_rows<5>(first, last, x, q, y);
+      }
+    });
+  }
   y = q;
   for (Index contact = 0; contact < nc_; ++contact) {
     const double* part = x.data() + std::ptrdiff_t{d_} * contact;

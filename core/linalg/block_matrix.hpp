@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "linalg/matrix.hpp"
+#include "linalg/workers.hpp"
 
 namespace fclib {
 
@@ -40,8 +41,8 @@ class BlockMatrix {
   template <int D>
   void add_column(Index contact, const double* delta, double* y) const;
 
-  /// y = W x + q, all of length d nc.
-  void multiply_add(const Vector& x, const Vector& q, Vector& y) const;
+  /// y = W x + q, all of length d nc. Workers share the rows; each sum has its order.
+  void multiply_add(const Vector& x, const Vector& q, Vector& y, Workers* workers = nullptr) const;
 
   /// Calls visit(row, col, block) for each stored block, a D x D matrix.
   template <int D, class Visitor>
@@ -57,6 +58,14 @@ class BlockMatrix {
  private:
   template <int D>
   void fill(const Matrix& a);
+
+  /// y += W(rows of these blocks of a column) x, y from its beginning.
+  template <int D>
+  void add_blocks(std::size_t first, std::size_t last, const double* x, double* y) const;
+
+  /// y = W x + q for the block rows from `first` up to `last`.
+  template <int D>
+  void multiply_rows(Index first, Index last, const Vector& x, const Vector& q, Vector& y) const;
 
   int d_ = 3;
   Index nc_ = 0;
@@ -101,8 +110,12 @@ inline void BlockMatrix::add_column(Index contact, const double* delta,
     }
     return;
   }
-  const std::size_t first = column_[contact];
-  const std::size_t last = column_[contact + 1];
+  add_blocks<D>(column_[contact], column_[contact + 1], x, y);
+}
+
+template <int D>
+inline void BlockMatrix::add_blocks(std::size_t first, std::size_t last, const double* x,
+                                    double* __restrict y) const {
   const double* block = values_.data() + std::size_t{D * D} * first;
   for (std::size_t k = first; k < last; ++k, block += D * D) {
     double* target = y + std::ptrdiff_t{D} * row_[k];

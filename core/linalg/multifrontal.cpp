@@ -15,6 +15,12 @@ constexpr double worth_threads = 3e7;
 /// Rows left of the pivots of a front that they share, a panel at a time.
 constexpr Index few = 768;
 
+/// Operations that it takes to put together an entry of a front, about.
+constexpr double moved = 10;
+
+/// Fronts for each thread that may be above the subtrees.
+constexpr std::size_t cuts = 16;
+
 }  // namespace
 
 Multifrontal::Multifrontal(const BlockPattern& pattern, int threads)
@@ -28,10 +34,11 @@ Multifrontal::Multifrontal(std::shared_ptr<const Fronts> symbolic, int threads)
   share_out(symbolic_->flops > worth_threads ? threads : 1);
   work_.resize(std::max<std::size_t>(1, shares_.size()));
   permuted_.resize(symbolic_->size);
-  local_.resize(symbolic_->largest);
+  local_.resize(work_.size(), Vector(symbolic_->largest));
 }
 
-/// Subtrees of fronts, none of which has much more than its thread's share of the work.
+/// Subtrees of fronts for each thread, and the fronts above them for all: cut where the time that
+/// this takes, by operations, is least.
 void Multifrontal::share_out(int threads) {
   const std::size_t count = factors_.size();
   top_.clear();
@@ -42,45 +49,79 @@ void Multifrontal::share_out(int threads) {
     return;
   }
   workers_ = std::make_unique<Workers>(threads);
-  std::vector<double> below(count);  // operations of the subtree
-  std::vector<char> open(count, 0);  // above the subtrees
+  const auto own = static_cast<std::size_t>(workers_->count());
+  std::vector<double> alone(count);  // operations of the front
+  std::vector<double> below(count);  // ... of its subtree
   std::vector<std::size_t> parent(count, count);
   for (std::size_t f = 0; f < count; ++f) {
     const Front& front = symbolic_->fronts[f];
     const double k = front.pivots;
     const double u = front.size - front.pivots;
-    below[f] += k * k * k / 3 + k * k * u + k * u * u + 1000;
+    alone[f] = k * k * k / 3 + k * k * u + k * u * u + moved * (k + u) * (k + u);
+    below[f] += alone[f];
     for (const Index child : front.children) {
       below[f] += below[child];
       parent[child] = f;
     }
   }
-  const double most = symbolic_->flops / (2.0 * threads);
-  for (std::size_t f = 0; f < count; ++f) open[f] = below[f] > most;
-  std::vector<std::size_t> roots;
+  const auto smaller = [&](std::size_t a, std::size_t b) { return below[a] < below[b]; };
+  std::vector<std::size_t> roots;  // a heap, the largest subtree first
+  for (std::size_t f = 0; f < count; ++f) {
+    if (parent[f] == count) roots.push_back(f);
+  }
+  std::make_heap(roots.begin(), roots.end(), smaller);
+  std::vector<std::size_t> owner(count, own);  // own: nobody's
+  const auto dealt = [&] {  // the largest load, each subtree given to whom has least
+    std::vector<std::size_t> sorted = roots;
+    std::sort_heap(sorted.begin(), sorted.end(), smaller);
+    std::vector<double> load(own, 0.0);
+    for (auto root = sorted.rbegin(); root != sorted.rend(); ++root) {
+      const auto least = std::min_element(load.begin(), load.end());
+      *least += below[*root];
+      owner[*root] = static_cast<std::size_t>(least - load.begin());
+    }
+    return *std::max_element(load.begin(), load.end());
+  };
+  std::vector<std::size_t> opened;
+  double above = 0;
+  double best = dealt();
+  std::size_t cut = 0;  // fronts opened of the best
+  while (opened.size() < cuts * own && !roots.empty()) {
+    std::pop_heap(roots.begin(), roots.end(), smaller);
+    const std::size_t top = roots.back();
+    roots.pop_back();
+    opened.push_back(top);
+    const Front& front = symbolic_->fronts[top];
+    // the products of large fronts are shared out too
+    above += front.size - front.pivots >= few ? alone[top] / static_cast<double>(own) : alone[top];
+    for (const Index child : front.children) {
+      roots.push_back(static_cast<std::size_t>(child));
+      std::push_heap(roots.begin(), roots.end(), smaller);
+    }
+    if (const double time = above + dealt(); time < best) {
+      best = time;
+      cut = opened.size();
+    }
+  }
+  // back to the best
+  std::vector<char> open(count, 0);
+  for (std::size_t k = 0; k < cut; ++k) open[opened[k]] = 1;
+  roots.clear();
+  for (std::size_t f = 0; f < count; ++f) {
+    if (!open[f] && (parent[f] == count || open[parent[f]])) roots.push_back(f);
+  }
+  std::make_heap(roots.begin(), roots.end(), smaller);
+  dealt();
+  shares_.resize(own);
+  for (std::size_t f = count; f-- > 0;) {
+    if (!open[f] && parent[f] < count && !open[parent[f]]) owner[f] = owner[parent[f]];
+  }
   for (std::size_t f = 0; f < count; ++f) {
     if (open[f]) {
       top_.push_back(f);
-    } else if (parent[f] == count || open[parent[f]]) {
-      roots.push_back(f);
+    } else {
+      shares_[owner[f]].push_back(f);
     }
-  }
-  std::stable_sort(roots.begin(), roots.end(),
-                   [&](std::size_t a, std::size_t b) { return below[a] > below[b]; });
-  std::vector<double> load(static_cast<std::size_t>(threads), 0.0);
-  std::vector<Index> owner(count, -1);
-  for (const std::size_t root : roots) {
-    const auto least = std::min_element(load.begin(), load.end());
-    *least += below[root];
-    owner[root] = static_cast<Index>(least - load.begin());
-  }
-  shares_.resize(static_cast<std::size_t>(threads));
-  for (std::size_t f = count; f-- > 0;) {
-    if (open[f]) continue;
-    if (owner[f] < 0) owner[f] = owner[parent[f]];
-  }
-  for (std::size_t f = 0; f < count; ++f) {
-    if (!open[f]) shares_[owner[f]].push_back(f);
   }
 }
 
@@ -230,6 +271,54 @@ int Multifrontal::determinant_sign() const {
   return negative ? -1 : 1;
 }
 
+void Multifrontal::forward(std::size_t f, Vector& local) const {
+  const int d = symbolic_->d;
+  const Front& front = symbolic_->fronts[f];
+  const Factors& factors = factors_[f];
+  const Index u = front.size - front.pivots;
+  const Index pivots = front.pivots / d;
+  for (Index k = 0; k < pivots; ++k) {
+    for (int c = 0; c < d; ++c) local[d * k + c] = permuted_[d * front.nodes[k] + c];
+  }
+  local.segment(front.pivots, u).setZero();
+  for (const Index child : front.children) {
+    const std::vector<Index>& to_parent = symbolic_->fronts[child].to_parent;
+    const double* source = factors_[child].right.data();
+    for (const Index to : to_parent) {
+      for (int c = 0; c < d; ++c) local[to + c] += *source++;
+    }
+  }
+  auto top = local.head(front.pivots);
+  for (Index k = 0; k < front.pivots; ++k) {
+    const Index other = factors.exchanged[static_cast<std::size_t>(k)];
+    if (other != k) std::swap(top[k], top[other]);
+  }
+  factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(top);
+  for (Index k = 0; k < pivots; ++k) {
+    for (int c = 0; c < d; ++c) permuted_[d * front.nodes[k] + c] = local[d * k + c];
+  }
+  if (u == 0) return;
+  factors.right = local.segment(front.pivots, u);
+  factors.right.noalias() -= factors.lower * top;
+}
+
+void Multifrontal::backward(std::size_t f, Vector& local) const {
+  const int d = symbolic_->d;
+  const Front& front = symbolic_->fronts[f];
+  const Factors& factors = factors_[f];
+  const Index u = front.size - front.pivots;
+  for (std::size_t k = 0; k < front.nodes.size(); ++k) {
+    for (int c = 0; c < d; ++c)
+      local[d * static_cast<Index>(k) + c] = permuted_[d * front.nodes[k] + c];
+  }
+  auto top = local.head(front.pivots);
+  if (u > 0) top.noalias() -= factors.upper * local.segment(front.pivots, u);
+  factors.diagonal.triangularView<Eigen::Upper>().solveInPlace(top);
+  for (Index k = 0; k < front.pivots / d; ++k) {
+    for (int c = 0; c < d; ++c) permuted_[d * front.nodes[k] + c] = local[d * k + c];
+  }
+}
+
 void Multifrontal::solve(Vector& b) const {
   const int d = symbolic_->d;
   const std::vector<Index>& position = symbolic_->position;
@@ -237,42 +326,21 @@ void Multifrontal::solve(Vector& b) const {
   for (Index node = 0; node < n; ++node) {
     for (int c = 0; c < d; ++c) permuted_[d * position[node] + c] = b[d * node + c];
   }
-  const auto gather = [&](const Front& front) {
-    for (std::size_t k = 0; k < front.nodes.size(); ++k) {
-      for (int c = 0; c < d; ++c)
-        local_[d * static_cast<Index>(k) + c] = permuted_[d * front.nodes[k] + c];
-    }
+  const auto share = [&](const auto& work) {
+    if (shares_.empty()) return;
+    workers_->run_tasks(static_cast<int>(shares_.size()), [&](int k) {
+      const auto own = static_cast<std::size_t>(k);
+      work(shares_[own], local_[own]);
+    });
   };
-  const auto scatter = [&](const Front& front) {
-    for (std::size_t k = 0; k < front.nodes.size(); ++k) {
-      for (int c = 0; c < d; ++c)
-        permuted_[d * front.nodes[k] + c] = local_[d * static_cast<Index>(k) + c];
-    }
-  };
-  for (std::size_t f = 0; f < factors_.size(); ++f) {
-    const Front& front = symbolic_->fronts[f];
-    const Factors& factors = factors_[f];
-    const Index u = front.size - front.pivots;
-    gather(front);
-    auto top = local_.head(front.pivots);
-    for (Index k = 0; k < front.pivots; ++k) {
-      const Index other = factors.exchanged[static_cast<std::size_t>(k)];
-      if (other != k) std::swap(top[k], top[other]);
-    }
-    factors.diagonal.triangularView<Eigen::UnitLower>().solveInPlace(top);
-    if (u > 0) local_.segment(front.pivots, u).noalias() -= factors.lower * top;
-    scatter(front);
-  }
-  for (std::size_t f = factors_.size(); f-- > 0;) {
-    const Front& front = symbolic_->fronts[f];
-    const Factors& factors = factors_[f];
-    const Index u = front.size - front.pivots;
-    gather(front);
-    auto top = local_.head(front.pivots);
-    if (u > 0) top.noalias() -= factors.upper * local_.segment(front.pivots, u);
-    factors.diagonal.triangularView<Eigen::Upper>().solveInPlace(top);
-    scatter(front);
-  }
+  share([&](const std::vector<std::size_t>& fronts, Vector& local) {
+    for (const std::size_t f : fronts) forward(f, local);
+  });
+  for (const std::size_t f : top_) forward(f, local_[0]);
+  for (auto f = top_.rbegin(); f != top_.rend(); ++f) backward(*f, local_[0]);
+  share([&](const std::vector<std::size_t>& fronts, Vector& local) {
+    for (auto f = fronts.rbegin(); f != fronts.rend(); ++f) backward(*f, local);
+  });
   for (Index node = 0; node < n; ++node) {
     for (int c = 0; c < d; ++c) b[d * node + c] = permuted_[d * position[node] + c];
   }

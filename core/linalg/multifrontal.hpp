@@ -6,8 +6,9 @@
 // replaced by a small one, which iterative refinement by the caller makes good. A small system is
 // one front: a dense LU.
 //
-// Threads take subtrees of fronts, then parts of the products of the fronts above; the result is
-// the same to the last bit for any number of them.
+// Threads take subtrees of fronts, then parts of the products of the fronts above; solves the
+// subtrees alone. What a front adds to its parent is kept until the parent takes it, child by
+// child, so the result is the same to the last bit for any number of threads.
 #pragma once
 
 #include <Eigen/Dense>
@@ -42,7 +43,9 @@ class Multifrontal {
   /// is not finite.
   bool factorise(const std::vector<double>& values);
 
-  /// CPU time of all factorisations on other threads than the caller's [s].
+  /// The threads that share its work; none where it is too small for them.
+  [[nodiscard]] Workers* workers() const { return workers_.get(); }
+  /// CPU time of other threads than the caller's [s].
   [[nodiscard]] double others_cpu() const { return workers_ ? workers_->cpu_s() : 0; }
 
   /// Of the determinant of the matrix factorised last: 1 or -1.
@@ -59,6 +62,7 @@ class Multifrontal {
     Dense lower, upper;            // L21, U12
     std::vector<Index> exchanged;  // rows, as in LAPACK
     Dense update;                  // until the parent has taken it
+    mutable Vector right;          // what a solve leaves to the parent
   };
 
   bool factorise_pivots(Eigen::Ref<Dense> a, std::vector<Index>& exchanged, double tiny,
@@ -66,6 +70,8 @@ class Multifrontal {
   bool factorise_front(std::size_t f, const std::vector<double>& values, double tiny, Dense& work,
                        int threads);
   void share_out(int threads);
+  void forward(std::size_t f, Vector& local) const;
+  void backward(std::size_t f, Vector& local) const;
   template <class F>
   void split(Index n, int threads, const F& f);
 
@@ -76,7 +82,7 @@ class Multifrontal {
   std::vector<std::size_t> top_;                  // those above them, which all threads work on
   std::vector<Dense> work_;                       // of each thread
   mutable Vector permuted_;
-  mutable Vector local_;
+  mutable std::vector<Vector> local_;  // of each thread
 };
 
 }  // namespace fclib

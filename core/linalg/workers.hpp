@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <thread>
 #include <vector>
 
@@ -44,5 +45,13 @@ class Workers {
   std::vector<double> cpu_;
   std::vector<std::thread> threads_;
 };
+
+/// Calls f(first, last) for parts of 0..n, one on each worker; for all of it where there are none.
+template <class F>
+void in_parts(Workers* workers, std::int64_t n, const F& f) {
+  if (workers == nullptr) return f(std::int64_t{0}, n);
+  const std::int64_t count = workers->count();
+  workers->run([&](int k) { f(k * n / count, (k + 1) * n / count); });
+}
 
 }  // namespace fclib

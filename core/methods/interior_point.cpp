@@ -139,7 +139,7 @@ double InteriorPoint<D>::det(const Vec& x) {
 
 template <int D>
 void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
-  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
   tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
   width_ = rules.smoothing * tau_;
   residual_ = 0;
@@ -172,7 +172,7 @@ auto InteriorPoint<D>::scaled_target(Index a) const -> Vec {
 template <int D>
 void InteriorPoint<D>::assemble(double delta, bool associated) {
   std::vector<double>& blocks = system_.blocks();
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  each([&](Index a) {
     const double mu = problem_.friction.mu[a];
     Scaling& s = scaling_[static_cast<std::size_t>(a)];
     const Vec x = x_.template segment<D>(D * a);
@@ -227,7 +227,7 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
     const Mat regular = Mat::Identity() + delta * d0;
     s.regular = inverse<D>(regular);
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = s.regular * d0 / omega_;
-  }
+  });
 }
 
 template <int D>
@@ -275,16 +275,16 @@ void InteriorPoint<D>::correct_shift(double step) {
 
 template <int D>
 bool InteriorPoint<D>::direction(double delta) {
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  each([&](Index a) {
     const Scaling& s = scaling_[static_cast<std::size_t>(a)];
     dr_.template segment<D>(D * a) =
         s.regular * (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
-  }
+  });
   system_.solve(dr_);
   if (!dr_.allFinite()) return false;
-  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_);  // W dr + R
+  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_, system_.workers());  // W dr + R
   rhs_ += delta * dr_;
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  each([&](Index a) {
     const double mu = problem_.friction.mu[a];
     const Scaling& s = scaling_[static_cast<std::size_t>(a)];
     Vec dx = dr_.template segment<D>(D * a);
@@ -298,7 +298,7 @@ bool InteriorPoint<D>::direction(double delta) {
     }
     dx_.template segment<D>(D * a) = dx;
     dy_.template segment<D>(D * a) = dy;
-  }
+  });
   return true;
 }
 

@@ -74,6 +74,14 @@ class InteriorPoint {
   /// ||y_T||, smoothed at its kink.
   [[nodiscard]] double sliding(double norm) const { return std::hypot(norm, width_) - width_; }
 
+  /// f(a) for each contact, on all threads; it writes what is the contact's alone.
+  template <class F>
+  void each(const F& f) const {
+    in_parts(system_.workers(), problem_.nc(), [&](std::int64_t first, std::int64_t last) {
+      for (auto a = first; a < last; ++a) f(static_cast<Index>(a));
+    });
+  }
+
   void evaluate(const InteriorPointRules& rules);
 
   /// S N g of a contact.

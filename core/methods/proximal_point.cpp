@@ -139,7 +139,7 @@ int ProximalPoint<Cone>::inner(double kappa, std::int64_t stop_at) {
     double trial_norm = 0;
     for (int halving = 0;; ++halving) {
       trial_ = p_ + length * step_;
-      problem_.velocity(trial_, trial_u_);
+      problem_.velocity(trial_, trial_u_, system_.workers());
       trial_norm = residual(kappa, trial_, trial_u_, f_);
       if (trial_norm < norm || halving == max_halvings) break;
       length *= 0.5;
@@ -152,7 +152,7 @@ int ProximalPoint<Cone>::inner(double kappa, std::int64_t stop_at) {
     const double rounding = 10 * std::numeric_limits<double>::epsilon() * kappa * p_.norm();
     if (norm > std::max(1e-2 * first, rounding)) continue;
     put_into_cones(kappa, p_, up_, next_);
-    problem_.velocity(next_, next_u_);
+    problem_.velocity(next_, next_u_, system_.workers());
     next_error_ = relative_error<Cone>(problem_, next_u_, next_);
     const double gap = (next_u_ - up_).norm() / problem_.scale;
     if (gap <= 0.1 * next_error_ || gap <= 1e-15 || norm <= 1e-15 * p_.norm()) return step;

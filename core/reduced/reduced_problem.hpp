@@ -41,11 +41,11 @@ struct ReducedProblem {
   [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }
 
   /// u = W r + q.
-  void velocity(const Vector& r, Vector& u) const {
+  void velocity(const Vector& r, Vector& u, Workers* workers = nullptr) const {
     if (known_r.size() == 0) {
-      W.multiply_add(r, q, u);
+      W.multiply_add(r, q, u, workers);
     } else {
-      W.multiply_add(r - known_r, known_u, u);
+      W.multiply_add(r - known_r, known_u, u, workers);
     }
   }
 };

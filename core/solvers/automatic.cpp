@@ -29,11 +29,13 @@ gauss-seidel                    : gauss_seidel                                  
 spectral gradient               : spectral_gradient   at_least=150 law=coulomb         worth=2 first_look=100
 proximal newton                 : polish              below=1e-5                       limit=24
 # from near what the sweeps have; then, where its path folds, from far away
-interior point                  : interior_point      from=swept                       far=4 tau=0.03 limit=60
+interior point                  : interior_point      law=coulomb from=swept           far=4 tau=0.03 limit=60
+# rolling contacts have errors in two units: where it slows down, the proximal point is near enough
+interior point                  : interior_point      law=rolling from=swept           far=4 tau=0.03 limit=60 polish=1e-4
 # dense heaps on which its path ends: gradients, for what the interior point has cost
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
-interior point, shorter steps   : interior_point      from=nothing                     tau=10 step_cap=0.8 delta=1e-3 limit=100
+interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
 gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows
 no solution?                    : no_solution                                          limit=60
@@ -41,7 +43,7 @@ no solution?                    : no_solution                                   
 # then without most of them
 held bodies                     : held_bodies         at_least=100                     creep=0
 held bodies                     : held_bodies         at_least=100
-interior point, smoothed        : interior_point      from=swept                       smoothing=1 step_cap=0.8 delta=1e-3 limit=100
+interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 associated                      : associated
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200

@@ -232,7 +232,7 @@ void CoupledSystem::solve(Vector& x) {
   rhs_ = x;
   solve_once(x);
   // one step of refinement: r = h - B x - D W x
-  problem_.W.multiply_add(x, zero_, product_);
+  problem_.W.multiply_add(x, zero_, product_, workers());
   apply(D_, product_, residual_);
   if (B_.empty()) {
     rhs_ -= x;

@@ -56,7 +56,9 @@ class CoupledSystem {
   /// [bytes] What a factorisation takes, about, before it is made.
   [[nodiscard]] double bytes() const { return lu_.bytes(); }
   [[nodiscard]] bool on_bodies() const { return on_bodies_; }
-  /// CPU time of factorisations on other threads than the caller's [s].
+  /// Threads that may share loops over the contacts too; none where the system is small.
+  [[nodiscard]] Workers* workers() const { return lu_.workers(); }
+  /// CPU time of other threads than the caller's [s].
   [[nodiscard]] double others_cpu() const { return lu_.others_cpu(); }
 
  private:

@@ -513,9 +513,9 @@ def test_a_chain_of_ones_own() -> None:
     for problem_, names in ((free, ["b"]), (joined, ["a"])):
         chain = "a : proximal_point jointed=0.01 from=nothing limit=500; b : proximal_point"
         assert stage_names(fclib.solve(problem_, chain=chain))[:1] == names
-    # an interior point has no rolling cone
+    # the convex problem of an associated law is that of Coulomb's cone alone
     rolling = planted_rolling(5, 17, 10)[0]
-    result = fclib.solve(rolling, chain="a : interior_point ; b : proximal_point limit=500")
+    result = fclib.solve(rolling, chain="a : associated ; b : proximal_point limit=500")
     assert stage_names(result) == ["b"]
 
 
@@ -583,8 +583,8 @@ def test_reactions_whose_rounding_is_more_than_the_tolerance() -> None:
 
 
 WEDGED = {  # stages that solve a few contacts of high friction, and problems of theirs
-    "pivoting": [450, 718, 1190, 2304, 2890],
-    "random starts": [1031, 1164, 1933],
+    "pivoting": [450, 1190, 2304, 2890],
+    "random starts": [1031, 1164],
 }
 
 

@@ -35,6 +35,31 @@ TEST(BlockMatrix, agrees_with_the_matrix_it_is_made_from) {
   }
 }
 
+template <int D>
+void expect_same_bits(int threads) {
+  testing::RandomData random(5);
+  constexpr int size = 240;
+  const BlockMatrix a(Matrix::from_eigen(random.sparse(size, size, 0.01)), D);
+  ASSERT_FALSE(a.dense());
+  Vector x = random.vector(size);
+  x.segment(D, D).setZero();
+  const Vector q = random.vector(size);
+  Vector expected(size);
+  a.multiply_add(x, q, expected);
+  Workers workers(threads);
+  Vector y;
+  a.multiply_add(x, q, y, &workers);
+  EXPECT_EQ(y, expected) << threads;
+}
+
+TEST(BlockMatrix, any_number_of_threads_gives_the_same_bits) {
+  for (const int threads : {1, 2, 3, 7}) {
+    expect_same_bits<2>(threads);
+    expect_same_bits<3>(threads);
+    expect_same_bits<5>(threads);
+  }
+}
+
 TEST(BlockMatrix, a_missing_diagonal_block_is_zero) {
   const BlockMatrix a(Matrix::from_eigen(SparseColumns(90, 90)), 3);
   EXPECT_EQ(a.diagonal_block<3>(17).norm(), 0);

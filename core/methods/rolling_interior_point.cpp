@@ -1,0 +1,360 @@
+#include "methods/rolling_interior_point.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "reduced/relative_error.hpp"
+#include "reduced/scale.hpp"
+
+namespace fclib {
+
+template <int D>
+RollingInteriorPoint<D>::RollingInteriorPoint(const ReducedProblem& problem, CoupledSystem& system)
+    : problem_(problem), system_(system) {
+  omega_ = mean_diagonal(problem);
+  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
+  if (!(size_q_ > 0)) size_q_ = 1.0;
+  contacts_.resize(static_cast<std::size_t>(problem.nc()));
+  for (Index a = 0; a < problem.nc(); ++a) {
+    auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
+    groups[0].coefficient = problem.friction.mu[a];
+    groups[1].coefficient = problem.friction.mu_r[a];
+    for (Group& group : groups) group.tail = group.coefficient > 0;
+    if (!groups[0].tail && !groups[1].tail) groups[0].coefficient = 1;
+    for (const Group& group : groups) count_ += group.coefficient > 0;
+  }
+}
+
+template <int D>
+void RollingInteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& guess,
+                                    FunctionRef<bool(double error, const Vector& r)> report) {
+  start(rules, guess);
+  double delta = rules.delta;
+  double least = std::numeric_limits<double>::infinity();
+  int least_at = 0;
+  for (int k = 0; k < rules.max_iterations; ++k) {
+    evaluate();
+    physical_ = r_ * (size_q_ / omega_);
+    velocity_ = u_ * size_q_;
+    const double error = relative_error<Cone>(problem_, velocity_, physical_);
+    if (report(error, physical_)) return;
+    if (error < 0.5 * least) {
+      least = error;
+      least_at = k;
+    }
+    if (k - least_at > rules.patience || !(tau_ > 1e-15)) return;
+    if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
+    delta = std::clamp(delta, 1e-8, 1.0);
+    assemble(delta);
+    if (!system_.factorise()) return;
+    each_group([](Contact&, Group& group, int) { group.g = -group.lambda; });
+    if (!direction(delta)) return;
+    const double affine_step = std::min(1.0, longest());
+    double affine_gap = 0;
+    each_group([&](Contact&, Group& group, int) {
+      group.affine_x = group.dx;
+      group.affine_y = group.dy;
+      affine_gap += (group.x + affine_step * group.dx).dot(group.y + affine_step * group.dy);
+    });
+    double sigma = std::clamp(std::pow(affine_gap / count_ / tau_, 3), 1e-6, 1.0);
+    if (residual_ > rules.balance * tau_) {
+      sigma = 1;
+    } else if (residual_ > 0.1 * rules.balance * tau_) {
+      sigma = std::max(sigma, 0.3);
+    }
+    const double cap = std::clamp(1 - tau_, std::min(0.9, rules.step_cap), rules.step_cap);
+    double step = 0;
+    for (int attempt = 0; attempt < 3; ++attempt) {
+      if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
+      correct(sigma, attempt == 0);
+      if (attempt == 0) correct_shift(affine_step);
+      if (!direction(delta)) return;
+      step = std::min(1.0, cap * longest());
+      if (step >= 0.3) break;
+    }
+    r_ += step * dr_;
+    for (Index a = 0; a < problem_.nc(); ++a) {  // x follows from r, to the last digit
+      const Vec r = r_.template segment<D>(D * a);
+      auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
+      for (int g = 0; g < 2; ++g) {
+        groups[g].x = lift(groups[g], g, r);
+        groups[g].y += step * groups[g].dy;
+      }
+    }
+    if (step < 0.1) {
+      delta *= 10;
+    } else if (step > 0.5) {
+      delta *= 0.1;
+    }
+    if (step < 1e-6) return;
+  }
+}
+
+/// E r of a group.
+template <int D>
+auto RollingInteriorPoint<D>::lift(const Group& group, int k, const Vec& r) -> Part {
+  Part x = Part::Zero();
+  x[0] = group.coefficient * r[0];
+  if (group.tail) x.template tail<T>() = r.template segment<T>(1 + T * k);
+  return x;
+}
+
+template <int D>
+void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& guess) {
+  const auto m = problem_.m();
+  q_ = problem_.q / size_q_;
+  for (Vector* v : {&u_, &dr_, &rhs_, &residual_vector_}) v->setZero(m);
+  r_ = guess * (omega_ / size_q_);
+  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  // x of x - y = z and x y = tau, without cancellation
+  const auto root = [&](double z) {
+    const double length = std::sqrt(z * z + 4 * rules.tau);
+    return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
+  };
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Vec u = Cone(problem_.friction, a).modified(u_.template segment<D>(D * a));
+    auto r = r_.template segment<D>(D * a);
+    auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
+    const double squares = std::pow(groups[0].coefficient, 2) + std::pow(groups[1].coefficient, 2);
+    double normal = 0;
+    Vec inside = Vec::Zero();
+    for (int g = 0; g < 2; ++g) {
+      Group& group = groups[g];
+      for (Part* part : {&group.x, &group.y, &group.dx, &group.dy}) part->setZero();
+      if (!(group.coefficient > 0)) continue;
+      Part z = lift(group, g, r);
+      z[0] -= u[0] * group.coefficient / squares;
+      if (group.tail) z.template tail<T>() -= u.template segment<T>(1 + T * g);
+      const double norm = z.template tail<T>().norm();
+      const double high = root(z[0] + norm);  // the spectral values of x
+      const double low = root(z[0] - norm);
+      normal = std::max(normal, 0.5 * (high + low) / group.coefficient);
+      group.y[0] = 0.5 * rules.tau * (1 / high + 1 / low);
+      if (!(norm > 0)) {
+        group.y[0] = rules.tau / high;
+        continue;
+      }
+      const ContactVector<T> along = z.template tail<T>() / norm;
+      inside.template segment<T>(1 + T * g) = 0.5 * (high - low) * along;
+      group.y.template tail<T>() = 0.5 * rules.tau * (1 / high - 1 / low) * along;
+    }
+    inside[0] = normal;  // the larger: within both cones
+    r = inside;
+    for (int g = 0; g < 2; ++g) groups[g].x = lift(groups[g], g, inside);
+  }
+}
+
+template <int D>
+double RollingInteriorPoint<D>::det(const Part& x) {
+  const double t = x.template tail<T>().norm();
+  return (x[0] - t) * (x[0] + t);
+}
+
+template <int D>
+void RollingInteriorPoint<D>::evaluate() {
+  problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
+  residual_ = 0;
+  double gap = 0;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
+    Vec residual = u_.template segment<D>(D * a);
+    for (int g = 0; g < 2; ++g) {
+      const Group& group = groups[g];
+      residual[0] -= group.coefficient * group.y[0];
+      auto tail = residual.template segment<T>(1 + T * g);
+      if (group.tail) {
+        residual[0] += group.coefficient * group.y.template tail<T>().norm();
+        tail -= group.y.template tail<T>();
+      } else {
+        tail.setZero();  // nothing holds it
+      }
+      gap += group.x.dot(group.y);
+    }
+    residual_ = std::max(residual_, residual.template lpNorm<Eigen::Infinity>());
+    residual_vector_.template segment<D>(D * a) = residual;
+  }
+  tau_ = gap / count_;
+}
+
+/// Nesterov & Todd's scaling.
+template <int D>
+void RollingInteriorPoint<D>::scale(Group& group) {
+  const double det_x = std::max(det(group.x), std::numeric_limits<double>::min());
+  const double det_y = std::max(det(group.y), std::numeric_limits<double>::min());
+  Part& w = group.w;
+  w = group.x / std::sqrt(det_x);
+  const Part y = group.y / std::sqrt(det_y);
+  const double gamma = std::sqrt(0.5 * (1 + w.dot(y)));
+  w[0] += y[0];
+  w.template tail<T>() -= y.template tail<T>();
+  w /= 2 * gamma;
+  const double beta = group.beta = std::sqrt(std::sqrt(det_x / det_y));
+  const ContactVector<T> along = w.template tail<T>();
+  group.N(0, 0) = w[0];
+  group.N.template block<1, T>(0, 1) = along.transpose();
+  group.N.template block<T, 1>(1, 0) = along;
+  group.N.template block<T, T>(1, 1).setIdentity();
+  group.N.template block<T, T>(1, 1) += along * along.transpose() / (1 + w[0]);
+  group.inverse = group.N / beta;
+  group.inverse.template block<1, T>(0, 1) *= -1;
+  group.inverse.template block<T, 1>(1, 0) *= -1;
+  group.N *= beta;
+  group.lambda = group.N * group.y;
+}
+
+template <int D>
+void RollingInteriorPoint<D>::assemble(double delta) {
+  std::vector<double>& blocks = system_.blocks();
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    Contact& contact = contacts_[static_cast<std::size_t>(a)];
+    contact.P.setIdentity();
+    // A is two blocks bordered by the normal part, whose complement is the sum of c^2 / (beta^2 k),
+    // k = 1 + 2 ||w_T||^2: so its inverse has no cancellation
+    contact.A.setZero();
+    Vec border = Vec::Zero();
+    border[0] = 1;
+    double complement = 0;
+    for (int g = 0; g < 2; ++g) {
+      Group& group = contact.groups[g];
+      const int at = 1 + T * g;
+      const double c = group.coefficient;
+      if (!(c > 0)) continue;
+      scale(group);
+      const ContactVector<T> w = group.w.template tail<T>();
+      const double k = 1 + 2 * w.squaredNorm();
+      complement += c * c / (group.beta * group.beta * k);
+      if (!group.tail) continue;
+      border.template segment<T>(at) = (2 * c * group.w[0] / k) * w;
+      contact.A.template block<T, T>(at, at).setIdentity();
+      contact.A.template block<T, T>(at, at) -= (2 / k) * w * w.transpose();
+      contact.A.template block<T, T>(at, at) *= group.beta * group.beta;
+      const double norm = group.y.template tail<T>().norm();
+      if (norm > 0) {
+        contact.P.template block<1, T>(0, at) = c * group.y.template tail<T>().transpose() / norm;
+      }
+    }
+    contact.A += border * border.transpose() / complement;
+    contact.D0 = contact.A * contact.P;
+    const Mat regular = Mat::Identity() + delta * contact.D0;
+    contact.regular = regular.inverse();
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
+        contact.regular * contact.D0 / omega_;
+  }
+}
+
+template <int D>
+void RollingInteriorPoint<D>::correct(double sigma, bool second_order) {
+  each_group([&](Contact&, Group& group, int) {
+    Part target = Part::Zero();
+    target[0] = sigma * tau_;
+    if (second_order) {
+      const Part p = group.inverse * group.affine_x;
+      const Part q = group.N * group.affine_y;
+      target[0] -= p.dot(q);
+      target.template tail<T>() -= p[0] * q.template tail<T>() + q[0] * p.template tail<T>();
+    }
+    const Part& lambda = group.lambda;
+    const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
+    Part solution;
+    solution[0] =
+        (lambda[0] * target[0] - lambda.template tail<T>().dot(target.template tail<T>())) /
+        determinant;
+    solution.template tail<T>() =
+        (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
+    group.g = solution - lambda;
+  });
+}
+
+template <int D>
+void RollingInteriorPoint<D>::correct_shift(double step) {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    for (const Group& group : contacts_[static_cast<std::size_t>(a)].groups) {
+      const ContactVector<T> y = group.y.template tail<T>();
+      const double norm = y.norm();
+      if (!group.tail || !(norm > 0)) continue;
+      const ContactVector<T> dy = step * group.affine_y.template tail<T>();
+      residual_vector_[D * a] += group.coefficient * ((y + dy).norm() - norm - y.dot(dy) / norm);
+    }
+  }
+}
+
+template <int D>
+bool RollingInteriorPoint<D>::direction(double delta) {
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    const Contact& contact = contacts_[static_cast<std::size_t>(a)];
+    Vec target = Vec::Zero();
+    for (int g = 0; g < 2; ++g) {
+      const Group& group = contact.groups[g];
+      if (!(group.coefficient > 0)) continue;
+      const Part part = group.inverse * group.g;
+      target[0] += group.coefficient * part[0];
+      if (group.tail) target.template segment<T>(1 + T * g) = part.template tail<T>();
+    }
+    dr_.template segment<D>(D * a) =
+        contact.regular *
+        (contact.A * target - contact.D0 * residual_vector_.template segment<D>(D * a));
+  }
+  system_.solve(dr_);
+  if (!dr_.allFinite()) return false;
+  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_, system_.workers());  // W dr + R
+  rhs_ += delta * dr_;
+  for (Index a = 0; a < problem_.nc(); ++a) {
+    Contact& contact = contacts_[static_cast<std::size_t>(a)];
+    const Vec dr = dr_.template segment<D>(D * a);
+    const Vec du = contact.P * rhs_.template segment<D>(D * a);
+    double left = du[0];
+    double squares = 0;
+    for (int g = 0; g < 2; ++g) {
+      Group& group = contact.groups[g];
+      if (!(group.coefficient > 0)) continue;
+      group.dx = lift(group, g, dr);
+      if (group.tail) group.dy.template tail<T>() = du.template segment<T>(1 + T * g);
+      // its normal part by the scaled equation, which loses fewer digits than N^-2 dx
+      group.dy[0] = ((group.g - group.inverse * group.dx)[0] -
+                     group.N.template block<1, T>(0, 1).dot(group.dy.template tail<T>())) /
+                    group.N(0, 0);
+      left -= group.coefficient * group.dy[0];
+      squares += group.coefficient * group.coefficient;
+    }
+    for (Group& group : contact.groups) group.dy[0] += group.coefficient * left / squares;
+  }
+  return true;
+}
+
+template <int D>
+double RollingInteriorPoint<D>::longest(const Part& x, const Part& d) {
+  // the least positive root of det(x + t d) = 0
+  const double a = det(d);
+  const double b = x[0] * d[0] - x.template tail<T>().dot(d.template tail<T>());
+  const double c = std::max(det(x), 0.0);
+  double root = std::numeric_limits<double>::infinity();
+  const double discriminant = b * b - a * c;
+  if (discriminant >= 0) {
+    const double s = std::sqrt(discriminant);
+    if (b < 0) {
+      root = c / (s - b);
+    } else if (a < 0) {
+      root = -(b + s) / a;
+    }
+  }
+  if (d[0] < 0) root = std::min(root, -x[0] / d[0]);
+  return root;
+}
+
+template <int D>
+double RollingInteriorPoint<D>::longest() const {
+  double step = std::numeric_limits<double>::infinity();
+  for (const Contact& contact : contacts_) {
+    for (const Group& group : contact.groups) {
+      if (!(group.coefficient > 0)) continue;
+      step = std::min({step, longest(group.x, group.dx), longest(group.y, group.dy)});
+    }
+  }
+  return step;
+}
+
+template class RollingInteriorPoint<3>;
+template class RollingInteriorPoint<5>;
+
+}  // namespace fclib

@@ -36,9 +36,9 @@
  *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
  *   system has no files without a name, it leaves NAME.PID-1 too.) A new file takes the place of
  *   the old one, with its owner, permissions and extended attributes. A file with several names,
- *   or one that cannot be replaced so, is rewritten in place. A process that is killed meanwhile leaves
- *   NAME.fclib-journal, or one in $TMPDIR if the folder cannot be written. The next read or write
- *   by that name completes what the journal says.
+ *   or one that cannot be replaced so, is rewritten in place. A process that is killed meanwhile
+ *   leaves NAME.fclib-journal, or one in $TMPDIR if the folder cannot be written. The next read
+ *   or write by that name completes what the journal says.
  *
  *   A file may hold one problem of each kind, one solution, and any number of guesses. If it has
  *   several problems, the solution and the guesses belong to the global one. What is there already

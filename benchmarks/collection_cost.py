@@ -1,6 +1,6 @@
 """What building the collection costs: CPU time and the peak of memory of each family.
 
-    .venv/bin/python benchmarks/build_cost.py OUT [NAME...] [--form both] [--with-references]
+    .venv/bin/python benchmarks/collection_cost.py OUT [NAME...] [--form both] [--with-references]
         [--limit 900] [--results build-cost]
 
 NAMES are sets or families; by default all that have stored states, and those that are assembled,

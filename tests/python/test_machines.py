@@ -47,7 +47,7 @@ SMALL: dict[str, tuple[dict[str, Any], int]] = {
     "GearTrain": ({"gears": 3}, 200),
     "ChainMail": ({"across": 4}, 300),
     "ShearBox": ({"across": 8, "layers": 5}, 400),
-    "Rover": ({"stones": 16, "across": 4}, 250),
+    "Rover": ({"stones": 16, "across": 4, "time_step": 1e-3}, 500),
     "Hand": ({}, 400),
 }
 

@@ -605,12 +605,12 @@ def test_a_stored_certificate_is_checked_on_its_page(
 
 
 @pytest.mark.slow
-def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path) -> None:
+def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path, module: Path) -> None:
     """One problem of a file that has two: its own solution, options, sliders."""
     file = tmp_path / "a tower#1.hdf5"
     shutil.copy(golden_work.TINY / "KaplasTower" / "0030-global.hdf5", file)
     words = [sys.executable, "-m", "fclib", "view", str(file), "--serve"]
-    words += ["--browser", str(browser_module.FOLDER)]
+    words += ["--browser", str(module)]
     silent = {**os.environ, "BROWSER": "true"}
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, env=silent) as process:
         assert process.stdout is not None
@@ -638,7 +638,7 @@ def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path) ->
 
     # the page as a file says how to get there
     out = tmp_path / "page.html"
-    words = ["view", str(file), "--out", str(out), "--browser", str(browser_module.FOLDER)]
+    words = ["view", str(file), "--out", str(out), "--browser", str(module)]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
     (tmp_path / "none").mkdir()

@@ -96,7 +96,6 @@ class Rules:
 
 
 HELD = "held bodies"
-LONG: dict[str, object] = {"keep": "true", "wander": 300, "path": 1500}
 
 
 def doubled(*names: str) -> list[Rules]:
@@ -138,18 +137,6 @@ RULES = [
     Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
     Rules(HELD, None, ({"most": 0.5}, {"most": 0.8}, {"most": 1}), "crowded"),
     *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
-    Rules(HELD, None, ({"keep": "true"}, {"wander": 300}, {"path": 1500}, LONG), "jammed"),
-    *(
-        Rules(HELD, None, ({**LONG, name: value}, {**LONG, name: 4 * value}), "jammed")
-        for name, value in (
-            ("wander_kappa", 50),
-            ("wander", 150),
-            ("smoothing", 0.5),
-            ("path", 750),
-            ("path_polish", 5e-5),
-            ("path_again", 0.05),
-        )
-    ),
 ]
 
 

@@ -4,7 +4,6 @@
 #include <limits>
 #include <numeric>
 
-#include "methods/homotopy.hpp"
 #include "methods/interior_point.hpp"
 #include "methods/proximal_point.hpp"
 #include "reduced/gauss_seidel.hpp"
@@ -127,7 +126,6 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
   squares_.emplace(squares(primal_, rules.regular), "H H^T");
   shift_ = Vector::Zero(problem_.nc());
   r_ = Vector::Zero(problem_.m());
-  moved_.assign(body_.size(), 0);
   double least = std::numeric_limits<double>::infinity();
   double last = least;
   double creep = rules.creep;
@@ -163,7 +161,6 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     last = error;
     Vector u;
     part.problem.velocity(r, u);
-    if (rules.keep) keep(part, u, std::max(rules.rest * size, rules.doubt * left * problem_.scale));
     shift_.setZero();
     for (std::size_t k = 0; k < part.contacts.size(); ++k) {
       const Index a = part.contacts[k];
@@ -183,8 +180,9 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
   part.problem.velocity(r, u);
   error = relative_error<Cone>(part.problem, u, r);
   bool ended = false;
-  const auto proximal = [&](const ProximalRules& own, Vector x) {
+  const auto proximal = [&](const ProximalRules& own) {
     ProximalPoint<Cone> method(part.problem, system);
+    Vector x = r;
     const double found = method.solve(own, tolerance, x, [&](double) { return ended = count(); });
     if (found < error) {
       error = found;
@@ -220,44 +218,20 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
                                  .easy = rules.near_easy,
                                  .hard = rules.near_hard,
                                  .max_factorisations = rules.near_proximal};
-  const ProximalRules wandering{.kappa = rules.wander_kappa,
-                                .patience = std::numeric_limits<double>::infinity(),
-                                .max_factorisations = rules.wander};
-  const auto path = [&] {
-    Homotopy<Cone> method(part.problem, system);
-    double next = rules.path_polish;
-    Vector last = r;
-    method.solve({.smoothing = rules.smoothing, .max_factorisations = rules.path},
-                 [&](double found, const Vector& x) {
-                   last = x;
-                   if ((ended = count())) return true;
-                   if (found < error) {
-                     error = found;
-                     r = x;
-                   }
-                   if (!(found < next)) return error <= tolerance;
-                   next = rules.path_again * found;
-                   return proximal(long_steps, x);
-                 });
-    return ended || error <= tolerance || (rules.wander > 0 && proximal(wandering, last));
-  };
-  const auto quickly = [&] {
-    if (!far) return proximal(long_steps, r) || proximal(short_steps, r);
+  const auto run = [&] {
+    if (!far) return proximal(long_steps) || proximal(short_steps);
     if (sweep()) return true;
     const double tau = std::clamp(rules.follow * error, rules.least_tau, rules.most_tau);
     return interior({.tau = tau, .max_iterations = rules.interior_limit}, Vector(r)) ||
-           proximal(short_steps, r) ||
+           proximal(short_steps) ||
            interior({.tau = rules.tau,
                      .step_cap = rules.step_cap,
                      .delta = rules.delta,
                      .max_iterations = rules.interior_limit},
                     Vector::Zero(r.size())) ||
-           proximal(short_steps, r);
+           proximal(short_steps);
   };
-  // what is nearly as large as the whole is left to the stages for that
-  const auto few = static_cast<double>(part.contacts.size()) <= rules.most * problem_.nc();
-  const bool solved = quickly() || !few || (rules.wander > 0 && proximal(wandering, r));
-  if (!solved && rules.path > 0) path();
+  run();
   factorisations_ += system.factorisations();
   return !ended;
 }
@@ -284,28 +258,11 @@ bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> cou
 }
 
 template <int D>
-void HeldBodies<D>::keep(const Part& part, const Vector& u, double slow) {
-  moved_.assign(body_.size(), 0);
-  for (std::size_t k = 0; k < part.contacts.size(); ++k) {
-    const auto at = D * static_cast<Eigen::Index>(k);
-    if (!(u.template segment<D>(at).norm() > slow)) continue;
-    for (int j = 0; j < D; ++j) {
-      const Index column = D * part.contacts[k] + j;
-      for (SparseColumns::InnerIterator entry(primal_.H, column); entry; ++entry) {
-        const Index body = body_[entry.row()];
-        moved_[body] = part.moves[body];
-      }
-    }
-  }
-}
-
-template <int D>
 bool HeldBodies<D>::release(double slow, Part& part) {
   const SparseColumns& H = primal_.H;
   const Vector v = squares_->solve(Vector(H * u_));
   part.contacts.clear();
-  std::vector<char>& moves = part.moves;
-  moves = moved_;
+  std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
   const auto each_body = [&](Index a, auto&& f) {
     Index last = -1;
     for (int k = 0; k < D; ++k) {

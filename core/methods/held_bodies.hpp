@@ -8,17 +8,12 @@
 //
 //   1. the convex problem, by the interior point: what rests there rests to many digits, and its
 //      reactions are at the centre of those that there are;
-//   2. bodies that hardly move are held at rest; with `keep`, but for those that moved in the last
-//      solution of 2. Coulomb's law for the others, from the reactions of 1, gives s; s = 0 at
-//      contacts that hardly slide, and at those of held bodies alone.
+//   2. bodies that hardly move are held at rest. Coulomb's law for the others, from the reactions
+//      of 1, gives s; s = 0 at contacts that hardly slide, and at those of held bodies alone.
 //
 // Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
 // "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
 // may rest in the end, and 2 is far harder with them than without.
-//
-// Where the first methods fail on 2, W of 2 may hardly see some of its reactions either. But 2 is
-// small: a long proximal point (`wander`), and the path of methods/homotopy.hpp (`path`), cost less
-// there than a convex problem on the whole.
 //
 // Let W = H^T M^-1 H, and B what is not held. The problem of 2 is u = W_B r + q_B on the contacts
 // of B, with W_B = H_B^T M_BB^-1 H_B and q_B such that the reactions of 1 give the velocity of 1,
@@ -44,7 +39,6 @@ struct HeldBodiesRules {
   double better = 0.5;      ///< share of the least error at which it did
   double most = 0.65;       ///< share of the contacts in 2, over which it must be solved at once
   double regular = 1e-9;    ///< eps of how fast a body is, over the traces of H H^T and M
-  bool keep = false;        ///< what moved in the last solution of 2 moves on
   double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
   double creep = 0.1;       ///< ... and over the error of 1 and ||q||
   double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
@@ -71,14 +65,6 @@ struct HeldBodiesRules {
   double near_easy = 10;            ///< its factor on kappa after few Newton steps
   double near_hard = 0.2;           ///< ... and after a failure
   std::int64_t near_proximal = 40;  ///< its factorisations
-  // where neither solves 2: a proximal point whose error may rise, and the path from a convex
-  // problem
-  double wander_kappa = 100;  ///< of that proximal point at first
-  std::int64_t wander = 0;    ///< its factorisations
-  double smoothing = 1;       ///< of the path
-  std::int64_t path = 0;      ///< factorisations on it
-  double path_polish = 1e-4;  ///< error under which its points are polished, with long steps
-  double path_again = 0.1;    ///< share of that error at which this is tried again
 };
 
 /// The coordinates of some contacts, with all that M links to them, and these contacts.
@@ -106,7 +92,6 @@ class HeldBodies {
   /// The bodies that are not held, with their contacts.
   struct Part {
     std::vector<Index> contacts;
-    std::vector<char> moves;  // of the coordinate that names each body
     Primal primal;
     ReducedProblem problem;
   };
@@ -114,12 +99,8 @@ class HeldBodies {
   /// r_ and u_ of the convex problem with s = shift_. False where it was ended.
   bool convex(const HeldBodiesRules& rules, FunctionRef<bool()> count);
 
-  /// The bodies that are faster than `slow`, at one of their contacts, and those that moved in the
-  /// last solution of 2. False where there is none.
+  /// The bodies that are faster than `slow`, at one of their contacts. False where none is.
   bool release(double slow, Part& part);
-
-  /// Bodies of the part at contacts faster than `slow`: they move in the next one too.
-  void keep(const Part& part, const Vector& u, double slow);
 
   /// Improves r, of the part; its error. False where it was ended.
   bool solve_part(const HeldBodiesRules& rules, const Part& part, bool far, double tolerance,
@@ -130,7 +111,6 @@ class HeldBodies {
   CoupledSystem& system_;
   std::optional<Factorization> squares_;  // of H H^T + eps M
   std::vector<Index> body_;               // of each coordinate
-  std::vector<char> moved_;               // in the last solution of 2, by body
   std::int64_t factorisations_ = 0;
   Vector shift_, r_, u_;
 };

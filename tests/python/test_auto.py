@@ -425,16 +425,6 @@ def test_bodies_that_creep_may_have_to_move() -> None:
     assert not fclib.solve(problem, chain=[HELD + " creep=0.1" + rounds]).converged
 
 
-@pytest.mark.parametrize("push", [0.0, 1.0])
-def test_bodies_that_move_may_need_a_long_way(push: float) -> None:
-    """Where the first methods fail on the bodies that move, a path or many small steps do not."""
-    problem = Packing().of_size(400, push, 101)
-    result = fclib.solve(problem, chain=[HELD + " wander=300 path=1500"], time_limit=60)
-    assert result.converged
-    assert judge(problem, result.solution).error <= 1.01e-8
-    assert not fclib.solve(problem, chain=[HELD]).converged
-
-
 def test_bodies_of_an_island_are_held() -> None:
     """A packing, and a ball that falls on the ground beside it: an island of its own."""
     packing = Packing().of_size(400, 0.0, 0)

@@ -132,12 +132,6 @@ void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& gues
 }
 
 template <int D>
-double InteriorPoint<D>::det(const Vec& x) {
-  const double t = x.template tail<T>().norm();
-  return (x[0] - t) * (x[0] + t);
-}
-
-template <int D>
 void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
   problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
   tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
@@ -164,7 +158,7 @@ void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
 template <int D>
 auto InteriorPoint<D>::scaled_target(Index a) const -> Vec {
   const double mu = problem_.friction.mu[a];
-  Vec v = scaling_[static_cast<std::size_t>(a)].N * g_.template segment<D>(D * a);
+  Vec v = scaling_[static_cast<std::size_t>(a)].cone.N * g_.template segment<D>(D * a);
   if (mu > 0) v[0] /= mu;
   return v;
 }
@@ -179,32 +173,13 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
     const Vec y = y_.template segment<D>(D * a);
     Mat d0 = Mat::Zero();
     s.P.setIdentity();
-    s.N.setZero();
     if (mu > 0) {
-      const double det_x = std::max(det(x), std::numeric_limits<double>::min());
-      const double det_y = std::max(det(y), std::numeric_limits<double>::min());
-      Vec w = x / std::sqrt(det_x);
-      const Vec yb = y / std::sqrt(det_y);
-      const double gamma = std::sqrt(0.5 * (1 + w.dot(yb)));
-      w[0] += yb[0];
-      w.template tail<T>() -= yb.template tail<T>();
-      w /= 2 * gamma;
-      const double beta = std::sqrt(std::sqrt(det_x / det_y));
-      const auto w1 = w.template tail<T>();
-      s.N(0, 0) = w[0];
-      s.N.template block<1, T>(0, 1) = w1.transpose();
-      s.N.template block<T, 1>(1, 0) = w1;
-      s.N.template block<T, T>(1, 1).setIdentity();
-      s.N.template block<T, T>(1, 1) += w1 * w1.transpose() / (1 + w[0]);
-      s.N *= beta;
+      s.cone.set(x, y);
+      const Vec& w = s.cone.w;
       Mat n2 = 2 * w * w.transpose();
       n2(0, 0) -= 1;
       for (int k = 1; k < D; ++k) n2(k, k) += 1;
-      n2 *= beta * beta;
-      s.inverse = s.N;
-      s.inverse.template block<1, T>(0, 1) *= -1;
-      s.inverse.template block<T, 1>(1, 0) *= -1;
-      s.inverse /= beta * beta;
+      n2 *= s.cone.beta * s.cone.beta;
       if (!associated) {
         const double norm = y.template tail<T>().norm();
         if (norm > 0) {
@@ -215,13 +190,12 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
       n2.row(0) /= mu;
       n2.col(0) /= mu;
       d0 = n2 * s.P;
-      lambda_.template segment<D>(D * a) = s.N * y;
+      lambda_.template segment<D>(D * a) = s.cone.N * y;
     } else {
-      s.N(0, 0) = std::sqrt(x[0] / y[0]);
-      s.inverse.setZero();
-      s.inverse(0, 0) = 1 / s.N(0, 0);
+      s.cone.N.setZero();
+      s.cone.N(0, 0) = std::sqrt(x[0] / y[0]);
       d0(0, 0) = x[0] / y[0];
-      lambda_[D * a] = s.N(0, 0) * y[0];
+      lambda_[D * a] = s.cone.N(0, 0) * y[0];
     }
     s.D0 = d0;
     const Mat regular = Mat::Identity() + delta * d0;
@@ -245,19 +219,10 @@ void InteriorPoint<D>::correct(double sigma, bool second_order) {
     Vec target = Vec::Zero();
     target[0] = sigma * tau_;
     if (second_order) {
-      const Vec p = s.inverse * affine_x_.template segment<D>(D * a);
-      const Vec q = s.N * affine_y_.template segment<D>(D * a);
-      target[0] -= p.dot(q);
-      target.template tail<T>() -= p[0] * q.template tail<T>() + q[0] * p.template tail<T>();
+      lorentz::subtract_product<D>(s.cone.inverse * affine_x_.template segment<D>(D * a),
+                                   s.cone.N * affine_y_.template segment<D>(D * a), target);
     }
-    const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
-    Vec solution;
-    solution[0] =
-        (lambda[0] * target[0] - lambda.template tail<T>().dot(target.template tail<T>())) /
-        determinant;
-    solution.template tail<T>() =
-        (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
-    g_.template segment<D>(D * a) = solution - lambda;
+    g_.template segment<D>(D * a) = lorentz::divide<D>(target, lambda) - lambda;
   }
 }
 
@@ -303,32 +268,14 @@ bool InteriorPoint<D>::direction(double delta) {
 }
 
 template <int D>
-double InteriorPoint<D>::longest(const Vec& x, const Vec& d) {
-  // the least positive root of det(x + t d) = 0
-  const double a = det(d);
-  const double b = x[0] * d[0] - x.template tail<T>().dot(d.template tail<T>());
-  const double c = std::max(det(x), 0.0);
-  double root = std::numeric_limits<double>::infinity();
-  const double discriminant = b * b - a * c;
-  if (discriminant >= 0) {
-    const double s = std::sqrt(discriminant);
-    if (b < 0) {
-      root = c / (s - b);
-    } else if (a < 0) {
-      root = -(b + s) / a;
-    }
-  }
-  if (d[0] < 0) root = std::min(root, -x[0] / d[0]);
-  return root;
-}
-
-template <int D>
 double InteriorPoint<D>::longest() const {
   double step = std::numeric_limits<double>::infinity();
   for (Index a = 0; a < problem_.nc(); ++a) {
     if (problem_.friction.mu[a] > 0) {
-      step = std::min({step, longest(x_.template segment<D>(D * a), dx_.template segment<D>(D * a)),
-                       longest(y_.template segment<D>(D * a), dy_.template segment<D>(D * a))});
+      const auto leaves = [&](const Vector& v, const Vector& d) {
+        return lorentz::longest<D>(v.template segment<D>(D * a), d.template segment<D>(D * a));
+      };
+      step = std::min({step, leaves(x_, dx_), leaves(y_, dy_)});
     } else {
       if (dx_[D * a] < 0) step = std::min(step, -x_[D * a] / dx_[D * a]);
       if (dy_[D * a] < 0) step = std::min(step, -y_[D * a] / dy_[D * a]);

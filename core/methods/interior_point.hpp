@@ -25,6 +25,7 @@
 #include <vector>
 
 #include "contact/coulomb.hpp"
+#include "contact/lorentz.hpp"
 #include "function_ref.hpp"
 #include "systems/coupled_system.hpp"
 
@@ -68,9 +69,6 @@ class InteriorPoint {
   /// smaller tau is.
   void start(const InteriorPointRules& rules, const Vector& guess);
 
-  /// The Lorentz cone's determinant, without cancellation.
-  static double det(const Vec& x);
-
   /// ||y_T||, smoothed at its kink.
   [[nodiscard]] double sliding(double norm) const { return std::hypot(norm, width_) - width_; }
 
@@ -98,13 +96,11 @@ class InteriorPoint {
 
   bool direction(double delta);
 
-  /// The step along d at which x leaves the Lorentz cone.
-  static double longest(const Vec& x, const Vec& d);
-
   [[nodiscard]] double longest() const;
 
   struct Scaling {
-    Mat N, inverse, P, D0, regular;
+    lorentz::Scaling<D> cone;
+    Mat P, D0, regular;
   };
 
   const ReducedProblem& problem_;

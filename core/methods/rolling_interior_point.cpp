@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
 #include "reduced/scale.hpp"
 
@@ -146,12 +147,6 @@ void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vecto
 }
 
 template <int D>
-double RollingInteriorPoint<D>::det(const Part& x) {
-  const double t = x.template tail<T>().norm();
-  return (x[0] - t) * (x[0] + t);
-}
-
-template <int D>
 void RollingInteriorPoint<D>::evaluate() {
   problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
   residual_ = 0;
@@ -177,32 +172,6 @@ void RollingInteriorPoint<D>::evaluate() {
   tau_ = gap / count_;
 }
 
-/// Nesterov & Todd's scaling.
-template <int D>
-void RollingInteriorPoint<D>::scale(Group& group) {
-  const double det_x = std::max(det(group.x), std::numeric_limits<double>::min());
-  const double det_y = std::max(det(group.y), std::numeric_limits<double>::min());
-  Part& w = group.w;
-  w = group.x / std::sqrt(det_x);
-  const Part y = group.y / std::sqrt(det_y);
-  const double gamma = std::sqrt(0.5 * (1 + w.dot(y)));
-  w[0] += y[0];
-  w.template tail<T>() -= y.template tail<T>();
-  w /= 2 * gamma;
-  const double beta = group.beta = std::sqrt(std::sqrt(det_x / det_y));
-  const ContactVector<T> along = w.template tail<T>();
-  group.N(0, 0) = w[0];
-  group.N.template block<1, T>(0, 1) = along.transpose();
-  group.N.template block<T, 1>(1, 0) = along;
-  group.N.template block<T, T>(1, 1).setIdentity();
-  group.N.template block<T, T>(1, 1) += along * along.transpose() / (1 + w[0]);
-  group.inverse = group.N / beta;
-  group.inverse.template block<1, T>(0, 1) *= -1;
-  group.inverse.template block<T, 1>(1, 0) *= -1;
-  group.N *= beta;
-  group.lambda = group.N * group.y;
-}
-
 template <int D>
 void RollingInteriorPoint<D>::assemble(double delta) {
   std::vector<double>& blocks = system_.blocks();
@@ -220,15 +189,17 @@ void RollingInteriorPoint<D>::assemble(double delta) {
       const int at = 1 + T * g;
       const double c = group.coefficient;
       if (!(c > 0)) continue;
-      scale(group);
-      const ContactVector<T> w = group.w.template tail<T>();
+      Scaling& scaling = group.scaling;
+      scaling.set(group.x, group.y);
+      group.lambda = scaling.N * group.y;
+      const ContactVector<T> w = scaling.w.template tail<T>();
       const double k = 1 + 2 * w.squaredNorm();
-      complement += c * c / (group.beta * group.beta * k);
+      complement += c * c / (scaling.beta * scaling.beta * k);
       if (!group.tail) continue;
-      border.template segment<T>(at) = (2 * c * group.w[0] / k) * w;
+      border.template segment<T>(at) = (2 * c * scaling.w[0] / k) * w;
       contact.A.template block<T, T>(at, at).setIdentity();
       contact.A.template block<T, T>(at, at) -= (2 / k) * w * w.transpose();
-      contact.A.template block<T, T>(at, at) *= group.beta * group.beta;
+      contact.A.template block<T, T>(at, at) *= scaling.beta * scaling.beta;
       const double norm = group.y.template tail<T>().norm();
       if (norm > 0) {
         contact.P.template block<1, T>(0, at) = c * group.y.template tail<T>().transpose() / norm;
@@ -237,7 +208,7 @@ void RollingInteriorPoint<D>::assemble(double delta) {
     contact.A += border * border.transpose() / complement;
     contact.D0 = contact.A * contact.P;
     const Mat regular = Mat::Identity() + delta * contact.D0;
-    contact.regular = regular.inverse();
+    contact.regular = inverse<D>(regular);
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
         contact.regular * contact.D0 / omega_;
   }
@@ -249,20 +220,10 @@ void RollingInteriorPoint<D>::correct(double sigma, bool second_order) {
     Part target = Part::Zero();
     target[0] = sigma * tau_;
     if (second_order) {
-      const Part p = group.inverse * group.affine_x;
-      const Part q = group.N * group.affine_y;
-      target[0] -= p.dot(q);
-      target.template tail<T>() -= p[0] * q.template tail<T>() + q[0] * p.template tail<T>();
+      lorentz::subtract_product<S>(group.scaling.inverse * group.affine_x,
+                                   group.scaling.N * group.affine_y, target);
     }
-    const Part& lambda = group.lambda;
-    const double determinant = std::max(det(lambda), std::numeric_limits<double>::min());
-    Part solution;
-    solution[0] =
-        (lambda[0] * target[0] - lambda.template tail<T>().dot(target.template tail<T>())) /
-        determinant;
-    solution.template tail<T>() =
-        (target.template tail<T>() - solution[0] * lambda.template tail<T>()) / lambda[0];
-    group.g = solution - lambda;
+    group.g = lorentz::divide<S>(target, group.lambda) - group.lambda;
   });
 }
 
@@ -287,7 +248,7 @@ bool RollingInteriorPoint<D>::direction(double delta) {
     for (int g = 0; g < 2; ++g) {
       const Group& group = contact.groups[g];
       if (!(group.coefficient > 0)) continue;
-      const Part part = group.inverse * group.g;
+      const Part part = group.scaling.inverse * group.g;
       target[0] += group.coefficient * part[0];
       if (group.tail) target.template segment<T>(1 + T * g) = part.template tail<T>();
     }
@@ -311,9 +272,9 @@ bool RollingInteriorPoint<D>::direction(double delta) {
       group.dx = lift(group, g, dr);
       if (group.tail) group.dy.template tail<T>() = du.template segment<T>(1 + T * g);
       // its normal part by the scaled equation, which loses fewer digits than N^-2 dx
-      group.dy[0] = ((group.g - group.inverse * group.dx)[0] -
-                     group.N.template block<1, T>(0, 1).dot(group.dy.template tail<T>())) /
-                    group.N(0, 0);
+      group.dy[0] = ((group.g - group.scaling.inverse * group.dx)[0] -
+                     group.scaling.N.template block<1, T>(0, 1).dot(group.dy.template tail<T>())) /
+                    group.scaling.N(0, 0);
       left -= group.coefficient * group.dy[0];
       squares += group.coefficient * group.coefficient;
     }
@@ -323,32 +284,13 @@ bool RollingInteriorPoint<D>::direction(double delta) {
 }
 
 template <int D>
-double RollingInteriorPoint<D>::longest(const Part& x, const Part& d) {
-  // the least positive root of det(x + t d) = 0
-  const double a = det(d);
-  const double b = x[0] * d[0] - x.template tail<T>().dot(d.template tail<T>());
-  const double c = std::max(det(x), 0.0);
-  double root = std::numeric_limits<double>::infinity();
-  const double discriminant = b * b - a * c;
-  if (discriminant >= 0) {
-    const double s = std::sqrt(discriminant);
-    if (b < 0) {
-      root = c / (s - b);
-    } else if (a < 0) {
-      root = -(b + s) / a;
-    }
-  }
-  if (d[0] < 0) root = std::min(root, -x[0] / d[0]);
-  return root;
-}
-
-template <int D>
 double RollingInteriorPoint<D>::longest() const {
   double step = std::numeric_limits<double>::infinity();
   for (const Contact& contact : contacts_) {
     for (const Group& group : contact.groups) {
       if (!(group.coefficient > 0)) continue;
-      step = std::min({step, longest(group.x, group.dx), longest(group.y, group.dy)});
+      step = std::min(
+          {step, lorentz::longest<S>(group.x, group.dx), lorentz::longest<S>(group.y, group.dy)});
     }
   }
   return step;

@@ -14,6 +14,7 @@
 #include <array>
 #include <vector>
 
+#include "contact/lorentz.hpp"
 #include "contact/rolling.hpp"
 #include "methods/interior_point.hpp"
 
@@ -35,25 +36,19 @@ class RollingInteriorPoint {
   static constexpr int S = 1 + T;
   using Vec = ContactVector<D>;
   using Mat = ContactMatrix<D>;
-  using Part = Eigen::Matrix<double, S, 1>;  // of a Lorentz cone
-  using Square = Eigen::Matrix<double, S, S>;
+  using Part = lorentz::Point<S>;
+  using Scaling = lorentz::Scaling<S>;
 
   struct Group {  // of a contact
     double coefficient = 0;
     bool tail = false;  // whether it has tangential components; else it is a half-line, or nothing
     Part x, y, dx, dy, affine_x, affine_y, g, lambda;
-    Part w;  // N = beta times the square root of 2 w w^T - diag(1, -1, ...)
-    double beta = 1;
-    Square N, inverse;
+    Scaling scaling;
   };
   struct Contact {
     std::array<Group, 2> groups;
     Mat P, A, D0, regular;  // A: the inverse of that above
   };
-
-  static double det(const Part& x);
-  static double longest(const Part& x, const Part& d);
-  static void scale(Group& group);
 
   [[nodiscard]] static Part lift(const Group& group, int k, const Vec& r);
   void start(const InteriorPointRules& rules, const Vector& guess);

@@ -48,9 +48,10 @@ def force_on(step: Step, body: str, by: str | None = None) -> Any:
 # ---- the gripper
 
 
-@pytest.mark.parametrize("blocks", [1, 5])
-def test_gripper_lifts_the_row_and_brings_it_back(blocks: int) -> None:
-    family: Any = scenes.get("Gripper")(blocks=blocks)
+@pytest.mark.parametrize(("blocks", "squeeze"), [(1, 1.5), (5, 4.0)])
+def test_gripper_lifts_the_row_and_brings_it_back(blocks: int, squeeze: float) -> None:
+    # pressed less, a row slides when the lift begins, and how it turns then is not unique
+    family: Any = scenes.get("Gripper")(blocks=blocks, squeeze=squeeze)
     steps = list(simulate(family.scene(seed=1), round(family.period / family.time_step) + 1))
     assert all(step.result.converged for step in steps)
     held = steps[round(LIFTED * family.period / family.time_step)]

@@ -23,7 +23,10 @@ class Gripper:
     A row of k blocks of mass m hangs on the friction of the two jaws. At rest it holds as long as
     the force of a jaw is at least k m g / (2 mu); the force here is `squeeze` times that, and below
     1 the row slides out. Between the blocks the shear goes from k m g / 2 at the jaws to 0 in the
-    middle. Each face has four contacts, which are redundant.
+    middle. Each face has four contacts, which are redundant. The lift begins so fast that the row
+    slides for some steps, unless the jaws press harder (`squeeze=4`). How it turns then depends on
+    how the contacts of a face share the force of the jaw, which is not unique: the last digits of a
+    solver decide.
 
     A servo holds the height: the row rests while the jaws close, rises, and comes back, again and
     again.

@@ -189,10 +189,33 @@ def test_classes_follow_from_runs(results: Path) -> None:
     assert (row.best.solver, row.best.error, row.solved, row.voters) == ("a", 2e-8, 0, 3)
     basis = standing.standings("tiny")[1]
     assert basis is not None
-    assert (basis.limit, basis.solvers) == (1.0, tuple("abcde"))
+    assert (basis.limits, basis.solvers) == ((1.0,), tuple("abcde"))
     # a longer run has no vote, and what it solves is no longer open
     standing.write([*standing.runs(), run(discs, "auto", 9e-9, limit=60.0)])
     assert ratings()[discs] == "hard"
+
+
+def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
+    wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
+    rows = [run(wall, name, 1e-9) for name in "abcd"]
+    # a family whose runs had longer, and not a vote of one that had less
+    rows += [run(kaplas, name, 1e-9 if name == "a" else None, limit=10.0) for name in "abc"]
+    rows += [run(kaplas, name, 1e-9, limit=1.0) for name in "de"]
+    # of as many runs those that had less
+    rows += [run(discs, "a", 1e-9, limit=limit) for limit in (10.0, 1.0)]
+    # a solution that was taken in has no vote, where nothing was run
+    rows += [run("FourBar/0150", "me", 1e-9, limit=None, status=standing.TAKEN)]
+    standing.write(rows)
+    found = {row.id.partition("/")[2]: row for row in standing.standings("tiny")[0]}
+    assert {name: row.limit for name, row in found.items() if row.rating} == {
+        wall: 1.0,
+        kaplas: 10.0,
+        discs: 1.0,
+    }
+    assert (found[kaplas].rating, found[kaplas].solved, found[kaplas].voters) == ("hard", 1, 3)
+    basis = standing.standings("tiny")[1]
+    assert basis is not None
+    assert "within 1 or 10 s of CPU a run, by 4 solvers (a, b, c, d;" in str(basis)
 
 
 def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) -> None:

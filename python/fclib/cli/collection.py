@@ -454,6 +454,7 @@ def status(
             out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
         return
     families: dict[str, Counter[str]] = {}
+    limits = {row.id.split("/")[1]: row.limit for row in rows if row.limit is not None}
     for row in rows:
         families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
     families["all"] = sum(families.values(), Counter())
@@ -461,7 +462,11 @@ def status(
     out.print(
         Rows(
             [
-                {"family": family, **{column: counts[column] for column in columns}}
+                {
+                    "family": family,
+                    "CPU a run [s]": limits.get(family),
+                    **{column: counts[column] for column in columns},
+                }
                 for family, counts in families.items()
             ]
         )
@@ -482,6 +487,7 @@ def record_of(row: standing.Standing) -> dict[str, Any]:
         "problem": row.id,
         "class": row.rating or "not run",
         "solved": f"{row.solved} of {row.voters}",
+        "limit": row.limit,
         "best error": best.error if best is not None else None,
         "by": best.solver if best is not None else "",
         "version": best.version if best is not None else "",

@@ -42,7 +42,7 @@ from fclib.cli._output import (
 from fclib.cli._progress import many_bars
 from fclib.collections import standing
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices, problems_of
+from fclib.collections.known import KNOWN, choices, kind_of, problems_of
 from fclib.collections.plan import evenly
 
 app = typer.Typer(
@@ -129,11 +129,12 @@ def show(
             collections.folders([name])
         except KeyError as error:
             usage_error(ValueError(error.args[0]))
-    family = collections.families()[name.rpartition("/")[2]]
+    kind = kind_of(name)
+    family = collections.families()[kind]
     record: dict[str, Any] = {
         "family": name,
         "set": family.collection,
-        "problems": problems_of(f"{family.collection}/{name.rpartition('/')[2]}"),
+        "problems": problems_of(f"{family.collection}/{kind}"),
         "title": family.title,
         "description": family.description,
         "application": family.application,

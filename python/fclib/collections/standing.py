@@ -143,7 +143,7 @@ def write(rows: Iterable[Run]) -> Path:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(Run)])
-    for row in sorted(set(rows), key=lambda run: (run.problem, run.digest, run.solver, run.date)):
+    for row in sorted(set(rows), key=place_of):
         values = asdict(row)
         numbers = {k: "" if values[k] is None else f"{values[k]:.6g}" for k in NUMBERS}
         writer.writerow((values | numbers).values())
@@ -151,6 +151,11 @@ def write(rows: Iterable[Run]) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     catalog.replace_file(path, lambda beside: beside.write_text(text.getvalue(), encoding="utf-8"))
     return path
+
+
+def place_of(run: Run) -> tuple[Any, ...]:
+    """What runs are sorted by: no two of the table are equal in it."""
+    return run.problem, run.digest, run.solver, run.date, run.limit or 0.0, run.version
 
 
 def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> int:

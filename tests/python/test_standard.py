@@ -505,8 +505,9 @@ def test_list_grows_by_what_runs_class_hard_or_open(
         assert fclib.digest(problem) == found["digest"]
         shown = invoke("collection", "show", "hard/Capsules_rt444")
         assert scenes.get("Capsules").title in shown.output
-        # what is neither way of choosing is refused
+        # what is neither way of choosing is refused, and a list of no version
         assert invoke(*args[:3], "--out", again).exit_code == 2
+        assert invoke(*args[:-1], "1", "--out", again).exit_code == 2
         assert invoke(*args, before, "--out", again).exit_code == 2
     finally:
         known.choices.cache_clear()

@@ -60,6 +60,8 @@ def choose_hard(
     or open by the runs that `fclib collection status` tells of.
     """
     if kept is not None and sets and not stores:
+        if not version.isdecimal() or int(version) < 2:
+            usage_error(ValueError("--version: give that of the list that is made, 2 or more"))
         grow(kept, sets, target, per_family, states, version)
         return
     if not stores or folder is None or kept is not None or sets:

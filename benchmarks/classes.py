@@ -2,9 +2,9 @@
 
     .venv/bin/python benchmarks/classes.py [SET...] [--results classes]
 
-Nothing is run: the runs are those of campaigns/regimes.toml and campaigns/families.toml, which
-`fclib collection status SET --add STORE` has taken in. --results stores the table of the families
-as NAME, and the open problems with the best error known as NAME-open.
+Nothing is run: the runs are those of campaigns/regimes.toml, regimes-large.toml and families.toml,
+which `fclib collection status SET --add STORE` has taken in. --results stores the table of the
+families as NAME, and the open problems with the best error known as NAME-open.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ def main() -> None:
     _results.add_option(parser)
     arguments = parser.parse_args()
     families: dict[str, list[standing.Standing]] = {}
-    bases: dict[str, None] = {}
+    solvers: set[str] = set()
     for name in arguments.sets:
         rows, basis = standing.standings(name)
         if basis:
-            bases[f"within {basis.limit:g} s of CPU, by {len(basis.solvers)} solvers"] = None
+            solvers.update(basis.solvers)
         for row in rows:
             families.setdefault(row.id.rpartition("/")[0], []).append(row)
     table = []
@@ -41,6 +41,7 @@ def main() -> None:
             {
                 "family": family,
                 "problems": len(own),
+                "CPU a run [s]": f"{worst.limit:g}" if worst else "",
                 **{name: counts[name] for name in (*standing.CLASSES, "not run")},
                 "the hardest is solved by": f"{worst.solved} of {worst.voters}" if worst else "",
             }
@@ -55,7 +56,7 @@ def main() -> None:
         for row in own
         if row.rating == "open"
     ]
-    note = f"To 1e-8 by both merits, {', or '.join(bases)}."
+    note = f"To 1e-8 by both merits, by those of {len(solvers)} solvers that take a problem."
     for rows_ in (table, open_ones):
         if rows_:
             print(_results.table(list(rows_[0]), rows_))

@@ -32,15 +32,15 @@ def mean(runs: list[standing.Run]) -> float:
 
 
 def votes() -> dict[tuple[str, str], standing.Run]:
-    """The last run of each problem and solver that takes it, at the limit of most runs."""
-    problems = standing.members(standing.FIRST)
-    _, basis = standing.standings(standing.FIRST)
+    """The last run of each problem and solver that takes it, at the limit of its family."""
+    rows, basis = standing.standings(standing.FIRST)
     assert basis is not None, "no runs are stored"
-    names = {digest[: standing.DIGITS]: name for name, digest in problems.items()}
+    own = {row.digest[: standing.DIGITS]: row for row in rows if row.limit is not None}
     found = {}
     for run in sorted(standing.runs(), key=standing.when):
-        if run.digest in names and run.limit == basis.limit and run.status != "unsuitable":
-            found[names[run.digest], run.solver] = run
+        row = own.get(run.digest)
+        if row is not None and run.limit == row.limit and run.status != "unsuitable":
+            found[row.id, run.solver] = run
     return found
 
 

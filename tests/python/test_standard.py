@@ -1,6 +1,8 @@
 """The set `standard`: how it is chosen, and how its problems stand."""
 
 import json
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,16 @@ from fclib.cli import app
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import candidates, features, known, published, select, standing, trajectory
+from fclib.collections import (
+    candidates,
+    choose,
+    features,
+    known,
+    published,
+    select,
+    standing,
+    trajectory,
+)
 
 load: Any = fclib.load
 there = pytest.mark.skipif(
@@ -189,10 +200,39 @@ def test_classes_follow_from_runs(results: Path) -> None:
     assert (row.best.solver, row.best.error, row.solved, row.voters) == ("a", 2e-8, 0, 3)
     basis = standing.standings("tiny")[1]
     assert basis is not None
-    assert (basis.limit, basis.solvers) == (1.0, tuple("abcde"))
+    assert (basis.limits, basis.solvers) == ((1.0,), tuple("abcde"))
     # a longer run has no vote, and what it solves is no longer open
     standing.write([*standing.runs(), run(discs, "auto", 9e-9, limit=60.0)])
     assert ratings()[discs] == "hard"
+
+
+def test_runs_vote_at_the_limit_of_their_family(results: Path) -> None:
+    wall, kaplas, discs = "Wall/0003", "KaplasTower/0030", "RollingDiscs/0040"
+    rows = [run(wall, name, 1e-9) for name in "abcd"]
+    # a family whose runs had longer, and not a vote of one that had less
+    rows += [run(kaplas, name, 1e-9 if name == "a" else None, limit=10.0) for name in "abc"]
+    rows += [run(kaplas, name, 1e-9, limit=1.0) for name in "de"]
+    # of as many runs those that had less
+    rows += [run(discs, "a", 1e-9, limit=limit) for limit in (10.0, 1.0)]
+    # a solution that was taken in has no vote, where nothing was run
+    rows += [run("FourBar/0150", "me", 1e-9, limit=None, status=standing.TAKEN)]
+    standing.write(rows)
+    found = {row.id.partition("/")[2]: row for row in standing.standings("tiny")[0]}
+    assert {name: row.limit for name, row in found.items() if row.rating} == {
+        wall: 1.0,
+        kaplas: 10.0,
+        discs: 1.0,
+    }
+    assert (found[kaplas].rating, found[kaplas].solved, found[kaplas].voters) == ("hard", 1, 3)
+    basis = standing.standings("tiny")[1]
+    assert basis is not None
+    assert "within 1 or 10 s of CPU a run, by 4 solvers (a, b, c, d;" in str(basis)
+
+
+def test_equal_runs_make_equal_tables(results: Path) -> None:
+    rows = [run("Wall/0003", name, 1e-9, limit=limit) for name in "abcdefgh" for limit in (1, 10)]
+    standing.write(rows)
+    assert [row.limit for row in standing.runs()] == [1, 10] * 8
 
 
 def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) -> None:
@@ -368,6 +408,106 @@ def test_a_version_of_a_set_has_families_that_did_not_change() -> None:
 
 
 @there
-def test_hard_is_of_standard() -> None:
-    rated = {row.digest: row.rating for row in standing.standings("standard")[0]}
-    assert {rated[choice.digest] for choice in known.choices("hard")} <= {"hard", "open"}
+def test_hard_is_what_runs_class_so() -> None:
+    sets = json.loads((known.DATA / "hard.json").read_text())["rule"]["grown"]["sets"]
+    rated = {row.digest: row for name in ["standard", *sets] for row in standing.standings(name)[0]}
+    own = [rated[choice.digest] for choice in known.choices("hard")]
+    assert {row.rating for row in own} <= {"hard", "open"}
+    # version 8 was of standard alone, and is in what came later
+    before = [rated[choice.digest] for choice in known.listed("hard", "8")]
+    assert {row.id.partition("/")[0] for row in before} == {"standard"}
+    assert len(before) == 57
+    later = [choice for choice in known.choices("hard") if choice.since == "9"]
+    assert len(later) + len(before) == len(own)
+    counts = Counter(rated[choice.digest].id.rpartition("/")[0] for choice in later)
+    assert max(counts.values()) <= 5
+    assert {folder.partition("/")[0] for folder in counts} <= set(sets)
+
+
+@there
+def test_version_8_of_hard_is_whole() -> None:
+    """Families that did not change since have their older states."""
+    found = {
+        (folder.partition("/")[2], number): digest
+        for folder in known.folders(["hard"], "8")
+        for plan in [known.plan_of(folder, version="8")]
+        for number, digest in (
+            published.digests(folder, plan.version) or standing.digests(folder)
+        ).items()
+        if number in plan.numbers()
+    }
+    assert found == {(c.family, c.number): c.digest for c in known.listed("hard", "8")}
+
+
+@there
+def test_list_grows_by_what_runs_class_hard_or_open(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("mujoco")
+    members = standing.members("rt444")
+
+    def ran(problem: str, solved: str) -> list[standing.Run]:
+        digest = members[f"rt444/{problem}"][: standing.DIGITS]
+        one = run("Wall/0003", "a", 1e-9)
+        return [
+            replace(one, problem=problem, digest=digest, solver=name)
+            if name in solved
+            else replace(
+                one, problem=problem, digest=digest, solver=name, error=1e-3, status="stalled"
+            )
+            for name in "abc"
+        ]
+
+    # of three hard ones the two that fewest solved, the first of equals; not the easy one
+    rows = [*ran("Chain/0010", "a"), *ran("Chain/0020", "b"), *ran("Chain/0030", "")]
+    standing.write([*rows, *ran("Capsules/0150", "a"), *ran("BoxesStack/0100", "abc")])
+    tiny = {choice.family: choice for choice in known.choices("tiny")}
+    before, after, states = tmp_path / "old.json", tmp_path / "data/hard.json", tmp_path / "own"
+    after.parent.mkdir()
+    choose.write_list(before, [tiny["Capsules"], tiny["Wall"]], {"share": 0.5})
+    more = ("--set", "rt444", "--per-family", 2, "--version", "9")
+    place = states / published.FOLDER
+    args = ("collection", "choose", "hard", "--keep", before, *more)
+    done = invoke(*args, "--out", after, "--states", place)
+    assert done.exit_code == 0, done.output
+    made = json.loads(after.read_text())
+    assert made["rule"] == {"share": 0.5, "grown": {"sets": ["rt444"], "per_family": 2}}
+    # another family of that name has a name of its own
+    kept = ["Capsules/300 8", "Wall/3 8"]
+    names = [f"{row['family']}/{row['number']} {row['since']}" for row in made["problems"]]
+    assert names == [kept[0], "Capsules_rt444/150 9", "Chain/10 9", "Chain/30 9", kept[1]]
+    # from what it made it makes the same
+    again = tmp_path / "again.json"
+    assert invoke(*args[:3], "--keep", after, *more, "--out", again).exit_code == 0
+    assert again.read_text() == after.read_text()
+
+    monkeypatch.setattr(known, "DATA", after.parent)
+    monkeypatch.setattr(published, "IN_PLACE", states)
+    known.choices.cache_clear()
+    try:
+        assert known.folders(["hard"], "8") == ["hard/Capsules", "hard/Wall"]
+        assert known.plan_of("hard/Wall", version="8").numbers().tolist() == [3]
+        with pytest.raises(collections.VersionError, match="version 8 is not stored here"):
+            known.plan_of("hard/Chain", version="8")
+        out = tmp_path / "built"
+        done = invoke(
+            *("collection", "build", "hard/Chain", "hard/Capsules_rt444", "hard/Wall"),
+            *("--form", "global", "--no-references", "--no-pictures", "--out", out),
+        )
+        assert done.exit_code == 0, done.output
+        built = {row["id"]: row for row in collections.read_catalog(out).to_pylist()}
+        found = built["hard/Capsules_rt444/0150"]
+        assert found["digest"] == members["rt444/Capsules/0150"]
+        assert found["license"] is not None
+        assert {known.origin_of(row) for row in built.values()} == {"published"}
+        assert all(verdict.ok for verdict in collections.verify(out))
+        problem = load("hard/Capsules_rt444/0150", folder=out)
+        assert fclib.digest(problem) == found["digest"]
+        shown = invoke("collection", "show", "hard/Capsules_rt444")
+        assert scenes.get("Capsules").title in shown.output
+        # what is neither way of choosing is refused, and a list of no version
+        assert invoke(*args[:3], "--out", again).exit_code == 2
+        assert invoke(*args[:-1], "1", "--out", again).exit_code == 2
+        assert invoke(*args, before, "--out", again).exit_code == 2
+    finally:
+        known.choices.cache_clear()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +12,7 @@ import typer
 import fclib
 from fclib import collections
 from fclib.bench import Store
-from fclib.cli._output import fail, out
+from fclib.cli._output import fail, out, usage_error
 from fclib.cli._progress import many_bars
 from fclib.collections import choose, known, select
 from fclib.collections.candidates import candidates
@@ -32,9 +33,19 @@ PerFamily = Annotated[int, typer.Option(help="Problems of a family, at most.", m
 
 @app.command("hard")
 def choose_hard(
-    stores: Annotated[list[Path], typer.Argument(help="Stores of fclib bench.")],
-    folder: Annotated[Path, typer.Option("--in", help="The collection that they are of.")],
     target: List,
+    stores: Annotated[list[Path] | None, typer.Argument(help="Stores of fclib bench.")] = None,
+    folder: Annotated[
+        Path | None, typer.Option("--in", help="The collection that they are of.")
+    ] = None,
+    kept: Annotated[
+        Path | None,
+        typer.Option("--keep", help="A list that stays; those of --set come to it."),
+    ] = None,
+    sets: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A set: what the stored runs class hard or open in it."),
+    ] = None,
     tol: Annotated[float, typer.Option(help="Tolerance of the runs that count.")] = 1e-8,
     share: Annotated[
         float, typer.Option(help="Share of the solvers that must have failed.", min=0.0, max=1.0)
@@ -43,7 +54,18 @@ def choose_hard(
     states: States = None,
     version: Version = "1",
 ) -> None:
-    """Choose the problems that most solvers fail on, from campaigns."""
+    """Choose the problems that most solvers fail on, from campaigns.
+
+    From stores over a built collection; or a list with the problems of further sets that are hard
+    or open by the runs that `fclib collection status` tells of.
+    """
+    if kept is not None and sets and not stores:
+        if not version.isdecimal() or int(version) < 2:
+            usage_error(ValueError("--version: give that of the list that is made, 2 or more"))
+        grow(kept, sets, target, per_family, states, version)
+        return
+    if not stores or folder is None or kept is not None or sets:
+        usage_error(ValueError("give stores and --in, or --keep and --set"))
     runs = []
     try:
         for path in stores:
@@ -62,6 +84,24 @@ def choose_hard(
             select.publish(sources, chosen, "hard", version, states)
         except (OSError, ValueError, KeyError) as error:
             fail(str(error))
+    tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
+
+
+def grow(
+    kept: Path, sets: list[str], target: Path, per_family: int, states: Path | None, version: str
+) -> None:
+    """Write a list that has the hard and open problems of further sets too."""
+    try:
+        rule = json.loads(kept.read_text(encoding="utf-8"))["rule"]
+        chosen, sources = choose.grown(known.Choice.read(kept), sets, version, per_family)
+        rule["grown"] = {"sets": sets, "per_family": per_family}
+        choose.write_list(target, chosen, rule)
+        if states is not None:
+            select.publish(sources, chosen, "hard", version, states)
+    except KeyError as error:
+        fail(str(error.args[0]))
+    except (ImportError, OSError, ValueError) as error:
+        fail(str(error))
     tell_chosen([f"{choice.family}/{choice.number:04d}" for choice in chosen], target)
 
 

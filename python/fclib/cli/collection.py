@@ -42,7 +42,7 @@ from fclib.cli._output import (
 from fclib.cli._progress import many_bars
 from fclib.collections import standing
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices, problems_of
+from fclib.collections.known import KNOWN, choices, kind_of, problems_of
 from fclib.collections.plan import evenly
 
 app = typer.Typer(
@@ -129,11 +129,12 @@ def show(
             collections.folders([name])
         except KeyError as error:
             usage_error(ValueError(error.args[0]))
-    family = collections.families()[name.rpartition("/")[2]]
+    kind = kind_of(name)
+    family = collections.families()[kind]
     record: dict[str, Any] = {
         "family": name,
         "set": family.collection,
-        "problems": problems_of(f"{family.collection}/{name.rpartition('/')[2]}"),
+        "problems": problems_of(f"{family.collection}/{kind}"),
         "title": family.title,
         "description": family.description,
         "application": family.application,
@@ -454,6 +455,7 @@ def status(
             out.print(f"None of the {len(rows)} problems of {name} is {only.value if only else ''}")
         return
     families: dict[str, Counter[str]] = {}
+    limits = {row.id.split("/")[1]: row.limit for row in rows if row.limit is not None}
     for row in rows:
         families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
     families["all"] = sum(families.values(), Counter())
@@ -461,7 +463,11 @@ def status(
     out.print(
         Rows(
             [
-                {"family": family, **{column: counts[column] for column in columns}}
+                {
+                    "family": family,
+                    "CPU a run [s]": limits.get(family),
+                    **{column: counts[column] for column in columns},
+                }
                 for family, counts in families.items()
             ]
         )
@@ -482,6 +488,7 @@ def record_of(row: standing.Standing) -> dict[str, Any]:
         "problem": row.id,
         "class": row.rating or "not run",
         "solved": f"{row.solved} of {row.voters}",
+        "limit": row.limit,
         "best error": best.error if best is not None else None,
         "by": best.solver if best is not None else "",
         "version": best.version if best is not None else "",

@@ -466,7 +466,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "id": f"{plan.name}/{number:04d}",
         "collection": plan.collection,
         "version": plan.version,
-        "family": plan.scene.name,
+        "family": plan.family,
         "number": number,
         "step": item.step,
         "time": item.time,

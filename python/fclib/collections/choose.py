@@ -1,6 +1,7 @@
 """Lists of chosen problems, by rules that anyone can repeat.
 
-hard    from stores of campaigns over a built collection: what most solvers fail on
+hard    from stores of campaigns over a built collection: what most solvers fail on; a list grows by
+        what the stored runs class hard or open in other sets
 local   from a built collection: the contacts that one-contact solvers find hardest
 tiny    one problem of each kind, from the list below
 """
@@ -11,14 +12,15 @@ import json
 import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog, trajectory
+from fclib.collections import catalog, known, standing, trajectory
+from fclib.collections.candidates import Candidates
 from fclib.collections.known import Choice
 from fclib.collections.plan import Plan, Simulation, source
 from fclib.collections.record import record
@@ -40,7 +42,11 @@ TINY: tuple[tuple[str, dict[str, Any], int], ...] = (
 
 def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -> None:
     """Write a list as the package keeps it: by what rule, and the problems."""
-    rows = [json.dumps(asdict(choice), sort_keys=True) for choice in choices]
+    rows = []
+    for choice in choices:
+        row = asdict(choice)
+        unsaid = [name for name in ("scene", "since") if not row[name]]
+        rows.append(json.dumps({k: v for k, v in row.items() if k not in unsaid}, sort_keys=True))
     head = json.dumps(dict(rule), sort_keys=True)
     text = f'{{"rule": {head},\n "problems": [\n  ' + ",\n  ".join(rows) + "\n]}\n"
     catalog.replace_file(path, lambda target: target.write_text(text, encoding="utf-8"))
@@ -144,6 +150,70 @@ def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
     return Choice(
         row["family"], made["parameters"], row["seed"], row["number"], row["step"], row["digest"]
     )
+
+
+def grown(
+    kept: Sequence[Choice], names: Iterable[str], version: str, per_family: int = 5
+) -> tuple[list[Choice], dict[str, Candidates]]:
+    """A list, and beside it what the stored runs class hard or open in other sets.
+
+    What the list has stays. Of each family of the sets those come to it that the smallest share of
+    the solvers solved, then the first by name; of a family whose states are stored, or which is
+    assembled directly. Where the list has problems of that name from elsewhere, the family is
+    called FAMILY_SET in it.
+
+    Args:
+        kept: the list, of the version before where it does not say otherwise.
+        names: of the sets.
+        version: the one of the list that is made.
+        per_family: problems of a family of a set, at most.
+
+    Returns:
+        The problems in order, and by their family in the list where states of new ones are.
+
+    Raises:
+        KeyError: there is no such set.
+        OSError, StandingError, TrajectoryError: states or results cannot be read.
+    """
+    chosen = [replace(c, since=c.since or str(int(version) - 1)) for c in kept]
+    sources: dict[str, Candidates] = {}
+    for name in names:
+        rows, _ = standing.standings(name)
+        members = {row.digest for row in rows}
+        wanted: dict[str, list[standing.Standing]] = defaultdict(list)
+        there = {choice.digest for choice in chosen}
+        for row in rows:
+            # of equal problems the first
+            if row.rating in ("hard", "open") and row.digest not in there:
+                there.add(row.digest)
+                wanted[row.id.rpartition("/")[0]].append(row)
+        for folder, own in wanted.items():
+            family = folder.partition("/")[2]
+            elsewhere = any(c.family == family and c.digest not in members for c in chosen)
+            label = f"{family}_{name}" if elsewhere else family
+            own.sort(key=lambda row: (row.solved / row.voters, row.id))
+            room = per_family - sum(choice.family == label for choice in chosen)
+            if room <= 0:
+                continue
+            plan = known.plan_of(folder)
+            states = None if plan.trajectory is None else trajectory.read(plan.trajectory)
+            sources[label] = Candidates(plan, tuple(plan.numbers().tolist()), states)
+            for row in own[:room]:
+                number = int(row.id.rpartition("/")[2])
+                step = number if states is None else int(states.step[states.index(number)])
+                chosen.append(
+                    Choice(
+                        label,
+                        dict(plan.scene.parameters),
+                        plan.scene.seed or 0,
+                        number,
+                        step,
+                        row.digest,
+                        family if elsewhere else "",
+                        version,
+                    )
+                )
+    return sorted(chosen, key=lambda choice: (choice.family, choice.number)), sources
 
 
 # ---- local

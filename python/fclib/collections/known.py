@@ -7,7 +7,8 @@ extended      all the families that came after RT-0444
 standard, hard, tiny, rr9118    chosen problems, in folders of their own; lists in data/
 
 A version changes when a problem of the set does, or when one comes or goes. Problems of a version
-whose trajectory is stored do not change (`published.py`).
+whose trajectory is stored do not change (`published.py`). A list that has grown says since when it
+has each problem.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("14", "all families that came after RT-0444"),
     "standard": ("2", "problems of all families, few of a kind, to benchmark with"),
-    "hard": ("8", "of standard, what most solvers fail on; chosen by the bench"),
+    "hard": ("9", "what most solvers fail on, of standard and of the later sets"),
     "tiny": ("6", "one problem of each kind; comes with the package"),
 }
 EXTENDED = (
@@ -65,6 +66,8 @@ class Choice:
     number: int  # among the steps with contact
     step: int  # of the simulation
     digest: str  # `fclib.digest`; empty where it is not known yet
+    scene: str = ""  # its family's own name, where the list has another one of that name
+    since: str = ""  # the version of the list that it came with, where the list has grown
 
     @classmethod
     def read(cls, path: Path) -> tuple[Choice, ...]:
@@ -80,6 +83,21 @@ def choices(name: str) -> tuple[Choice, ...]:
     return Choice.read(path) if path.is_file() else ()
 
 
+def listed(name: str, version_: str) -> list[Choice]:
+    """The problems of a list in one of its versions; none where the list does not know them."""
+    if version_ == version(name):
+        return list(choices(name))
+    if not version_.isdecimal():
+        return []
+    return [c for c in choices(name) if c.since and int(c.since) <= int(version_)]
+
+
+def kind_of(folder: str) -> str:
+    """Of SET/FAMILY: the family that its scene is of, which a list may call otherwise."""
+    name, _, family = folder.rpartition("/")
+    return next((c.scene for c in choices(name) if c.family == family and c.scene), family)
+
+
 def version(name: str) -> str:
     """Of a set: the present one."""
     return KNOWN[name][0] if name in KNOWN else "1"
@@ -93,8 +111,13 @@ def version_of(folder: str) -> str:
 
 def stored_version(folder: str, wanted: str | None) -> str:
     """Of SET/FAMILY in a version of its set: the present one has the newest of each family."""
-    if wanted is None or wanted == version(folder.split("/")[0]):
+    name, family = folder.split("/")
+    if wanted is None or wanted == version(name):
         return version_of(folder)
+    if any(choice.family == family for choice in listed(name, wanted)):
+        # the newest that there was then
+        there = [one for one in published.versions(folder) if int(one) <= int(wanted)]
+        return there[-1] if there else wanted
     return wanted
 
 
@@ -134,9 +157,10 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
     found: dict[str, None] = {}
     for name in names:
         older = version is not None and version != KNOWN.get(name, ("", ""))[0]
-        if name in known and older and choices(name):
+        if version is not None and name in known and older and choices(name):
+            had = [f"{name}/{choice.family}" for choice in listed(name, version)]
             stored = [own for own in published.folders(name) if version in published.versions(own)]
-            found.update(dict.fromkeys(stored or known[name]))
+            found.update(dict.fromkeys(had or stored or known[name]))
         elif name in known:
             found.update(dict.fromkeys(known[name]))
         elif name in every or (version is not None and version in published.versions(name)):
@@ -199,7 +223,8 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
     """
     wanted, family = stored_version(folder, version), folder.partition("/")[2]
     stored = published.path_of(folder, wanted)
-    unchanged = family in scenes.assemblies() and wanted == version_of(folder)
+    had = any(choice.family == family for choice in listed(folder.split("/")[0], wanted))
+    unchanged = family in scenes.assemblies() and (had or wanted == version_of(folder))
     if version is not None and stored is None and not unchanged:
         there = ", ".join(published.versions(folder)) or "none"
         raise published.VersionError(
@@ -209,8 +234,8 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
     plan = fresh_plan(folder, seed, **{"version": wanted, **settings})
     if stored is not None:
         frozen, _ = trajectory.read_origin(stored)
-        listed = [choice for choice in choices(plan.collection) if choice.family == family]
-        if choices(plan.collection) and (wanted != version_of(folder) or not listed):
+        now = any(choice.family == family for choice in choices(plan.collection))
+        if choices(plan.collection) and (wanted != version_of(folder) or not now):
             # the list was another one then
             numbers = tuple(published.digests(folder, wanted))
             own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
@@ -239,16 +264,18 @@ def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
         ValueError: as `plan_of`.
     """
     name, family = folder.split("/")
-    own = [choice for choice in choices(name) if choice.family == family]
     settings = {"collection": name, "version": version_of(folder), **settings}
+    had = listed(name, settings["version"]) or choices(name)
+    own = [choice for choice in had if choice.family == family]
     if not own:
         return Plan.of_family(family, seed, **settings)
     first = own[0]
     if any((c.parameters, c.seed) != (first.parameters, first.seed) for c in own):
         raise ValueError(f"{folder}: the list {name}.json has two scenes of one name")
     numbers = tuple(sorted({choice.number for choice in own}))
-    settings = {"chosen": numbers, "problems": numbers[-1] + 1, **settings}
-    return Plan(scene=source(family, dict(first.parameters), first.seed), **settings)
+    settings = {"chosen": numbers, "problems": numbers[-1] + 1, "label": family, **settings}
+    scene = source(first.scene or family, dict(first.parameters), first.seed)
+    return Plan(scene=scene, **settings)
 
 
 def from_folder(plan: Plan, folder: str | Path) -> Plan:
@@ -296,8 +323,6 @@ def published_digest(row: Mapping[str, Any]) -> str | None:
         if published.seed(folder, row["version"]) != row["seed"]:
             return None
         return published.digests(folder, row["version"]).get(number)
-    if row["version"] != version(row["collection"]):
-        return None
-    listed = choices(row["collection"])
-    found = [c.digest for c in listed if (c.family, c.number) == (row["family"], number)]
+    own = listed(row["collection"], row["version"])
+    found = [c.digest for c in own if (c.family, c.number) == (row["family"], number)]
     return found[0] or None if found else None

@@ -86,6 +86,7 @@ class Plan:
 
     scene: Source
     collection: str  # the set
+    label: str = ""  # what the set calls the family, where it has another one of the scene's name
     version: str = ""  # of the set
     problems: int | None  # steps with contact that are looked at; None: as many as `steps` give
     steps: int | None = None  # at most; None: as many as `problems` need
@@ -121,8 +122,13 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """SET/SCENE, also the folder."""
-        return f"{self.collection}/{self.scene.name}"
+        """SET/FAMILY, also the folder."""
+        return f"{self.collection}/{self.family}"
+
+    @property
+    def family(self) -> str:
+        """What the set calls it."""
+        return self.label or self.scene.name
 
     @property
     def total(self) -> int:

@@ -7,14 +7,14 @@ In the data package `fclib-collection`, beside the trajectories:
 
 A problem is known by the digest of its data, of which 16 digits are stored, whatever its name is in
 however many sets. Of the runs to TOLERANCE those at one limit of CPU time have a vote, the limit at
-which most runs were done, of the newest version of each solver:
+which most runs of the problem's family were done, of the newest version of each solver:
 
 easy    more than half of the solvers that take such problems solved it
 hard    not so many
 open    no run and no solution that was taken in has an error within TOLERANCE, and no run has
         proved that there is no solution, which counts as solved
 
-Runs at a longer limit have no vote; what they solved is no longer open.
+Runs at another limit have no vote; what they solved is no longer open.
 """
 
 from __future__ import annotations
@@ -83,6 +83,7 @@ class Standing:
     rating: str  # easy, hard or open; empty where it was not run
     solved: int  # by so many
     voters: int  # of so many solvers
+    limit: float | None  # [s] of CPU time that these had, one for a family; None where none was run
     best: Run | None  # the one with the least error
     solution: Path | None  # where it is stored
 
@@ -91,7 +92,7 @@ class Standing:
 class Basis:
     """What the classes of a set rest on."""
 
-    limit: float | None  # [s] of CPU time
+    limits: tuple[float, ...]  # [s] of CPU time, those of its families
     solvers: tuple[str, ...]  # with a vote
     versions: tuple[str, ...]
     dates: tuple[str, str]  # the first and the last
@@ -99,7 +100,8 @@ class Basis:
     def __str__(self) -> str:
         """In a sentence."""
         return (
-            f"to {TOLERANCE:g} within {self.limit:g} s of CPU a run, by {len(self.solvers)} solvers"
+            f"to {TOLERANCE:g} within {' or '.join(f'{limit:g}' for limit in self.limits)} s of CPU"
+            f" a run, by {len(self.solvers)} solvers"
             f" ({', '.join(self.solvers)}; version {', '.join(self.versions)}),"
             f" {' to '.join(dict.fromkeys(self.dates))}"
         )
@@ -141,7 +143,7 @@ def write(rows: Iterable[Run]) -> Path:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([field.name for field in fields(Run)])
-    for row in sorted(set(rows), key=lambda run: (run.problem, run.digest, run.solver, run.date)):
+    for row in sorted(set(rows), key=place_of):
         values = asdict(row)
         numbers = {k: "" if values[k] is None else f"{values[k]:.6g}" for k in NUMBERS}
         writer.writerow((values | numbers).values())
@@ -149,6 +151,11 @@ def write(rows: Iterable[Run]) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     catalog.replace_file(path, lambda beside: beside.write_text(text.getvalue(), encoding="utf-8"))
     return path
+
+
+def place_of(run: Run) -> tuple[Any, ...]:
+    """What runs are sorted by: no two of the table are equal in it."""
+    return run.problem, run.digest, run.solver, run.date, run.limit or 0.0, run.version
 
 
 def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> int:
@@ -225,23 +232,27 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
     for run in runs():
         stored[run.digest].append(run)
     problems = members(name)
-    own = [run for digest in problems.values() for run in stored[digest[:DIGITS]]]
-    limits = Counter(run.limit for run in own if run.limit is not None)
-    limit = max(limits, key=lambda value: (limits[value], -value), default=None)
+    done: dict[str, Counter[float]] = defaultdict(Counter)
+    for name_, digest in problems.items():
+        limits = [run.limit for run in stored[digest[:DIGITS]] if run.limit is not None]
+        done[name_.rpartition("/")[0]].update(limits)
     rows = []
     voting: list[Run] = []
     for name_, digest in problems.items():
         mine = stored[digest[:DIGITS]]
+        counts = done[name_.rpartition("/")[0]]
+        limit = max(counts, key=lambda value: (counts[value], -value), default=None)
         # of several versions of a solver the last one has the vote
         last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
-        voters = [run for run in last.values() if run.status != "unsuitable"]
+        # a solution that was taken in has no limit, and no vote
+        voters = [run for run in last.values() if run.limit and run.status != "unsuitable"]
         voting += voters
         rows.append(standing(name_, digest, mine, voters))
-    if limit is None:
+    if not voting:
         return rows, None
     dates = sorted(run.date for run in voting)
     return rows, Basis(
-        limit,
+        tuple(sorted({run.limit for run in voting if run.limit is not None})),
         tuple(sorted({run.solver for run in voting})),
         # without the hash of a solver's code
         tuple(sorted({run.version.partition("-")[0] for run in voting})),
@@ -266,8 +277,9 @@ def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run])
     else:
         rating = "easy" if 2 * solved > len(voters) else "hard"
     path = solution_path(digest)
+    limit = voters[0].limit if voters else None
     return Standing(
-        name, digest, rating, solved, len(voters), best, path if path.is_file() else None
+        name, digest, rating, solved, len(voters), limit, best, path if path.is_file() else None
     )
 
 

@@ -31,6 +31,7 @@ from fclib._solve import MERITS
 from fclib.bench import profiles
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog, sets, standing
+from fclib.collections.known import kind_of
 from fclib.report import browser, citing, drawn, taking
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
@@ -206,7 +207,7 @@ class Problems:
             self._add_runs(campaigns)
         known = families()
         for row in self.rows:
-            family = known.get(row["family"])
+            family = known.get(kind_of(f"{row.get('collection')}/{row['family']}"))
             row["kind"] = family.collection if family else row.get("collection")
             row["application"] = family.application if family else None
             if not row["formulation"].startswith("G"):
@@ -502,8 +503,9 @@ class _Writer:
             record["citation"] = rows[0].get("citation")
             if (collection, name) in steps:
                 record["steps"] = steps[collection, name]
-            if name in known:
-                record |= _family(known[name])
+            kind = kind_of(f"{collection}/{name}")
+            if kind in known:
+                record |= _family(known[kind])
             record["bibtex"] = citing.family(record)
             shown = [k for k in places if self.problems.rows[k].get("thumb")]
             if shown:

@@ -8,7 +8,6 @@ like any other: conversions, limits, history and the judgement are the same.
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 import math
@@ -23,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
+from fclib._meant import meant
 
 GROUP = "fclib.solvers"
 SolverError = _core.SolverError
@@ -279,6 +279,6 @@ def find_solver(name: str) -> _core.SolverInfo:
     if name in _registered:  # by an entry point
         return _registered[name]
     known = [info.name for info in solvers()]
-    close = difflib.get_close_matches(name, known, 1)
-    meant = f"did you mean {close[0]}? " if close else ""
-    raise _core.OptionError(f"solver '{name}': unknown; {meant}there is: {', '.join(known)}")
+    raise _core.OptionError(
+        f"solver '{name}': unknown; {meant(name, known)}there is: {', '.join(known)}"
+    )

@@ -60,10 +60,11 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 # in a file an import stands, it counts. "__init__" is what `import fclib` gives
 PYTHON: dict[str, set[str]] = {
     "_geometry": set(),
+    "_meant": set(),
     "_core": set(),
     "_display": {"_core"},
     "_digest": set(),
-    "_registry": {"_core"},
+    "_registry": {"_core", "_meant"},
     "_same": set(),
     "_solve": {"_core", "_registry"},
     "_batch": {"_core", "_same"},
@@ -74,10 +75,19 @@ PYTHON: dict[str, set[str]] = {
     "jax": {"_layer"},
     "external": {"_core", "_registry"},
     "analysis": {"_core", "_digest", "_registry", "_solve"},
-    "scenes": {"_core", "_geometry"},
+    "scenes": {"_core", "_geometry", "_meant"},
     "simulate": {"_core", "_geometry", "_solve", "scenes"},
     "recorders": {"_core", "_solve", "external"},
-    "collections": {"_core", "_digest", "_geometry", "_solve", "analysis", "scenes", "simulate"},
+    "collections": {
+        "_core",
+        "_digest",
+        "_geometry",
+        "_meant",
+        "_solve",
+        "analysis",
+        "scenes",
+        "simulate",
+    },
     "__init__": {
         "_batch",
         "_core",
@@ -92,6 +102,7 @@ PYTHON: dict[str, set[str]] = {
     "bench": {
         "_core",
         "_digest",
+        "_meant",
         "_registry",
         "_solve",
         "external",

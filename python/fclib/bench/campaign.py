@@ -6,7 +6,6 @@ jobs of it.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import math
 import random
@@ -21,6 +20,7 @@ from types import MappingProxyType
 from typing import Any
 
 from fclib import _core, _registry
+from fclib._meant import meant
 from fclib._solve import MeritKind
 from fclib.bench import made, problems
 from fclib.bench.fingerprint import version_of
@@ -386,14 +386,9 @@ def _only(entries: object, known: set[str], where: str) -> None:
     for name in entries:
         if name not in known:
             raise CampaignError(
-                f"{where}{name}: is not known here; {_there_is(name, sorted(known))}"
+                f"{where}{name}: is not known here; {meant(name, known)}"
+                f"there is: {', '.join(sorted(known))}"
             )
-
-
-def _there_is(word: str, known: Sequence[str]) -> str:
-    """What may have been meant by a word, and all that there is."""
-    close = difflib.get_close_matches(word, known, 1)
-    return f"{f'did you mean {close[0]}? ' if close else ''}there is: {', '.join(known)}"
 
 
 def _texts(entries: Mapping[str, Any], name: str) -> list[str]:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import scenes
+from fclib._meant import meant
 from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, evenly, families, source
 
@@ -169,12 +170,16 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
             found[f"{families()[name].collection}/{name}"] = None
         elif name.partition("/")[0] in known:
             own = name.partition("/")[0]
-            has = ", ".join(folder.partition("/")[2] for folder in known[own])
-            raise KeyError(f"the set {own} has no family {name.partition('/')[2]!r}; it has {has}")
+            has = [folder.partition("/")[2] for folder in known[own]]
+            family = name.partition("/")[2]
+            raise KeyError(
+                f"the set {own} has no family {family!r}; {meant(family, has)}"
+                f"it has {', '.join(has)}"
+            )
         else:
             raise KeyError(
-                f"no set and no family is called {name!r}; sets: {', '.join(known)};"
-                f" families: {', '.join(families())}"
+                f"no set and no family is called {name!r}; {meant(name, [*known, *families()])}"
+                f"sets: {', '.join(known)}; families: {', '.join(families())}"
             )
     return list(found)
 

@@ -20,6 +20,7 @@ import importlib
 import pkgutil
 from typing import Any
 
+from fclib._meant import meant
 from fclib.scenes.shared.family import Assembled, Assembly, Described, Family, Law, Scene, parameter
 
 __all__ = [
@@ -65,5 +66,8 @@ def get(name: str) -> type[Family]:
     """The family of scenes called `name`. KeyError, with the known names, where there is none."""
     known = families()
     if name not in known:
-        raise KeyError(f"no family of scenes is called {name!r}; known: {', '.join(known)}")
+        raise KeyError(
+            f"no family of scenes is called {name!r}; {meant(name, known)}"
+            f"there is: {', '.join(known)}"
+        )
     return known[name]

@@ -12,7 +12,7 @@ times the limit.
 from __future__ import annotations
 
 import argparse
-from collections import defaultdict
+from collections import Counter, defaultdict
 from typing import Any
 
 import _results
@@ -32,16 +32,25 @@ def mean(runs: list[standing.Run]) -> float:
 
 
 def votes() -> dict[tuple[str, str], standing.Run]:
-    """The last run of each problem and solver that takes it, at the limit of its family."""
+    """The last run of each problem and solver that takes it, at the limit of its family.
+
+    Of the solvers that were tried on the whole set: other campaigns share some of its problems.
+    """
     rows, basis = standing.standings(standing.FIRST)
     assert basis is not None, "no runs are stored"
     own = {row.digest[: standing.DIGITS]: row for row in rows if row.limit is not None}
     found = {}
     for run in sorted(standing.runs(), key=standing.when):
         row = own.get(run.digest)
-        if row is not None and run.limit == row.limit and run.status != "unsuitable":
+        if row is not None and run.limit == row.limit:
             found[row.id, run.solver] = run
-    return found
+    tried = Counter(solver for _, solver in found)
+    most = max(tried.values())
+    return {
+        (name, solver): run
+        for (name, solver), run in found.items()
+        if tried[solver] == most and run.status != "unsuitable"
+    }
 
 
 def main() -> None:

@@ -242,6 +242,10 @@ def changes(lines: list[str]) -> list[Change]:
             Change(f"{first}: {key}={value:g}", first, with_rules(at, **{key: value}))
             for value in values
         ]
+    rolling = place(lines, first, 1)
+    for value in (1e-6, 1e-5, 1e-3):
+        change = with_rules(rolling, polish=f"{value:g}")
+        result.append(Change(f"{first}, rolling: polish={value:g}", first, change))
     sweeps = place(lines, "gauss-seidel", 1)
     for value in (10, 40):
         result.append(

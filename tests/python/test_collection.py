@@ -272,7 +272,7 @@ def test_nonsense_plans(settings: dict[str, Any], message: str) -> None:
 def test_names() -> None:
     assert collections.folders(["rt444", "Chain"]) == sorted(collections.sets()["rt444"])
     assert collections.folders(["Chain", "rt444/Chain"]) == ["rt444/Chain"]
-    with pytest.raises(KeyError, match=r"'rt44'; sets: .*rt444"):
+    with pytest.raises(KeyError, match=r"'rt44'; did you mean rt444\? sets: .*rt444"):
         collections.folders(["rt44"])
 
 

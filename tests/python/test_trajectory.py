@@ -469,6 +469,7 @@ NOT_MET = {
 NOT_SIMULATED = {
     "ChuteLocalProblems",
     "FrictionRange",
+    "Jammed",
     "LocalProblems",
     "ManySolutions",
     "MassRatios",

@@ -3,7 +3,8 @@
 // det(x) = x_0^2 - ||x_1..||^2, x o y = (x^T y, x_0 y_1.. + y_0 x_1..). Nesterov & Todd's scaling N
 // of x and y inside the cone is symmetric, N^2 y = x, and lambda = N y = N^-1 x.
 //
-// Alizadeh & Goldfarb, "Second-order cone programming" (2003).
+// Alizadeh & Goldfarb, "Second-order cone programming" (2003); the scaling: Nesterov &
+// Todd (1997). S is the number of components.
 #pragma once
 
 #include <Eigen/Dense>
@@ -16,7 +17,7 @@ namespace fclib::lorentz {
 template <int S>
 using Point = Eigen::Matrix<double, S, 1>;
 
-/// Without cancellation.
+/// The determinant, without cancellation.
 template <int S>
 double det(const Point<S>& x) {
   const double t = x.template tail<S - 1>().norm();
@@ -76,6 +77,7 @@ struct Scaling {
   Point<S> w;
   Eigen::Matrix<double, S, S> N, inverse;
 
+  /// That of x and y, which are inside the cone.
   void set(const Point<S>& x, const Point<S>& y) {
     constexpr int T = S - 1;
     const double det_x = inner_det(x);

@@ -1,7 +1,12 @@
 """Families assembled directly: what they say, and mechanics with a closed form."""
 
 import dataclasses
+import decimal
 import json
+import math
+import os
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
@@ -10,6 +15,7 @@ from scipy.spatial.distance import pdist
 
 import fclib
 from fclib import scenes
+from fclib.collections import known
 from fclib.scenes import Assembled
 from fclib.scenes.pile import DIAMETER, Pile, contacts_of
 from fclib.scenes.shared import assembly
@@ -160,3 +166,67 @@ def test_mass_ratios_and_friction_are_what_they_say() -> None:
 def test_nonsense_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=name):
         FAMILIES["Wall"](**{name: value})
+
+
+LISTED = [c for name in ("standard", "hard") for c in known.choices(name) if c.family in FAMILIES]
+OLDER_PROCESSOR = """
+import json, sys, warnings
+warnings.simplefilter("ignore")  # of a NumPy that knows some of these features by other names
+import fclib
+from fclib.scenes import assemblies
+found = {}
+for name, count in json.load(sys.stdin).items():
+    family = assemblies()[name]()
+    found[name] = [fclib.digest(family.problem(k)) for k in range(count)]
+json.dump(found, sys.stdout)
+"""
+
+
+def test_published_problems_are_assembled_as_they_were_published() -> None:
+    assert {"Jammed", "Packing", "Wall"} <= {choice.family for choice in LISTED}
+    for c in LISTED:
+        family = FAMILIES[c.scene or c.family](**c.parameters)
+        assert fclib.digest(family.problem(c.number, c.seed)) == c.digest, c
+
+
+def test_an_older_processor_assembles_the_same_problems() -> None:
+    """BLAS and the vector functions of NumPy round otherwise there."""
+    counts = {
+        name: min(family().problems, 12)
+        for name, family in FAMILIES.items()
+        if not hasattr(family, "digests")
+    }
+    environment = os.environ | {
+        "OPENBLAS_CORETYPE": "PRESCOTT",
+        "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX2 FMA3 AVX512F AVX512CD AVX512_SKX",
+    }
+    told = subprocess.run(
+        [sys.executable, "-c", OLDER_PROCESSOR],
+        input=json.dumps(counts),
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    elsewhere = json.loads(told.stdout)
+    for name, count in counts.items():
+        family = FAMILIES[name]()
+        here = [fclib.digest(family.problem(k)) for k in range(count)]
+        assert here == elsewhere[name], name
+
+
+def test_cubes_and_exponentials_are_exactly_rounded() -> None:
+    x = np.random.Generator(np.random.PCG64(0)).uniform(0.5, 2.0, 1000)
+    with decimal.localcontext(decimal.Context(prec=200)):
+        cubes = [float(decimal.Decimal(value) ** 3) for value in x.tolist()]
+        powers = [float(decimal.Decimal(value).exp()) for value in x.tolist()]
+    assert assembly.cubes(x).tolist() == cubes
+    assert assembly.exponentials(x).tolist() == powers
+    np.testing.assert_allclose(powers, np.exp(x), rtol=1e-15)
+
+
+def test_last_digits_are_as_published() -> None:
+    x = np.full(100, 0.3)
+    assert assembly.as_published("Wall/100", x).tolist() == x.tolist()
+    found = assembly.as_published("Packing/100", x)
+    assert (found[0], found[1:].tolist()) == (math.nextafter(0.3, 0.0), x[1:].tolist())

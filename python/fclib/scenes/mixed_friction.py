@@ -43,7 +43,11 @@ class MixedFriction:
         bodies = assembly.running_bond(SIZES[size], seed, push=self.push)
         random = np.random.Generator(np.random.PCG64([seed, number]))
         if kind < len(SPREADS):
-            mu = self.median * np.exp(SPREADS[kind] * random.standard_normal(len(bodies.normals)))
+            drawn = random.standard_normal(len(bodies.normals))
+            factors = assembly.exponentials(SPREADS[kind] * drawn)
+            if seed == 0:
+                factors = assembly.as_published(f"MixedFriction/{number}", factors)
+            mu = self.median * factors
             return bodies.problem(mu, f"{len(mu)} contacts, spread {SPREADS[kind]:g}")
         mu = np.where(np.rint(bodies.points[:, 2]) % 2 == 0, RUBBER, ICE)
         return bodies.problem(mu, f"{len(mu)} contacts, ice and rubber")

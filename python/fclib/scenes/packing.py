@@ -76,7 +76,10 @@ class Packing:
         width = np.full(len(first), 0.5 * SPACING)
         width[: len(pairs)] = np.linalg.norm(difference, axis=1)
         gaps = width - radii[second] - np.where(first >= 0, radii[first], 0.0)
-        masses = 2500 * 4 / 3 * np.pi * radii**3
+        volumes = assembly.cubes(radii)
+        if seed == 0:
+            volumes = assembly.as_published(f"Packing/{contacts}", volumes)
+        masses = 2500 * 4 / 3 * np.pi * volumes
         impulses = np.zeros((len(centres), 3))
         pushed = np.flatnonzero(grid[:, 0] == side - 1)
         weight = masses.sum() * assembly.GRAVITY * assembly.STEP

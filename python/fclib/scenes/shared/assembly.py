@@ -6,7 +6,12 @@ ground is -1), its normal from the first to the second, and its point.
 
 from __future__ import annotations
 
+import decimal
+import functools
+import json
 from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 import numpy as np
@@ -26,6 +31,36 @@ SIZES = (10, 30, 100, 300, 1000, 3000, 10000, 30000, 100000)
 ROUNDING = 1e-15  # entries of H below are none
 LENGTH_NAMES: Final = {1e-3: "mm", 1.0: "m", 1e3: "km"}
 MASS_NAMES: Final = {1e-3: "g", 1.0: "kg", 1e3: "t"}
+
+
+# NumPy's powers and exponentials depend on the processor: these are exactly rounded. Problems that
+# were published with NumPy's keep their last digits by `as_published`
+
+
+def cubes(x: Vector) -> Vector:
+    """x^3 of each number."""
+    return np.array([float(Fraction(value) ** 3) for value in x.tolist()])
+
+
+def exponentials(x: Vector) -> Vector:
+    """e^x of each number."""
+    with decimal.localcontext(decimal.Context(prec=40)):
+        return np.array([float(decimal.Decimal(value).exp()) for value in x.tolist()])
+
+
+def as_published(name: str, exact: Vector) -> Vector:
+    """The same numbers, where some were published with another last digit: by their name."""
+    found = exact.copy()
+    for side, places in _last_digits().get(name, {}).items():
+        found[places] = np.nextafter(exact[places], -np.inf if side == "below" else np.inf)
+    return found
+
+
+@functools.cache
+def _last_digits() -> dict[str, dict[str, list[int]]]:
+    """By FAMILY/SIZE: places of numbers one unit in the last place below, or above."""
+    text = Path(__file__).with_name("last_digits.json").read_text(encoding="utf-8")
+    return dict(json.loads(text))
 
 
 @dataclass(frozen=True)

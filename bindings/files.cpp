@@ -132,9 +132,9 @@ void bind_hdf5(nb::module_& m) {
       nb::sig(signature("write_solutions", ", solutions: " + list_type + ", *, " + compression_type,
                         "None")
                   .c_str()),
-      "Puts all solutions that are known of a problem into its file, with Merit.error of each as "
-      "/solutions/error, in place of those it had, atomically. They stay where the one of "
-      "write_solution is replaced. An empty list takes them away.\n\n"
+      "Puts all known solutions of a problem into its file, atomically.\n\n"
+      "They replace those that write_solutions put there before; an empty list removes these. "
+      "Merit.error of each is stored as /solutions/error. write_solution does not change them.\n\n"
       "Raises FileError, or ProblemError where the sizes disagree.");
   m.def(
       "kinds", [](const fs::path& path) { return read_contents(path.string()).kinds; }, "path"_a,
@@ -218,8 +218,8 @@ void bind_hdf5(nb::module_& m) {
                             compression_type,
                         "None")
                   .c_str()),
-      "Puts guesses into a file that has their problem, atomically: in place of those it had "
-      "(\"replace\"), or after them (\"add\").\n\n"
+      "Puts guesses into a file that has their problem, atomically. mode says whether they "
+      "replace those in the file (\"replace\") or follow them (\"add\").\n\n"
       "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
       "or a compression outside 0..9.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
@@ -255,16 +255,17 @@ void bind_hdf5(nb::module_& m) {
                               compression_type + ", dense: bool = False, sync: bool = True",
                           "None")
                     .c_str()),
-        "Writes an FCLIB file, atomically. What the solution and the guesses lack of v and u is "
-        "completed: readers of libfclib 3.1 need it.\n\n"
-        "A file that is there is replaced whole (\"overwrite\"); or it keeps what it holds, and "
-        "must not have such a problem (\"add\"), or gives up the problem of this kind, with its "
-        "solution and its guesses (\"replace\"). In a file of several problems solution and "
-        "guesses are those of the global one. compression is the level of deflate, 0 (none) to "
-        "9. Dense matrices are written by rows, which every reader takes; dense keeps those of a "
-        "local problem as they are. Without sync a new file is not flushed: whoever writes many "
-        "calls "
-        "sync_files after them.\n\n"
+        "Writes an FCLIB file, atomically. If the solution or a guess has no v or no u, these are "
+        "computed: readers of libfclib 3.1 need them.\n\n"
+        "mode says what happens to a file that exists:\n\n"
+        "- \"overwrite\": it is replaced whole;\n"
+        "- \"add\": it keeps what it holds, and must not hold a problem of this kind;\n"
+        "- \"replace\": its problem of this kind goes, with the solution and the guesses.\n\n"
+        "In a file of several problems, solution and guesses belong to the global one. compression "
+        "is the level of deflate, from 0 (none) to 9. Dense matrices are written by rows, which "
+        "every reader can read; with dense=True those of a local problem keep their storage. With "
+        "sync=False the file is not flushed to the disk: call sync_files after the last of many "
+        "files.\n\n"
         "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
         "mode or a compression outside 0..9.");
   });
@@ -278,10 +279,10 @@ void bind_siconos(nb::module_& m) {
         "path"_a, "problem"_a,
         nb::sig(signature("write_siconos", ", problem: " + class_name(P::kind), "None").c_str()),
         nb::call_guard<Unlocked>(),
-        "Writes a problem in Siconos' text format (\".dat\"), or replaces the old file whole, "
-        "atomically. Every number reads back equal. Matrices keep their storage; W by rows is "
-        "written in blocks, other matrices by rows are written by columns. The format has no "
-        "place for bilateral constraints, solutions and info.\n\n"
+        "Writes a problem in Siconos' text format (\".dat\"), atomically. A file of this name is "
+        "replaced whole. Every number reads back equal. Matrices keep their storage, except those "
+        "stored by rows: W is then written in blocks, and other matrices by columns. The format "
+        "has no place for bilateral constraints, solutions and info.\n\n"
         "Raises UnsuitableError where there are bilateral constraints, FileError, or ProblemError "
         "where the data is not valid.");
   });

@@ -97,11 +97,16 @@ void bind_merits(nb::module_& m) {
         },
         "problem"_a, "solution"_a,
         nb::sig(signature("contact_merits", "dict[str, typing.Any]").c_str()),
-        "The merit contact by contact: status (open, stick, slide), u (m,) recomputed, natural "
-        "(||r - P_K(r - u^)||), cone and dual_cone (distances from K and K*), each (nc,); and "
-        "mismatches: of each of v, u and l that is stored the component that is worst, a dict of "
-        "part, index, stored, difference (of l the velocity left at its joint) and error, the "
-        "difference beyond rounding over the velocity of its component.\n\n"
+        "The merit of each contact, as a dict:\n\n"
+        "- status (nc,): open, stick or slide;\n"
+        "- natural (nc,): ||r - P_K(r - u^)||;\n"
+        "- cone, dual_cone (nc,): the distances of r from K and of u^ from K*;\n"
+        "- u (m,): the velocities, computed again from r;\n"
+        "- mismatches: a list. It has a dict for each of v, u and l that the solution stores, "
+        "about "
+        "the worst component of it: part, index, stored, difference and error. The difference is "
+        "that of the stored value and the computed one (for l: the velocity that is left at the "
+        "joint). The error is what of it is not rounding, over the velocity of the component.\n\n"
         "Raises ProblemError where problem or solution are not valid.");
     m.def(
         "merit",

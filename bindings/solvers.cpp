@@ -435,12 +435,15 @@ void bind_solvers(nb::module_& m) {
           },
           nb::for_getter(
               nb::sig("def certificate(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
-          "y >= 0 (nc) which proves that there is no solution, where the status is infeasible, on\n"
-          "the problem as it was given: -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and\n"
-          "y . q_N + z . s < 0, or H E y + G z = 0 and y . w_N + z . b < 0, with E y the vector\n"
-          "whose normal parts are y. Else None. Of a global problem these sums may vanish for "
-          "real\n"
-          "numbers next to y and z instead: fclib.analysis.check_arrays gives them.")
+          "If the status is infeasible: y >= 0 (nc,), which proves that the problem as it was "
+          "given\n"
+          "has no solution. Else None. E y is the vector whose normal parts are y. Then, for a "
+          "local\n"
+          "problem, -(W^T E y + V z) is in K*, V^T E y + R^T z = 0 and y . q_N + z . s < 0. For a\n"
+          "global problem, H E y + G z = 0 and y . w_N + z . b < 0. The sums of a global problem "
+          "may\n"
+          "vanish for real numbers close to y and z instead. fclib.analysis.check_arrays gives "
+          "them.")
       .def_prop_ro(
           "certificate_z",
           [](nb::handle self) -> nb::object {
@@ -456,9 +459,10 @@ void bind_solvers(nb::module_& m) {
             if (!r.certificate.proven()) return std::nullopt;
             return r.certificate.bound;
           },
-          "reactions of a norm below this are no solution, where the status is infeasible: inf\n"
-          "where the proof is exact, finite where the last digits of W are all that is left of\n"
-          "W^T E y. Else None.")
+          "If the status is infeasible: no reactions of a norm below this are a solution. It is "
+          "inf\n"
+          "if the proof is exact. It is finite if only the last digits of W are left of W^T E y.\n"
+          "Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
       .def_prop_ro("history", history_of,
                    nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),

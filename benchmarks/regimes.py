@@ -9,7 +9,8 @@ steps whose contacts are as many as published (published_sets.csv), some are kep
 their number of contacts. Where other figures choose too, a step has all of them as published, to a
 tenth, as collection_table.py compares them; the steps are then spread by each figure in turn. A
 regime that is as long as published is filled up to the published number by further steps, evenly
-spread in time.
+spread in time. A simulation made again is another one in its last digits, and in the end in all of
+them. So a regime that grows keeps the states that are stored, and takes further steps beside them.
 
 States in which a body is more than DEEPEST in another are left out.
 
@@ -27,7 +28,7 @@ import json
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,7 @@ class Regime:
     states: str = ""  # SET/FAMILY of a stored trajectory whose states are taken, instead
     by: tuple[str, ...] = ()  # columns of published_sets.csv that choose beside the contacts
     fill: bool = False  # to as many problems as published
+    grows: bool = False  # the states of the newest stored version stay, and others join them
     every: int = 1  # of so many steps one is looked at
     version: str = "1"  # of the trajectory
 
@@ -77,19 +79,27 @@ REGIMES: dict[str, Regime] = {
         keep=32,
         steps=440,
         by=("dof", "density", "rank_ratio"),
-        version="2",
+        fill=True,
+        grows=True,
+        version="3",
     ),
     "Chute4000": Regime(
         "Chute_4000",
         CHUTE | {"layers": 14, "across": 14, "time_step": 1e-3, "grains": 3340},
         keep=6,
         steps=800,
+        fill=True,
+        grows=True,
+        version="2",
     ),
     "Aqueduct": Regime(
         "Aqueduct_PR",
         {"bond": True, "voussoirs": 8, "settlement": 0.05},
         keep=10,
-        steps=14,
+        steps=40,
+        fill=True,
+        grows=True,
+        version="2",
         way=Simulation(solver="auto", tol=1e-4, options={"time_limit": 20.0}),
     ),
     "SpheresBox": Regime(
@@ -97,6 +107,9 @@ REGIMES: dict[str, Regime] = {
         {"margin": 0.4, "load": 5.0, "offset": 0.2, "time_step": 0.01},
         keep=12,
         steps=140,
+        fill=True,
+        grows=True,
+        version="2",
     ),
     "PeriodicBox": Regime(
         "100_PR_Periobox",
@@ -175,7 +188,9 @@ REGIMES: dict[str, Regime] = {
         keep=24,
         steps=75,
         by=("density",),
-        version="2",
+        fill=True,
+        grows=True,
+        version="3",
     ),
     "CubesH8x20": Regime("Cubes_H8_20", STEEL | {"upper": 1.0}, keep=1, steps=1, way=EXACT),
 }
@@ -207,6 +222,13 @@ def depth(contacts: Contacts, model: Model) -> float:
     return -float(contacts.gap.min(initial=0.0)) / (2 * size) if size else 0.0
 
 
+def newest(source: str) -> trajectory.Trajectory:
+    """The newest stored trajectory of SET/FAMILY."""
+    path = published.path_of(source, published.versions(source)[-1])
+    assert path is not None
+    return trajectory.read(path)
+
+
 def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
     """The steps of a regime that have a contact; of a simulation, as it goes.
 
@@ -227,9 +249,7 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
         return Row(number, step, position, velocity, *sizes, ratio, conditioning)
 
     if regime.states:
-        path = published.path_of(regime.states, published.versions(regime.states)[-1])
-        assert path is not None
-        stored = trajectory.read(path)
+        stored = newest(regime.states)
         for k in range(len(stored)):
             place = int(stored.number[k]), int(stored.step[k])
             yield row(*place, stored.position[k], stored.velocity[k])
@@ -252,13 +272,17 @@ def rows(name: str, regime: Regime, scene: scenes.Scene) -> Iterator[Row]:
             number += 1
 
 
-def chosen(found: list[Row], regime: Regime) -> list[Row]:
+def chosen(found: list[Row], regime: Regime, there: int = 0) -> list[Row]:
     """Those of as many contacts as published, evenly spread by that number.
 
     Where other figures choose too, of those that have them as published, evenly spread by each.
+    So many problems as `there` says are chosen already.
     """
     with PUBLISHED.open(newline="") as file:
         published = next(row for row in csv.DictReader(file) if row["set"] == regime.published)
+    wanted = int(published["problems"]) - there
+    if wanted <= 0:
+        return []
 
     def bounds(name: str) -> tuple[float, float]:
         low, _, high = published[name].partition(" to ")
@@ -283,10 +307,10 @@ def chosen(found: list[Row], regime: Regime) -> list[Row]:
     for name in names if inside else ():
         values = np.array([measure(row, name) for row in inside])
         ends = np.nanmin(values), np.nanmax(values)
-        for wanted in np.linspace(*ends, regime.keep // len(names)):
-            kept.add(int(np.nanargmin(np.abs(values - wanted))))
+        for value in np.linspace(*ends, min(regime.keep, wanted) // len(names)):
+            kept.add(int(np.nanargmin(np.abs(values - value))))
     others = [place for place in range(len(inside)) if place not in kept]
-    missing = int(published["problems"]) - len(kept)
+    missing = wanted - len(kept)
     if regime.fill and missing > 0 and others:
         kept.update(others[k] for k in evenly(len(others), missing))
     return [inside[place] for place in sorted(kept)]
@@ -295,8 +319,15 @@ def chosen(found: list[Row], regime: Regime) -> list[Row]:
 def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     """Write the trajectory of a regime; the problems that were chosen."""
     family = scenes.get(name)(**regime.parameters)
-    scene = family.scene(0)
-    kept = chosen(list(rows(name, regime, scene)), regime)
+    # a stored scene, as a scene made again may differ in its last digits
+    scene = newest(f"{SET}/{name}").scene if regime.grows else family.scene(0)
+    found = list(rows(name, regime, scene))
+    stays: list[Row] = []
+    if regime.grows:
+        stays = list(rows(name, replace(regime, states=f"{SET}/{name}"), scene))
+        taken = {row.number for row in stays}
+        found = [row for row in found if row.number not in taken]
+    kept = sorted(stays + chosen(found, regime, len(stays)), key=lambda row: row.number)
     model = model_of(scene)
     scheme = scheme_of(model)
     exponent = trajectory.exponent_of(model)
@@ -305,9 +336,7 @@ def make(name: str, regime: Regime, out: Path) -> list[Choice]:
     ]
     settings: dict[str, Any] = {"fclib": fclib.__version__, **regime.way.record()}
     if regime.states:
-        path = published.path_of(regime.states, published.versions(regime.states)[-1])
-        assert path is not None
-        origin = trajectory.read(path).origin
+        origin = newest(regime.states).origin
         settings = dict(origin["settings"]) | {"states": f"{regime.states}, {origin['version']}"}
     trajectory.write(
         out / published.file_name(f"{SET}/{name}", regime.version),
@@ -387,7 +416,8 @@ def main() -> None:
         before = known.Choice.read(target) if target.is_file() else ()
         listed = [choice for choice in before if choice.family != name] + own
         listed.sort(key=lambda choice: (choice.family, choice.number))
-        lines = ",\n".join(" " + json.dumps(asdict(choice), sort_keys=True) for choice in listed)
+        rows = [{k: v for k, v in asdict(choice).items() if v != ""} for choice in listed]
+        lines = ",\n".join(" " + json.dumps(row, sort_keys=True) for row in rows)
         target.write_text(f'{{"problems": [\n{lines}\n]}}\n', encoding="utf-8")
         print(f"{name}: {len(own)} problems", flush=True)
 

@@ -517,9 +517,7 @@ def test_published_trajectories_are_few_megabytes() -> None:
         name for name in collections.sets()["tiny"] if name.split("/")[1] in scenes.families()
     }
     assert names >= simulated
-    sizes = {
-        name: (published.IN_PLACE / published.FOLDER / name).stat().st_size for name in STORED
-    }
+    sizes = {name: (published.IN_PLACE / published.FOLDER / name).stat().st_size for name in STORED}
     core = sum(size for name, size in sizes.items() if name.partition("/")[0] in CORE)
     assert core < LIMITS["core"]
     assert sum(sizes.values()) < LIMITS["all"]

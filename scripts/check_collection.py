@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fclib.collections import published, trajectory
 
-LIMIT = 25e6  # bytes: what a release of the core sets may take
+LIMIT = 40e6  # bytes; the core sets have a limit of their own in test_trajectory.py
 
 
 def main() -> int:

@@ -1,7 +1,7 @@
 """What a solver does on jammed packings: each size and seed, at rest and pushed.
 
     .venv/bin/python benchmarks/packings.py [--contacts 1000 3000] [--limit 20 120]
-        [--seeds 0 1 2 3 4 5 6 7] [--solver auto] [--results packings]
+        [--seeds 0 1 2 3 4 5 6 7] [--counts 8 4] [--solver auto] [--results packings]
 
 One row a size and kind. A limit is CPU time of a solve [s], one for each size; --counts are the
 seeds of each size, of --seeds the first ones. What is not solved counts with the error of its best

@@ -45,9 +45,7 @@ void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& gues
     assemble(delta, rules.associated);
     if (!system_.factorise()) return;
     // predictor
-    for (Index a = 0; a < nc; ++a) {
-      g_.template segment<D>(D * a) = -lambda_.template segment<D>(D * a);
-    }
+    g_ = -lambda_;
     if (!direction(delta)) return;
     const double affine_step = std::min(1.0, longest());
     const double affine_gap = (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
@@ -72,11 +70,11 @@ void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& gues
     x_ += step * dx_;
     y_ += step * dy_;
     r_ += step * dr_;
-    for (Index a = 0; a < nc; ++a) {  // x follows from r, to the last digit
+    each([&](Index a) {  // x follows from r, to the last digit
       const double mu = problem_.friction.mu[a];
       x_.template segment<D>(D * a) = r_.template segment<D>(D * a);
       if (mu > 0) x_[D * a] *= mu;
-    }
+    });
     if (step < 0.1) {
       delta *= 10;
     } else if (step > 0.5) {
@@ -136,8 +134,7 @@ void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
   problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
   tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
   width_ = rules.smoothing * tau_;
-  residual_ = 0;
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  residual_ = largest([&](Index a) {
     const double mu = problem_.friction.mu[a];
     const Vec y = y_.template segment<D>(D * a);
     Vec residual = u_.template segment<D>(D * a);
@@ -145,14 +142,13 @@ void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
       residual -= y;
       residual[0] += y[0] - mu * y[0];
       if (!rules.associated) residual[0] += mu * sliding(y.template tail<T>().norm());
-      residual_ = std::max(residual_, residual.template lpNorm<Eigen::Infinity>());
     } else {
       residual[0] -= y[0];
       residual.template tail<T>().setZero();
-      residual_ = std::max(residual_, std::abs(residual[0]));
     }
     residual_vector_.template segment<D>(D * a) = residual;
-  }
+    return residual.template lpNorm<Eigen::Infinity>();
+  });
 }
 
 template <int D>
@@ -206,7 +202,7 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
 
 template <int D>
 void InteriorPoint<D>::correct(double sigma, bool second_order) {
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  each([&](Index a) {
     const double mu = problem_.friction.mu[a];
     const Scaling& s = scaling_[static_cast<std::size_t>(a)];
     const Vec lambda = lambda_.template segment<D>(D * a);
@@ -214,7 +210,7 @@ void InteriorPoint<D>::correct(double sigma, bool second_order) {
       double target = sigma * tau_;
       if (second_order) target -= affine_x_[D * a] * affine_y_[D * a];
       g_[D * a] = -lambda[0] + target / lambda[0];
-      continue;
+      return;
     }
     Vec target = Vec::Zero();
     target[0] = sigma * tau_;
@@ -223,19 +219,19 @@ void InteriorPoint<D>::correct(double sigma, bool second_order) {
                                    s.cone.N * affine_y_.template segment<D>(D * a), target);
     }
     g_.template segment<D>(D * a) = lorentz::divide<D>(target, lambda) - lambda;
-  }
+  });
 }
 
 template <int D>
 void InteriorPoint<D>::correct_shift(double step) {
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  each([&](Index a) {
     const auto y = y_.template segment<T>(D * a + 1);
     const double norm = y.norm();
-    if (!(norm > 0)) continue;
+    if (!(norm > 0)) return;
     const ContactVector<T> dy = step * affine_y_.template segment<T>(D * a + 1);
     residual_vector_[D * a] += problem_.friction.mu[a] * (sliding((y + dy).norm()) - sliding(norm) -
                                                           y.dot(dy) / std::hypot(norm, width_));
-  }
+  });
 }
 
 template <int D>
@@ -269,8 +265,9 @@ bool InteriorPoint<D>::direction(double delta) {
 
 template <int D>
 double InteriorPoint<D>::longest() const {
-  double step = std::numeric_limits<double>::infinity();
-  for (Index a = 0; a < problem_.nc(); ++a) {
+  // of the steps at each contact the least
+  return -largest([&](Index a) {
+    double step = std::numeric_limits<double>::infinity();
     if (problem_.friction.mu[a] > 0) {
       const auto leaves = [&](const Vector& v, const Vector& d) {
         return lorentz::longest<D>(v.template segment<D>(D * a), d.template segment<D>(D * a));
@@ -280,8 +277,8 @@ double InteriorPoint<D>::longest() const {
       if (dx_[D * a] < 0) step = std::min(step, -x_[D * a] / dx_[D * a]);
       if (dy_[D * a] < 0) step = std::min(step, -y_[D * a] / dy_[D * a]);
     }
-  }
-  return step;
+    return -step;
+  });
 }
 
 template class InteriorPoint<2>;

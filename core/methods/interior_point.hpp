@@ -21,7 +21,10 @@
 // All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <mutex>
 #include <vector>
 
 #include "contact/coulomb.hpp"
@@ -78,6 +81,20 @@ class InteriorPoint {
     in_parts(system_.workers(), problem_.nc(), [&](std::int64_t first, std::int64_t last) {
       for (auto a = first; a < last; ++a) f(static_cast<Index>(a));
     });
+  }
+
+  /// The largest f(a) of all contacts.
+  template <class F>
+  [[nodiscard]] double largest(const F& f) const {
+    double result = -std::numeric_limits<double>::infinity();
+    std::mutex one_at_a_time;
+    in_parts(system_.workers(), problem_.nc(), [&](std::int64_t first, std::int64_t last) {
+      double own = -std::numeric_limits<double>::infinity();
+      for (auto a = first; a < last; ++a) own = std::max(own, f(static_cast<Index>(a)));
+      const std::lock_guard lock(one_at_a_time);
+      result = std::max(result, own);
+    });
+    return result;
   }
 
   void evaluate(const InteriorPointRules& rules);

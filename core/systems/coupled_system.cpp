@@ -9,14 +9,6 @@ namespace fclib {
 
 namespace {
 
-/// The bodies are tried only where a contact touches few of their coordinates.
-constexpr Eigen::Index longest_column = 64;
-
-void sort_once(std::vector<Index>& rows) {
-  std::sort(rows.begin(), rows.end());
-  rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-}
-
 /// The pattern of d x d blocks whose columns have these rows, in any order, and their diagonal.
 BlockPattern pattern_of(std::vector<std::vector<Index>>& columns, int d) {
   BlockPattern pattern;
@@ -25,18 +17,12 @@ BlockPattern pattern_of(std::vector<std::vector<Index>>& columns, int d) {
   for (std::size_t col = 0; col < columns.size(); ++col) {
     auto& rows = columns[col];
     rows.push_back(static_cast<Index>(col));
-    sort_once(rows);
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
     pattern.row.insert(pattern.row.end(), rows.begin(), rows.end());
     pattern.first.push_back(static_cast<std::int64_t>(pattern.row.size()));
   }
   return pattern;
-}
-
-/// Which block of the pattern is at this row of this column; there is one.
-std::int64_t place_in(const BlockPattern& pattern, Index row, Index col) {
-  const auto begin = pattern.row.begin() + pattern.first[col];
-  const auto end = pattern.row.begin() + pattern.first[col + 1];
-  return std::lower_bound(begin, end, row) - pattern.row.begin();
 }
 
 }  // namespace
@@ -61,7 +47,11 @@ CoupledSystem::CoupledSystem(const ReducedProblem& problem, Form form, int threa
       on_bodies_ = false;
     }
   }
-  if (on_bodies_) values_.resize(fixed_.size());
+  if (!on_bodies_) {
+    bodies_ = {};
+  } else if (workers() != nullptr) {
+    bodies_.share_out(workers()->count());
+  }
 }
 
 void CoupledSystem::analyse_contacts() {
@@ -78,58 +68,24 @@ void CoupledSystem::analyse_contacts_of() {
     columns[row].push_back(col);
   });
   const BlockPattern pattern = pattern_of(columns, D);
-  const auto find = [&](Index row, Index col) { return place_in(pattern, row, col); };
+  const auto place = [&](Index row, Index col) {  // of the block that is there
+    const auto end = pattern.row.begin() + pattern.first[col + 1];
+    return std::lower_bound(pattern.row.begin() + pattern.first[col], end, row) -
+           pattern.row.begin();
+  };
   place_.clear();
   problem_.W.template for_each_block<D>(
-      [&](Index row, Index col, const auto&) { place_.push_back(find(row, col)); });
+      [&](Index row, Index col, const auto&) { place_.push_back(place(row, col)); });
   diagonal_.resize(count);
-  for (Index a = 0; a < nc; ++a) diagonal_[a] = find(a, a);
+  for (Index a = 0; a < nc; ++a) diagonal_[a] = place(a, a);
   values_.assign(pattern.values(), 0.0);
   lu_ = Multifrontal(pattern, threads_);
 }
 
 bool CoupledSystem::analyse_bodies() {
-  const SparseColumns& M = problem_.primal->M;
-  const SparseColumns& H = problem_.primal->H;
-  const Eigen::Index n = M.rows();
-  const int d = problem_.d();
-  // the coordinates that a contact touches
-  std::vector<std::vector<Index>> columns(static_cast<std::size_t>(n));
-  std::vector<std::vector<Index>> touched(static_cast<std::size_t>(problem_.nc()));
-  for (Index a = 0; a < problem_.nc(); ++a) {
-    auto& rows = touched[a];
-    for (int c = 0; c < d; ++c) {
-      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at)
-        rows.push_back(static_cast<Index>(at.row()));
-    }
-    sort_once(rows);
-    if (static_cast<Eigen::Index>(rows.size()) > longest_column) return false;
-    for (const Index row : rows) {
-      auto& column = columns[row];
-      column.insert(column.end(), rows.begin(), rows.end());
-    }
-  }
-  for (Index col = 0; col < n; ++col) {
-    for (SparseColumns::InnerIterator at(M, col); at; ++at) {
-      columns[col].push_back(static_cast<Index>(at.row()));
-      columns[at.row()].push_back(col);
-    }
-  }
-  const BlockPattern pattern = pattern_of(columns, 1);
-  const auto find = [&](Index row, Index col) { return place_in(pattern, row, col); };
-  fixed_.assign(pattern.row.size(), 0.0);
-  for (Index col = 0; col < n; ++col) {
-    for (SparseColumns::InnerIterator at(M, col); at; ++at) {
-      fixed_[find(static_cast<Index>(at.row()), col)] += at.value();
-    }
-  }
-  scatter_.clear();
-  for (const auto& rows : touched) {
-    for (const Index col : rows) {
-      for (const Index row : rows) scatter_.push_back(find(row, col));
-    }
-  }
-  lu_ = Multifrontal(pattern, threads_);
+  const std::optional<BlockPattern> pattern = bodies_.analyse(*problem_.primal, problem_.d());
+  if (!pattern) return false;
+  lu_ = Multifrontal(*pattern, threads_);
   return true;
 }
 
@@ -163,39 +119,11 @@ void CoupledSystem::fill_contacts() {
   }
 }
 
-void CoupledSystem::fill_bodies() {
-  const SparseColumns& H = problem_.primal->H;
-  values_ = fixed_;
-  const int d = problem_.d();
-  const std::int64_t* place = scatter_.data();
-  Eigen::MatrixXd h;
-  Eigen::MatrixXd product;
-  std::vector<Index> rows;
-  for (Index a = 0; a < problem_.nc(); ++a) {
-    rows.clear();
-    for (int c = 0; c < d; ++c) {
-      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at)
-        rows.push_back(static_cast<Index>(at.row()));
-    }
-    std::sort(rows.begin(), rows.end());
-    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
-    h.setZero(static_cast<Eigen::Index>(rows.size()), d);
-    for (int c = 0; c < d; ++c) {
-      for (SparseColumns::InnerIterator at(H, d * a + c); at; ++at) {
-        h(std::lower_bound(rows.begin(), rows.end(), at.row()) - rows.begin(), c) = at.value();
-      }
-    }
-    const Eigen::Map<const Eigen::MatrixXd> block(D_.data() + std::ptrdiff_t{d} * d * a, d, d);
-    product.noalias() = (h * block) * h.transpose();
-    for (Eigen::Index k = 0; k < product.size(); ++k) values_[*place++] += product.data()[k];
-  }
-}
-
 bool CoupledSystem::factorise() {
   if (problem_.out_of_time()) return false;
   ++factorisations_;
   if (on_bodies_) {
-    fill_bodies();
+    bodies_.fill(D_, values_, workers());
   } else {
     with_dimension(problem_.d(), [&](auto D) { fill_contacts<D>(); });
   }
@@ -207,20 +135,20 @@ void CoupledSystem::apply(const std::vector<double>& blocks, const Vector& x, Ve
   y.resize(x.size());
   with_dimension(d, [&](auto D) {
     using Block = Eigen::Matrix<double, D, D>;
-    for (Index a = 0; a < problem_.nc(); ++a) {
-      y.segment<D>(D * a).noalias() =
-          Eigen::Map<const Block>(blocks.data() + std::ptrdiff_t{D * D} * a) * x.segment<D>(D * a);
-    }
+    in_parts(workers(), problem_.nc(), [&](std::int64_t first, std::int64_t last) {
+      for (auto a = first; a < last; ++a) {
+        y.segment<D>(D * a).noalias() =
+            Eigen::Map<const Block>(blocks.data() + D * D * a) * x.segment<D>(D * a);
+      }
+    });
   });
 }
 
 void CoupledSystem::solve_once(Vector& x) {
   if (on_bodies_) {
-    body_ = problem_.primal->H * x;
+    bodies_.to_bodies(x, body_, workers());
     lu_.solve(body_);
-    product_ = problem_.primal->H.transpose() * body_;
-    apply(D_, product_, residual_);
-    x -= residual_;
+    bodies_.subtract_from_contacts(D_, body_, x, workers());
     return;
   }
   const int d = problem_.d();

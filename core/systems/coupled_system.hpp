@@ -15,6 +15,7 @@
 
 #include "linalg/multifrontal.hpp"
 #include "reduced/reduced_problem.hpp"
+#include "systems/body_matrix.hpp"
 
 namespace fclib {
 
@@ -64,7 +65,6 @@ class CoupledSystem {
  private:
   template <int D>
   void fill_contacts();
-  void fill_bodies();
   void apply(const std::vector<double>& blocks, const Vector& x, Vector& y) const;
   void solve_once(Vector& x);
   // the symbolic factorisations; false where the bodies will not do
@@ -83,8 +83,7 @@ class CoupledSystem {
   std::vector<std::int64_t> place_;     // of each block of W in the values, in W's order
   std::vector<std::int64_t> diagonal_;  // of each diagonal block
   bool on_bodies_ = false;
-  std::vector<double> fixed_;          // M in the pattern of the bodies
-  std::vector<std::int64_t> scatter_;  // of each contact's H D H^T
+  BodyMatrix bodies_;  // where the system is factorised on them
   std::int64_t factorisations_ = 0;
   Vector rhs_, residual_, product_, body_;
   Vector zero_;

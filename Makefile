@@ -33,8 +33,8 @@ help:
 	@echo "make layers  fclib.torch, fclib.jax and the recipes, tested in an environment of their own, which is large"
 	@echo "make man     man pages of the command line, into man/"
 	@echo "make sdist   the source distribution, into dist/"
-	@echo "make wheel   a wheel of it with an HDF5 of its own, installed and tried (HDF5_SOURCE=FOLDER:"
-	@echo "             sources of HDF5, which are downloaded otherwise)"
+	@echo "make wheel   a wheel of it with HDF5 and METIS inside, installed and tried (HDF5_SOURCE=FOLDER,"
+	@echo "             METIS_SOURCE=FOLDER: their sources, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make campaigns  run the published campaigns, BUDGET=10min each, and pack stores and tables"
@@ -115,7 +115,7 @@ sdist: man $(VENV)/.package-tools
 	$(BIN)/python -m build --sdist --outdir dist
 
 wheel: sdist
-	HDF5_SOURCE="$(HDF5_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
+	HDF5_SOURCE="$(HDF5_SOURCE)" METIS_SOURCE="$(METIS_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
 	rm -rf $(BUILD)/wheel dist/*.whl
 	$(BIN)/pip wheel --no-deps --wheel-dir $(BUILD)/wheel \
 	  --config-settings=cmake.define.FCLIB_BUNDLED=$(abspath $(BUILD)/bundled) dist/fclib-*.tar.gz
@@ -124,7 +124,7 @@ wheel: sdist
 
 # for every Python there is from 3.10 to 3.14, and each tried; CHROOTS: folders of scripts/try_on.sh
 wheels: sdist
-	HDF5_SOURCE="$(HDF5_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
+	HDF5_SOURCE="$(HDF5_SOURCE)" METIS_SOURCE="$(METIS_SOURCE)" sh scripts/wheel-libraries.sh $(BUILD)/bundled
 	$(BIN)/python scripts/try_wheels.py --build $(BUILD)/bundled $(CHROOTS:%=--chroot %)
 
 # tried as it is installed: every stored trajectory is found in it and read

@@ -10,6 +10,7 @@
 #include <map>
 
 #include "io/hdf5/library.hpp"
+#include "linalg/fronts.hpp"
 #include "version.hpp"
 
 NB_MODULE(_core, m) {
@@ -31,10 +32,11 @@ NB_MODULE(_core, m) {
             {"hdf5", hdf5_loaded_version()},
             {"hdf5_compiled", hdf5_compiled_version()},
             {"hdf5_bundled", hdf5_bundled ? "yes" : ""},
+            {"metis", has_nested_dissection() ? "yes" : ""},
             {"nanobind", dotted(NB_VERSION_MAJOR, NB_VERSION_MINOR, NB_VERSION_PATCH)}};
       },
       "What the core was built with, by its name, and the version of HDF5 that is loaded.\n\n"
-      "hdf5_bundled is empty where HDF5 is a library of the system.");
+      "hdf5_bundled is empty where HDF5 is a library of the system, metis where the core has none.");
   bind_errors(m);
   bind_problems(m);
   bind_conversions(m);

@@ -83,6 +83,10 @@ def brought() -> dict[str, tuple[str, str]]:
             macro(bundled / "H5public.h", r"^#define H5_VERS_(?:MAJOR|MINOR|RELEASE)\s+(\d+)"),
             "BSD-3-Clause",
         ),
+        "metis": (
+            macro(bundled / "metis.h", r"^#define METIS_VER_(?:MAJOR|MINOR|SUBMINOR)\s+(\d+)"),
+            "Apache-2.0",
+        ),
         "eigen": (
             macro(
                 eigen / "Eigen/src/Core/util/Macros.h",

@@ -1,21 +1,24 @@
 #!/bin/sh
-# Makes what a wheel carries: a static HDF5 with nothing but deflate in it, Eigen where the system
-# has none, and their licences.
+# Makes what a wheel carries: a static HDF5 with nothing but deflate in it, a static METIS, Eigen where
+# the system has none, and their licences.
 #
 #   sh scripts/wheel-libraries.sh FOLDER    then build with -DFCLIB_BUNDLED=FOLDER
 #
-# The sources are downloaded, and checked; or HDF5_SOURCE and EIGEN_SOURCE name folders of them.
+# The sources are downloaded, and checked; or HDF5_SOURCE, METIS_SOURCE and EIGEN_SOURCE name folders
+# of them.
 set -eu
 [ $# -eq 1 ] || { echo "usage: $0 FOLDER" >&2; exit 2; }
 mkdir -p "$1"
 prefix=$(cd "$1" && pwd)
 HDF5=1.14.6
 HDF5_SHA256=e4defbac30f50d64e1556374aa49e574417c9e72c6b1de7a4ff88c4b1bea6e9b
+METIS=5.1.0
+METIS_SHA256=76faebe03f6c963127dbb73c13eab58c9a3faeae48779f049066a21c087c5db2
 EIGEN=3.4.0
 EIGEN_SHA256=8586084f71f9bde545ee7fa6d00288b264a2b7ac3607b974e54d13e7162c1c72
 
-if [ -f "$prefix/done" ]; then
-  echo "== HDF5 and Eigen for the wheel: there already, in $prefix"
+if [ -f "$prefix/done" ] && [ -f "$prefix/lib/libmetis.a" ]; then
+  echo "== HDF5, METIS and Eigen for the wheel: there already, in $prefix"
   exit 0
 fi
 work=$(mktemp -d)
@@ -26,8 +29,9 @@ fetch() {
   echo "== downloading $1 $2"
   archive=$work/$1.tar.gz
   curl --fail --location --silent --show-error --retry 3 --output "$archive" "$3" || {
+    variable=$(echo "$1" | tr '[:lower:]' '[:upper:]')_SOURCE
     echo "$1 cannot be downloaded. Unpack its sources, and name their folder:" >&2
-    echo "  make wheel HDF5_SOURCE=FOLDER    (on Debian, those of apt-get source hdf5)" >&2
+    echo "  make wheel $variable=FOLDER    (on Debian, those of apt-get source $1)" >&2
     exit 1
   }
   if command -v sha256sum >/dev/null; then sum=$(sha256sum "$archive"); else sum=$(shasum -a 256 "$archive"); fi
@@ -56,6 +60,34 @@ cmake --build "$work/build" --parallel "${JOBS:-2}" >"$work/log" 2>&1 || { tail 
 cmake --install "$work/build" >"$work/log" 2>&1 || { tail -30 "$work/log" >&2; exit 1; }
 mkdir -p "$prefix/licenses"
 cp "$HDF5_SOURCE/COPYING" "$prefix/licenses/HDF5"
+
+if [ -z "${METIS_SOURCE:-}" ]; then
+  fetch metis $METIS \
+    https://karypis.github.io/glaros/files/sw/metis/metis-$METIS.tar.gz $METIS_SHA256
+  METIS_SOURCE=$work/metis
+fi
+[ -f "$METIS_SOURCE/libmetis/ometis.c" ] || { echo "METIS_SOURCE: $METIS_SOURCE is no METIS 5.1" >&2; exit 1; }
+echo "== building METIS"
+# not by its own CMakeLists.txt, which a recent CMake refuses, and which builds programs too
+mkdir "$work/metis-build"
+cat >"$work/metis-build/CMakeLists.txt" <<'END'
+cmake_minimum_required(VERSION 3.18)
+project(metis C)
+file(GLOB sources ${METIS_SOURCE}/GKlib/*.c ${METIS_SOURCE}/libmetis/*.c)
+add_library(metis STATIC ${sources})
+target_include_directories(metis PRIVATE ${METIS_SOURCE}/GKlib ${METIS_SOURCE}/include ${METIS_SOURCE}/libmetis)
+target_compile_definitions(metis PRIVATE _GNU_SOURCE LINUX HAVE_GETLINE HAVE_THREADLOCALSTORAGE NDEBUG NDEBUG2)
+set_target_properties(metis PROPERTIES C_STANDARD 99 C_EXTENSIONS ON C_VISIBILITY_PRESET hidden
+                      POSITION_INDEPENDENT_CODE ON)
+install(TARGETS metis ARCHIVE DESTINATION lib)
+install(FILES ${METIS_SOURCE}/include/metis.h DESTINATION include)
+END
+metis=$(cd "$METIS_SOURCE" && pwd)
+( cd "$work/metis-build"; mkdir build; cd build; cmake .. -DMETIS_SOURCE="$metis" \
+  -DCMAKE_INSTALL_PREFIX="$prefix" -DCMAKE_BUILD_TYPE=Release -DCMAKE_C_FLAGS=-w &&
+  cmake --build . --parallel "${JOBS:-2}" && cmake --install . ) >"$work/log" 2>&1 ||
+  { tail -30 "$work/log" >&2; exit 1; }
+cp "$METIS_SOURCE/LICENSE.txt" "$prefix/licenses/METIS"
 
 if [ -z "${EIGEN_SOURCE:-}" ] && [ -f /usr/share/doc/libeigen3-dev/copyright ]; then
   cp /usr/share/doc/libeigen3-dev/copyright "$prefix/licenses/Eigen"

@@ -178,6 +178,14 @@ def check_core() -> Iterator[Finding]:
         remedy = f"{reinstall}, or set LD_LIBRARY_PATH so that the latter comes first"
         yield Finding(part, "HDF5", "broken", built["hdf5"], origin, problem, remedy)
     yield Finding(part, "Eigen", "ok", built["eigen"])
+    yield Finding(
+        part,
+        "METIS",
+        "ok" if built["metis"] else "absent",
+        "",
+        "orders the factorisations of large systems",
+        remedy="" if built["metis"] else "install libmetis-dev, and build fclib anew",
+    )
     yield Finding(part, "compiler", "ok", built["compiler"])
 
 

@@ -54,6 +54,7 @@ def test_what_is_here() -> None:
     assert findings["fclib"]["found"] == fclib.__version__
     assert findings["HDF5"]["found"] == _core.build_info()["hdf5_compiled"]
     assert findings["Eigen"]["found"].startswith("3.")
+    assert (findings["METIS"]["state"] == "ok") == (_core.build_info()["metis"] == "yes")
     for name in ("Python", "numpy", "scipy", "trial"):
         assert findings[name]["state"] == "ok", findings[name]
     for name in ("mujoco", "clarabel", "scs", "pyarrow", "matplotlib", "dask", "siconos"):

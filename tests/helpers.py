@@ -535,6 +535,7 @@ def benchmark(name: str) -> Any:
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
+        sys.modules.setdefault(name, module)  # where dataclasses look
         spec.loader.exec_module(module)
     finally:
         sys.path.remove(str(path.parent))

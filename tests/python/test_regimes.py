@@ -19,6 +19,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("skfem")
 
 table = benchmark("collection_table")
+regimes = benchmark("regimes")
 if table is None:
     pytest.skip("a source distribution has no benchmarks", allow_module_level=True)
 with table.PUBLISHED.open(newline="") as file:
@@ -49,6 +50,58 @@ def test_ranges_that_exclude_each_other_are_found() -> None:
     assert not list(table.exclusions(row | {"contacts": "9 to 28"}))
     assert not list(table.exclusions(row | {"dof": "48 to 60"}))
     assert not list(table.exclusions(row | {"density": "0.4 to 1.3"}))
+
+
+def row_of(number: int, contacts: int, **figures: Any) -> Any:
+    """A step; what is not given is as in Bridge_PR, or no matter."""
+    given = {"dof": 100, "depth": 0.0, "rank_ratio": 1.0, "conditioning": 9e4} | figures
+    given |= {"position": None, "velocity": None}
+    return regimes.Row(number=number, step=number, contacts=contacts, **given)
+
+
+def test_steps_are_chosen_inside_the_published_range() -> None:
+    row = next(row for row in PUBLISHED if row["set"] == "Chute_4000")
+    low, high = (int(end) for end in row["contacts"].split(" to "))
+    regime = regimes.Regime("Chute_4000", {}, keep=6, steps=1, fill=True)
+    count = 500
+    contacts = np.linspace(low - 500, high + 500, count).round().astype(int)
+    steps = [row_of(k, int(contacts[k]), depth=0.03 if k % 5 == 0 else 0.0) for k in range(count)]
+    kept = regimes.chosen(steps, regime)
+    assert len(kept) == int(row["problems"])
+    assert len({one.number for one in kept}) == len(kept)
+    assert [one.number for one in kept] == sorted(one.number for one in kept)
+    assert all(low <= one.contacts <= high and one.depth <= regimes.DEEPEST for one in kept)
+    inside = [one for one in steps if low <= one.contacts <= high and one.depth <= regimes.DEEPEST]
+    assert inside[0] in kept
+    assert inside[-1] in kept
+    # the largest step between two neighbours: they are spread over the whole range
+    assert np.diff([one.contacts for one in kept]).max() < 0.1 * (high - low)
+    # as many as are wanting, and none where there are enough
+    assert len(regimes.chosen(steps, regime, len(kept) - 3)) == 3
+    assert regimes.chosen(steps, regime, len(kept)) == []
+    assert regimes.chosen([steps[0]], regime) == []
+    few = dataclasses.replace(regime, fill=False)
+    assert 2 <= len(regimes.chosen(steps, few)) <= few.keep
+
+
+def test_steps_are_chosen_by_every_figure_that_is_known() -> None:
+    row = next(row for row in PUBLISHED if row["set"] == "Bridge_PR")
+    low, high = (float(end) for end in row["conditioning"].split(" to "))
+    regime = regimes.Regime("Bridge_PR", {}, keep=4, steps=1, by=("conditioning",))
+    middle = sum(int(end) for end in row["contacts"].split(" to ")) // 2
+    inside = np.geomspace(low, high, 20)
+    steps = [row_of(k, middle, conditioning=float(value)) for k, value in enumerate(inside)]
+    far = [
+        row_of(100, middle, conditioning=low / 100),
+        row_of(101, middle, conditioning=high * 100),
+    ]
+    unknown = row_of(102, middle, conditioning=float("nan"))
+    kept = regimes.chosen([*steps, *far, unknown], regime)
+    assert steps[0] in kept
+    assert steps[-1] in kept
+    assert not set(far) & set(kept)
+    filled = regimes.chosen([*steps, *far, unknown], dataclasses.replace(regime, fill=True))
+    assert set(filled) == {*steps, unknown}
 
 
 def test_problems_of_one_contact_are_conditioned_as_published() -> None:

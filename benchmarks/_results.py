@@ -14,6 +14,7 @@ import os
 import platform
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -116,6 +117,8 @@ def power(tolerance: float) -> str:
 def commit() -> str:
     """The commit of the working tree, with a + where it has changes."""
     git = ["git", "-C", str(ROOT)]
+    if shutil.which("git") is None:
+        return "unknown"
     done = subprocess.run([*git, "rev-parse", "--short=10", "HEAD"], capture_output=True, text=True)
     if done.returncode != 0:
         return "unknown"

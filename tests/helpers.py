@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -522,6 +523,16 @@ def local_problem(W: npt.ArrayLike, q: npt.ArrayLike, mu: npt.ArrayLike) -> fcli
     q, mu = np.asarray(q, dtype=float), np.asarray(mu, dtype=float)
     d = q.size // mu.size if mu.size else 3
     return fclib.LocalProblem(spacedim=d, W=sp.csr_array(np.asarray(W, float)), q=q, mu=mu)
+
+
+def git(*words: str) -> str:
+    """What git says of this repository; nothing where there is no git, or where it refuses."""
+    root = Path(__file__).parents[1]
+    try:
+        done = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True)
+    except FileNotFoundError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
 
 
 def benchmark(name: str) -> Any:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import rebuild
+from helpers import git
 
 DEPENDENCIES = """\
 core/a.o: #deps 3, deps mtime 1700000000000000000 (VALID)
@@ -303,9 +304,7 @@ def test_a_release_has_checksums_and_a_list_of_parts(
 def test_the_readme_of_the_scripts_has_a_line_on_each(root: Path) -> None:
     text = (root / "scripts" / "README.md").read_text()
     named = re.findall(r"^\| `([\w./-]+)` \|", text, re.MULTILINE)
-    kept = subprocess.run(
-        ["git", "-C", str(root), "ls-files", "scripts"], capture_output=True, text=True
-    ).stdout.split()
+    kept = git("ls-files", "scripts").split()
     if not kept:
         pytest.skip("this is no repository")
     first = {Path(path).parts[1] + "/" * (len(Path(path).parts) > 2) for path in kept}

@@ -6,12 +6,13 @@ import csv
 import importlib.util
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
+
+from helpers import git
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -208,17 +209,14 @@ def test_every_table_says_what_made_it_and_is_on_a_page() -> None:
 
 
 def test_every_table_names_a_commit_that_is_there() -> None:
-    git = ["git", "-C", str(ROOT)]
-    shallow = subprocess.run(
-        [*git, "rev-parse", "--is-shallow-repository"], capture_output=True, text=True
-    ).stdout.strip()
-    if shallow != "false":
+    if git("rev-parse", "--is-shallow-repository") != "false":
         pytest.skip("this is no repository with its history")
     for path in TABLES:
         _, about = results.Results(FOLDER).load(path.stem)
         commit = about["commit"].rstrip("+")
-        known = subprocess.run([*git, "merge-base", "--is-ancestor", commit, "HEAD"], check=False)
-        assert known.returncode == 0, f"{path.stem}.json: {commit} is not in the history"
+        known = git("rev-parse", "--verify", f"{commit}^{{commit}}")
+        there = known and git("merge-base", known, "HEAD") == known
+        assert there, f"{path.stem}.json: {commit} is not in the history"
 
 
 def test_a_table_goes_from_a_script_to_a_page(

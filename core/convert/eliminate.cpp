@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 
 #include "linalg/dependent_columns.hpp"
@@ -66,10 +67,10 @@ Vector selected(const Vector& a, const std::vector<Index>& places) {
 
 SparseColumns transposed(const SparseColumns& a) { return a.transpose(); }
 
-/// Throws where a constraint that follows from others differs from them by more than rounding: by
-/// more than a part of its terms, of which the first `rounding` [m/s] does not count.
-void require_agreement(const std::vector<Index>& dropped, const Vector& gap, const Vector& size,
-                       double rounding = 0) {
+/// The constraint that follows from others and differs from them the most, if by more than
+/// rounding: by more than a part of its terms, of which the first `rounding` [m/s] does not count.
+std::optional<Error> disagreement(const std::vector<Index>& dropped, const Vector& gap,
+                                  const Vector& size, double rounding = 0) {
   Eigen::Index worst = -1;
   double most = agreement;
   for (Eigen::Index k = 0; k < gap.size(); ++k) {
@@ -80,11 +81,11 @@ void require_agreement(const std::vector<Index>& dropped, const Vector& gap, con
       worst = k;
     }
   }
-  if (worst < 0) return;
-  throw Error(ErrorKind::unsuitable,
-              "contradicts the others, from which it follows: where they hold it is off by " +
-                  shortest(std::abs(gap[worst])) + ", " + shortest(most) + " of its terms",
-              "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
+  if (worst < 0) return std::nullopt;
+  return Error(ErrorKind::unsuitable,
+               "contradicts the others, from which it follows: where they hold it is off by " +
+                   shortest(std::abs(gap[worst])) + ", " + shortest(most) + " of its terms",
+               "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }
 
 }  // namespace
@@ -148,8 +149,8 @@ bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation
   }
   // no velocity holds a constraint better than this, the columns having length one
   constexpr double rounding_unit = 32 * std::numeric_limits<double>::epsilon();
-  require_agreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta, size,
-                    rounding_unit * free_rows.norm());
+  contradiction_ = disagreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta, size,
+                                rounding_unit * free_rows.norm());
 
   s_ = basis.Q.transpose() * free_rows + beta;
   // V' by rows of Q; what is rounding of a contact's row would couple what is apart
@@ -220,8 +221,8 @@ bool Elimination::leave_out_redundant(const SparseColumns& r, const Vector& size
   const Vector impulse = bilateral_->solve(s_);
   const SparseColumns rows = transposed(selected(transposed(of_kept), columns.dropped));
   const Vector gap = selected(problem_.s, columns.dropped) - rows * impulse;
-  require_agreement(columns.dropped, gap,
-                    selected(size, columns.dropped) + rows.cwiseAbs() * impulse.cwiseAbs());
+  contradiction_ = disagreement(
+      columns.dropped, gap, selected(size, columns.dropped) + rows.cwiseAbs() * impulse.cwiseAbs());
 
   const SparseColumns right = transposed(selected(transposed(selected(r, columns.dropped)), kept_));
   const Eigen::MatrixXd combined = bilateral_->solve(right);
@@ -325,7 +326,10 @@ bool Elimination::hold(const GlobalProblem& bodies, const Condensation& condensa
 }
 
 LocalProblem eliminate(const LocalProblem& problem) {
-  return is_mixed(problem) ? Elimination(problem).plain() : problem;
+  if (!is_mixed(problem)) return problem;
+  const Elimination elimination(problem);
+  if (elimination.contradiction()) throw *elimination.contradiction();
+  return elimination.plain();
 }
 
 LocalRollingProblem eliminate(const LocalRollingProblem& problem) {

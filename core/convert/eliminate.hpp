@@ -3,8 +3,8 @@
 //   lambda = -R^-1 (V^T r + s),   W' = W - V R^-1 V^T,   q' = q - V R^-1 s
 //
 // Constraints may follow from others, as those of parallel linkages and of closed loops in space
-// do. R is singular then: those that follow are left out, once they are found to agree with the
-// others, and of all lambda that do the same the shortest is returned.
+// do. R is singular then: those that follow are left out, and of all lambda that do the same the
+// shortest is returned. Whether those left out agree with the others is said.
 //
 // R = G^T M^-1 G has the squared condition number of the constraints. Where that is too much and
 // the bodies are known, the constraints are made orthonormal: L^-1 G = Q T with M = L L^T,
@@ -15,6 +15,7 @@
 #include <optional>
 
 #include "convert/condense.hpp"
+#include "error.hpp"
 #include "linalg/factorization.hpp"
 #include "problem.hpp"
 
@@ -23,8 +24,7 @@ namespace fclib {
 /// Keeps the factorisation of R, so that lambda is found again from r.
 class Elimination {
  public:
-  /// Throws Error (unsuitable) where R is singular though no constraint follows from the others,
-  /// and where one that follows contradicts them; the message names it.
+  /// Throws Error (unsuitable) where R is singular though no constraint follows from the others.
   ///
   /// The deadline is looked at after each factorisation, and nothing is done once it has passed:
   /// finished() says so, and plain() is empty then.
@@ -44,6 +44,9 @@ class Elimination {
   /// feel it. False where no constraints are so close, and nothing is changed.
   bool hold(const GlobalProblem& bodies, const Condensation& condensation,
             Solution& solution) const;
+
+  /// Where a constraint that follows from the others contradicts them: which one, and by how much.
+  [[nodiscard]] const std::optional<Error>& contradiction() const { return contradiction_; }
 
   /// Bilateral constraints that follow from others.
   [[nodiscard]] Eigen::Index redundant() const { return idle_.cols(); }
@@ -70,11 +73,13 @@ class Elimination {
   Eigen::MatrixXd turn_;     // ... and T1 of those made orthonormal
   Vector scale_;             // ... with the scaling of their columns
   Eigen::MatrixXd idle_;     // combinations of multipliers that do nothing
+  std::optional<Error> contradiction_;
   LocalProblem plain_;
   bool finished_ = false;
 };
 
-/// The local problem without bilateral constraints; itself where it has none.
+/// The local problem without bilateral constraints; itself where it has none. Throws Error
+/// (unsuitable) where R is singular, and where constraints contradict each other.
 LocalProblem eliminate(const LocalProblem& problem);
 LocalRollingProblem eliminate(const LocalRollingProblem& problem);
 

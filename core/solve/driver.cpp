@@ -9,6 +9,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "linalg/cpu_watch.hpp"
+#include "number_text.hpp"
 #include "solve/plugin.hpp"
 
 namespace fclib {
@@ -258,6 +259,41 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
   }
 }
 
+/// What is left of the bilateral constraints, over their terms, at most; no rounding is taken off.
+double broken(const LocalProblem& problem, const Solution& solution) {
+  const SparseColumns V = to_eigen(problem.V);
+  const SparseColumns R = to_eigen(problem.R);
+  const Vector left = V.transpose() * solution.r + R * solution.l + problem.s;
+  const Vector terms = V.cwiseAbs().transpose() * solution.r.cwiseAbs() +
+                       R.cwiseAbs() * solution.l.cwiseAbs() + problem.s.cwiseAbs();
+  return (left.array().abs() / terms.array().max(std::numeric_limits<double>::min())).maxCoeff();
+}
+
+double broken(const GlobalProblem& problem, const Solution& solution) {
+  const SparseColumns G = to_eigen(problem.G);
+  const Vector left = G.transpose() * solution.v + problem.b;
+  const Vector terms = G.cwiseAbs().transpose() * solution.v.cwiseAbs() + problem.b.cwiseAbs();
+  return (left.array().abs() / terms.array().max(std::numeric_limits<double>::min())).maxCoeff();
+}
+
+/// Bilateral constraints that contradict each other are refused, unless by less than the tolerance:
+/// the merit takes off what the rounding of large multipliers may be, which says nothing of them.
+template <class P>
+Result agreeing(const P& problem, Result result, const Elimination& elimination, double tolerance) {
+  const std::optional<Error>& contradiction = elimination.contradiction();
+  if (!contradiction || result.status == Status::infeasible) return result;
+  const double error = std::max(result.error, broken(problem, result.solution));
+  if (error <= tolerance) return result;
+  if (result.status == Status::interrupted || result.status == Status::time_limit) {
+    result.message = contradiction->what();
+    return result;
+  }
+  throw Error(contradiction->kind,
+              contradiction->message + "; the best solution found has an error of " +
+                  shortest(error) + ": correct it, leave it out, or ask for a looser tolerance",
+              contradiction->where);
+}
+
 template <class P>
 Result solve_local(const P& problem, const Request& request, const Solution& guess) {
   const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
@@ -279,8 +315,10 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
     solution = elimination.expand(solution);
     return judge(solution);
   };
-  return run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded,
-             prove);
+  return agreeing(
+      problem,
+      run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded, prove),
+      elimination, request.settings.tolerance);
 }
 
 template <class P>
@@ -321,8 +359,10 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
     solution = std::move(expanded);
     return other;
   };
-  return run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded,
-             prove);
+  return agreeing(
+      problem,
+      run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded, prove),
+      elimination, request.settings.tolerance);
 }
 
 /// What every solve does: checks, times.

@@ -3,6 +3,8 @@
 import contextlib
 import importlib.util
 import os
+import re
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -20,6 +22,7 @@ import pytest
 import fclib
 from capi_library import HEADERS, ROOT, compile_program, compiler
 from fclib import bench, external
+from fclib.bench.fingerprint import version_of
 from fclib.external import command, siconos
 from helpers import local_problem, planted_global, planted_local, planted_rolling
 
@@ -726,6 +729,26 @@ def test_a_shared_object_solves(shared_objects: Path, name: str) -> None:
         assert len(seen) == result.iterations + 1 > 1
     limited = fclib.solve(problem, f"plugin:{shared_objects}/lib{name}.so", tol=0, max_iterations=3)
     assert (limited.status, limited.iterations) == ("iteration_limit", 3)
+
+
+def test_another_shared_object_is_another_version(shared_objects: Path, tmp_path: Path) -> None:
+    """So that a campaign runs it again."""
+    own = tmp_path / "libown.so"
+    versions = []
+    for source in ("libpgs.so", "libpgs.so", "libtold.so"):
+        own.unlink(missing_ok=True)
+        shutil.copy(shared_objects / source, own)
+        versions.append(version_of(fclib.find_solver(f"plugin:{own}")))
+    assert versions[0] == versions[1] != versions[2]
+    assert all(versions)
+
+
+def test_solvers_of_packages_have_the_versions_of_these() -> None:
+    found = [solver for solver in external.solvers() if solver.origin != "fclib"]
+    if not found:
+        pytest.skip("there is no solver of another package")
+    for solver in found:
+        assert re.fullmatch(r"\d+(\.\d+)+\S*", version_of(solver)), solver
 
 
 def test_a_shared_object_has_options(shared_objects: Path) -> None:

@@ -4,6 +4,7 @@ A run is done again where the solver has changed since, and not where it has not
 
     of the core     its sources and those they include, when the core was built
     a program       the files that the command names, the program itself too
+    a plugin        its shared object
     a module        its file and those it imports; of packages the version
     an adapter      the version of its package
 """
@@ -21,8 +22,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 
-from fclib import _core
-from fclib.external import command
+from fclib import _core, external
+from fclib.external import command, plugin
 
 LENGTH = 12  # digits of a digest
 INSTALLED = tuple(
@@ -42,9 +43,14 @@ def version_of(info: _core.SolverInfo, modules: Sequence[str] = ()) -> str:
         return f"{_core.version}-{_core.fingerprints()[info.name]}"
     if info.name.startswith(command.PREFIX):
         return _of_files(_named(info.name.removeprefix(command.PREFIX)))
+    if info.name.startswith(plugin.PREFIX):
+        return _of_files([Path(info.name.removeprefix(plugin.PREFIX))])
     for path in modules:
         if Path(path).stem == info.origin:
             return _of_module(sys.modules[info.origin], Path(path))
+    for adapter in external.adapters():
+        if info.name.startswith(adapter.PREFIX):
+            return adapter.version().partition(" in ")[0]  # whichever interpreter has it
     try:
         return importlib.metadata.version(info.origin)
     except (importlib.metadata.PackageNotFoundError, ValueError):

@@ -127,6 +127,7 @@ def missing() -> str:
     return _probe(python())
 
 
+@functools.cache
 def version() -> str:
     """As its interpreter says, with that interpreter; Debian's 4.4.0 calls itself 4.5.0."""
     code = "import siconos; print(siconos.version)"

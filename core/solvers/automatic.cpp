@@ -36,6 +36,8 @@ interior point                  : interior_point      law=rolling from=swept    
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
+# the last digits of a tight tolerance, where interior points end at rounding
+proximal point, near            : proximal_point      from=best below=1e-8             limit=200
 gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows
 no solution?                    : no_solution                                          limit=60

@@ -255,7 +255,7 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
         tuple(sorted({run.limit for run in voting if run.limit is not None})),
         tuple(sorted({run.solver for run in voting})),
         # without the hash of a solver's code
-        tuple(sorted({run.version.partition("-")[0] for run in voting})),
+        tuple(sorted({run.version.partition("-")[0] for run in voting if run.version})),
         (dates[0], dates[-1]),
     )
 

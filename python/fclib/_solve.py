@@ -79,7 +79,8 @@ def solve(
     Raises:
         ProblemError: the data of the problem or of the guess is not valid.
         OptionError: unknown solver or option, or a value out of range.
-        UnsuitableError: the problem cannot be brought to the form that the solver takes.
+        UnsuitableError: the problem cannot be brought to the form that the solver takes, or its
+            bilateral constraints contradict each other by more than ``tol``.
         SolverError: a solver that is not of fclib failed.
     """
     try:

@@ -195,6 +195,16 @@ def moved(number: int, before: int, **rules: object) -> Callable[[list[str]], li
     ]
 
 
+def put_off(number: int, before: int) -> Callable[[list[str]], list[str]]:
+    """The change that takes a stage to the place before a later one."""
+    return lambda lines: [
+        *lines[:number],
+        *lines[number + 1 : before],
+        lines[number],
+        *lines[before:],
+    ]
+
+
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
     """The change that puts a stage before all others of islands."""
     return lambda lines: [
@@ -279,6 +289,24 @@ def changes(lines: list[str]) -> list[Change]:
                 f"proximal point: limit={value}", "proximal point", with_rules(middle, limit=value)
             )
         )
+    # another gate lets other problems in: they came to the stage before it
+    gated = {
+        "proximal point, near": (first, (1e-6, 1e-5, 1e-3, 1e-2), (50, 100, 400)),
+        "proximal point, longer": ("proximal point", (1e-5, 1e-4, 1e-2), (600, 2400)),
+    }
+    for name, (before, gates, limits) in gated.items():
+        k = place(lines, name)
+        for gate in gates:
+            change = with_rules(k, below=f"{gate:g}")
+            result.append(Change(f"{name}: below={gate:g}", before, change))
+        for value in limits:
+            result.append(Change(f"{name}: limit={value}", name, with_rules(k, limit=value)))
+    near = place(lines, "proximal point, near")
+    for later in ("no solution?", "held bodies"):
+        change = put_off(near, place(lines, later))
+        result.append(Change(f"{names[near]}: before {later}", names[near], change))
+    change = moved(near, place(lines, longer))
+    result.append(Change(f"{names[near]}: before {longer}", first, change))
     for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):
         for value in (200, 400):
             change = moved(middle, place(lines, earlier), limit=value)

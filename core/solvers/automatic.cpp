@@ -35,9 +35,11 @@ interior point                  : interior_point      law=rolling from=swept    
 # dense heaps on which its path ends: gradients, for what the interior point has cost
 spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb from=swept
 gauss-seidel                    : sweep_on            law=coulomb
+# near a solution, once gradients or sweeps have smoothed what the interior point has left
+proximal point, near            : proximal_point      from=best below=1e-4             limit=200
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
-# the last digits of a tight tolerance, where interior points end at rounding
-proximal point, near            : proximal_point      from=best below=1e-8             limit=200
+# a tight tolerance, where interior points end at rounding
+proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200
 gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows
 no solution?                    : no_solution                                          limit=60
@@ -50,6 +52,8 @@ associated                      : associated
 # where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
 semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
 proximal point                  : proximal_point      from=best                        limit=200
+# slow, but cheaper than the paths that follow
+proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200
 # another width of smoothing is another path
 homotopy                        : homotopy                                             smoothing=0.3 limit=1500
 homotopy                        : homotopy                                             smoothing=1 limit=1500

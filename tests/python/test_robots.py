@@ -65,7 +65,8 @@ def test_gripper_lifts_the_row_and_brings_it_back(blocks: int, squeeze: float) -
 
 def test_gripper_carries_the_weight_by_the_friction_of_its_jaws() -> None:
     """Action and reaction: what its jaws give the row is the row's weight, half of it each."""
-    family: Any = scenes.get("Gripper")()
+    # pressed less, the row slides for some steps, and how it turns then is not unique
+    family: Any = scenes.get("Gripper")(squeeze=2.0)
     *_, held = simulate(family.scene(seed=2), round(LIFTED * family.period / family.time_step))
     carried = {jaw: force_on(held, jaw) for jaw in ("left", "right")}
     # the servo still rises a little

@@ -296,9 +296,9 @@ def changes(lines: list[str]) -> list[Change]:
     }
     for name, (before, gates, limits) in gated.items():
         k = place(lines, name)
-        for gate in gates:
-            change = with_rules(k, below=f"{gate:g}")
-            result.append(Change(f"{name}: below={gate:g}", before, change))
+        for error in gates:
+            change = with_rules(k, below=f"{error:g}")
+            result.append(Change(f"{name}: below={error:g}", before, change))
         for value in limits:
             result.append(Change(f"{name}: limit={value}", name, with_rules(k, limit=value)))
     near = place(lines, "proximal point, near")

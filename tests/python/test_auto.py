@@ -458,6 +458,20 @@ def test_boxes_that_overlap_are_solved() -> None:
     assert_honest(problem, result, 1e-10)
 
 
+def test_near_a_solution_the_proximal_point_goes_on() -> None:
+    """A heap whose islands end near solutions: each homotopy takes more factorisations than all."""
+    path = Path(__file__).parents[2].parent / "shared/data/real/local3d/RockPile_tob1.hdf5"
+    if not path.is_file():
+        pytest.skip("there is no such file")
+    problem = fclib.read(path)
+    result = fclib.solve(problem)
+    assert result.converged
+    assert_honest(problem, result, 1e-8)
+    solved = [stage.name for stage in result.stages if stage.solved]
+    assert {"proximal point, near", "proximal point, longer"} & set(solved)
+    assert "homotopy" not in names(result)
+
+
 def test_each_word_of_a_chain_is_told_and_taken() -> None:
     anywhere, *methods = fclib.chain_methods()
     rules = {method.name: {rule.name for rule in method.rules} for method in methods}

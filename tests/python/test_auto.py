@@ -469,7 +469,7 @@ def test_near_a_solution_the_proximal_point_goes_on() -> None:
     assert_honest(problem, result, 1e-8)
     solved = [stage.name for stage in result.stages if stage.solved]
     assert {"proximal point, near", "proximal point, longer"} & set(solved)
-    assert "homotopy" not in names(result)
+    assert "homotopy" not in stage_names(result)
 
 
 def test_each_word_of_a_chain_is_told_and_taken() -> None:

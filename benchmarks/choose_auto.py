@@ -186,23 +186,14 @@ def inserted_before(number: int, line: str) -> Callable[[list[str]], list[str]]:
 
 
 def moved(number: int, before: int, **rules: object) -> Callable[[list[str]], list[str]]:
-    """The change that takes a stage to the place of an earlier one, with other rules."""
-    return lambda lines: [
-        *lines[:before],
-        ruled(lines[number], **rules),
-        *lines[before:number],
-        *lines[number + 1 :],
-    ]
+    """The change that takes a stage to the place before another one, with other rules."""
 
+    def change(lines: list[str]) -> list[str]:
+        rest = without(number)(lines)
+        at = before - (before > number)
+        return [*rest[:at], ruled(lines[number], **rules), *rest[at:]]
 
-def put_off(number: int, before: int) -> Callable[[list[str]], list[str]]:
-    """The change that takes a stage to the place before a later one."""
-    return lambda lines: [
-        *lines[:number],
-        *lines[number + 1 : before],
-        lines[number],
-        *lines[before:],
-    ]
+    return change
 
 
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
@@ -303,7 +294,7 @@ def changes(lines: list[str]) -> list[Change]:
             result.append(Change(f"{name}: limit={value}", name, with_rules(k, limit=value)))
     near = place(lines, "proximal point, near")
     for later in ("no solution?", "held bodies"):
-        change = put_off(near, place(lines, later))
+        change = moved(near, place(lines, later))
         result.append(Change(f"{names[near]}: before {later}", names[near], change))
     change = moved(near, place(lines, longer))
     result.append(Change(f"{names[near]}: before {longer}", first, change))

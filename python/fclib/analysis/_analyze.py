@@ -276,7 +276,8 @@ def analyze(
     Args:
         problem: any formulation.
         tol: the error up to which a solution is at hand.
-        time_limit: [s] wall clock, of the solver and of each conic program.
+        time_limit: [s] wall clock, of the solver and of each conic program. The solver has at most
+            2 s where Slater's condition proves that there is a solution.
         dense: the side of a block up to which singular values are found densely.
 
     Raises:

@@ -32,6 +32,7 @@ from fclib.analysis._enumerate import EXISTS, NONE, Enumeration
 
 PAIRS = 500  # of contacts, that are tried as a proof at most
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
+LOOK = 2.0  # [s] for a solution that no verdict waits for, at most
 
 EXISTS_SLATER = "exists by Slater"
 EXISTS_ENUMERATED = "exists by enumeration"
@@ -286,8 +287,9 @@ def existence(
     problem = data.problem
     solution, error, proof = None, float("nan"), None
     why = ""
+    limit = min(time_limit, LOOK) if condition.holds else time_limit
     try:
-        result = _solve.solve(problem, "auto", tol, time_limit=time_limit)
+        result = _solve.solve(problem, "auto", tol, time_limit=limit)
     except _core.UnsuitableError as refused:
         why = f"no solver takes it: {refused}"
     else:

@@ -97,6 +97,7 @@ def command(
 ) -> None:
     """Find ranks, units, existence with its proof, and uniqueness.
 
+    A solution is looked for too, for 2 s at most where Slater's condition proves that there is one.
     If a file has several problems, the global one is taken. The exit status is 1 if a problem
     cannot be analysed, or a reference solution cannot be certified.
     """

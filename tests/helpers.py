@@ -103,10 +103,28 @@ def natural_map(r: Array, hat: Array, mu: Array) -> Array:
 
 
 def natural_map_rolling(r: Array, hat: Array, mu: Array, mu_r: Array) -> Array:
-    """The map r - P_K(r - u^) of each row, as u^ + (y - P_K(y)) where it is not r."""
+    """The map r - P_K(r - u^) of each row, without the difference of two large numbers.
+
+    Of y = r - u^ it is u^ + y - P_K(y). The normal part of P_K(y) is above y_N by the largest of
+    what each choice of binding limits lifts it, and the other parts are shortened to their limits.
+    """
     y = r - hat
-    projected = project_rolling(y, mu, mu_r)
-    return np.where((projected[:, 0] == 0)[:, None], r, hat + (y - projected))
+    half = (y.shape[1] - 1) // 2
+    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(y))
+    gaps = slides - mu * y[:, 0], rolls - mu_r * y[:, 0]
+    lift = np.zeros_like(slides)
+    for a, b in ((mu, 0 * mu_r), (0 * mu, mu_r), (mu, mu_r)):
+        lift = np.maximum(lift, (a * gaps[0] + b * gaps[1]) / (1 + a**2 + b**2))
+    outside = np.zeros_like(y)
+    outside[:, 0] = -lift
+    for part, size, gap, limit in (
+        (slice(1, 1 + half), slides, gaps[0], mu),
+        (slice(1 + half, None), rolls, gaps[1], mu_r),
+    ):
+        left = np.maximum(gap - limit * lift, 0)
+        outside[:, part] = (left / np.where(size > 0, size, 1))[:, None] * y[:, part]
+    apex = y[:, 0] + mu * slides + mu_r * rolls <= 0
+    return np.where(apex[:, None], r, hat + outside)
 
 
 @dataclass(frozen=True)

@@ -54,6 +54,18 @@ class Coulomb {
     return result;
   }
 
+  [[nodiscard]] Vec outside(const Vec& x) const {
+    const Real norm = tangential_norm(x);
+    const Real beyond = norm - mu_ * x[0];
+    if (x[0] >= 0 && beyond <= 0) return Vec::Zero();
+    if (mu_ * norm <= -x[0]) return x;
+    const Real length = beyond / (1 + mu_ * mu_);
+    Vec result;
+    result[0] = -mu_ * length;
+    for (int k = 1; k < D; ++k) result[k] = length / norm * x[k];
+    return result;
+  }
+
  private:
   Real mu_;
 };

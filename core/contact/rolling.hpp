@@ -40,6 +40,8 @@ class Rolling {
   /// linear but for the values of n at which a limit ceases to bind.
   [[nodiscard]] Vec project(const Vec& x) const;
 
+  [[nodiscard]] Vec outside(const Vec& x) const;
+
  private:
   static Real tangential_norm(const Vec& x) { return x.template segment<T>(1).norm(); }
   static Real rolling_norm(const Vec& x) { return x.template segment<T>(1 + T).norm(); }
@@ -74,6 +76,33 @@ auto Rolling<D, Real>::project(const Vec& x) const -> Vec {
   result[0] = n;
   if (t > mu_ * n) result.template segment<T>(1) *= mu_ * n / t;
   if (r > mu_r_ * n) result.template segment<T>(1 + T) *= mu_r_ * n / r;
+  return result;
+}
+
+template <int D, class Real>
+auto Rolling<D, Real>::outside(const Vec& x) const -> Vec {
+  const Real t = tangential_norm(x);
+  const Real r = rolling_norm(x);
+  // beyond their limits at n = x_N
+  const Real beyond_t = t - mu_ * x[0];
+  const Real beyond_r = r - mu_r_ * x[0];
+  if (x[0] >= 0 && beyond_t <= 0 && beyond_r <= 0) return Vec::Zero();
+  if (x[0] + mu_ * t + mu_r_ * r <= 0) return x;
+  // n - x_N with one limit that binds, or with both: see project()
+  const bool sliding = t > 0 && (!(r > 0) || t * mu_r_ >= r * mu_);
+  const Real limit = sliding ? mu_ : mu_r_;
+  Real rise = limit * (sliding ? beyond_t : beyond_r) / (1 + limit * limit);
+  Real left_t = beyond_t - mu_ * rise;
+  Real left_r = beyond_r - mu_r_ * rise;
+  if (left_t > 0 && left_r > 0) {
+    rise = (mu_ * beyond_t + mu_r_ * beyond_r) / (1 + mu_ * mu_ + mu_r_ * mu_r_);
+    left_t = beyond_t - mu_ * rise;
+    left_r = beyond_r - mu_r_ * rise;
+  }
+  Vec result = Vec::Zero();
+  result[0] = -rise;
+  if (left_t > 0) result.template segment<T>(1) = left_t / t * x.template segment<T>(1);
+  if (left_r > 0) result.template segment<T>(1 + T) = left_r / r * x.template segment<T>(1 + T);
   return result;
 }
 

@@ -68,7 +68,7 @@ class NaturalSums {
     const Cone& cone;
 
     [[nodiscard]] const Vec& modified(const Vec& u) const { return u; }
-    [[nodiscard]] Vec project(const Vec& x) const { return cone.project(x); }
+    [[nodiscard]] Vec outside(const Vec& x) const { return cone.outside(x); }
   };
 
   /// The natural map of a contact beyond what the rounding of its q explains.

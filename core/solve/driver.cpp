@@ -88,6 +88,18 @@ struct Measure {
   }
 };
 
+/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
+/// there, and beside a large one the reactions of the others round.
+void clear_without_effect(const Matrix& W, int d, Vector& r) {
+  std::vector<bool> moves(static_cast<std::size_t>(r.size() / d), false);
+  for_each_entry(W, [&](Index, Index col, double value) {
+    if (value != 0) moves[static_cast<std::size_t>(col / d)] = true;
+  });
+  for (std::size_t a = 0; a < moves.size(); ++a) {
+    if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
+  }
+}
+
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
 /// `prove` looks for a proof near y that the problem as it was given has no solution.
 template <class Judge>
@@ -124,6 +136,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
                          .deadline = &request.deadline,
                          .proves_no_solution = &proves};
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
+  if (guess.r.size() > 0) clear_without_effect(plain.W, plain.spacedim, r);
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;

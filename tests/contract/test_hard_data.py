@@ -13,7 +13,7 @@ import pytest
 
 import fclib
 from fclib import _core
-from helpers import judge, local_problem, planted_global, planted_law
+from helpers import dense, judge, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from planted_judge import claim, verdict
@@ -100,6 +100,43 @@ def test_a_guess_never_makes_a_solvable_problem_unsolved(size: float) -> None:
             guess = size * np.random.default_rng(seed).standard_normal(problem.m)
             result = fclib.solve(problem, guess=fclib.Solution(r=guess))
             assert result.status == "converged", (seed, d, rolling, result.status)
+
+
+@pytest.mark.parametrize(("d", "rolling"), FORMS)
+def test_a_guess_where_nothing_moves_does_not_round_the_others(d: int, rolling: bool) -> None:
+    problem = of_rank(d, d, rolling, 1)
+    still = slice(d, 2 * d)
+    W, q = dense(problem.W).copy(), problem.q.copy()
+    W[still], W[:, still], q[still] = 0, 0, 0
+    problem = problem.replace(W=W, q=q)
+    guess = fclib.Solution(r=1e12 * np.abs(np.random.default_rng(1).standard_normal(problem.m)))
+    for solver in ("auto", "nsgs"):
+        result = fclib.solve(problem, solver, guess=guess)
+        assert result.status == "converged"
+        assert not result.solution.r[still].any()
+        assert judge(problem, result.solution).error <= 1e-8
+
+
+@pytest.mark.parametrize(("heavy", "tol"), [(1e2, 1e-8), (1e3, 1e-8), (1e4, 1e-8), (1e5, 1e-6)])
+def test_a_pebble_that_rolls_under_a_heavy_body_is_solved(heavy: float, tol: float) -> None:
+    """Beside the normal reaction its limit of rolling is small, and its inertia far smaller."""
+    light, radius = 1e-3, 5e-3
+    M = np.diag([light] * 3 + [0.4 * light * radius**2] * 2 + [heavy] * 3 + [0.4 * heavy] * 2)
+    lever = np.zeros((5, 5))
+    lever[3, 1] = lever[4, 2] = radius
+    H = np.block([[np.eye(5) + lever, -np.eye(5) + lever], [np.zeros((5, 5)), np.eye(5)]])
+    problem = fclib.GlobalRollingProblem(
+        spacedim=5,
+        M=M,
+        H=H,
+        f=[-9.81e-3 * light, 0, 0, 0, 0, -1.01 * heavy, 0.2 * heavy, 0, 0, 0],
+        w=np.zeros(10),
+        mu=[0.6, 0.6],
+        mu_r=[1e-4, 1e-4],
+    )
+    result = fclib.solve(problem, tol=tol)
+    assert result.status == "converged"
+    assert judge(problem, result.solution).error <= tol
 
 
 @pytest.mark.parametrize("mass", [1e-9, 1e-3, 1e3, 1e9])

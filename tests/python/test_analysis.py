@@ -481,12 +481,12 @@ def test_no_verdict_waits_for_a_solution_that_it_does_not_need(
         limits.append(time_limit)
         return fclib.solve(*arguments, time_limit=1e-9, **rest)  # never solved
 
-    monkeypatch.setattr(_existence._solve, "solve", solve)
+    monkeypatch.setattr("fclib._solve.solve", solve)
     found = analysis.analyze(local_problem(np.eye(3), q=[-1.0, 0.5, 0], mu=[0.4]))
     assert found.existence.verdict == analysis.EXISTS_SLATER
     assert found.existence.solution is None
     # a body between two walls at rest: there is no Slater point, so the solution decides
-    W = [[1.0, 0, -1, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, 1, 0, 1]]
+    W = np.array([[1.0, 0, -1, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, 1, 0, 1]])
     walls = local_problem(W, q=np.zeros(4), mu=[0.3, 0.3])
     assert analysis.analyze(walls, time_limit=20.0).existence.verdict != analysis.EXISTS_SLATER
     assert limits == [_existence.LOOK, 20.0]

@@ -14,7 +14,7 @@ import pytest
 
 import fclib
 from fclib import analysis
-from helpers import last_resort
+from helpers import judge, last_resort
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -59,7 +59,10 @@ def test_a_light_body_under_a_heavy_one_is_not_infeasible(power: int, extra: boo
 @cases("cx07", "cx08", "cx09", "cx10")
 def test_what_has_a_solution_is_not_called_infeasible(path: Path) -> None:
     problem = fclib.read(path)
-    assert fclib.solve(problem, time_limit=10).status != "infeasible"
+    result = fclib.solve(problem, time_limit=10)
+    assert result.status == "converged"
+    if not path.name.startswith("cx07"):  # what its large multipliers round is taken off there
+        assert judge(problem, result.solution).error <= 1e-8
     assert analysis.analyze(problem, time_limit=5).existence.verdict != analysis.PROVEN_NOT
 
 

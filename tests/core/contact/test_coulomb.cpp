@@ -35,6 +35,19 @@ TEST(CoulombCone, projection_satisfies_the_decomposition_of_Moreau) {
   }
 }
 
+TEST(CoulombCone, what_is_outside_is_the_difference_from_the_projection) {
+  testing::RandomData random(18);
+  for (const double mu : {0.0, 1e-4, 0.7, 50.0}) {
+    const Coulomb<3> cone(mu);
+    for (int k = 0; k < 1000; ++k) {
+      ContactVector<3> x = random.vector(3);
+      if (k % 4 == 0) x.tail<2>().setZero();
+      EXPECT_LT((cone.outside(x) - (x - cone.project(x))).norm(), 1e-15 * (1 + mu));
+      EXPECT_EQ(cone.outside(x).isZero(0), cone.project(x) == x);
+    }
+  }
+}
+
 TEST(CoulombCone, natural_map_is_zero_for_each_status_and_not_otherwise) {
   const Coulomb<3> cone(0.5);
   using Vec = Eigen::Vector3d;

@@ -40,6 +40,38 @@ TEST(RollingCone, projection_satisfies_the_decomposition_of_Moreau) {
   }
 }
 
+TEST(RollingCone, what_is_outside_is_the_difference_from_the_projection) {
+  testing::RandomData random(17);
+  for (const double mu : {0.0, 0.3, 20.0}) {
+    for (const double mu_r : {0.0, 1e-4, 1.0}) {
+      const Rolling<5> cone(mu, mu_r);
+      const Rolling<3> planar(mu, mu_r);
+      for (int k = 0; k < 2000; ++k) {
+        ContactVector<5> x = random.vector(5);
+        if (k % 5 == 1) x.segment<2>(1).setZero();
+        if (k % 5 == 2) x.tail<2>().setZero();
+        if (k % 5 == 3) x[0] *= 100;
+        EXPECT_LT((cone.outside(x) - (x - cone.project(x))).norm(), 1e-15 * (1 + x.norm()) * 30);
+        const ContactVector<3> y = x.head<3>();
+        EXPECT_LT((planar.outside(y) - (y - planar.project(y))).norm(),
+                  1e-15 * (1 + y.norm()) * 30);
+        EXPECT_EQ(cone.outside(x).isZero(0), cone.project(x) == x);
+      }
+    }
+  }
+}
+
+TEST(RollingCone, a_large_normal_part_does_not_swallow_what_its_small_limit_leaves) {
+  const Rolling<5> cone(0.6, 1e-4);
+  ContactVector<5> u = ContactVector<5>::Zero();
+  ContactVector<5> r = u;
+  u[3] = -18;
+  r << 1e5, -2e3, 0, 1e-4 * 1e5, 0;
+  EXPECT_LT(natural_map(cone, u, r, 1e-8).norm(), 1e-14);
+  r[3] += 1e-12;
+  EXPECT_NEAR(natural_map(cone, u, r, 1e-8).norm(), 1e-12, 1e-14);
+}
+
 TEST(RollingCone, natural_map_is_zero_for_each_status) {
   const Rolling<5> cone(0.5, 0.1);
   using Vec = ContactVector<5>;

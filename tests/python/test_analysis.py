@@ -559,6 +559,22 @@ def test_heavy_bodies_are_no_rounding_of_light_ones(size: float) -> None:
     assert "contraction" not in reason
 
 
+@pytest.mark.filterwarnings("error")
+def test_contacts_of_nothing_beside_large_joints_overflow_nothing() -> None:
+    problem = fclib.GlobalProblem(
+        M=np.eye(3),
+        H=np.zeros((3, 3)),
+        G=np.array([[1e10], [0], [0]]),
+        f=[1.0, 0, 0],
+        w=[-1e-3, 0, 0],
+        b=[5e9],
+        mu=[0.5],
+    )
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert_no_solution(problem, found.existence.certificate)
+
+
 def test_units_far_from_one_are_said() -> None:
     problem = planted_local(1).problem
     assert analysis.analyze(problem).units.trouble == ()

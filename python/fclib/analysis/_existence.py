@@ -188,7 +188,7 @@ def slater(
     k = A.shape[1]
     program = Program(k + 1 + own)  # x, t and what rolling needs
     top = sp.csr_array((np.full(nc, -1.0), (d * np.arange(nc), np.zeros(nc, int))), (d * nc, 1))
-    row_scale = max(abs(A.data).max(initial=0.0), 1e-300)
+    row_scale = abs(A.data).max(initial=0.0) or 1.0
     map_ = sp.hstack([A / row_scale, top, sp.csr_array((d * nc, own))])
     add_dual_cones(program, data, map_, c / data.speed, k + 1)
     if e.size:

@@ -5,18 +5,12 @@
 
 #include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
-#include "reduced/scale.hpp"
 
 namespace fclib {
 
 template <class Cone>
 Homotopy<Cone>::Homotopy(const ReducedProblem& problem, CoupledSystem& system)
-    : problem_(problem), system_(system) {
-  omega_ = mean_diagonal(problem);
-  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
-  if (!(size_q_ > 0)) size_q_ = 1.0;
-  q_ = problem.q / size_q_;
-}
+    : problem_(problem), system_(system), units_(problem) {}
 
 template <class Cone>
 void Homotopy<Cone>::solve(const HomotopyRules& rules, Report report) {
@@ -56,7 +50,7 @@ void Homotopy<Cone>::solve(const HomotopyRules& rules, Report report) {
 
 template <class Cone>
 bool Homotopy<Cone>::tell(Report report) {
-  physical_ = r_ * (size_q_ / omega_);
+  physical_ = units_.reactions(r_);
   problem_.velocity(physical_, velocity_);
   return report(relative_error<Cone>(problem_, velocity_, physical_), physical_);
 }
@@ -65,6 +59,7 @@ template <class Cone>
 void Homotopy<Cone>::start() {
   const auto m = problem_.m();
   r_ = Vector::Zero(m);
+  inverted_.resize(static_cast<std::size_t>(problem_.nc()));
   for (Index a = 0; a < problem_.nc(); ++a) r_[D * a] = 1;
   for (Vector* v : {&c_, &residual_, &derivative_, &next_, &tangent_, &across_, &along_})
     v->setZero(m);
@@ -75,7 +70,7 @@ void Homotopy<Cone>::start() {
   evaluate(r_, lambda_);
   c_ = residual_;
   for (Index a = 0; a < problem_.nc(); ++a) {
-    const Cone cone(problem_.friction, a);
+    const Cone cone(units_.friction(), a);
     for (int group = 0; group < Cone::groups; ++group) {
       if (cone.coefficient(group) > 0) continue;
       c_.template segment<T>(D * a + 1 + T * group).setZero();
@@ -86,7 +81,7 @@ void Homotopy<Cone>::start() {
 template <class Cone>
 bool Homotopy<Cone>::inside(const Vector& r) const {
   for (Index a = 0; a < problem_.nc(); ++a) {
-    const Cone cone(problem_.friction, a);
+    const Cone cone(units_.friction(), a);
     if (!(r[D * a] > 0)) return false;
     for (int group = 0; group < Cone::groups; ++group) {
       const double mu = cone.coefficient(group);
@@ -102,11 +97,11 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
   const double t = std::exp(lambda);
   const double s = 1 - t;
   const double e = rules_.smoothing;
-  problem_.W.multiply_add(r / omega_, q_, residual_);
+  units_.product(r, units_.q(), residual_);
   std::vector<double>& blocks = system_.blocks();
   negative_ = false;
   for (Index a = 0; a < problem_.nc(); ++a) {
-    const Cone cone(problem_.friction, a);
+    const Cone cone(units_.friction(), a);
     const auto at = D * a;
     Vec g = Vec::Zero();
     Vec dg = Vec::Zero();  // dg / dlambda
@@ -149,7 +144,8 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
     residual_.template segment<D>(at) -= forcing;
     derivative_.template segment<D>(at) = -(forcing + t * dg);
     if (determinant<D>(B) < 0) negative_ = !negative_;
-    Mat inverted = inverse<D>(B);
+    Mat& inverted = inverted_[static_cast<std::size_t>(a)];
+    inverted = inverse<D>(B);
     for (int group = 0; group < Cone::groups; ++group) {
       if (!(cone.coefficient(group) > 0)) {
         const int k = 1 + T * group;
@@ -157,7 +153,8 @@ void Homotopy<Cone>::evaluate(const Vector& r, double lambda) {
         inverted.template middleCols<T>(k).setZero();
       }
     }
-    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = inverted / omega_;
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
+        units_.template block<D>(a, inverted);
   }
 }
 
@@ -166,21 +163,24 @@ bool Homotopy<Cone>::linearise(const Vector& r, double lambda) {
   evaluate(r, lambda);
   if (!system_.factorise()) return false;
   sign_ = system_.determinant_sign() * (negative_ ? -1 : 1);
-  const std::vector<double>& blocks = system_.blocks();
   for (Index a = 0; a < problem_.nc(); ++a) {
-    const Eigen::Map<const Mat> block(blocks.data() + std::ptrdiff_t{D * D} * a);
-    across_.template segment<D>(D * a) = -omega_ * (block * residual_.template segment<D>(D * a));
-    along_.template segment<D>(D * a) = -omega_ * (block * derivative_.template segment<D>(D * a));
+    const Mat& block = inverted_[static_cast<std::size_t>(a)];
+    across_.template segment<D>(D * a) = -block * residual_.template segment<D>(D * a);
+    along_.template segment<D>(D * a) = -block * derivative_.template segment<D>(D * a);
   }
+  across_ = units_.from_side(across_);
   system_.solve(across_);
+  across_ = units_.to_side(across_);
+  along_ = units_.from_side(along_);
   system_.solve(along_);
+  along_ = units_.to_side(along_);
   return across_.allFinite() && along_.allFinite();
 }
 
 template <class Cone>
 double Homotopy<Cone>::product(const Vector& base, Index a, const Vector& x,
                                const Vector& y) const {
-  const Cone cone(problem_.friction, a);
+  const Cone cone(units_.friction(), a);
   const auto at = D * a;
   const double r = base[at];
   double sum = 0;

@@ -21,13 +21,15 @@
 // the arclength; S. N. Chow, J. Mallet-Paret, J. A. Yorke, "Finding zeroes of maps: homotopy
 // methods that are constructive with probability one" (1978), for why the path arrives.
 //
-// All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
+// All is done in the units of the contacts (reduced/own_units.hpp).
 #pragma once
 
 #include <cmath>
+#include <vector>
 
 #include "contact/cones.hpp"
 #include "function_ref.hpp"
+#include "reduced/own_units.hpp"
 #include "systems/coupled_system.hpp"
 
 namespace fclib {
@@ -93,9 +95,9 @@ class Homotopy {
   const ReducedProblem& problem_;
   CoupledSystem& system_;
   HomotopyRules rules_;
-  double omega_ = 1;
-  double size_q_ = 1;
-  Vector q_, c_, r_;
+  OwnUnits units_;
+  std::vector<Mat> inverted_;  // of each contact, (-t g')^-1
+  Vector c_, r_;
   double lambda_ = 0;  // log t
   Vector residual_, derivative_;
   Vector tangent_, across_, along_;

@@ -6,17 +6,12 @@
 
 #include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
-#include "reduced/scale.hpp"
 
 namespace fclib {
 
 template <int D>
 InteriorPoint<D>::InteriorPoint(const ReducedProblem& problem, CoupledSystem& system)
-    : problem_(problem), system_(system) {
-  omega_ = mean_diagonal(problem);
-  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
-  if (!(size_q_ > 0)) size_q_ = 1.0;
-}
+    : problem_(problem), system_(system), units_(problem) {}
 
 template <int D>
 void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& guess,
@@ -29,8 +24,8 @@ void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& gues
   int least_at = 0;
   for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
     evaluate(rules);
-    physical_ = r_ * (size_q_ / omega_);
-    velocity_ = u_ * size_q_;
+    physical_ = units_.reactions(r_);
+    velocity_ = units_.velocities(u_);
     const double error = relative_error<Cone>(problem_, velocity_, physical_);
     if (report(error, physical_)) return;
     if (error < 0.5 * least) {
@@ -87,12 +82,11 @@ void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& gues
 template <int D>
 void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& guess) {
   const auto m = problem_.m();
-  q_ = problem_.q / size_q_;
   for (Vector* v : {&g_, &lambda_, &dx_, &dy_, &dr_, &rhs_, &residual_vector_, &u_, &x_, &y_})
     v->setZero(m);
   scaling_.resize(static_cast<std::size_t>(problem_.nc()));
-  r_ = guess * (omega_ / size_q_);
-  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  r_ = units_.to_own(guess);
+  units_.product(r_, units_.q(), u_);
   // x of x - y = z and x y = tau, without cancellation
   const auto root = [&](double z) {
     const double length = std::sqrt(z * z + 4 * rules.tau);
@@ -131,7 +125,7 @@ void InteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& gues
 
 template <int D>
 void InteriorPoint<D>::evaluate(const InteriorPointRules& rules) {
-  problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
+  units_.product(r_, units_.q(), u_, system_.workers());
   tau_ = x_.dot(y_) / static_cast<double>(problem_.nc());
   width_ = rules.smoothing * tau_;
   residual_ = largest([&](Index a) {
@@ -196,7 +190,8 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
     s.D0 = d0;
     const Mat regular = Mat::Identity() + delta * d0;
     s.regular = inverse<D>(regular);
-    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) = s.regular * d0 / omega_;
+    Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
+        units_.template block<D>(a, s.regular * d0);
   });
 }
 
@@ -241,9 +236,11 @@ bool InteriorPoint<D>::direction(double delta) {
     dr_.template segment<D>(D * a) =
         s.regular * (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
   });
+  dr_ = units_.from_side(dr_);
   system_.solve(dr_);
+  dr_ = units_.to_side(dr_);
   if (!dr_.allFinite()) return false;
-  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_, system_.workers());  // W dr + R
+  units_.product(dr_, residual_vector_, rhs_, system_.workers());  // W dr + R
   rhs_ += delta * dr_;
   each([&](Index a) {
     const double mu = problem_.friction.mu[a];

@@ -18,7 +18,8 @@
 // mechanics using interior point algorithm" (2023), for the convex part, to
 // which the shift in the Newton system is added.
 //
-// All is done in units where the mean of tr(W_aa) / d and ||q||_inf are 1.
+// All is done in the units of the contacts (reduced/own_units.hpp): the start and delta fit to
+// light bodies beside heavy ones.
 #pragma once
 
 #include <algorithm>
@@ -30,6 +31,7 @@
 #include "contact/coulomb.hpp"
 #include "contact/lorentz.hpp"
 #include "function_ref.hpp"
+#include "reduced/own_units.hpp"
 #include "systems/coupled_system.hpp"
 
 namespace fclib {
@@ -59,7 +61,7 @@ class InteriorPoint {
   [[nodiscard]] double tau() const { return tau_; }
   /// ||R||_inf / ||q||_inf and ||u|| / ||q|| of the last iterate.
   [[nodiscard]] double residual() const { return residual_; }
-  [[nodiscard]] double speed() const { return u_.norm() / problem_.q.norm() * size_q_; }
+  [[nodiscard]] double speed() const { return velocity_.norm() / problem_.q.norm(); }
   [[nodiscard]] int iterations() const { return iterations_; }
 
   /// Iterates from near a guess; `report(error, r)` is told of each iterate, and ends it by
@@ -122,14 +124,13 @@ class InteriorPoint {
 
   const ReducedProblem& problem_;
   CoupledSystem& system_;
-  double omega_ = 1;
-  double size_q_ = 1;
+  OwnUnits units_;
   double tau_ = 1;
   double width_ = 0;  // of the smoothing
   double residual_ = 0;
   int iterations_ = 0;
   std::vector<Scaling> scaling_;
-  Vector q_, x_, y_, r_, u_, g_, lambda_, dx_, dy_, dr_, rhs_, residual_vector_;
+  Vector x_, y_, r_, u_, g_, lambda_, dx_, dy_, dr_, rhs_, residual_vector_;
   Vector affine_x_, affine_y_, physical_, velocity_;
 };
 

@@ -6,21 +6,17 @@
 
 #include "contact/inverse.hpp"
 #include "reduced/relative_error.hpp"
-#include "reduced/scale.hpp"
 
 namespace fclib {
 
 template <int D>
 RollingInteriorPoint<D>::RollingInteriorPoint(const ReducedProblem& problem, CoupledSystem& system)
-    : problem_(problem), system_(system) {
-  omega_ = mean_diagonal(problem);
-  size_q_ = problem.q.template lpNorm<Eigen::Infinity>();
-  if (!(size_q_ > 0)) size_q_ = 1.0;
+    : problem_(problem), system_(system), units_(problem) {
   contacts_.resize(static_cast<std::size_t>(problem.nc()));
   for (Index a = 0; a < problem.nc(); ++a) {
     auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
-    groups[0].coefficient = problem.friction.mu[a];
-    groups[1].coefficient = problem.friction.mu_r[a];
+    groups[0].coefficient = units_.friction().mu[a];
+    groups[1].coefficient = units_.friction().mu_r[a];
     for (Group& group : groups) group.tail = group.coefficient > 0;
     if (!groups[0].tail && !groups[1].tail) groups[0].coefficient = 1;
     for (const Group& group : groups) count_ += group.coefficient > 0;
@@ -36,8 +32,8 @@ void RollingInteriorPoint<D>::solve(const InteriorPointRules& rules, const Vecto
   int least_at = 0;
   for (int k = 0; k < rules.max_iterations; ++k) {
     evaluate();
-    physical_ = r_ * (size_q_ / omega_);
-    velocity_ = u_ * size_q_;
+    physical_ = units_.reactions(r_);
+    velocity_ = units_.velocities(u_);
     const double error = relative_error<Cone>(problem_, velocity_, physical_);
     if (report(error, physical_)) return;
     if (error < 0.5 * least) {
@@ -104,17 +100,16 @@ auto RollingInteriorPoint<D>::lift(const Group& group, int k, const Vec& r) -> P
 template <int D>
 void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vector& guess) {
   const auto m = problem_.m();
-  q_ = problem_.q / size_q_;
   for (Vector* v : {&u_, &dr_, &rhs_, &residual_vector_}) v->setZero(m);
-  r_ = guess * (omega_ / size_q_);
-  problem_.W.multiply_add(r_ / omega_, q_, u_);
+  r_ = units_.to_own(guess);
+  units_.product(r_, units_.q(), u_);
   // x of x - y = z and x y = tau, without cancellation
   const auto root = [&](double z) {
     const double length = std::sqrt(z * z + 4 * rules.tau);
     return z > 0 ? 0.5 * (z + length) : 2 * rules.tau / (length - z);
   };
   for (Index a = 0; a < problem_.nc(); ++a) {
-    const Vec u = Cone(problem_.friction, a).modified(u_.template segment<D>(D * a));
+    const Vec u = Cone(units_.friction(), a).modified(u_.template segment<D>(D * a));
     auto r = r_.template segment<D>(D * a);
     auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
     const double squares = std::pow(groups[0].coefficient, 2) + std::pow(groups[1].coefficient, 2);
@@ -148,7 +143,7 @@ void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vecto
 
 template <int D>
 void RollingInteriorPoint<D>::evaluate() {
-  problem_.W.multiply_add(r_ / omega_, q_, u_, system_.workers());
+  units_.product(r_, units_.q(), u_, system_.workers());
   residual_ = 0;
   double gap = 0;
   for (Index a = 0; a < problem_.nc(); ++a) {
@@ -210,7 +205,7 @@ void RollingInteriorPoint<D>::assemble(double delta) {
     const Mat regular = Mat::Identity() + delta * contact.D0;
     contact.regular = inverse<D>(regular);
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
-        contact.regular * contact.D0 / omega_;
+        units_.template block<D>(a, contact.regular * contact.D0);
   }
 }
 
@@ -256,9 +251,11 @@ bool RollingInteriorPoint<D>::direction(double delta) {
         contact.regular *
         (contact.A * target - contact.D0 * residual_vector_.template segment<D>(D * a));
   }
+  dr_ = units_.from_side(dr_);
   system_.solve(dr_);
+  dr_ = units_.to_side(dr_);
   if (!dr_.allFinite()) return false;
-  problem_.W.multiply_add(dr_ / omega_, residual_vector_, rhs_, system_.workers());  // W dr + R
+  units_.product(dr_, residual_vector_, rhs_, system_.workers());  // W dr + R
   rhs_ += delta * dr_;
   for (Index a = 0; a < problem_.nc(); ++a) {
     Contact& contact = contacts_[static_cast<std::size_t>(a)];

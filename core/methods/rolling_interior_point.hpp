@@ -70,13 +70,12 @@ class RollingInteriorPoint {
 
   const ReducedProblem& problem_;
   CoupledSystem& system_;
-  double omega_ = 1;
-  double size_q_ = 1;
+  OwnUnits units_;
   double tau_ = 1;
   double residual_ = 0;
   double count_ = 0;  // cones
   std::vector<Contact> contacts_;
-  Vector q_, r_, u_, dr_, rhs_, residual_vector_, physical_, velocity_;
+  Vector r_, u_, dr_, rhs_, residual_vector_, physical_, velocity_;
 };
 
 extern template class RollingInteriorPoint<3>;

@@ -1,0 +1,57 @@
+#include "reduced/own_units.hpp"
+
+#include <cmath>
+
+#include "linalg/with_dimension.hpp"
+
+namespace fclib {
+
+OwnUnits::OwnUnits(const ReducedProblem& problem)
+    : problem_(problem), unit_(problem.m()), friction_(problem.friction) {
+  const int d = problem.d();
+  const int moved = problem.rolling() ? (d + 1) / 2 : d;  // components before the rolling ones
+  with_dimension(d, [&](auto dim) {
+    for (Index a = 0; a < problem.nc(); ++a) {
+      unit_.segment<dim>(Eigen::Index{dim} * a) = problem.W.diagonal_block<dim>(a).diagonal();
+    }
+  });
+  // the mean of each part; the mean of all contacts where it has none
+  const auto each_part = [&](const auto& visit) {
+    for (Index a = 0; a < problem.nc(); ++a) {
+      visit(0, unit_.segment(Eigen::Index{d} * a, moved));
+      if (moved < d) visit(1, unit_.segment(Eigen::Index{d} * a + moved, d - moved));
+    }
+  };
+  double sum[2] = {0, 0};
+  double count[2] = {0, 0};
+  each_part([&](int part, auto values) {
+    const double mean = values.mean();
+    values.setConstant(mean);
+    if (!(mean > 0)) return;
+    sum[part] += mean;
+    ++count[part];
+  });
+  each_part([&](int part, auto values) {
+    const double mean = values[0];
+    const double usual = count[part] > 0 ? sum[part] / count[part] : 1.0;
+    values.setConstant(std::sqrt(mean > 0 ? mean : usual));
+  });
+  inverse_ = unit_.cwiseInverse();
+  q_ = problem.q.cwiseProduct(inverse_);
+  const double largest = q_.lpNorm<Eigen::Infinity>();
+  if (largest > 0) size_ = largest;
+  q_ /= size_;
+  if (problem.rolling()) {
+    for (Index a = 0; a < problem.nc(); ++a) {
+      const auto first = Eigen::Index{d} * a;
+      friction_.mu_r[a] *= unit_[first + moved] * inverse_[first];
+    }
+  }
+}
+
+void OwnUnits::product(const Vector& r, const Vector& b, Vector& y, Workers* workers) const {
+  problem_.W.multiply_add(r.cwiseProduct(inverse_), b.cwiseProduct(unit_), y, workers);
+  y = y.cwiseProduct(inverse_);
+}
+
+}  // namespace fclib

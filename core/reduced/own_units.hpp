@@ -1,0 +1,50 @@
+// A problem in the units of its own contacts, for methods whose path from far away depends on
+// units.
+//
+//   r~ = S r / size,  u~ = S^-1 u / size,  W~ = S^-1 W S^-1,  q~ = S^-1 q / size
+//
+// S is diagonal, the root of the mean diagonal of W_aa over the normal and the tangential part, and
+// over the rolling part: masses, and lengths beside angles, may differ from contact to contact. A
+// cone stays one of its kind, with mu_r~ = mu_r s_R / s_N, and r~ . u~ is r . u / size^2.
+// ||q~||_inf is 1.
+#pragma once
+
+#include "reduced/reduced_problem.hpp"
+
+namespace fclib {
+
+class OwnUnits {
+ public:
+  explicit OwnUnits(const ReducedProblem& problem);
+
+  [[nodiscard]] const Friction& friction() const { return friction_; }
+  [[nodiscard]] const Vector& q() const { return q_; }
+
+  [[nodiscard]] Vector to_own(const Vector& r) const { return r.cwiseProduct(unit_) / size_; }
+  /// Back from them.
+  [[nodiscard]] Vector reactions(const Vector& r) const { return size_ * r.cwiseProduct(inverse_); }
+  [[nodiscard]] Vector velocities(const Vector& u) const { return size_ * u.cwiseProduct(unit_); }
+
+  /// y = W~ r + b.
+  void product(const Vector& r, const Vector& b, Vector& y, Workers* workers = nullptr) const;
+
+  /// A block D_a (d x d) of a system (I + D W~) x~ = b~, as it is in (I + D W) x = b.
+  template <int d>
+  [[nodiscard]] Eigen::Matrix<double, d, d> block(Index a,
+                                                  const Eigen::Matrix<double, d, d>& own) const {
+    const auto scale = inverse_.segment<d>(Eigen::Index{d} * a).asDiagonal();
+    return scale * own * scale;
+  }
+  /// b of b~, or x of x~.
+  [[nodiscard]] Vector from_side(const Vector& b) const { return b.cwiseProduct(inverse_); }
+  [[nodiscard]] Vector to_side(const Vector& x) const { return x.cwiseProduct(unit_); }
+
+ private:
+  const ReducedProblem& problem_;
+  Vector unit_, inverse_;  // of each component [W^1/2], and 1 over it
+  double size_ = 1;
+  Friction friction_;
+  Vector q_;
+};
+
+}  // namespace fclib

@@ -196,6 +196,17 @@ def moved(number: int, before: int, **rules: object) -> Callable[[list[str]], li
     return change
 
 
+def after_held(stages: Sequence[str]) -> Callable[[list[str]], list[str]]:
+    """The change that takes stages to the place behind "held bodies"."""
+
+    def change(lines: list[str]) -> list[str]:
+        rest = [line for line in lines if name_of(line) not in stages]
+        at = place(rest, "associated")
+        return [*rest[:at], *(lines[place(lines, name)] for name in stages), *rest[at:]]
+
+    return change
+
+
 def before_islands(line: str) -> Callable[[list[str]], list[str]]:
     """The change that puts a stage before all others of islands."""
     return lambda lines: [
@@ -298,6 +309,13 @@ def changes(lines: list[str]) -> list[Change]:
         result.append(Change(f"{names[near]}: before {later}", names[near], change))
     change = moved(near, place(lines, longer))
     result.append(Change(f"{names[near]}: before {longer}", first, change))
+    # each of them, then both
+    late = ("interior point, smoothed", "semismooth newton")
+    associated = place(lines, "associated")
+    for name in late:
+        change = moved(place(lines, name), associated)
+        result.append(Change(f"{name}: after held bodies", name, change))
+    result.append(Change(f"{' and '.join(late)}: after held bodies", late[0], after_held(late)))
     for earlier in ("interior point, shorter steps", "held bodies", "interior point, smoothed"):
         for value in (200, 400):
             change = moved(middle, place(lines, earlier), limit=value)

@@ -43,14 +43,15 @@ proximal point, last digits     : proximal_point      from=best below=1e-8      
 gauss-seidel                    : sweep_on            law=coulomb
 # a proof is found at once or not at all, and spares what follows
 no solution?                    : no_solution                                          limit=60
+# cheap beside what follows
+interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
+# where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
+semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
 # where most bodies rest: reactions that hold them are found by convex problems. With all that creep,
 # then without most of them
 held bodies                     : held_bodies         at_least=100                     creep=0
 held bodies                     : held_bodies         at_least=100
-interior point, smoothed        : interior_point      law=coulomb from=swept           smoothing=1 step_cap=0.8 delta=1e-3 limit=100
 associated                      : associated
-# where it converges, it does from nothing as well; slower than the proximal point on rolling contacts
-semismooth newton               : semismooth_newton   from=nothing law=coulomb         most_flops=100 limit=200
 proximal point                  : proximal_point      from=best                        limit=200
 # slow, but cheaper than the paths that follow
 proximal point, longer          : proximal_point      from=best below=1e-3             limit=1200

@@ -64,8 +64,9 @@ def test_gripper_lifts_the_row_and_brings_it_back(blocks: int, squeeze: float) -
 
 
 def test_gripper_carries_the_weight_by_the_friction_of_its_jaws() -> None:
-    """Action and reaction: what its jaws give the row is the row's weight, half of it each."""
-    # pressed less, the row slides for some steps, and how it turns then is not unique
+    """Action and reaction: what its jaws give the row is the row's weight."""
+    # pressed less, the row slides for some steps, and how it turns then is not unique; how much
+    # each jaw carries is not unique in any case
     family: Any = scenes.get("Gripper")(squeeze=2.0)
     *_, held = simulate(family.scene(seed=2), round(LIFTED * family.period / family.time_step))
     carried = {jaw: force_on(held, jaw) for jaw in ("left", "right")}
@@ -79,7 +80,6 @@ def test_gripper_carries_the_weight_by_the_friction_of_its_jaws() -> None:
     handed = force_on(held, "block1", by="block0")[2]
     share = weight / family.blocks
     assert handed == pytest.approx(-carried["left"][2] - share, abs=0.01 * weight)
-    assert handed > share
 
 
 def test_gripper_that_presses_too_little_lets_the_row_go() -> None:

@@ -1,10 +1,18 @@
 #include "reduced/own_units.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "linalg/with_dimension.hpp"
 
 namespace fclib {
+
+namespace {
+
+/// Of the largest mean: what joints leave of a contact that they hold is rounding.
+constexpr double nothing = 1e-14;
+
+}  // namespace
 
 OwnUnits::OwnUnits(const ReducedProblem& problem)
     : problem_(problem), unit_(problem.m()), friction_(problem.friction) {
@@ -15,31 +23,32 @@ OwnUnits::OwnUnits(const ReducedProblem& problem)
       unit_.segment<dim>(Eigen::Index{dim} * a) = problem.W.diagonal_block<dim>(a).diagonal();
     }
   });
-  // the mean of each part; the mean of all contacts where it has none
   const auto each_part = [&](const auto& visit) {
     for (Index a = 0; a < problem.nc(); ++a) {
       visit(0, unit_.segment(Eigen::Index{d} * a, moved));
       if (moved < d) visit(1, unit_.segment(Eigen::Index{d} * a + moved, d - moved));
     }
   };
+  // the mean of each part; where it is nothing beside the others, their mean
+  double largest[2] = {0, 0};
+  each_part([&](int part, auto values) {
+    values.setConstant(values.mean());
+    largest[part] = std::max(largest[part], values[0]);
+  });
   double sum[2] = {0, 0};
   double count[2] = {0, 0};
   each_part([&](int part, auto values) {
-    const double mean = values.mean();
-    values.setConstant(mean);
-    if (!(mean > 0)) return;
-    sum[part] += mean;
+    if (!(values[0] > nothing * largest[part])) return;
+    sum[part] += values[0];
     ++count[part];
   });
   each_part([&](int part, auto values) {
-    const double mean = values[0];
     const double usual = count[part] > 0 ? sum[part] / count[part] : 1.0;
-    values.setConstant(std::sqrt(mean > 0 ? mean : usual));
+    values.setConstant(std::sqrt(values[0] > nothing * largest[part] ? values[0] : usual));
   });
   inverse_ = unit_.cwiseInverse();
   q_ = problem.q.cwiseProduct(inverse_);
-  const double largest = q_.lpNorm<Eigen::Infinity>();
-  if (largest > 0) size_ = largest;
+  if (const double size = q_.lpNorm<Eigen::Infinity>(); size > 0) size_ = size;
   q_ /= size_;
   if (problem.rolling()) {
     for (Index a = 0; a < problem.nc(); ++a) {

@@ -105,16 +105,15 @@ TEST(OwnUnits, there_and_back) {
 }
 
 TEST(OwnUnits, what_nothing_moves_has_the_usual_unit) {
-  ReducedProblem problem{
-      .W = {Matrix::from_eigen(
-                SparseColumns(Eigen::MatrixXd(Vector{{4, 4, 0, 0}}.asDiagonal()).sparseView())),
-            2},
-      .q = Vector{{-1, 0, 1, 0}},
-      .friction = {Vector::Ones(2), {}}};
-  const OwnUnits units(problem);
-  EXPECT_EQ(units.to_own(Vector::Ones(4)), Vector::Constant(4, 4));
-  problem.q.setZero();
-  EXPECT_TRUE(OwnUnits(problem).q().isZero(0));
+  for (const double left : {0.0, 1e-16}) {
+    const Eigen::MatrixXd W = Vector{{4, 4, left, left}}.asDiagonal();
+    ReducedProblem problem{.W = {Matrix::from_eigen(SparseColumns(W.sparseView())), 2},
+                           .q = Vector{{-1, 0, 1, 0}},
+                           .friction = {Vector::Ones(2), {}}};
+    EXPECT_EQ(OwnUnits(problem).to_own(Vector::Ones(4)), Vector::Constant(4, 4));
+    problem.q.setZero();
+    EXPECT_TRUE(OwnUnits(problem).q().isZero(0));
+  }
 }
 
 }  // namespace

@@ -102,7 +102,9 @@ def row(ratio: float, count: int, solver: str) -> dict[str, Any]:
         "solved to 1e-8": len(solved),
         "not solved, but told": told,
         "largest error of the others": "" if worst is None else f"{worst:.0e}",
-        "median iterations": round(statistics.median(r.iterations for r in solved)),
+        "median iterations": round(statistics.median(r.iterations for r in solved))
+        if solved
+        else "",
         "CPU of all [s]": f"{sum(result.cpu_s for result in results):.3g}",
     }
 

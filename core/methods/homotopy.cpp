@@ -168,12 +168,12 @@ bool Homotopy<Cone>::linearise(const Vector& r, double lambda) {
     across_.template segment<D>(D * a) = -block * residual_.template segment<D>(D * a);
     along_.template segment<D>(D * a) = -block * derivative_.template segment<D>(D * a);
   }
-  across_ = units_.from_side(across_);
+  across_ = units_.divided(across_);
   system_.solve(across_);
-  across_ = units_.to_side(across_);
-  along_ = units_.from_side(along_);
+  across_ = units_.multiplied(across_);
+  along_ = units_.divided(along_);
   system_.solve(along_);
-  along_ = units_.to_side(along_);
+  along_ = units_.multiplied(along_);
   return across_.allFinite() && along_.allFinite();
 }
 

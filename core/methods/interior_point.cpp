@@ -236,9 +236,9 @@ bool InteriorPoint<D>::direction(double delta) {
     dr_.template segment<D>(D * a) =
         s.regular * (scaled_target(a) - s.D0 * residual_vector_.template segment<D>(D * a));
   });
-  dr_ = units_.from_side(dr_);
+  dr_ = units_.divided(dr_);
   system_.solve(dr_);
-  dr_ = units_.to_side(dr_);
+  dr_ = units_.multiplied(dr_);
   if (!dr_.allFinite()) return false;
   units_.product(dr_, residual_vector_, rhs_, system_.workers());  // W dr + R
   rhs_ += delta * dr_;

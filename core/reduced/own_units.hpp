@@ -17,27 +17,32 @@ class OwnUnits {
  public:
   explicit OwnUnits(const ReducedProblem& problem);
 
+  /// With mu_r~ in the place of mu_r.
   [[nodiscard]] const Friction& friction() const { return friction_; }
+  /// q~ (m).
   [[nodiscard]] const Vector& q() const { return q_; }
 
+  /// r~ of r (m).
   [[nodiscard]] Vector to_own(const Vector& r) const { return r.cwiseProduct(unit_) / size_; }
-  /// Back from them.
+  /// r of r~, and u of u~ (m).
   [[nodiscard]] Vector reactions(const Vector& r) const { return size_ * r.cwiseProduct(inverse_); }
   [[nodiscard]] Vector velocities(const Vector& u) const { return size_ * u.cwiseProduct(unit_); }
 
   /// y = W~ r + b.
   void product(const Vector& r, const Vector& b, Vector& y, Workers* workers = nullptr) const;
 
-  /// A block D_a (d x d) of a system (I + D W~) x~ = b~, as it is in (I + D W) x = b.
+  /// A block D_a (d x d) of a system (I + D W~) x~ = b~, as it is in the one for r, (I + D W) x =
+  /// b.
   template <int d>
   [[nodiscard]] Eigen::Matrix<double, d, d> block(Index a,
                                                   const Eigen::Matrix<double, d, d>& own) const {
     const auto scale = inverse_.segment<d>(Eigen::Index{d} * a).asDiagonal();
     return scale * own * scale;
   }
-  /// b of b~, or x of x~.
-  [[nodiscard]] Vector from_side(const Vector& b) const { return b.cwiseProduct(inverse_); }
-  [[nodiscard]] Vector to_side(const Vector& x) const { return x.cwiseProduct(unit_); }
+  /// S^-1 b: the right side of that system for r, given the one for r~.
+  [[nodiscard]] Vector divided(const Vector& b) const { return b.cwiseProduct(inverse_); }
+  /// S x: the solution for r~, given the one for r.
+  [[nodiscard]] Vector multiplied(const Vector& x) const { return x.cwiseProduct(unit_); }
 
  private:
   const ReducedProblem& problem_;

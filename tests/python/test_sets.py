@@ -305,14 +305,20 @@ def test_local_problems_are_solved_and_some_are_not_symmetric() -> None:
     assert plan.total == family.problems >= 100
     found = set()
     asymmetric = {3: 0, 5: 0}
+    rounded: list[int] = []
     for number in range(plan.total):
         problem: Any = family().problem(number)
         assert problem.nc == 1
-        assert fclib.solve(problem, tol=1e-9).converged
+        result = fclib.solve(problem, tol=1e-10)
+        if not result.converged:  # its reactions are 5e6 beside velocities of 1
+            rounded.append(number)
+            assert "last digit" in result.message
+            assert result.error <= 2e-10
         W = np.asarray(problem.W)
         if np.abs(W - W.T).max() > 1e-3 * np.abs(W).max():
             asymmetric[problem.spacedim] += 1
         found.add((problem.kind, problem.spacedim))
+    assert len(rounded) <= 1
     assert found == {("local", 2), ("local", 3), ("local_rolling", 3), ("local_rolling", 5)}
     assert min(asymmetric.values()) >= 8
 

@@ -77,11 +77,64 @@ class Constant:
     problems: str
 
 
+HELD = "held bodies"
+HELD_SOURCE = "methods/held_bodies.cpp"
+
+
+def pattern(name: str) -> str:
+    """What defines a constant, up to its value."""
+    return rf"(constexpr [\w:]+ {name} = )([^;]+);"
+
+
+def varied(name: str, kind: str, *values: float) -> Constant:
+    """A constant of the stages that hold bodies; without values half and double of its own."""
+    text = (ROOT / "core" / HELD_SOURCE).read_text(encoding="utf-8")
+    found = re.search(pattern(name), text)
+    if found is None:
+        raise SystemExit(f"there is no constant {name} in core/{HELD_SOURCE}")
+    value = float(found[2])
+    whole = " int " in found[1] or "int64_t" in found[1]
+    others = values or ((value // 2, 2 * value) if whole else (value / 2, 2 * value))
+    return Constant(name, HELD_SOURCE, (found[2], *(f"{other:g}" for other in others)), kind)
+
+
 CONSTANTS = [
     Constant("rounding_in_error", "solve/driver.cpp", ("1e3", "0", "10", "1e5"), "digits"),
     Constant("rounding_in_tolerance", "solve/driver.cpp", ("0.1", "0", "1e-3", "10"), "digits"),
     Constant("most_parts", "proof/no_solution.cpp", ("8", "0", "1", "1000"), "linked"),
-    Constant("instead_of_factors", "chain/chain.cpp", ("100", "10", "1000"), "no memory"),
+    Constant("instead_of_factors", "chain/stages.cpp", ("100", "10", "1000"), "no memory"),
+    *(
+        varied(name, "jammed")
+        for name in (
+            "round_patience",
+            "better",
+            "regular",
+            "rest_speed",
+            "most_moving",
+            "creep_change",
+            "stuck",
+            "convex_accuracy",
+            "convex_limit",
+            "inner",
+            "doubt",
+            "interior_above",
+            "first_sweeps",
+            "follow",
+            "least_tau",
+            "second_tau",
+            "second_delta",
+            "interior_limit",
+            "short_kappa",
+            "short_limit",
+            "long_kappa",
+            "long_easy",
+            "long_hard",
+            "long_limit",
+        )
+    ),
+    varied("most_tau", "jammed", 2, 4),
+    varied("second_cap", "jammed", 0.9, 0.6),  # half and double of what is left of it
+    varied("most_moving", "crowded", 0.5, 0.8, 1),
 ]
 
 
@@ -95,48 +148,12 @@ class Rules:
     problems: str = "random"
 
 
-HELD = "held bodies"
-
-
-def doubled(*names: str) -> list[Rules]:
-    """Half and double of the default of rules of the stages that hold bodies."""
-    (method,) = (m for m in fclib.chain_methods() if m.name == "held_bodies")
-    found = []
-    for name in names:
-        (value,) = (rule.default for rule in method.rules if rule.name == name)
-        assert not isinstance(value, str)
-        half = value // 2 if isinstance(value, int) else value / 2
-        found.append(
-            Rules(HELD, None, ({name: f"{half:g}"}, {name: f"{2 * value:g}"}), problems="jammed")
-        )
-    return found
-
-
 RULES = [
     Rules("pivoting", 0, ({}, {"tries": 20}, {"tries": 180}, {"edges": 3}, {"edges": 8})),
     Rules("pivoting", 1, ({}, {"tries": 13}, {"tries": 120}, {"edges": 8}, {"edges": 32})),
     Rules("random starts", 0, ({}, {"tries": 67}, {"tries": 600})),
     *(Rules(HELD, k, ({},), kind) for kind in ("jammed", "crowded") for k in range(2)),
-    *doubled(
-        "patience",
-        "better",
-        "regular",
-        "rest",
-        "most",
-        "change",
-        "stuck",
-        "accuracy",
-        "convex_limit",
-        "inner",
-    ),
     Rules(HELD, 1, ({"creep": 0.05}, {"creep": 0.2}), "jammed"),
-    *doubled(
-        "doubt", "interior_above", "sweeps", "follow", "least_tau", "tau", "delta", "interior_limit"
-    ),
-    Rules(HELD, None, ({"most_tau": 2}, {"most_tau": 4}), "jammed"),
-    Rules(HELD, None, ({"step_cap": 0.9}, {"step_cap": 0.6}), "jammed"),  # of what is left of it
-    Rules(HELD, None, ({"most": 0.5}, {"most": 0.8}, {"most": 1}), "crowded"),
-    *doubled("kappa", "proximal", "near_kappa", "near_easy", "near_hard", "near_proximal"),
 ]
 
 
@@ -272,7 +289,7 @@ def build(constant: Constant, value: str, folder: Path) -> None:
         if entry.name != MODULE:
             (package / entry.name).symlink_to(entry)
     text = (ROOT / "core" / constant.source).read_text(encoding="utf-8")
-    changed, times = re.subn(rf"(constexpr \w+ {constant.name} = )[^;]+;", rf"\g<1>{value};", text)
+    changed, times = re.subn(pattern(constant.name), rf"\g<1>{value};", text)
     if times != 1:
         raise SystemExit(f"{constant.name} stands {times} times in core/{constant.source}")
     source, made = folder / "changed.cpp", folder / "changed.o"
@@ -323,25 +340,35 @@ def rows_of(arguments: argparse.Namespace) -> Iterator[dict[str, object]]:
     def wanted(name: str) -> bool:
         return not arguments.only or any(word in name for word in arguments.only)
 
+    def late(kind: str) -> list[str]:
+        """The problems of a kind that come to its stages."""
+        given = {"jammed": PACKINGS, "crowded": files}.get(kind, [])
+        found: list[str] = measured(ROOT / "python", {**job, "kind": kind, "given": given})["late"]
+        return found
+
+    given: dict[str, list[str]] = {"no memory": files}
     for constant in CONSTANTS:
-        if not wanted(constant.name) or (constant.problems == "no memory" and not files):
+        kind = constant.problems
+        if not wanted(f"{constant.name} {HELD if constant.source == HELD_SOURCE else ''}"):
             continue
-        given = files if constant.problems == "no memory" else []
+        if kind in {"no memory", "crowded"} and not files:
+            continue
+        if LATE[kind] and kind not in given:
+            given[kind] = late(kind)
         for k, value in enumerate(constant.values):
             with tempfile.TemporaryDirectory() as folder:
                 build(constant, value, Path(folder))
-                own = {**job, "kind": constant.problems, "given": given}
-                if constant.problems == "digits":
+                own = {**job, "kind": kind, "given": given.get(kind, [])}
+                if kind == "digits":
                     own["repeats"] = REPEATS
                 found = measured(Path(folder), own)
-            yield row(constant.name, value, k == 0, constant.problems, found)
+            yield row(constant.name, value, k == 0, kind, found)
     lines = choose_auto.table()
-    for kind, given in (("random", []), ("jammed", PACKINGS), ("crowded", files)):
-        own = {**job, "kind": kind, "given": given}
+    for kind in ("random", "jammed", "crowded"):
         asked = [rules for rules in RULES if rules.problems == kind and wanted(rules.stage)]
         if not asked or (kind == "crowded" and not files):
             continue
-        own["given"] = measured(ROOT / "python", own)["late"]
+        own = {**job, "kind": kind, "given": given.get(kind) or late(kind)}
         found = measured(ROOT / "python", own)
         yield row("the chain", "as it is", True, kind, found)
         for rules in asked:

@@ -2,23 +2,17 @@
 //
 // Every stage returns to the best iterate so far, and most start from it; each island is held to
 // its share of the tolerance. An iterate that is not finite ends the stage that made it, never the
-// chain. Where the chain does not solve the problem from a guess it starts again from r = 0.
+// chain. If it does not solve the problem from a guess, it starts again from r = 0.
 #pragma once
 
-#include "chain/rules.hpp"
+#include "chain/stages.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::chain {
 
-/// What a chain may take of the machine.
-struct Means {
-  int threads = 1;
-  double memory = 0;  ///< [bytes] of factors; 0: what is available
-};
-
 /// From r; the best iterate ends in r. Where the factors of a system would not fit into memory the
 /// methods that factorise are left out, and the message says so.
-Outcome run(const ReducedProblem& problem, const Table& table, const Means& means,
+Outcome run(const ReducedProblem& problem, const Table& table, const Resources& resources,
             const Settings& settings, Vector& r);
 
 }  // namespace fclib::chain

@@ -13,6 +13,40 @@ namespace fclib {
 
 namespace {
 
+// benchmarks/constants.py has other values of these
+constexpr int round_patience = 5;  // rounds in which the error must get better
+constexpr double better = 0.5;     // share of the least error at which it did
+constexpr double most_moving =
+    0.65;                         // share of the contacts in 2; beyond, it must be solved at once
+constexpr double regular = 1e-9;  // eps of how fast a body is, over the traces of H H^T and M
+constexpr double rest_speed = 1e-6;        // [||q||_inf] A slower body rests.
+constexpr double creep_change = 3;         // factor on creep if 2 was solved and 1 got no better
+constexpr double stuck = 0.9;              // share of its last error at which 1 got no better
+constexpr double doubt = 1;                // [error of 2, ||q||] slip of a contact that sticks
+constexpr double convex_accuracy = 1e-14;  // complementarity and residual of the convex problem
+constexpr int convex_limit = 100;          // iterations on a convex problem
+constexpr double inner = 0.1;              // tolerance of 2, over that of the whole
+
+// 2 from far away, as the first stages of `auto`: sweeps, an interior point from what they have, a
+// proximal point; then both again, from r = 0
+constexpr double interior_above = 1e-3;   // error of 1 over which it is far away
+constexpr int first_sweeps = 40;          // sweeps of Gauss-Seidel
+constexpr double follow = 4;              // tau of the first interior point, over the error
+constexpr double least_tau = 0.03;        // ... the least
+constexpr double most_tau = 1;            // ... and the most
+constexpr double second_tau = 10;         // ... and that of the second
+constexpr double second_cap = 0.8;        // step_cap of the second
+constexpr double second_delta = 1e-3;     // delta of the second
+constexpr int interior_limit = 60;        // iterations of each
+constexpr double short_kappa = 10;        // of the proximal points at first
+constexpr std::int64_t short_limit = 80;  // factorisations of each
+
+// 2 from nearby: a proximal point with long steps at first
+constexpr double long_kappa = 1000;
+constexpr double long_easy = 10;         // factor on kappa after few Newton steps
+constexpr double long_hard = 0.2;        // ... and after a failure
+constexpr std::int64_t long_limit = 40;  // factorisations
+
 /// The number of the body that each coordinate is of: coordinates that M links, and near ones of
 /// which one feels no other contact than the other does. M of a sphere links nothing.
 std::vector<Index> bodies(const Primal& primal, int d) {
@@ -121,9 +155,9 @@ HeldBodies<D>::HeldBodies(const ReducedProblem& problem, const Primal& primal,
 template <int D>
 void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report report,
                           FunctionRef<bool()> count) {
-  const double enough = rules.inner * tolerance;
+  const double enough = inner * tolerance;
   const double size = problem_.q.template lpNorm<Eigen::Infinity>();
-  squares_.emplace(squares(primal_, rules.regular), "H H^T");
+  squares_.emplace(squares(primal_, regular), "H H^T");
   shift_ = Vector::Zero(problem_.nc());
   r_ = Vector::Zero(problem_.m());
   double least = std::numeric_limits<double>::infinity();
@@ -131,32 +165,32 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
   double creep = rules.creep;
   int since = 0;
   for (int round = 0; round < rules.rounds; ++round) {
-    if (!convex(rules, count)) return;
+    if (!convex(count)) return;
     const double error = relative_error<Cone>(problem_, u_, r_);
     if (report(error, r_)) return;
-    if (error < rules.better * least) {
+    if (error < better * least) {
       least = error;
       since = 0;
-    } else if (++since > rules.patience) {
+    } else if (++since > round_patience) {
       return;
     }
     Part part;
-    if (!release(std::max(rules.rest * size, creep * error * problem_.scale), part) &&
-        !release(rules.rest * size, part)) {
+    if (!release(std::max(rest_speed * size, creep * error * problem_.scale), part) &&
+        !release(rest_speed * size, part)) {
       return;
     }
     Vector r = part.problem.known_r;
     double left = 0;
-    if (!solve_part(rules, part, error > rules.interior_above, enough, r, left, count)) {
+    if (!solve_part(part, error > interior_above, enough, r, left, count)) {
       return;
     }
     // too many were held, or too few
     const bool solved = left <= enough;
-    if (!solved && static_cast<double>(part.contacts.size()) > rules.most * problem_.nc()) return;
+    if (!solved && static_cast<double>(part.contacts.size()) > most_moving * problem_.nc()) return;
     if (!solved) {
-      creep = std::min(creep * rules.change, rules.creep);
-    } else if (error > rules.stuck * last) {
-      creep /= rules.change;
+      creep = std::min(creep * creep_change, rules.creep);
+    } else if (error > stuck * last) {
+      creep /= creep_change;
     }
     last = error;
     Vector u;
@@ -166,15 +200,14 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
       const Index a = part.contacts[k];
       const auto at = D * static_cast<Eigen::Index>(k);
       const double slip = u.template segment<D - 1>(at + 1).norm();
-      if (slip > rules.doubt * left * problem_.scale) shift_[a] = problem_.friction.mu[a] * slip;
+      if (slip > doubt * left * problem_.scale) shift_[a] = problem_.friction.mu[a] * slip;
     }
   }
 }
 
 template <int D>
-bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, bool far,
-                               double tolerance, Vector& r, double& error,
-                               FunctionRef<bool()> count) {
+bool HeldBodies<D>::solve_part(const Part& part, bool far, double tolerance, Vector& r,
+                               double& error, FunctionRef<bool()> count) {
   CoupledSystem system(part.problem);
   Vector u;
   part.problem.velocity(r, u);
@@ -204,7 +237,7 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
   const auto sweep = [&] {
     GaussSeidel<Cone> contacts(part.problem);
     Vector x = r;
-    for (int k = 0; k < rules.sweeps; ++k) contacts.sweep(x, u);
+    for (int k = 0; k < first_sweeps; ++k) contacts.sweep(x, u);
     part.problem.velocity(x, u);
     const double found = relative_error<Cone>(part.problem, u, x);
     if (found < error) {
@@ -213,21 +246,19 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
     }
     return (ended = count()) || error <= tolerance;
   };
-  const ProximalRules short_steps{.kappa = rules.kappa, .max_factorisations = rules.proximal};
-  const ProximalRules long_steps{.kappa = rules.near_kappa,
-                                 .easy = rules.near_easy,
-                                 .hard = rules.near_hard,
-                                 .max_factorisations = rules.near_proximal};
+  const ProximalRules short_steps{.kappa = short_kappa, .max_factorisations = short_limit};
+  const ProximalRules long_steps{
+      .kappa = long_kappa, .easy = long_easy, .hard = long_hard, .max_factorisations = long_limit};
   const auto run = [&] {
     if (!far) return proximal(long_steps) || proximal(short_steps);
     if (sweep()) return true;
-    const double tau = std::clamp(rules.follow * error, rules.least_tau, rules.most_tau);
-    return interior({.tau = tau, .max_iterations = rules.interior_limit}, Vector(r)) ||
+    const double tau = std::clamp(follow * error, least_tau, most_tau);
+    return interior({.tau = tau, .max_iterations = interior_limit}, Vector(r)) ||
            proximal(short_steps) ||
-           interior({.tau = rules.tau,
-                     .step_cap = rules.step_cap,
-                     .delta = rules.delta,
-                     .max_iterations = rules.interior_limit},
+           interior({.tau = second_tau,
+                     .step_cap = second_cap,
+                     .delta = second_delta,
+                     .max_iterations = interior_limit},
                     Vector::Zero(r.size())) ||
            proximal(short_steps);
   };
@@ -237,7 +268,7 @@ bool HeldBodies<D>::solve_part(const HeldBodiesRules& rules, const Part& part, b
 }
 
 template <int D>
-bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> count) {
+bool HeldBodies<D>::convex(FunctionRef<bool()> count) {
   ReducedProblem shifted = problem_;
   for (Index a = 0; a < problem_.nc(); ++a) {
     shifted.q[D * a] += shift_[a];
@@ -246,12 +277,12 @@ bool HeldBodies<D>::convex(const HeldBodiesRules& rules, FunctionRef<bool()> cou
   InteriorPoint<D> method(shifted, system_);
   bool ended = false;
   method.solve({.associated = true,
-                .max_iterations = rules.convex_limit,
+                .max_iterations = convex_limit,
                 .patience = std::numeric_limits<int>::max()},
                Vector::Zero(problem_.m()), [&](double, const Vector& r) {
                  if (r.allFinite()) r_ = r;
                  if (count()) return ended = true;
-                 return method.tau() <= rules.accuracy && method.residual() <= rules.accuracy;
+                 return method.tau() <= convex_accuracy && method.residual() <= convex_accuracy;
                });
   problem_.velocity(r_, u_);
   return !ended;

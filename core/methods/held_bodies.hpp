@@ -24,47 +24,29 @@
 
 #include <optional>
 #include <span>
+#include <tuple>
 #include <vector>
 
 #include "contact/coulomb.hpp"
 #include "function_ref.hpp"
 #include "linalg/factorization.hpp"
+#include "solve/options.hpp"
 #include "systems/coupled_system.hpp"
 
 namespace fclib {
 
 struct HeldBodiesRules {
-  int rounds = 40;          ///< of both, at most
-  int patience = 5;         ///< rounds in which the error must get better
-  double better = 0.5;      ///< share of the least error at which it did
-  double most = 0.65;       ///< share of the contacts in 2, over which it must be solved at once
-  double regular = 1e-9;    ///< eps of how fast a body is, over the traces of H H^T and M
-  double rest = 1e-6;       ///< speed of a body that rests, over ||q||_inf ...
-  double creep = 0.1;       ///< ... and over the error of 1 and ||q||
-  double change = 3;        ///< of `creep`: less where 2 was solved and 1 got no better
-  double stuck = 0.9;       ///< share of its last error at which 1 got no better
-  double doubt = 1;         ///< slip of a contact that sticks, over the error of 2 and ||q||
-  double accuracy = 1e-14;  ///< of the convex problem: complementarity and residual
-  int convex_limit = 100;   ///< iterations on a convex problem
-  double inner = 0.1;       ///< tolerance of 2, over that of the whole
-  // 2 from far away, as the first stages of `auto`: sweeps, an interior point from what they have,
-  // a proximal point; then both again, from r = 0
-  double interior_above = 1e-3;  ///< error of 1 over which it is far away
-  int sweeps = 40;               ///< of Gauss-Seidel
-  double follow = 4;  ///< complementarity at first of the first interior point, over the error
-  double least_tau = 0.03;     ///< ... the least
-  double most_tau = 1;         ///< ... and the most
-  double tau = 10;             ///< ... and that of the second
-  double step_cap = 0.8;       ///< of the second
-  double delta = 1e-3;         ///< of the second
-  int interior_limit = 60;     ///< iterations of each
-  double kappa = 10;           ///< of the proximal points at first
-  std::int64_t proximal = 80;  ///< factorisations of each
-  // from nearby, with long steps at first
-  double near_kappa = 1000;         ///< of a first proximal point
-  double near_easy = 10;            ///< its factor on kappa after few Newton steps
-  double near_hard = 0.2;           ///< ... and after a failure
-  std::int64_t near_proximal = 40;  ///< its factorisations
+  int rounds = 40;
+  double creep = 0.1;
+
+  static constexpr auto fields() {
+    using O = HeldBodiesRules;
+    return std::tuple{
+        option("limit", &O::rounds, "rounds", {1, 1e9}, "The largest number of rounds of both."),
+        option("creep", &O::creep, "error ||q||", {0},
+               "The speed of a body, at one of its contacts, up to which it is held: a share of "
+               "the error of the convex problem's solution.")};
+  }
 };
 
 /// The coordinates of some contacts, with all that M links to them, and these contacts.
@@ -97,14 +79,14 @@ class HeldBodies {
   };
 
   /// r_ and u_ of the convex problem with s = shift_. False where it was ended.
-  bool convex(const HeldBodiesRules& rules, FunctionRef<bool()> count);
+  bool convex(FunctionRef<bool()> count);
 
   /// The bodies that are faster than `slow`, at one of their contacts. False where none is.
   bool release(double slow, Part& part);
 
   /// Improves r, of the part; its error. False where it was ended.
-  bool solve_part(const HeldBodiesRules& rules, const Part& part, bool far, double tolerance,
-                  Vector& r, double& error, FunctionRef<bool()> count);
+  bool solve_part(const Part& part, bool far, double tolerance, Vector& r, double& error,
+                  FunctionRef<bool()> count);
 
   const ReducedProblem& problem_;
   const Primal& primal_;

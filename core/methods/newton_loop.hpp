@@ -20,44 +20,23 @@ struct NewtonOptions : NewtonRules {
   static constexpr auto fields() {
     using O = NewtonOptions;
     return std::tuple{
-        OptionField<O, RhoRule>{
-            .name = "rho_rule",
-            .member = &O::rho_rule,
-            .doc = "rho of each contact: constant; 1 / the spectral norm of W_aa; that of its "
-                   "normal and tangential parts (the first alone where the function takes one "
-                   "rho); or adaptive, such that a step moves rho u^ about as much as r",
-            .choices = rho_rules},
-        OptionField<O, double>{.name = "rho",
-                               .member = &O::rho,
-                               .unit = "1/[W] where the rule is constant, else 1",
-                               .doc = "rho itself, or a factor of what the rule gives",
-                               .lowest = 1e-12,
-                               .highest = 1e12},
-        OptionField<O, LineSearch>{
-            .name = "line_search",
-            .member = &O::line_search,
-            .doc = "none, or on 1/2 ||F||^2: armijo or goldstein_price; fischer_burmeister is "
-                   "armijo on the merit of that function (rolling contacts: on 1/2 ||F||^2)",
-            .choices = line_searches},
-        OptionField<O, double>{.name = "regularisation",
-                               .member = &O::regularisation,
-                               .unit = "mean of tr(W_aa) / d",
-                               .doc = "added to the diagonal of W in Newton's system, times the "
-                                      "error where that is less than 1",
-                               .lowest = 0,
-                               .highest = 1e6},
-        OptionField<O, std::int64_t>{.name = "sweeps",
-                                     .member = &O::sweeps,
-                                     .unit = "sweeps",
-                                     .doc = "of Gauss-Seidel where Newton stands still, twice as "
-                                            "many each time up to 1000; 0: it ends there",
-                                     .lowest = 0,
-                                     .highest = 1000},
-        OptionField<O, std::int64_t>{.name = "patience",
-                                     .member = &O::patience,
-                                     .unit = "iterations",
-                                     .doc = "in which the error must halve, or Newton stands still",
-                                     .lowest = 1},
+        choice("rho_rule", &O::rho_rule, rho_rules,
+               "rho of each contact: constant; 1 / the spectral norm of W_aa; that of its normal "
+               "and tangential parts (the first alone where the function takes one rho); or "
+               "adaptive, such that a step moves rho u^ about as much as r"),
+        option("rho", &O::rho, "1/[W] where the rule is constant, else 1", {1e-12, 1e12},
+               "rho itself, or a factor of what the rule gives"),
+        choice("line_search", &O::line_search, line_searches,
+               "none, or on 1/2 ||F||^2: armijo or goldstein_price; fischer_burmeister is armijo "
+               "on the merit of that function (rolling contacts: on 1/2 ||F||^2)"),
+        option("regularisation", &O::regularisation, "mean of tr(W_aa) / d", {0, 1e6},
+               "added to the diagonal of W in Newton's system, times the error where that is less "
+               "than 1"),
+        option("sweeps", &O::sweeps, "sweeps", {0, 1000},
+               "of Gauss-Seidel where Newton stands still, twice as many each time up to 1000; 0: "
+               "it ends there"),
+        option("patience", &O::patience, "iterations", {1},
+               "in which the error must halve, or Newton stands still"),
     };
   }
 };

@@ -23,33 +23,14 @@ namespace fclib {
 template <class O>
 constexpr auto step_fields() {
   return std::tuple{
-      OptionField<O, Metric>{
-          .name = "metric", .member = &O::metric, .doc = metric_doc, .choices = metrics},
-      OptionField<O, double>{.name = "rho",
-                             .member = &O::rho,
-                             .unit = "1/W_aa",
-                             .doc = "first step",
-                             .lowest = 1e-12,
-                             .highest = 1e12},
-      OptionField<O, double>{.name = "tau",
-                             .member = &O::tau,
-                             .unit = "1",
-                             .doc = "factor by which the step shrinks, or by whose inverse it "
-                                    "grows",
-                             .lowest = 0.01,
-                             .highest = 0.99},
-      OptionField<O, double>{.name = "ratio_high",
-                             .member = &O::ratio_high,
-                             .unit = "1",
-                             .doc = "L: the step shrinks while its ratio is above this",
-                             .lowest = 1e-3,
-                             .highest = 1},
-      OptionField<O, double>{.name = "ratio_low",
-                             .member = &O::ratio_low,
-                             .unit = "1",
-                             .doc = "L_min: the step grows where its ratio is under this",
-                             .lowest = 0,
-                             .highest = 1},
+      choice("metric", &O::metric, metrics, metric_doc),
+      option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "first step"),
+      option("tau", &O::tau, "1", {0.01, 0.99},
+             "factor by which the step shrinks, or by whose inverse it grows"),
+      option("ratio_high", &O::ratio_high, "1", {1e-3, 1},
+             "L: the step shrinks while its ratio is above this"),
+      option("ratio_low", &O::ratio_low, "1", {0, 1},
+             "L_min: the step grows where its ratio is under this"),
   };
 }
 
@@ -75,12 +56,10 @@ struct ExtragradientOptions : StepOptions {
     using O = ExtragradientOptions;
     return std::tuple_cat(
         step_fields<O>(),
-        std::tuple{OptionField<O, SecondProjection>{
-            .name = "second",
-            .member = &O::second,
-            .doc = "where the second projection sets out: at the trial point, as Siconos does, or "
-                   "at the start of the iteration, as Korpelevich and the paper do",
-            .choices = second_projections}});
+        std::tuple{
+            choice("second", &O::second, second_projections,
+                   "where the second projection sets out: at the trial point, as Siconos does, or "
+                   "at the start of the iteration, as Korpelevich and the paper do")});
   }
 };
 

@@ -56,14 +56,55 @@ struct OptionField {
   void (*check)(std::string_view) = nullptr;
 };
 
+/// What a number may be, ends included.
+struct Bounds {
+  double lowest = -std::numeric_limits<double>::infinity();
+  double highest = std::numeric_limits<double>::infinity();
+};
+
+/// An option of a struct, one line for each kind: a number, ...
+template <class Options, class Value>
+constexpr OptionField<Options, Value> option(std::string_view name, Value Options::* member,
+                                             std::string_view unit, Bounds bounds,
+                                             std::string_view doc) {
+  return {.name = name,
+          .member = member,
+          .unit = unit,
+          .doc = doc,
+          .lowest = bounds.lowest,
+          .highest = bounds.highest};
+}
+/// ... yes or no, ...
+template <class Options>
+constexpr OptionField<Options, bool> flag(std::string_view name, bool Options::* member,
+                                          std::string_view doc) {
+  return {.name = name, .member = member, .doc = doc};
+}
+/// ... one of an enumeration, with the names of its values, ...
+template <class Options, class Value>
+constexpr OptionField<Options, Value> choice(std::string_view name, Value Options::* member,
+                                             std::span<const std::string_view> choices,
+                                             std::string_view doc) {
+  return {.name = name, .member = member, .doc = doc, .choices = choices};
+}
+/// ... or a text. `check` throws Error (option) at what is wrong.
+template <class Options>
+constexpr OptionField<Options, std::string> text(std::string_view name,
+                                                 std::string Options::* member,
+                                                 std::string_view doc,
+                                                 void (*check)(std::string_view)) {
+  return {.name = name, .member = member, .doc = doc, .check = check};
+}
+
 namespace detail {
 
 OptionInfo describe_option(std::string_view name, std::string_view unit, std::string_view doc,
                            std::span<const std::string_view> choices, double lowest,
                            double highest);
 
-template <class Options, class Value>
-OptionInfo describe_option(const OptionField<Options, Value>& field, const Options& defaults) {
+/// `Struct` may be derived from what has the member.
+template <class Options, class Value, class Struct>
+OptionInfo describe_option(const OptionField<Options, Value>& field, const Struct& defaults) {
   OptionInfo info = describe_option(field.name, field.unit, field.doc, field.choices, field.lowest,
                                     field.highest);
   const Value value = defaults.*field.member;

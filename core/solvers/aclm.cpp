@@ -42,13 +42,11 @@ struct Options : FixedPointOptions {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(std::tuple{OptionField<O, Inner>{
-                              .name = "inner",
-                              .member = &O::inner,
-                              .doc = "solver of the convex problem; interior_point does not take "
-                                     "rolling friction",
-                              .choices = inners}},
-                          fixed_point_fields<O>());
+    return std::tuple_cat(
+        std::tuple{
+            choice("inner", &O::inner, inners,
+                   "solver of the convex problem; interior_point does not take rolling friction")},
+        fixed_point_fields<O>());
   }
 };
 

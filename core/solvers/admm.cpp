@@ -51,45 +51,21 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, double>{.name = "rho",
-                               .member = &O::rho,
-                               .unit = "1",
-                               .doc = "penalty at first, relative to tr(W_aa) / d",
-                               .lowest = 1e-6,
-                               .highest = 1e6},
-        OptionField<O, PenaltyRule>{.name = "penalty",
-                                    .member = &O::penalty,
-                                    .doc = "how rho changes: not at all, by balancing the relative "
-                                           "residuals, or by spectral estimates of curvature",
-                                    .choices = penalties},
-        OptionField<O, std::int64_t>{.name = "penalty_interval",
-                                     .member = &O::penalty_interval,
-                                     .unit = "iterations",
-                                     .doc = "between changes of rho; doubles with each change",
-                                     .lowest = 1,
-                                     .highest = 1e6},
-        OptionField<O, double>{.name = "relaxation",
-                               .member = &O::relaxation,
-                               .unit = "1",
-                               .doc = "alpha: above 1 is over-relaxation",
-                               .lowest = 0.1,
-                               .highest = 1.95},
-        OptionField<O, Acceleration>{.name = "acceleration",
-                                     .member = &O::acceleration,
-                                     .doc = "Nesterov's momentum, started afresh where the "
-                                            "residual does not fall (restart), or none",
-                                     .choices = accelerations},
-        OptionField<O, double>{.name = "restart",
-                               .member = &O::restart,
-                               .unit = "1",
-                               .doc = "share of its last value that the combined residual must "
-                                      "fall below for the momentum to be kept",
-                               .lowest = 0.1,
-                               .highest = 1},
-        OptionField<O, bool>{.name = "weights",
-                             .member = &O::weights,
-                             .doc = "a penalty for each contact by its own block of W, else the "
-                                    "same for all"},
+        option("rho", &O::rho, "1", {1e-6, 1e6}, "penalty at first, relative to tr(W_aa) / d"),
+        choice("penalty", &O::penalty, penalties,
+               "how rho changes: not at all, by balancing the relative residuals, or by spectral "
+               "estimates of curvature"),
+        option("penalty_interval", &O::penalty_interval, "iterations", {1, 1e6},
+               "between changes of rho; doubles with each change"),
+        option("relaxation", &O::relaxation, "1", {0.1, 1.95}, "alpha: above 1 is over-relaxation"),
+        choice("acceleration", &O::acceleration, accelerations,
+               "Nesterov's momentum, started afresh where the residual does not fall (restart), or "
+               "none"),
+        option("restart", &O::restart, "1", {0.1, 1},
+               "share of its last value that the combined residual must fall below for the "
+               "momentum to be kept"),
+        flag("weights", &O::weights,
+             "a penalty for each contact by its own block of W, else the same for all"),
     };
   }
 };

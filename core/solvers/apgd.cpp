@@ -39,25 +39,12 @@ struct Options {
     using O = Options;
     return std::tuple{
         shift_field<O>(),
-        OptionField<O, bool>{.name = "restart",
-                             .member = &O::restart,
-                             .doc = "start the momentum afresh where it goes uphill"},
-        OptionField<O, double>{.name = "growth",
-                               .member = &O::growth,
-                               .unit = "1",
-                               .doc = "factor of the step after each iteration",
-                               .lowest = 1,
-                               .highest = 10},
-        OptionField<O, double>{.name = "reduction",
-                               .member = &O::reduction,
-                               .unit = "1",
-                               .doc = "factor of the step, at most, where it was too long",
-                               .lowest = 0.1,
-                               .highest = 0.95},
-        OptionField<O, bool>{.name = "weights",
-                             .member = &O::weights,
-                             .doc = "a step for each contact by its own block of W, else the same "
-                                    "for all"},
+        flag("restart", &O::restart, "start the momentum afresh where it goes uphill"),
+        option("growth", &O::growth, "1", {1, 10}, "factor of the step after each iteration"),
+        option("reduction", &O::reduction, "1", {0.1, 0.95},
+               "factor of the step, at most, where it was too long"),
+        flag("weights", &O::weights,
+             "a step for each contact by its own block of W, else the same for all"),
     };
   }
 };

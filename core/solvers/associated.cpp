@@ -25,9 +25,7 @@ namespace fclib::associated {
 
 namespace {
 
-struct Options : InteriorPointRules {
-  static constexpr auto fields() { return interior_point_fields<Options>(); }
-};
+using Options = InteriorPointRules;
 
 /// Of the tolerance, for complementarity and residual.
 constexpr double share = 0.1;

@@ -1,7 +1,7 @@
 // auto: the default. A chain of methods, each cheap to leave. The first ones are fast and solve
 // most problems, the last ones are slow and solve nearly all. The table below is all of it: a stage
 // a line, in their order, first those for the whole problem, then those for each island of contacts
-// (linked through W) that is left. chain/rules.hpp says what each word of it means, chain/chain.cpp
+// (linked through W) that is left. chain/table.hpp says what each word of it means, chain/chain.cpp
 // walks through it.
 //
 // Before the chain, r = 0 where nothing approaches. After it, the chain again from r = 0, where it
@@ -77,24 +77,13 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, std::int64_t>{.name = "threads",
-                                     .member = &O::threads,
-                                     .unit = "threads",
-                                     .doc = "that share a large factorisation; the result is the "
-                                            "same for any number",
-                                     .lowest = 1,
-                                     .highest = 256},
-        OptionField<O, double>{.name = "memory_limit",
-                               .member = &O::memory_limit,
-                               .unit = "GB",
-                               .doc = "that the factors of a system may take, else it goes on "
-                                      "without factorisations; 0: what the machine has available",
-                               .lowest = 0},
-        OptionField<O, std::string>{
-            .name = "chain",
-            .member = &O::chain,
-            .doc = "the stages, one a line: NAME : METHOD key=value ...",
-            .check = [](std::string_view text) { chain::parse_table(text); }},
+        option("threads", &O::threads, "threads", {1, 256},
+               "that share a large factorisation; the result is the same for any number"),
+        option("memory_limit", &O::memory_limit, "GB", {0},
+               "that the factors of a system may take, else it goes on without factorisations; 0: "
+               "what the machine has available"),
+        text("chain", &O::chain, "the stages, one a line: NAME : METHOD key=value ...",
+             [](std::string_view text) { chain::parse_table(text); }),
     };
   }
 };
@@ -106,10 +95,10 @@ Outcome solve(const ReducedProblem& problem, const OptionValues& values, const S
   if (values.empty()) return chain::run(problem, own, {}, settings, r);
   const auto options = parse_options<Options>(values);
   constexpr double gigabyte = 1e9;
-  const chain::Means means{.threads = static_cast<int>(options.threads),
-                           .memory = gigabyte * options.memory_limit};
-  if (options.chain == defaults.chain) return chain::run(problem, own, means, settings, r);
-  return chain::run(problem, chain::parse_table(options.chain), means, settings, r);
+  const chain::Resources resources{.threads = static_cast<int>(options.threads),
+                                   .memory = gigabyte * options.memory_limit};
+  if (options.chain == defaults.chain) return chain::run(problem, own, resources, settings, r);
+  return chain::run(problem, chain::parse_table(options.chain), resources, settings, r);
 }
 
 }  // namespace

@@ -43,27 +43,13 @@ struct Options {
     using O = Options;
     return std::tuple{
         shift_field<O>(),
-        OptionField<O, SpectralStep>{.name = "step",
-                                     .member = &O::step,
-                                     .doc = "which of the two steps of Barzilai and Borwein",
-                                     .choices = spectral_steps},
-        OptionField<O, std::int64_t>{.name = "memory",
-                                     .member = &O::memory,
-                                     .unit = "iterations",
-                                     .doc = "whose objective the line search may rise to; 1 makes "
-                                            "it monotone",
-                                     .lowest = 1,
-                                     .highest = 1000},
-        OptionField<O, double>{.name = "decrease",
-                               .member = &O::decrease,
-                               .unit = "1",
-                               .doc = "share of the predicted decrease that is asked for",
-                               .lowest = 0,
-                               .highest = 0.5},
-        OptionField<O, bool>{.name = "weights",
-                             .member = &O::weights,
-                             .doc = "a metric for each contact by its own block of W, else the "
-                                    "same for all"},
+        choice("step", &O::step, spectral_steps, "which of the two steps of Barzilai and Borwein"),
+        option("memory", &O::memory, "iterations", {1, 1000},
+               "whose objective the line search may rise to; 1 makes it monotone"),
+        option("decrease", &O::decrease, "1", {0, 0.5},
+               "share of the predicted decrease that is asked for"),
+        flag("weights", &O::weights,
+             "a metric for each contact by its own block of W, else the same for all"),
     };
   }
 };

@@ -24,14 +24,9 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, Metric>{
-            .name = "metric", .member = &O::metric, .doc = metric_doc, .choices = metrics},
-        OptionField<O, double>{.name = "rho",
-                               .member = &O::rho,
-                               .unit = "1/||W||",
-                               .doc = "the step; without friction all below 2 converge",
-                               .lowest = 1e-6,
-                               .highest = 1e6},
+        choice("metric", &O::metric, metrics, metric_doc),
+        option("rho", &O::rho, "1/||W||", {1e-6, 1e6},
+               "the step; without friction all below 2 converge"),
     };
   }
 };

@@ -19,38 +19,17 @@ struct Options : HomotopyRules {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple{
-        OptionField<O, double>{
-            .name = "smoothing",
-            .member = &O::smoothing,
-            .unit = "1",
-            .doc = "of the kink of de Saxce's term, over the velocity on the path of "
-                   "a contact that sticks",
-            .lowest = 1e-3,
-            .highest = 100},
-        OptionField<O, double>{.name = "stride",
-                               .member = &O::stride,
-                               .unit = "1",
-                               .doc = "longest step of a contact, in the metric of its barrier",
-                               .lowest = 1e-3,
-                               .highest = 10},
-        OptionField<O, double>{.name = "accuracy",
-                               .member = &O::accuracy,
-                               .unit = "1",
-                               .doc = "of a point of the path, in the metric of the barrier",
-                               .lowest = 1e-10,
-                               .highest = 0.5},
-        OptionField<O, double>{.name = "cosine",
-                               .member = &O::cosine,
-                               .unit = "1",
-                               .doc = "least, between the directions of the path at two points",
-                               .lowest = 0,
-                               .highest = 0.99},
-        OptionField<O, double>{.name = "polish_below",
-                               .member = &O::polish_below,
-                               .unit = "1",
-                               .doc = "error under which the proximal Newton method is tried",
-                               .lowest = 0}};
+    return std::tuple{option("smoothing", &O::smoothing, "1", {1e-3, 100},
+                             "of the kink of de Saxce's term, over the velocity on the path of a "
+                             "contact that sticks"),
+                      option("stride", &O::stride, "1", {1e-3, 10},
+                             "longest step of a contact, in the metric of its barrier"),
+                      option("accuracy", &O::accuracy, "1", {1e-10, 0.5},
+                             "of a point of the path, in the metric of the barrier"),
+                      option("cosine", &O::cosine, "1", {0, 0.99},
+                             "least, between the directions of the path at two points"),
+                      option("polish_below", &O::polish_below, "1", {0},
+                             "error under which the proximal Newton method is tried")};
   }
 };
 

@@ -39,36 +39,14 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, Metric>{
-            .name = "metric", .member = &O::metric, .doc = metric_doc, .choices = metrics},
-        OptionField<O, double>{.name = "rho",
-                               .member = &O::rho,
-                               .unit = "1/W_aa",
-                               .doc = "first step of the first projection",
-                               .lowest = 1e-12,
-                               .highest = 1e12},
-        OptionField<O, double>{.name = "sigma",
-                               .member = &O::sigma,
-                               .unit = "1",
-                               .doc = "how clearly the hyperplane must separate",
-                               .lowest = 1e-3,
-                               .highest = 0.999},
-        OptionField<O, double>{.name = "growth",
-                               .member = &O::growth,
-                               .unit = "1",
-                               .doc = "factor of rho after a full step; 1 keeps rho from growing",
-                               .lowest = 1,
-                               .highest = 10},
-        OptionField<O, std::int64_t>{.name = "line_search",
-                                     .member = &O::line_search,
-                                     .unit = "1",
-                                     .doc = "limit of the halvings of alpha",
-                                     .lowest = 1,
-                                     .highest = 1000},
-        OptionField<O, bool>{.name = "intersection",
-                             .member = &O::intersection,
-                             .doc = "project on the cone and the half-space together, and not on "
-                                    "one after the other"},
+        choice("metric", &O::metric, metrics, metric_doc),
+        option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "first step of the first projection"),
+        option("sigma", &O::sigma, "1", {1e-3, 0.999}, "how clearly the hyperplane must separate"),
+        option("growth", &O::growth, "1", {1, 10},
+               "factor of rho after a full step; 1 keeps rho from growing"),
+        option("line_search", &O::line_search, "1", {1, 1000}, "limit of the halvings of alpha"),
+        flag("intersection", &O::intersection,
+             "project on the cone and the half-space together, and not on one after the other"),
     };
   }
 };

@@ -42,38 +42,17 @@ struct Options : SweepOptions {
     using O = Options;
     return std::tuple_cat(
         sweep_fields<O>(),
-        std::tuple{
-            OptionField<O, double>{.name = "relaxation",
-                                   .member = &O::relaxation,
-                                   .unit = "1",
-                                   .doc = "omega in r <- omega r_local + (1 - omega) r; above 1 r "
-                                          "may leave the cone and is projected back",
-                                   .lowest = 1e-3,
-                                   .highest = 1.999},
-            OptionField<O, Shuffle>{.name = "shuffle",
-                                    .member = &O::shuffle,
-                                    .doc = "order of the contacts (of the colours, with threads): "
-                                           "as given, shuffled once, or before every sweep",
-                                    .choices = shuffles},
-            OptionField<O, std::int64_t>{.name = "seed",
-                                         .member = &O::seed,
-                                         .unit = "1",
-                                         .doc = "of the shuffling",
-                                         .lowest = 0},
-            OptionField<O, std::int64_t>{.name = "freeze",
-                                         .member = &O::freeze,
-                                         .unit = "sweeps",
-                                         .doc = "for which a settled contact is left alone",
-                                         .lowest = 0,
-                                         .highest = 1e6},
-            OptionField<O, double>{.name = "freeze_below",
-                                   .member = &O::freeze_below,
-                                   .unit = "1",
-                                   .doc =
-                                       "relative change of its reaction under which a contact is "
-                                       "settled",
-                                   .lowest = 0,
-                                   .highest = 1}});
+        std::tuple{option("relaxation", &O::relaxation, "1", {1e-3, 1.999},
+                          "omega in r <- omega r_local + (1 - omega) r; above 1 r may leave the "
+                          "cone and is projected back"),
+                   choice("shuffle", &O::shuffle, shuffles,
+                          "order of the contacts (of the colours, with threads): as given, "
+                          "shuffled once, or before every sweep"),
+                   option("seed", &O::seed, "1", {0}, "of the shuffling"),
+                   option("freeze", &O::freeze, "sweeps", {0, 1e6},
+                          "for which a settled contact is left alone"),
+                   option("freeze_below", &O::freeze_below, "1", {0, 1},
+                          "relative change of its reaction under which a contact is settled")});
   }
 };
 

@@ -35,16 +35,11 @@ struct Options : InteriorPointRules {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(interior_point_fields<O>(),
-                          std::tuple{patience_field<O>(), smoothing_field<O>(),
-                                     OptionField<O, std::int64_t>{
-                                         .name = "sweeps",
-                                         .member = &O::sweeps,
-                                         .unit = "sweeps",
-                                         .doc = "of Gauss-Seidel at most, where the steps of "
-                                                "the interior point end",
-                                         .lowest = 0,
-                                         .highest = 1e6}});
+    return std::tuple_cat(
+        InteriorPointRules::fields(),
+        std::tuple{patience_option(), smoothing_option(),
+                   option("sweeps", &O::sweeps, "sweeps", {0, 1e6},
+                          "of Gauss-Seidel at most, where the steps of the interior point end")});
   }
 };
 

@@ -36,22 +36,11 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        OptionField<O, Inner>{.name = "inner",
-                              .member = &O::inner,
-                              .doc = "solver of the normal and of the tangential problem",
-                              .choices = inners},
-        OptionField<O, double>{.name = "inner_accuracy",
-                               .member = &O::inner_accuracy,
-                               .unit = "1",
-                               .doc = "of the two problems, as a share of the current error",
-                               .lowest = 1e-6,
-                               .highest = 1},
-        OptionField<O, std::int64_t>{.name = "inner_iterations",
-                                     .member = &O::inner_iterations,
-                                     .unit = "iterations",
-                                     .doc = "of the inner solver before the other problem's turn",
-                                     .lowest = 1,
-                                     .highest = 1e9},
+        choice("inner", &O::inner, inners, "solver of the normal and of the tangential problem"),
+        option("inner_accuracy", &O::inner_accuracy, "1", {1e-6, 1},
+               "of the two problems, as a share of the current error"),
+        option("inner_iterations", &O::inner_iterations, "iterations", {1, 1e9},
+               "of the inner solver before the other problem's turn"),
     };
   }
 };

@@ -41,25 +41,13 @@ struct Options : ProximalOptions {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(
-        std::tuple{
-            OptionField<O, Rule>{.name = "rule",
-                                 .member = &O::rule,
-                                 .doc = "of alpha: sigma error^nu (at most sigma), or constant",
-                                 .choices = rules}},
+        std::tuple{choice("rule", &O::rule, rules,
+                          "of alpha: sigma error^nu (at most sigma), or constant")},
         proximal_fields<O>("mean of tr(W_aa) / d", "where it is constant"),
-        std::tuple{
-            OptionField<O, double>{.name = "inner_accuracy",
-                                   .member = &O::inner_accuracy,
-                                   .unit = "1",
-                                   .doc = "error of an inner solution over that of the outer one",
-                                   .lowest = 1e-6,
-                                   .highest = 0.99},
-            OptionField<O, std::int64_t>{.name = "inner_sweeps",
-                                         .member = &O::inner_sweeps,
-                                         .unit = "sweeps",
-                                         .doc = "limit of an inner solution",
-                                         .lowest = 1,
-                                         .highest = 1e6}});
+        std::tuple{option("inner_accuracy", &O::inner_accuracy, "1", {1e-6, 0.99},
+                          "error of an inner solution over that of the outer one"),
+                   option("inner_sweeps", &O::inner_sweeps, "sweeps", {1, 1e6},
+                          "limit of an inner solution")});
   }
 };
 

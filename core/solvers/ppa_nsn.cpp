@@ -35,19 +35,11 @@ struct Options : ProximalOptions {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(
-        std::tuple{OptionField<O, Rule>{
-            .name = "rule",
-            .member = &O::rule,
-            .doc = "of alpha: less as Newton takes fewer steps, sigma error^nu, or "
-                   "constant",
-            .choices = rules}},
+        std::tuple{
+            choice("rule", &O::rule, rules,
+                   "of alpha: less as Newton takes fewer steps, sigma error^nu, or constant")},
         proximal_fields<O>("tr(W_aa) / d", "at first, and where it is constant"),
-        std::tuple{OptionField<O, double>{.name = "alpha_min",
-                                          .member = &O::alpha_min,
-                                          .unit = "tr(W_aa) / d",
-                                          .doc = "least alpha",
-                                          .lowest = 1e-15,
-                                          .highest = 1}});
+        std::tuple{option("alpha_min", &O::alpha_min, "tr(W_aa) / d", {1e-15, 1}, "least alpha")});
   }
 
   [[nodiscard]] ProximalRules to_rules() const {

@@ -32,14 +32,9 @@ struct Options : SweepOptions {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(
-        std::tuple{OptionField<O, double>{.name = "omega",
-                                          .member = &O::omega,
-                                          .unit = "1",
-                                          .doc = "relaxation; above 1 over-relaxed, 1 is nsgs",
-                                          .lowest = 1e-3,
-                                          .highest = 1.999}},
-        sweep_fields<O>());
+    return std::tuple_cat(std::tuple{option("omega", &O::omega, "1", {1e-3, 1.999},
+                                            "relaxation; above 1 over-relaxed, 1 is nsgs")},
+                          sweep_fields<O>());
   }
 };
 

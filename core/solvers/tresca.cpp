@@ -32,12 +32,9 @@ struct Options : FixedPointOptions {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(
-        std::tuple{OptionField<O, ConvexMethod>{.name = "inner",
-                                                .member = &O::inner,
-                                                .doc = "solver of the convex problem on cylinders",
-                                                .choices = convex_methods}},
-        fixed_point_fields<O>());
+    return std::tuple_cat(std::tuple{choice("inner", &O::inner, convex_methods,
+                                            "solver of the convex problem on cylinders")},
+                          fixed_point_fields<O>());
   }
 };
 

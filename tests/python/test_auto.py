@@ -417,8 +417,8 @@ def test_bodies_that_rest_are_held(contacts: int, seed: int, push: float, rules:
     problem = Packing().of_size(contacts, push, seed)
     result = fclib.solve(problem, chain=[HELD + rules], time_limit=30)
     assert result.converged
-    blind = fclib.solve(problem, chain=[HELD + " doubt=1e12 limit=3"])
-    assert not blind.converged  # no slip is believed: the convex problem alone
+    # some slip: the convex problem alone is another one
+    assert not fclib.solve(problem, chain="associated : associated").converged
 
 
 def test_bodies_that_creep_may_have_to_move() -> None:
@@ -634,14 +634,6 @@ def test_contacts_that_wedge_each_other(stage: str, number: int) -> None:
     assert judge(problem, result.solution).error <= 1.01e-8
     others = [line for line in auto_chain() if line.split(":")[0].strip() not in WEDGED]
     assert fclib.solve(problem, chain=others, max_iterations=20000).status == "stalled"
-
-
-def test_pivoting_is_exact_in_the_plane() -> None:
-    # Lemke's method needs no polish where the polygon is the disk
-    for seed in range(20):
-        problem = planted_local(seed, d=2, nc=6).problem
-        chain = "pivoting : pivoting tries=1 polish=0"
-        assert fclib.solve(problem, chain=chain).error < 1e-6
 
 
 def factorisations(result: fclib.Result) -> int:

@@ -1,4 +1,4 @@
-#include "chain/rules.hpp"
+#include "chain/table.hpp"
 
 #include <algorithm>
 
@@ -154,7 +154,7 @@ Table parse_table(std::string_view text) {
 
 std::vector<MethodInfo> describe_methods() {
   std::vector<MethodInfo> result;
-  result.push_back({"", "where a stage applies", describe_options<When>()});
+  result.push_back({"", "Where a stage applies.", describe_options<When>()});
   for_each_method([&]<class T>(T) {
     result.push_back({std::string(T::name), std::string(T::doc), describe_options<T>()});
   });

@@ -1,0 +1,114 @@
+// The methods of a chain's table at work: on the whole problem, or on one island of contacts.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+
+#include "chain/table.hpp"
+#include "chain/tracker.hpp"
+#include "contact/cones.hpp"
+#include "reduced/gauss_seidel.hpp"
+#include "systems/coupled_system.hpp"
+
+namespace fclib::chain {
+
+/// What a chain may take of the machine.
+struct Resources {
+  int threads = 1;
+  double memory = 0;  ///< [bytes] of factors; 0: what is available
+};
+
+template <class Cone>
+class Island {
+ public:
+  static constexpr int D = Cone::dim;
+
+  /// What is known of the bodies: of the whole problem, if anything, and which contacts of it the
+  /// island has; none: all.
+  struct KnownBodies {
+    const Primal* whole = nullptr;
+    std::span<const Index> contacts;
+  };
+
+  /// `proves` says whether y (nc of the island) proves that there is no solution.
+  Island(const ReducedProblem& problem, const KnownBodies& bodies, const Table& table,
+         const Resources& resources, Tracker& tracker, double tolerance, bool guessed,
+         std::function<bool(const Vector&)> proves);
+
+  /// From r, by the stages for the whole or for islands; the best iterate ends in r. Its error
+  /// relative to the problem's scale.
+  double solve(Vector& r, On on);
+
+ private:
+  [[nodiscard]] bool done() const { return error_ <= tolerance_ || tracker_.stopped(); }
+
+  // ---- the checkpoints between stages
+
+  /// What later stages start from, as the chain comes to the first that does.
+  void remember(const StageRule& rule);
+  [[nodiscard]] bool applies(const StageRule& rule) const;
+  /// Whether there is memory for what the method factorises.
+  [[nodiscard]] bool affordable(const StageRule& rule);
+  bool fits(const CoupledSystem& system);
+  /// The largest share of a contact's mobility that bilateral constraints take: rho has what it
+  /// was.
+  [[nodiscard]] double jointed() const;
+  void enter(const StageRule& rule);
+  [[nodiscard]] Vector start_of(Start from) const;
+  /// Keeps r where it is the best so far. Whether to end the stage.
+  bool take(std::int64_t iterations, double error, const Vector& r);
+  /// Sweeps from the best iterate; what is kept of each contact is lost where it has overflown.
+  void return_to_best();
+  CoupledSystem& system();
+
+  // ---- the methods
+
+  void run(const GaussSeidelStage& rules);
+  /// Steps that a stage may make, by what they cost.
+  double paid_for(const Patience& rules);
+  void run(const SweepOnStage& rules);
+  void run(const SpectralGradientStage& rules);
+  void run(const ConjugateGradientsStage& rules);
+  void project(Vector& r) const;
+  [[nodiscard]] double violation(const Vector& r) const;
+  void proximal(ProximalRules rules, Vector r);
+  void run(const PolishStage& rules) { proximal(rules, start_of(rules.from)); }
+  void run(const ProximalStage& rules);
+  class ProximalPolish;
+  void run(const InteriorPointStage& stage);
+  void run(const HeldBodiesStage& rules);
+  /// Around the folds of the path.
+  void run(const HomotopyStage& rules);
+  void run(const NewtonStage& rules);
+  void descend(SemismoothNewton<Cone>& newton, const NewtonRules& rules, std::int64_t left,
+               Vector r);
+  void run(const PivotingStage& rules);
+  /// About what rounding leaves of u where the reactions are these, relative to the scale.
+  [[nodiscard]] double rounding_of_velocity(const Vector& r) const;
+  void run(const RandomStartsStage& rules);
+  void run(const NoSolutionStage& rules);
+  void run(const AssociatedStage& rules);
+
+  const ReducedProblem& problem_;
+  KnownBodies bodies_;
+  const Table& table_;
+  const Resources& resources_;
+  Tracker& tracker_;
+  double tolerance_;
+  bool guessed_;
+  std::function<bool(const Vector&)> proves_;
+  std::optional<GaussSeidel<Cone>> gauss_seidel_;
+  std::optional<CoupledSystem> system_;
+  Vector r_, u_, best_;
+  Vector swept_, associated_;            // what stages start from
+  std::int64_t own_factorisations_ = 0;  // of a stage with a system of its own
+  double error_ = 0;
+};
+
+#define FCLIB_DECLARE(Cone) extern template class Island<Cone>;
+FCLIB_FOR_EACH_CONE(FCLIB_DECLARE)
+#undef FCLIB_DECLARE
+
+}  // namespace fclib::chain

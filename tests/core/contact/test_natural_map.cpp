@@ -36,7 +36,8 @@ typename Cone::Vec by_definition(const Cone& cone, const typename Cone::Vec& u,
 /// A contact of one of these kinds: anything; open at a distance; grazing; sticking; sliding. Each
 /// group of velocities and reactions may be exactly zero.
 template <class Cone>
-void draw(const Cone& cone, int kind, testing::RandomData& random, Vector& u, Vector& r) {
+void draw(const Cone& cone, int kind, testing::RandomData& random, ContactVector<Cone::dim>& u,
+          ContactVector<Cone::dim>& r) {
   constexpr int S = Cone::group_size;
   u = random.vector(Cone::dim);
   r = random.vector(Cone::dim);
@@ -44,8 +45,8 @@ void draw(const Cone& cone, int kind, testing::RandomData& random, Vector& u, Ve
   u[0] = kind == 1 ? std::abs(u[0]) : 0.0;
   r[0] = kind <= 2 ? 0.0 : std::abs(r[0]);
   for (int g = 0; g < Cone::groups; ++g) {
-    auto slip = u.segment(1 + S * g, S);
-    auto force = r.segment(1 + S * g, S);
+    auto slip = u.template segment<S>(1 + S * g);
+    auto force = r.template segment<S>(1 + S * g);
     const auto limit = static_cast<double>(cone.coefficient(g)) * r[0];
     if (kind == 3 || random.vector(1)[0] > 0.3) slip.setZero();
     force *= (kind == 3 ? 0.5 : 1.0) * limit / force.norm();
@@ -58,14 +59,14 @@ void expect_the_definition(const Cone& wide, testing::RandomData& random) {
   using Vec = typename Cone::Vec;
   const auto cone = narrow(wide);
   for (int k = 0; k < 200; ++k) {
-    Vector u;
-    Vector r;
+    ContactVector<Cone::dim> u;
+    ContactVector<Cone::dim> r;
     draw(wide, k % 5, random, u, r);
     for (const double rho : {1.0, 1e-9, 1e9}) {
-      const Vec expected = by_definition(wide, u.cast<Wide>(), r.cast<Wide>(), Wide(rho));
-      const Vector found = natural_map(cone, u, r, rho);
+      const Vec expected = by_definition(wide, Vec(u.template cast<Wide>()), Vec(r.template cast<Wide>()), Wide(rho));
+      const ContactVector<Cone::dim> found = natural_map(cone, u, r, rho);
       const double size = r.norm() + rho * u.norm() + expected.template cast<double>().norm();
-      EXPECT_LE((found.cast<Wide>() - expected).template cast<double>().norm(), 1e-14 * size)
+      EXPECT_LE((found.template cast<Wide>() - expected).template cast<double>().norm(), 1e-14 * size)
           << "kind " << k % 5 << " rho " << rho << " mu " << cone.coefficient(0);
     }
   }
@@ -89,23 +90,25 @@ TEST(NaturalMap, an_exact_solution_has_none) {
   for (const double mu : coefficients) {
     for (const double mu_r : coefficients) {
       const Rolling<5> cone(mu, mu_r);
-      Vector u(5);
+      using Vec = ContactVector<5>;
+      Vec u;
       u << 0, 3, 4, 0, 0;  // slides without rolling and without a reaction
-      EXPECT_EQ(natural_map(cone, u, Vector(Vector::Zero(5))).norm(), 0);
+      EXPECT_EQ(natural_map(cone, u, Vec(Vec::Zero())).norm(), 0);
       u << 0, 0, 0, 3, 4;
-      EXPECT_EQ(natural_map(cone, u, Vector(Vector::Zero(5))).norm(), 0);
-      Vector r(5);
+      EXPECT_EQ(natural_map(cone, u, Vec(Vec::Zero())).norm(), 0);
+      Vec r;
       r << 1, 0.3 * mu, 0.4 * mu, 0, 0.5 * mu_r;  // sticks
-      EXPECT_EQ(natural_map(cone, Vector(Vector::Zero(5)), r).norm(), 0);
+      EXPECT_EQ(natural_map(cone, Vec(Vec::Zero()), r).norm(), 0);
     }
   }
 }
 
 TEST(NaturalMap, sees_a_penetration_without_rolling_at_any_friction) {
   for (const double mu : coefficients) {
-    Vector u(5);
+    using Vec = ContactVector<5>;
+    Vec u;
     u << -0.75, 1, 0, 0, 0;
-    const Vector map = natural_map(Rolling<5>(mu, 0.2), u, Vector(Vector::Zero(5)));
+    const Vec map = natural_map(Rolling<5>(mu, 0.2), u, Vec(Vec::Zero()));
     EXPECT_TRUE(map.allFinite());
     EXPECT_GT(map.norm(), 0.7 / (1 + mu));
   }
@@ -115,9 +118,9 @@ TEST(NaturalMap, what_is_no_number_stays_so) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   for (int k = 0; k < 5; ++k) {
     for (const double force : {0.0, 1.0}) {
-      Vector u = Vector::Ones(5);
+      ContactVector<5> u = ContactVector<5>::Ones();
       u[k] = nan;
-      const Vector r = Vector::Constant(5, force);
+      const ContactVector<5> r = ContactVector<5>::Constant(force);
       EXPECT_FALSE(natural_map(Rolling<5>(0.3, 0.2), u, r).allFinite()) << k;
       if (k >= 3) continue;
       const ContactVector<3> three = u.head<3>();

@@ -11,6 +11,14 @@ import fclib
 from helpers import case
 
 
+def stored(name: str) -> fclib.Merit:
+    """What the solution of a file is worth."""
+    problem: Any = fclib.read(case(name))
+    solution = fclib.read_solution(case(name))
+    assert solution is not None
+    return fclib.merit(problem, solution)
+
+
 def rolling(**changes: Any) -> fclib.LocalRollingProblem:
     """One contact of a body that slides at 1 m/s, and does not roll."""
     data: dict[str, Any] = {
@@ -24,16 +32,13 @@ def rolling(**changes: Any) -> fclib.LocalRollingProblem:
 
 
 def test_a_body_that_penetrates_is_not_ok() -> None:
-    path = case("rolling-nan-false-ok.hdf5")
-    problem = fclib.read(path)
-    merit = fclib.merit(problem, fclib.read_solution(path))
+    merit = stored("rolling-nan-false-ok.hdf5")
     assert merit.error > 0.1
     assert np.isfinite(merit.scaled_natural)
 
 
 def test_an_exact_solution_with_large_friction_is_ok() -> None:
-    path = case("rolling-exact-refused.hdf5")
-    assert fclib.merit(fclib.read(path), fclib.read_solution(path)).error <= 1e-15
+    assert stored("rolling-exact-refused.hdf5").error <= 1e-15
 
 
 @pytest.mark.parametrize("mu", [0.3, 0.96, 1e5, 3e6, 1e9, 1e12])
@@ -47,8 +52,7 @@ def test_a_contact_that_slides_and_does_not_roll(mu: float, mu_r: float) -> None
 
 
 def test_a_solve_without_a_solution_returns_the_best_iterate() -> None:
-    path = case("empty-r-fp-ds.hdf5")
-    problem = fclib.read(path)
+    problem: Any = fclib.read(case("empty-r-fp-ds.hdf5"))
     result = fclib.solve(problem, solver="fp-ds", tol=1e-12)
     assert result.solution.r.size == problem.m
     nothing = fclib.merit(problem, np.zeros(problem.m)).error
@@ -57,9 +61,7 @@ def test_a_solve_without_a_solution_returns_the_best_iterate() -> None:
 
 
 def test_multipliers_of_ones_own_do_not_hide_a_joint() -> None:
-    path = case("multipliers-hide-joint.hdf5")
-    merit = fclib.merit(fclib.read(path), fclib.read_solution(path))
-    assert merit.bilateral > 0.1
+    assert stored("multipliers-hide-joint.hdf5").bilateral > 0.1
 
 
 @pytest.mark.parametrize("size", [1e6, 1e10, 1e14, 1e17])
@@ -72,7 +74,7 @@ def test_a_self_stress_hides_nothing(size: float, stored: bool) -> None:
     problem = fclib.GlobalProblem(
         spacedim=2, M=np.eye(2), H=H, f=[0.0, 1.0], w=np.zeros(4), mu=[0.5, 0.5], G=G, b=[0.0, 0]
     )
-    still = {"v": [0.0, 0], "u": np.zeros(4)} if stored else {}
+    still: dict[str, Any] = {"v": [0.0, 0], "u": np.zeros(4)} if stored else {}
     r = [size, 0, size, 0]
     right = fclib.Solution(r=r, l=[-1.0, 0], **still)
     assert fclib.merit(problem, right).error <= 1e-15

@@ -20,11 +20,11 @@ enum class LocalSolver {
 inline constexpr std::array<std::string_view, 6> local_solvers{
     "exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister", "hybrid"};
 inline constexpr std::string_view local_solvers_doc =
-    "one-contact solver: exact (enumeration of statuses), projection (P_K with local iterations), "
-    "diagonal (one projection, the block replaced by its diagonal), alart-curnier or "
-    "fischer-burmeister (damped Newton), hybrid (alart-curnier, then exact); where one has no "
-    "solution the projection steps in; rolling contacts have no exact solver, and "
-    "alart-curnier for fischer-burmeister";
+    "The solver of one contact. exact: by its statuses. projection: P_K with local iterations. "
+    "diagonal: one projection, with the diagonal in the place of the block. alart-curnier and "
+    "fischer-burmeister: damped Newton. hybrid: alart-curnier, then exact. If one finds no "
+    "solution, the projection does. Rolling contacts have no exact solver, and alart-curnier in "
+    "the place of fischer-burmeister.";
 
 /// One projection with the block of a contact replaced by its diagonal, normal part first: each
 /// part is projected with the velocities that the parts before it leave. False, with r untouched,

@@ -21,22 +21,23 @@ struct NewtonOptions : NewtonRules {
     using O = NewtonOptions;
     return std::tuple{
         choice("rho_rule", &O::rho_rule, rho_rules,
-               "rho of each contact: constant; 1 / the spectral norm of W_aa; that of its normal "
-               "and tangential parts (the first alone where the function takes one rho); or "
-               "adaptive, such that a step moves rho u^ about as much as r"),
+               "rho of each contact. constant: the same for all. spectral: 1 / the spectral norm "
+               "of W_aa. split_spectral: that of its normal and of its tangential part; the first "
+               "alone if the function takes one rho. adaptive: such that a step moves rho u^ about "
+               "as much as r."),
         option("rho", &O::rho, "1/[W] where the rule is constant, else 1", {1e-12, 1e12},
-               "rho itself, or a factor of what the rule gives"),
+               "rho itself, or a factor on what the rule gives."),
         choice("line_search", &O::line_search, line_searches,
-               "none, or on 1/2 ||F||^2: armijo or goldstein_price; fischer_burmeister is armijo "
-               "on the merit of that function (rolling contacts: on 1/2 ||F||^2)"),
+               "armijo and goldstein_price search on 1/2 ||F||^2. fischer_burmeister is armijo on "
+               "the merit of that function; for rolling contacts it is armijo."),
         option("regularisation", &O::regularisation, "mean of tr(W_aa) / d", {0, 1e6},
-               "added to the diagonal of W in Newton's system, times the error where that is less "
-               "than 1"),
+               "What is added to the diagonal of W in Newton's system. It is multiplied by the "
+               "error if that is less than 1."),
         option("sweeps", &O::sweeps, "sweeps", {0, 1000},
-               "of Gauss-Seidel where Newton stands still, twice as many each time up to 1000; 0: "
-               "it ends there"),
+               "The number of sweeps of Gauss-Seidel if Newton stands still: twice as many each "
+               "time, up to 1000. 0: it ends then."),
         option("patience", &O::patience, "iterations", {1},
-               "in which the error must halve, or Newton stands still"),
+               "Newton stands still if the error does not halve in so many iterations."),
     };
   }
 };

@@ -24,13 +24,13 @@ template <class O>
 constexpr auto step_fields() {
   return std::tuple{
       choice("metric", &O::metric, metrics, metric_doc),
-      option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "first step"),
+      option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "The first step."),
       option("tau", &O::tau, "1", {0.01, 0.99},
-             "factor by which the step shrinks, or by whose inverse it grows"),
+             "The step shrinks by this factor, and grows by its inverse."),
       option("ratio_high", &O::ratio_high, "1", {1e-3, 1},
-             "L: the step shrinks while its ratio is above this"),
+             "L: the step shrinks while its ratio is above this."),
       option("ratio_low", &O::ratio_low, "1", {0, 1},
-             "L_min: the step grows where its ratio is under this"),
+             "L_min: the step grows if its ratio is below this."),
   };
 }
 
@@ -58,8 +58,8 @@ struct ExtragradientOptions : StepOptions {
         step_fields<O>(),
         std::tuple{
             choice("second", &O::second, second_projections,
-                   "where the second projection sets out: at the trial point, as Siconos does, or "
-                   "at the start of the iteration, as Korpelevich and the paper do")});
+                   "Where the second projection starts: at the trial point, as in Siconos, or at "
+                   "the start of the iteration, as in Korpelevich's and in the paper.")});
   }
 };
 

@@ -27,15 +27,18 @@ constexpr auto sweep_fields() {
   return std::tuple{
       choice("local_solver", &O::local_solver, local_solvers, local_solvers_doc),
       option("local_iterations", &O::local_iterations, "1", {1, 1e6},
-             "limit of the iterations of the projection or of Newton"),
+             "The largest number of iterations of the projection or of Newton."),
       option("local_accuracy", &O::local_accuracy, "1", {0, 1},
-             "relative step at which the projection stops, relative residual of Newton"),
-      flag("symmetric", &O::symmetric, "every second sweep runs backwards"),
+             "The relative step at which the projection stops, or the relative residual at which "
+             "Newton does."),
+      flag("symmetric", &O::symmetric, "Every second sweep runs backwards."),
       option("threads", &O::threads, "threads", {1, 256},
-             "from 2 on the contacts are swept colour by colour, those of a colour on all threads "
-             "at once, with one result for any number; 1: in the order as given"),
+             "With 2 or more, the contacts are swept colour by colour, those of a colour on all "
+             "threads at once. The result is the same for any number. With 1 they are swept in "
+             "their order."),
       option("error_interval", &O::error_interval, "sweeps", {0},
-             "sweeps between evaluations of the error; 0 adapts it to the convergence"),
+             "The number of sweeps between two evaluations of the error. 0: it follows the "
+             "convergence."),
   };
 }
 
@@ -46,8 +49,8 @@ inline constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
 template <class O>
 constexpr auto shift_field() {
   return choice("shift", &O::shift, shifts,
-                "iterated: Coulomb's law; none: the convex relaxation, which is NOT Coulomb's law "
-                "where contacts slide");
+                "iterated: Coulomb's law. none: the convex relaxation, which is NOT Coulomb's law "
+                "if contacts slide.");
 }
 
 /// Of a fixed point over convex problems.
@@ -62,13 +65,13 @@ template <class O>
 constexpr auto fixed_point_fields() {
   return std::tuple{
       option("inner_accuracy", &O::inner_accuracy, "1", {1e-6, 1},
-             "of the convex problem, as a share of the current error"),
+             "The accuracy of the convex problem, as a share of the current error."),
       option("inner_iterations", &O::inner_iterations, "iterations", {1, 1e9},
-             "limit of those of the inner solver on one convex problem"),
+             "The largest number of iterations of the inner solver on one convex problem."),
       option("local_iterations", &O::local_iterations, "iterations", {1, 1e6},
-             "limit of those of Gauss-Seidel on a contact"),
+             "The largest number of iterations of Gauss-Seidel on a contact."),
       option("relaxation", &O::relaxation, "1", {0.01, 1},
-             "share of the new shift or threshold in the next, at first"),
+             "The share of the new shift or threshold in the next one, at first."),
   };
 }
 
@@ -83,8 +86,8 @@ template <class O>
 constexpr auto proximal_fields(std::string_view unit, std::string_view alpha_doc) {
   return std::tuple{
       option("alpha", &O::alpha, unit, {1e-12, 1e6}, alpha_doc),
-      option("sigma", &O::sigma, unit, {1e-9, 1e9}, "of sigma error^nu"),
-      option("nu", &O::nu, "1", {0, 4}, "of sigma error^nu"),
+      option("sigma", &O::sigma, unit, {1e-9, 1e9}, "sigma in sigma error^nu."),
+      option("nu", &O::nu, "1", {0, 4}, "nu in sigma error^nu."),
   };
 }
 

@@ -34,8 +34,8 @@ enum class StepRatio {
 enum class Metric { contact, uniform };
 inline constexpr std::array<std::string_view, 2> metrics{"contact", "uniform"};
 inline constexpr std::string_view metric_doc =
-    "the step of each contact is relative to the mean diagonal of its own W_aa (contact), or of "
-    "the largest of all (uniform, as in the paper)";
+    "What a step is relative to. contact: the mean diagonal of the contact's own W_aa. uniform: "
+    "the largest of all, as in the paper.";
 
 template <class Cone>
 class VariationalInequality {

@@ -43,9 +43,9 @@ struct Options : FixedPointOptions {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(
-        std::tuple{
-            choice("inner", &O::inner, inners,
-                   "solver of the convex problem; interior_point does not take rolling friction")},
+        std::tuple{choice(
+            "inner", &O::inner, inners,
+            "The solver of the convex problem. interior_point does not take rolling friction.")},
         fixed_point_fields<O>());
   }
 };

@@ -51,21 +51,22 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        option("rho", &O::rho, "1", {1e-6, 1e6}, "penalty at first, relative to tr(W_aa) / d"),
+        option("rho", &O::rho, "1", {1e-6, 1e6}, "The penalty at first, relative to tr(W_aa) / d."),
         choice("penalty", &O::penalty, penalties,
-               "how rho changes: not at all, by balancing the relative residuals, or by spectral "
-               "estimates of curvature"),
+               "How rho changes: not at all, by balancing the relative residuals, or by spectral "
+               "estimates of the curvature."),
         option("penalty_interval", &O::penalty_interval, "iterations", {1, 1e6},
-               "between changes of rho; doubles with each change"),
-        option("relaxation", &O::relaxation, "1", {0.1, 1.95}, "alpha: above 1 is over-relaxation"),
+               "The number of iterations between two changes of rho. It doubles with each change."),
+        option("relaxation", &O::relaxation, "1", {0.1, 1.95},
+               "alpha. Above 1 it is over-relaxation."),
         choice("acceleration", &O::acceleration, accelerations,
-               "Nesterov's momentum, started afresh where the residual does not fall (restart), or "
-               "none"),
+               "restart: Nesterov's momentum, which starts again if the residual does not fall. "
+               "none: no momentum."),
         option("restart", &O::restart, "1", {0.1, 1},
-               "share of its last value that the combined residual must fall below for the "
-               "momentum to be kept"),
+               "The momentum is kept if the combined residual falls below this share of its last "
+               "value."),
         flag("weights", &O::weights,
-             "a penalty for each contact by its own block of W, else the same for all"),
+             "Each contact has a penalty by its own block of W. Else all have the same."),
     };
   }
 };

@@ -39,12 +39,13 @@ struct Options {
     using O = Options;
     return std::tuple{
         shift_field<O>(),
-        flag("restart", &O::restart, "start the momentum afresh where it goes uphill"),
-        option("growth", &O::growth, "1", {1, 10}, "factor of the step after each iteration"),
+        flag("restart", &O::restart, "The momentum starts again if it goes uphill."),
+        option("growth", &O::growth, "1", {1, 10},
+               "The step is multiplied by this after each iteration."),
         option("reduction", &O::reduction, "1", {0.1, 0.95},
-               "factor of the step, at most, where it was too long"),
+               "The largest factor on a step that was too long."),
         flag("weights", &O::weights,
-             "a step for each contact by its own block of W, else the same for all"),
+             "Each contact has a step by its own block of W. Else all have the same."),
     };
   }
 };

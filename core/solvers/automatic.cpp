@@ -78,11 +78,12 @@ struct Options {
     using O = Options;
     return std::tuple{
         option("threads", &O::threads, "threads", {1, 256},
-               "that share a large factorisation; the result is the same for any number"),
+               "The number of threads that share a large factorisation. The result is the same for "
+               "any number."),
         option("memory_limit", &O::memory_limit, "GB", {0},
-               "that the factors of a system may take, else it goes on without factorisations; 0: "
-               "what the machine has available"),
-        text("chain", &O::chain, "the stages, one a line: NAME : METHOD key=value ...",
+               "The memory that the factors of a system may take. If they need more, the chain "
+               "goes on without factorisations. 0: what the machine has available."),
+        text("chain", &O::chain, "The stages, one a line: NAME : METHOD key=value ...",
              [](std::string_view text) { chain::parse_table(text); }),
     };
   }

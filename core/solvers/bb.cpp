@@ -43,13 +43,15 @@ struct Options {
     using O = Options;
     return std::tuple{
         shift_field<O>(),
-        choice("step", &O::step, spectral_steps, "which of the two steps of Barzilai and Borwein"),
+        choice("step", &O::step, spectral_steps,
+               "Which of the two steps of Barzilai and Borwein is taken."),
         option("memory", &O::memory, "iterations", {1, 1000},
-               "whose objective the line search may rise to; 1 makes it monotone"),
+               "The line search may rise to the largest objective of so many iterations. 1 makes "
+               "it monotone."),
         option("decrease", &O::decrease, "1", {0, 0.5},
-               "share of the predicted decrease that is asked for"),
+               "The share of the predicted decrease that is asked for."),
         flag("weights", &O::weights,
-             "a metric for each contact by its own block of W, else the same for all"),
+             "Each contact has a metric by its own block of W. Else all have the same."),
     };
   }
 };

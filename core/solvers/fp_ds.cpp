@@ -26,7 +26,7 @@ struct Options {
     return std::tuple{
         choice("metric", &O::metric, metrics, metric_doc),
         option("rho", &O::rho, "1/||W||", {1e-6, 1e6},
-               "the step; without friction all below 2 converge"),
+               "The step. Without friction every step below 2 converges."),
     };
   }
 };

@@ -20,16 +20,16 @@ struct Options : HomotopyRules {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{option("smoothing", &O::smoothing, "1", {1e-3, 100},
-                             "of the kink of de Saxce's term, over the velocity on the path of a "
-                             "contact that sticks"),
+                             "The width of the smoothed kink of de Saxce's term, over the velocity "
+                             "on the path of a contact that sticks."),
                       option("stride", &O::stride, "1", {1e-3, 10},
-                             "longest step of a contact, in the metric of its barrier"),
+                             "The longest step of a contact, in the metric of its barrier."),
                       option("accuracy", &O::accuracy, "1", {1e-10, 0.5},
-                             "of a point of the path, in the metric of the barrier"),
+                             "How near a point must be to the path, in the metric of the barrier."),
                       option("cosine", &O::cosine, "1", {0, 0.99},
-                             "least, between the directions of the path at two points"),
+                             "The least cosine between the directions of the path at two points."),
                       option("polish_below", &O::polish_below, "1", {0},
-                             "error under which the proximal Newton method is tried")};
+                             "The proximal Newton method is tried if the error is below this.")};
   }
 };
 

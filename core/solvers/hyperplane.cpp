@@ -40,13 +40,15 @@ struct Options {
     using O = Options;
     return std::tuple{
         choice("metric", &O::metric, metrics, metric_doc),
-        option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "first step of the first projection"),
-        option("sigma", &O::sigma, "1", {1e-3, 0.999}, "how clearly the hyperplane must separate"),
+        option("rho", &O::rho, "1/W_aa", {1e-12, 1e12}, "The first step of the first projection."),
+        option("sigma", &O::sigma, "1", {1e-3, 0.999}, "How clearly the hyperplane must separate."),
         option("growth", &O::growth, "1", {1, 10},
-               "factor of rho after a full step; 1 keeps rho from growing"),
-        option("line_search", &O::line_search, "1", {1, 1000}, "limit of the halvings of alpha"),
+               "rho is multiplied by this after a full step. With 1 it does not grow."),
+        option("line_search", &O::line_search, "1", {1, 1000},
+               "The largest number of halvings of alpha."),
         flag("intersection", &O::intersection,
-             "project on the cone and the half-space together, and not on one after the other"),
+             "The projection is on the cone and the half-space together. Else it is on one after "
+             "the other."),
     };
   }
 };

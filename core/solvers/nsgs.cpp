@@ -42,17 +42,18 @@ struct Options : SweepOptions {
     using O = Options;
     return std::tuple_cat(
         sweep_fields<O>(),
-        std::tuple{option("relaxation", &O::relaxation, "1", {1e-3, 1.999},
-                          "omega in r <- omega r_local + (1 - omega) r; above 1 r may leave the "
-                          "cone and is projected back"),
-                   choice("shuffle", &O::shuffle, shuffles,
-                          "order of the contacts (of the colours, with threads): as given, "
-                          "shuffled once, or before every sweep"),
-                   option("seed", &O::seed, "1", {0}, "of the shuffling"),
-                   option("freeze", &O::freeze, "sweeps", {0, 1e6},
-                          "for which a settled contact is left alone"),
-                   option("freeze_below", &O::freeze_below, "1", {0, 1},
-                          "relative change of its reaction under which a contact is settled")});
+        std::tuple{
+            option("relaxation", &O::relaxation, "1", {1e-3, 1.999},
+                   "omega in r <- omega r_local + (1 - omega) r. Above 1, r may leave the cone, "
+                   "and is projected back."),
+            choice("shuffle", &O::shuffle, shuffles,
+                   "The order of the contacts, or of the colours with threads: as given, shuffled "
+                   "once, or shuffled before every sweep."),
+            option("seed", &O::seed, "1", {0}, "The seed of the random order."),
+            option("freeze", &O::freeze, "sweeps", {0, 1e6},
+                   "The number of sweeps for which a settled contact is left alone."),
+            option("freeze_below", &O::freeze_below, "1", {0, 1},
+                   "A contact is settled if the relative change of its reaction is below this.")});
   }
 };
 

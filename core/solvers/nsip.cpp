@@ -35,11 +35,11 @@ struct Options : InteriorPointRules {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(
-        InteriorPointRules::fields(),
-        std::tuple{patience_option(), smoothing_option(),
-                   option("sweeps", &O::sweeps, "sweeps", {0, 1e6},
-                          "of Gauss-Seidel at most, where the steps of the interior point end")});
+    return std::tuple_cat(InteriorPointRules::fields(),
+                          std::tuple{patience_option(), smoothing_option(),
+                                     option("sweeps", &O::sweeps, "sweeps", {0, 1e6},
+                                            "The largest number of sweeps of Gauss-Seidel after "
+                                            "the last step of the interior point.")});
   }
 };
 

@@ -36,11 +36,13 @@ struct Options {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple{
-        choice("inner", &O::inner, inners, "solver of the normal and of the tangential problem"),
+        choice("inner", &O::inner, inners,
+               "The solver of the normal and of the tangential problem."),
         option("inner_accuracy", &O::inner_accuracy, "1", {1e-6, 1},
-               "of the two problems, as a share of the current error"),
-        option("inner_iterations", &O::inner_iterations, "iterations", {1, 1e9},
-               "of the inner solver before the other problem's turn"),
+               "The accuracy of the two problems, as a share of the current error."),
+        option(
+            "inner_iterations", &O::inner_iterations, "iterations", {1, 1e9},
+            "The number of iterations of the inner solver before it is the other problem's turn."),
     };
   }
 };

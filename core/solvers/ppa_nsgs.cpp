@@ -42,12 +42,12 @@ struct Options : ProximalOptions {
     using O = Options;
     return std::tuple_cat(
         std::tuple{choice("rule", &O::rule, rules,
-                          "of alpha: sigma error^nu (at most sigma), or constant")},
-        proximal_fields<O>("mean of tr(W_aa) / d", "where it is constant"),
+                          "What alpha is: sigma error^nu, at most sigma, or a constant.")},
+        proximal_fields<O>("mean of tr(W_aa) / d", "The constant alpha."),
         std::tuple{option("inner_accuracy", &O::inner_accuracy, "1", {1e-6, 0.99},
-                          "error of an inner solution over that of the outer one"),
+                          "The error of an inner solution, over that of the outer one."),
                    option("inner_sweeps", &O::inner_sweeps, "sweeps", {1, 1e6},
-                          "limit of an inner solution")});
+                          "The largest number of sweeps of an inner solution.")});
   }
 };
 

@@ -35,11 +35,12 @@ struct Options : ProximalOptions {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(
+        std::tuple{choice(
+            "rule", &O::rule, rules,
+            "What alpha is: less if Newton takes fewer steps, sigma error^nu, or a constant.")},
+        proximal_fields<O>("tr(W_aa) / d", "alpha at first, and the constant alpha."),
         std::tuple{
-            choice("rule", &O::rule, rules,
-                   "of alpha: less as Newton takes fewer steps, sigma error^nu, or constant")},
-        proximal_fields<O>("tr(W_aa) / d", "at first, and where it is constant"),
-        std::tuple{option("alpha_min", &O::alpha_min, "tr(W_aa) / d", {1e-15, 1}, "least alpha")});
+            option("alpha_min", &O::alpha_min, "tr(W_aa) / d", {1e-15, 1}, "The least alpha.")});
   }
 
   [[nodiscard]] ProximalRules to_rules() const {

@@ -32,9 +32,10 @@ struct Options : SweepOptions {
 
   static constexpr auto fields() {
     using O = Options;
-    return std::tuple_cat(std::tuple{option("omega", &O::omega, "1", {1e-3, 1.999},
-                                            "relaxation; above 1 over-relaxed, 1 is nsgs")},
-                          sweep_fields<O>());
+    return std::tuple_cat(
+        std::tuple{option("omega", &O::omega, "1", {1e-3, 1.999},
+                          "The relaxation. Above 1 it is over-relaxed; 1 is nsgs.")},
+        sweep_fields<O>());
   }
 };
 

@@ -33,7 +33,7 @@ struct Options : FixedPointOptions {
   static constexpr auto fields() {
     using O = Options;
     return std::tuple_cat(std::tuple{choice("inner", &O::inner, convex_methods,
-                                            "solver of the convex problem on cylinders")},
+                                            "The solver of the convex problem on cylinders.")},
                           fixed_point_fields<O>());
   }
 };

@@ -9,11 +9,8 @@
 #endif
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
-#include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <optional>
@@ -104,12 +101,6 @@ void write_all(int file, Pieces pieces, const std::string& path) {
   for (const std::string_view piece : pieces) write_all(file, piece, path);
 }
 
-std::size_t size_of(Pieces pieces) {
-  std::size_t size = 0;
-  for (const std::string_view piece : pieces) size += piece.size();
-  return size;
-}
-
 std::string read_all(int file, std::size_t size, const std::string& path) {
   std::string bytes(size, '\0');
   std::size_t done = 0;
@@ -194,168 +185,17 @@ class Temporary {
   Descriptor file_;
 };
 
-// ---- rewriting in place, by a journal
-
-/// Ends a journal that is whole: until it is, the file itself has not been touched.
-struct JournalEnd {
-  std::array<char, 16> magic{'f', 'c', 'l', 'i', 'b', ' ', 'j', 'o', 'u', 'r', 'n', 'a', 'l'};
-  std::uint64_t size = 0;
-  std::uint64_t hash = 0;
-};
-
-std::uint64_t hash_of(Pieces pieces) {
-  std::uint64_t hash = 0xcbf29ce484222325U;  // FNV-1a
-  for (const std::string_view piece : pieces) {
-    for (const char byte : piece) {
-      hash ^= static_cast<unsigned char>(byte);
-      hash *= 0x100000001b3U;
-    }
-  }
-  return hash;
-}
-
-/// Where the journals of a file may lie: beside it, and where its folder cannot be written, in that
-/// of temporary files.
-std::vector<std::string> journals_of(const std::string& target) {
-  std::vector<std::string> places{target + ".fclib-journal"};
-  struct stat status{};
-  if (::stat(target.c_str(), &status) == 0) {
-    const char* const named = std::getenv("TMPDIR");
-    places.push_back(std::string(named != nullptr && *named != '\0' ? named : "/tmp") +
-                     "/fclib-journal-" + std::to_string(::geteuid()) + "-" +
-                     std::to_string(status.st_dev) + "-" + std::to_string(status.st_ino));
-  }
-  return places;
-}
-
-void put_in_place(const std::string& target, Pieces pieces, const std::string& path) {
-  const Descriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
-  if (file.id() < 0) fail_in_system(path, "cannot be written");
-  write_all(file.id(), pieces, path);
-  if (::ftruncate(file.id(), static_cast<off_t>(size_of(pieces))) != 0 || ::fsync(file.id()) != 0) {
-    fail_in_system(path, "cannot be written");
-  }
-}
-
-/// Makes a file that is to grow as long as it is to be, so that a full disk is found while all of
-/// its bytes are there.
-void make_room(const std::string& target, std::size_t size, const std::string& path) {
-#ifdef __linux__
-  const Descriptor file(::open(target.c_str(), O_WRONLY | O_CLOEXEC));
-  struct stat status{};
-  if (file.id() < 0 || ::fstat(file.id(), &status) != 0) fail_in_system(path, "cannot be written");
-  const auto end = static_cast<off_t>(size);
-  if (end <= status.st_size) return;
-  int error = 0;
-  do {
-    error = ::posix_fallocate(file.id(), status.st_size, end - status.st_size);
-  } while (error == EINTR);
-  if (error != ENOSPC && error != EDQUOT && error != EFBIG) return;
-  if (::ftruncate(file.id(), status.st_size) != 0) return;
-  errno = error;
-  fail_in_system(path, "cannot be written");
-#else
-  static_cast<void>(target), static_cast<void>(size), static_cast<void>(path);
-#endif
-}
-
-void sync_folder_of(const std::string& name) {
-  const fs::path folder = fs::path(name).parent_path();
-  const Descriptor file(
-      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (file.id() >= 0) ::fsync(file.id());
-}
-
-/// Writes over the bytes of a file that must stay the same file. They are in a journal by then,
-/// from which finish_rewrite() goes on after a kill.
-void rewrite(const std::string& path, const std::string& target, Pieces pieces) {
-  finish_rewrite(path);
-  std::string journal;
-  Descriptor file(-1);
-  int reason = 0;
-  for (const std::string& place : journals_of(target)) {
-    Descriptor opened(::open(place.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC,
-                             S_IRUSR | S_IWUSR));
-    if (opened.id() < 0) {
-      reason = errno;
-      continue;
-    }
-    journal = place;
-    JournalEnd end;
-    end.size = size_of(pieces);
-    end.hash = hash_of(pieces);
-    try {
-      write_all(opened.id(), pieces, path);
-      write_all(opened.id(), std::string_view(reinterpret_cast<const char*>(&end), sizeof end),
-                path);
-      if (::fsync(opened.id()) != 0) fail_in_system(path, "cannot be written");
-      make_room(target, end.size, path);
-    } catch (...) {
-      ::unlink(place.c_str());
-      throw;
-    }
-    sync_folder_of(place);
-    break;
-  }
-  if (journal.empty()) {
-    errno = reason;
-    fail_in_system(path, "cannot be written without a journal, and that cannot be");
-  }
-  // a journal that stays after a failure has the whole file
-  put_in_place(target, pieces, path);
-  ::unlink(journal.c_str());
-}
-
 }  // namespace
 
-Turn::Turn(const std::string& path) {
+FolderLock::FolderLock(const std::string& path) {
   const fs::path folder = fs::path(resolve_links(path)).parent_path();
   folder_ = ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   while (folder_ >= 0 && ::flock(folder_, LOCK_EX) != 0 && errno == EINTR) {
   }
 }
 
-Turn::~Turn() {
+FolderLock::~FolderLock() {
   if (folder_ >= 0) ::close(folder_);
-}
-
-void finish_rewrite(const std::string& path) {
-  const std::string target = resolve_links(path);
-  for (const std::string& place : journals_of(target)) {
-    const Descriptor file(::open(place.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
-    struct stat status{};
-    if (file.id() < 0 || ::fstat(file.id(), &status) != 0 || !S_ISREG(status.st_mode)) continue;
-    struct stat own{};
-    // nobody else's, in a folder that all may write to
-    const bool ours = ::stat(target.c_str(), &own) == 0 &&
-                      (status.st_uid == ::geteuid() || status.st_uid == own.st_uid);
-    if (!ours) continue;
-    std::string bytes = read_all(file.id(), static_cast<std::size_t>(status.st_size), path);
-    JournalEnd end;
-    const JournalEnd expected;
-    bool whole = bytes.size() >= sizeof end;
-    if (whole) {
-      std::memcpy(&end, bytes.data() + bytes.size() - sizeof end, sizeof end);
-      bytes.resize(bytes.size() - sizeof end);
-    }
-    const std::array<std::string_view, 1> all{bytes};
-    whole = whole && end.magic == expected.magic && end.size == bytes.size() &&
-            end.hash == hash_of(all);
-    if (whole && ::access(target.c_str(), W_OK) != 0) {
-      fail(path, "was being written when its writer ended, and is not yours to repair; " + place +
-                     " has what it is to be");
-    }
-    if (whole) put_in_place(target, all, path);
-    ::unlink(place.c_str());
-  }
-}
-
-void finish_rewrite_in_turn(const std::string& path) {
-  for (const std::string& place : journals_of(resolve_links(path))) {
-    if (::access(place.c_str(), F_OK) != 0) continue;
-    const Turn turn(path);
-    return finish_rewrite(path);
-  }
 }
 
 std::string resolve_links(const std::string& path) {
@@ -384,17 +224,15 @@ void replace_file(const std::string& path, std::string_view bytes) {
 void replace_file(const std::string& path, Pieces pieces, bool sync) {
   const std::string target = resolve_links(path);
   const std::optional<struct stat> old = status_of(path, target);
-  // a file of several names stays the one that they name
-  if (old && old->st_nlink > 1) return rewrite(path, target, pieces);
   const mode_t own = S_IRUSR | S_IWUSR;
   const mode_t all = own | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH;
   Temporary file(path, target, old ? own : all);
-  if (!file.ok()) {
-    const bool forbidden = errno == EACCES || errno == EPERM || errno == EROFS;
-    if (old && forbidden) return rewrite(path, target, pieces);
-    fail_in_system(path, "cannot be written");
+  if (!file.ok()) fail_in_system(path, "cannot be written: no new file can be made beside it");
+  if (old && !take_over(file.id(), target, *old)) {
+    fail_in_system(path,
+                   "cannot be replaced: a new file cannot be given its owner, permissions and "
+                   "attributes. Write to another path");
   }
-  if (old && !take_over(file.id(), target, *old)) return rewrite(path, target, pieces);
   write_all(file.id(), pieces, path);
   // the old file is not given up for one that may be lost
   if ((sync || old) && ::fsync(file.id()) != 0) fail_in_system(path, "cannot be written");

@@ -18,11 +18,9 @@ std::string read_file(const std::string& path);
 /// instant between its naming and its renaming; where the system has no files without a name, it
 /// leaves NAME.PID-1. Links are followed; owner, permissions and extended attributes kept.
 ///
-/// A file of several names, one whose owner or attributes a new file cannot be given, and one in a
-/// folder that cannot be written, are rewritten in place: the bytes go into a journal beside it, or
-/// in $TMPDIR, are flushed, and then written over the file. A process that is killed leaves the
-/// journal, NAME.fclib-journal, from which the next reader or writer of fclib goes on. Throws Error
-/// (file) that names the file.
+/// Of a file with several names (hard links) this one gets the new file, and the others keep the
+/// old one. Throws Error (file) that names the file, if its folder takes no new file or a new file
+/// cannot be given its owner, permissions and attributes.
 void replace_file(const std::string& path, std::string_view bytes);
 
 /// The same of bytes that lie in pieces, one after another. Without `sync` a new file is not
@@ -34,24 +32,17 @@ void replace_file(const std::string& path, std::span<const std::string_view> pie
 void sync_files(const std::string& folder);
 
 /// Makes those who read a file, change it and put it back take turns. The lock is on the folder,
-/// since the file itself is replaced; it goes with the process that holds it. Where the file system
-/// has no such locks there is none.
-class Turn {
+/// since the file itself is replaced; it goes with the process that holds it. If the file system
+/// has no such locks, there is none.
+class FolderLock {
  public:
-  explicit Turn(const std::string& path);
-  ~Turn();
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
+  explicit FolderLock(const std::string& path);
+  ~FolderLock();
+  FolderLock(const FolderLock&) = delete;
+  FolderLock& operator=(const FolderLock&) = delete;
 
  private:
   int folder_ = -1;
 };
-
-/// Goes on with a rewrite that was cut. To be called in one's turn. Throws Error (file) where the
-/// file may not be written.
-void finish_rewrite(const std::string& path);
-
-/// The same before a file is read: after whoever is at it.
-void finish_rewrite_in_turn(const std::string& path);
 
 }  // namespace fclib

@@ -13,7 +13,6 @@ import pytest
 from capi_library import compile_program
 
 KILLS = 150
-KILLS_IN_PLACE = 60
 TIME_LIMIT = 600.0  # seconds for all of them, on a machine however busy
 SIZES = (30, 900)  # contacts of the problems that take turns, of one chunk and of several
 
@@ -110,35 +109,6 @@ def two_turns(writer: Path, path: Path) -> float:
             changes, inode = changes + (now != inode), now
         process.kill()
     return time.monotonic() - start
-
-
-@pytest.mark.slow
-def test_a_file_of_two_names_is_whole_after_a_kill(
-    programs: tuple[Path, Path], tmp_path: Path
-) -> None:
-    """It is rewritten in place; the next reader goes on where the writer was killed."""
-    writer, reader = programs
-    random.seed(2)
-    path, other = tmp_path / "problem.hdf5", tmp_path / "other.hdf5"
-    longest = max(0.05, 1.5 * two_turns(writer, path))
-    os.link(path, other)
-    repaired = 0
-    found: list[list[str]] = []
-    start = time.monotonic()
-    while len(found) < KILLS_IN_PLACE and time.monotonic() - start < TIME_LIMIT:
-        process = subprocess.Popen([writer, path, *map(str, SIZES)], stdout=subprocess.DEVNULL)
-        time.sleep(random.uniform(0, longest))
-        process.kill()
-        assert process.wait() == -signal.SIGKILL
-        journal = Path(f"{path}.fclib-journal")
-        repaired += journal.exists()
-        done = subprocess.run([reader], input=str(path), capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        assert not journal.exists()
-        found.append(done.stdout.split())
-    assert {whole for _, whole, _ in found} == {"1"}
-    assert repaired > 0
-    assert path.samefile(other)
 
 
 @pytest.mark.slow

@@ -95,7 +95,6 @@ template <class Body>
 auto read_from(const std::string& path, const Body& body) {
   const Session session;
   return in_file(path, [&] {
-    finish_rewrite_in_turn(path);
     const Handle file = open_file(path);
     return body(Group{file.id(), "/"});
   });

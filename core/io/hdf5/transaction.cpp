@@ -37,9 +37,8 @@ void change_file(const std::string& path, Start start, int compression,
   require_level(compression);
   const Session session;
   in_file(path, [&] {
-    const Turn turn(path);
+    const FolderLock lock(path);
     std::error_code error;
-    finish_rewrite(path);
     bool existing =
         start == Start::existing || (start == Start::existing_or_empty && fs::exists(path, error));
     MemoryFile file = [&] {

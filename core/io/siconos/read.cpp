@@ -6,7 +6,6 @@
 namespace fclib {
 
 Problem read_siconos(const std::string& path, std::string_view kind) {
-  finish_rewrite_in_turn(path);
   const std::string text = read_file(path);
   try {
     Problem problem = parse_siconos(text, kind);

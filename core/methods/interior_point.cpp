@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "contact/inverse.hpp"
+#include "methods/interior_path.hpp"
 #include "reduced/relative_error.hpp"
 
 namespace fclib {
@@ -16,67 +17,38 @@ InteriorPoint<D>::InteriorPoint(const ReducedProblem& problem, CoupledSystem& sy
 template <int D>
 void InteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& guess,
                              FunctionRef<bool(double error, const Vector& r)> report) {
-  const Index nc = problem_.nc();
-  const double count = static_cast<double>(nc);
   start(rules, guess);
-  double delta = rules.delta;
-  double least = std::numeric_limits<double>::infinity();
-  int least_at = 0;
-  for (iterations_ = 0; iterations_ < rules.max_iterations; ++iterations_) {
-    evaluate(rules);
+  iterations_ = follow_path(*this, rules, [&](int iteration) -> std::optional<double> {
+    iterations_ = iteration;
     physical_ = units_.reactions(r_);
     velocity_ = units_.velocities(u_);
     const double error = relative_error<Cone>(problem_, velocity_, physical_);
-    if (report(error, physical_)) return;
-    if (error < 0.5 * least) {
-      least = error;
-      least_at = iterations_;
-    }
-    if (iterations_ - least_at > rules.patience) return;
-    if (!(tau_ > 1e-15)) return;
-    if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
-    delta = std::clamp(delta, 1e-8, 1.0);
+    if (report(error, physical_)) return std::nullopt;
+    return error;
+  });
+}
 
-    assemble(delta, rules.associated);
-    if (!system_.factorise()) return;
-    // predictor
-    g_ = -lambda_;
-    if (!direction(delta)) return;
-    const double affine_step = std::min(1.0, longest());
-    const double affine_gap = (x_ + affine_step * dx_).dot(y_ + affine_step * dy_) / count;
-    double sigma = std::clamp(std::pow(affine_gap / tau_, 3), 1e-6, 1.0);
-    if (residual_ > rules.balance * tau_) {
-      sigma = 1;
-    } else if (residual_ > 0.1 * rules.balance * tau_) {
-      sigma = std::max(sigma, 0.3);
-    }
-    affine_x_ = dx_;
-    affine_y_ = dy_;
-    const double cap = std::clamp(1 - tau_, std::min(0.9, rules.step_cap), rules.step_cap);
-    double step = 0;
-    for (int attempt = 0; attempt < 3; ++attempt) {
-      if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
-      correct(sigma, attempt == 0);
-      if (attempt == 0 && !rules.associated) correct_shift(affine_step);
-      if (!direction(delta)) return;
-      step = std::min(1.0, cap * longest());
-      if (step >= 0.3) break;
-    }
-    x_ += step * dx_;
-    y_ += step * dy_;
-    r_ += step * dr_;
-    each([&](Index a) {  // x follows from r, to the last digit
-      const double mu = problem_.friction.mu[a];
-      x_.template segment<D>(D * a) = r_.template segment<D>(D * a);
-      if (mu > 0) x_[D * a] *= mu;
-    });
-    if (step < 0.1) {
-      delta *= 10;
-    } else if (step > 0.5) {
-      delta *= 0.1;
-    }
-    if (step < 1e-6) return;
-  }
+template <int D>
+void InteriorPoint<D>::keep_predictor() {
+  affine_x_ = dx_;
+  affine_y_ = dy_;
+}
+
+template <int D>
+double InteriorPoint<D>::gap(double step) const {
+  return (x_ + step * dx_).dot(y_ + step * dy_) / static_cast<double>(problem_.nc());
+}
+
+template <int D>
+void InteriorPoint<D>::advance(double step) {
+  x_ += step * dx_;
+  y_ += step * dy_;
+  r_ += step * dr_;
+  each([&](Index a) {  // x follows from r, to the last digit
+    const double mu = problem_.friction.mu[a];
+    x_.template segment<D>(D * a) = r_.template segment<D>(D * a);
+    if (mu > 0) x_[D * a] *= mu;
+  });
 }
 
 template <int D>
@@ -154,7 +126,7 @@ auto InteriorPoint<D>::scaled_target(Index a) const -> Vec {
 }
 
 template <int D>
-void InteriorPoint<D>::assemble(double delta, bool associated) {
+bool InteriorPoint<D>::assemble(double delta, const InteriorPointRules& rules) {
   std::vector<double>& blocks = system_.blocks();
   each([&](Index a) {
     const double mu = problem_.friction.mu[a];
@@ -170,7 +142,7 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
       n2(0, 0) -= 1;
       for (int k = 1; k < D; ++k) n2(k, k) += 1;
       n2 *= s.cone.beta * s.cone.beta;
-      if (!associated) {
+      if (!rules.associated) {
         const double norm = y.template tail<T>().norm();
         if (norm > 0) {
           s.P.template block<1, T>(0, 1) =
@@ -193,6 +165,7 @@ void InteriorPoint<D>::assemble(double delta, bool associated) {
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
         units_.template block<D>(a, s.regular * d0);
   });
+  return system_.factorise();
 }
 
 template <int D>

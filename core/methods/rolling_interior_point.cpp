@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "contact/inverse.hpp"
+#include "methods/interior_path.hpp"
 #include "reduced/relative_error.hpp"
 
 namespace fclib {
@@ -27,64 +28,50 @@ template <int D>
 void RollingInteriorPoint<D>::solve(const InteriorPointRules& rules, const Vector& guess,
                                     FunctionRef<bool(double error, const Vector& r)> report) {
   start(rules, guess);
-  double delta = rules.delta;
-  double least = std::numeric_limits<double>::infinity();
-  int least_at = 0;
-  for (int k = 0; k < rules.max_iterations; ++k) {
-    evaluate();
+  follow_path(*this, rules, [&](int) -> std::optional<double> {
     physical_ = units_.reactions(r_);
     velocity_ = units_.velocities(u_);
     const double error = relative_error<Cone>(problem_, velocity_, physical_);
-    if (report(error, physical_)) return;
-    if (error < 0.5 * least) {
-      least = error;
-      least_at = k;
+    if (report(error, physical_)) return std::nullopt;
+    return error;
+  });
+}
+
+template <int D>
+void RollingInteriorPoint<D>::predict() {
+  each_group([](Contact&, Group& group, int) { group.g = -group.lambda; });
+}
+
+template <int D>
+void RollingInteriorPoint<D>::keep_predictor() {
+  each_group([](Contact&, Group& group, int) {
+    group.affine_x = group.dx;
+    group.affine_y = group.dy;
+  });
+}
+
+template <int D>
+double RollingInteriorPoint<D>::gap(double step) const {
+  double sum = 0;
+  for (const Contact& contact : contacts_) {
+    for (const Group& group : contact.groups) {
+      if (!(group.coefficient > 0)) continue;
+      sum += (group.x + step * group.dx).dot(group.y + step * group.dy);
     }
-    if (k - least_at > rules.patience || !(tau_ > 1e-15)) return;
-    if (rules.delta_follows) delta = std::min(delta, 1e4 * tau_);
-    delta = std::clamp(delta, 1e-8, 1.0);
-    assemble(delta);
-    if (!system_.factorise()) return;
-    each_group([](Contact&, Group& group, int) { group.g = -group.lambda; });
-    if (!direction(delta)) return;
-    const double affine_step = std::min(1.0, longest());
-    double affine_gap = 0;
-    each_group([&](Contact&, Group& group, int) {
-      group.affine_x = group.dx;
-      group.affine_y = group.dy;
-      affine_gap += (group.x + affine_step * group.dx).dot(group.y + affine_step * group.dy);
-    });
-    double sigma = std::clamp(std::pow(affine_gap / count_ / tau_, 3), 1e-6, 1.0);
-    if (residual_ > rules.balance * tau_) {
-      sigma = 1;
-    } else if (residual_ > 0.1 * rules.balance * tau_) {
-      sigma = std::max(sigma, 0.3);
+  }
+  return sum / count_;
+}
+
+template <int D>
+void RollingInteriorPoint<D>::advance(double step) {
+  r_ += step * dr_;
+  for (Index a = 0; a < problem_.nc(); ++a) {  // x follows from r, to the last digit
+    const Vec r = r_.template segment<D>(D * a);
+    auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
+    for (int g = 0; g < 2; ++g) {
+      groups[g].x = lift(groups[g], g, r);
+      groups[g].y += step * groups[g].dy;
     }
-    const double cap = std::clamp(1 - tau_, std::min(0.9, rules.step_cap), rules.step_cap);
-    double step = 0;
-    for (int attempt = 0; attempt < 3; ++attempt) {
-      if (attempt > 0) sigma = std::max(sigma, attempt == 1 ? 0.3 : 0.9);
-      correct(sigma, attempt == 0);
-      if (attempt == 0) correct_shift(affine_step);
-      if (!direction(delta)) return;
-      step = std::min(1.0, cap * longest());
-      if (step >= 0.3) break;
-    }
-    r_ += step * dr_;
-    for (Index a = 0; a < problem_.nc(); ++a) {  // x follows from r, to the last digit
-      const Vec r = r_.template segment<D>(D * a);
-      auto& groups = contacts_[static_cast<std::size_t>(a)].groups;
-      for (int g = 0; g < 2; ++g) {
-        groups[g].x = lift(groups[g], g, r);
-        groups[g].y += step * groups[g].dy;
-      }
-    }
-    if (step < 0.1) {
-      delta *= 10;
-    } else if (step > 0.5) {
-      delta *= 0.1;
-    }
-    if (step < 1e-6) return;
   }
 }
 
@@ -142,7 +129,7 @@ void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vecto
 }
 
 template <int D>
-void RollingInteriorPoint<D>::evaluate() {
+void RollingInteriorPoint<D>::evaluate(const InteriorPointRules& /*rules*/) {
   units_.product(r_, units_.q(), u_, system_.workers());
   residual_ = 0;
   double gap = 0;
@@ -168,7 +155,7 @@ void RollingInteriorPoint<D>::evaluate() {
 }
 
 template <int D>
-void RollingInteriorPoint<D>::assemble(double delta) {
+bool RollingInteriorPoint<D>::assemble(double delta, const InteriorPointRules& /*rules*/) {
   std::vector<double>& blocks = system_.blocks();
   for (Index a = 0; a < problem_.nc(); ++a) {
     Contact& contact = contacts_[static_cast<std::size_t>(a)];
@@ -207,6 +194,7 @@ void RollingInteriorPoint<D>::assemble(double delta) {
     Eigen::Map<Mat>(blocks.data() + std::ptrdiff_t{D * D} * a) =
         units_.template block<D>(a, contact.regular * contact.D0);
   }
+  return system_.factorise();
 }
 
 template <int D>

@@ -16,7 +16,10 @@
 
 #include "contact/lorentz.hpp"
 #include "contact/rolling.hpp"
-#include "methods/interior_point.hpp"
+#include "function_ref.hpp"
+#include "methods/interior_rules.hpp"
+#include "reduced/own_units.hpp"
+#include "systems/coupled_system.hpp"
 
 namespace fclib {
 
@@ -30,6 +33,21 @@ class RollingInteriorPoint {
   /// As InteriorPoint::solve; `associated` and `smoothing` are not for it.
   void solve(const InteriorPointRules& rules, const Vector& guess,
              FunctionRef<bool(double error, const Vector& r)> report);
+
+  // ---- what follow_path (methods/interior_path.hpp) calls
+
+  [[nodiscard]] double tau() const { return tau_; }
+  [[nodiscard]] double residual() const { return residual_; }
+  void evaluate(const InteriorPointRules& rules);
+  bool assemble(double delta, const InteriorPointRules& rules);
+  void predict();
+  void keep_predictor();
+  void correct(double sigma, bool second_order);
+  void correct_shift(double step);
+  bool direction(double delta);
+  [[nodiscard]] double longest() const;
+  [[nodiscard]] double gap(double step) const;
+  void advance(double step);
 
  private:
   static constexpr int T = Cone::group_size;
@@ -52,12 +70,6 @@ class RollingInteriorPoint {
 
   [[nodiscard]] static Part lift(const Group& group, int k, const Vec& r);
   void start(const InteriorPointRules& rules, const Vector& guess);
-  void evaluate();
-  void assemble(double delta);
-  void correct(double sigma, bool second_order);
-  void correct_shift(double step);
-  bool direction(double delta);
-  [[nodiscard]] double longest() const;
 
   template <class F>
   void each_group(const F& f) {

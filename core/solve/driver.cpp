@@ -9,6 +9,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "linalg/cpu_watch.hpp"
+#include "merit/consistent_joints.hpp"
 #include "number_text.hpp"
 #include "solve/plugin.hpp"
 
@@ -334,9 +335,11 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
       elimination, request.settings.tolerance);
 }
 
+/// `given` is the problem as it was given, which proofs are of.
 template <class P>
-Result solve_global(const P& problem, const Request& request, const Solution& guess) {
-  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
+Result solve_global(const P& problem, const P& given, const Request& request,
+                    const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(given, y); };
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
@@ -378,6 +381,16 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
       elimination, request.settings.tolerance);
 }
 
+/// With joints that agree, if only rounding keeps them from it.
+template <class P>
+Result solve_consistent(const P& given, const Request& request, const Solution& guess) {
+  const std::optional<ConsistentJoints> joints = consistent_joints(given);
+  if (!joints) return solve_global(given, given, request, guess);
+  Result result = solve_global(with(given, *joints), given, request, guess);
+  result.message = joints->words() + (result.message.empty() ? "" : "; " + result.message);
+  return result;
+}
+
 /// What every solve does: checks, times.
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
@@ -416,12 +429,13 @@ Result solve(const LocalRollingProblem& problem, const Solver& solver, const Set
 
 Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalProblem>);
+  return solve_any(problem, solver, settings, options, guess, solve_consistent<GlobalProblem>);
 }
 
 Result solve(const GlobalRollingProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalRollingProblem>);
+  return solve_any(problem, solver, settings, options, guess,
+                   solve_consistent<GlobalRollingProblem>);
 }
 
 }  // namespace fclib

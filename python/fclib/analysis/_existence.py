@@ -305,6 +305,10 @@ def existence(
     problem = data.problem
     solution, error, proof = None, float("nan"), None
     why = ""
+    agreed = ""  # why other joints are solved and judged than those of the data
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        found = problem.consistent()
+        agreed = found[1] if found is not None else ""
     limit = min(time_limit, LOOK) if condition.holds else time_limit
     try:
         result = _solve.solve(problem, "auto", tol, time_limit=limit)
@@ -317,7 +321,7 @@ def existence(
         if result.certificate is not None:
             proof = farkas(problem, result.certificate, result.certificate_z)
     if joints.agree is False:
-        return _contradiction(data, joints, why, solution, error)
+        return _contradiction(data, joints, agreed, why, solution, error)
     if condition.holds:
         name = "W'" if problem.p else "W"
         reason = f"Slater's condition holds ({condition.method}), {name} is positive semidefinite"
@@ -337,6 +341,8 @@ def existence(
             f"solved to an error of {error:.1e} relative to ||q|| (tolerance {tol:.0e}), which is "
             "no proof"
         )
+        if agreed:
+            reason = f"{agreed}; {reason}"
         return Existence(EXISTS_AT_HAND, reason, None, solution, error)
     proof = proof or prove(data, time_limit)
     if proof is not None:
@@ -352,10 +358,15 @@ def existence(
 
 
 def _contradiction(
-    data: Data, joints: Joints, why: str, solution: _core.Solution | None, error: float
+    data: Data,
+    joints: Joints,
+    agreed: str,
+    why: str,
+    solution: _core.Solution | None,
+    error: float,
 ) -> Existence:
     """Of joints that contradict each other: a proof, unless it is within rounding."""
-    for sign in (1, -1):
+    for sign in () if agreed else (1, -1):
         z = {k: sign * value for k, value in joints.combination.items()}
         try:
             proof = check(data.problem, {}, z)
@@ -363,5 +374,6 @@ def _contradiction(
             continue
         reason = f"{joints.reason}, in exact arithmetic"
         return Existence(PROVEN_NOT, reason, proof, None, error)
-    reason = f"{joints.reason}, exactly, which may be the rounding of the data; {why}"
+    rounding = agreed or "which may be the rounding of the data"
+    reason = f"{joints.reason}, exactly; {rounding}; {why}"
     return Existence(UNDECIDED, reason, None, solution, error)

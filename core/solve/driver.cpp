@@ -89,16 +89,38 @@ struct Measure {
   }
 };
 
-/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
-/// there, and beside a large one the reactions of the others round.
-void clear_without_effect(const Matrix& W, int d, Vector& r) {
-  std::vector<bool> moves(static_cast<std::size_t>(r.size() / d), false);
+/// Of each contact, whether its reaction moves anything.
+std::vector<bool> moving(const Matrix& W, int d) {
+  std::vector<bool> moves(static_cast<std::size_t>(W.cols / d), false);
   for_each_entry(W, [&](Index, Index col, double value) {
     if (value != 0) moves[static_cast<std::size_t>(col / d)] = true;
   });
+  return moves;
+}
+
+/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
+/// there, beside a large one the reactions of the others round, and none is better than zero.
+void clear_without_effect(const Matrix& W, int d, Vector& r) {
+  const std::vector<bool> moves = moving(W, d);
   for (std::size_t a = 0; a < moves.size(); ++a) {
     if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
   }
+}
+
+/// The contacts that no reaction moves and that close all the same, where that is no proof: joints
+/// hold them, up to rounding. A solver would raise their reactions for ever.
+std::vector<Index> held_contacts(const LocalProblem& plain,
+                                 const std::function<bool(const Vector&)>& proves) {
+  std::vector<Index> result;
+  const std::vector<bool> moves = moving(plain.W, plain.spacedim);
+  for (std::size_t a = 0; a < moves.size(); ++a) {
+    const auto contact = static_cast<Index>(a);
+    if (moves[a] || !(plain.q[contact * plain.spacedim] < 0)) continue;
+    if (!proves(Vector::Unit(static_cast<Eigen::Index>(moves.size()), contact))) {
+      result.push_back(contact);
+    }
+  }
+  return result;
 }
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
@@ -136,6 +158,12 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
                          .primal = primal,
                          .deadline = &request.deadline,
                          .proves_no_solution = &proves};
+  const std::vector<Index> held = held_contacts(plain, proves);
+  result.certificate = {};
+  const auto leave_held = [&] {  // the merit judges their velocities, which are not for solvers
+    for (const Index a : held) reduced.q.segment(a * plain.spacedim, plain.spacedim).setZero();
+  };
+  leave_held();
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
   if (guess.r.size() > 0) clear_without_effect(plain.W, plain.spacedim, r);
   Settings settings = request.settings;
@@ -220,6 +248,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     Vector u;
     reduced.velocity(r, u);
     reduced.q += result.solution.u - u;
+    leave_held();
     if (rounded) {
       reduced.known_r = r;
       reduced.known_u = result.solution.u;
@@ -326,6 +355,7 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
     return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
   }
   const auto judge_expanded = [&](Solution& solution) {
+    clear_without_effect(elimination.plain().W, problem.spacedim, solution.r);
     solution = elimination.expand(solution);
     return judge(solution);
   };
@@ -364,6 +394,7 @@ Result solve_global(const P& problem, const P& given, const Request& request,
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
   const auto judge_expanded = [&](Solution& solution) {
+    clear_without_effect(elimination.plain().W, problem.spacedim, solution.r);
     Solution expanded = condensation.expand(elimination.expand(solution));
     solution = expanded;
     const bool held = elimination.hold(problem, condensation, solution);

@@ -163,7 +163,7 @@ def _contradicting(joints: Joints, combination: Mapping[int, Fraction]) -> Joint
 
 def _eliminated(B: sp.csr_array, e: Array, end: float) -> tuple[int, dict[int, Fraction]]:
     """The rank, and the combination of rows that vanishes and contradicts e the most; or none."""
-    rows, size = B.shape
+    size = B.shape[1]
     equations: list[Equation] = exact_rows(B)
     for k, equation in enumerate(equations):
         equation[size + k] = Fraction(1)

@@ -29,7 +29,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from math import hypot, inf, isfinite, sqrt
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp

@@ -9,7 +9,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "convert/storage.hpp"
-#include "merit/consistent_joints.hpp"
+#include "joints/consistent.hpp"
 #include "module.hpp"
 
 namespace fclib::bindings {

@@ -4,8 +4,8 @@
 #include <optional>
 #include <utility>
 
+#include "joints/consistent.hpp"
 #include "linalg/extended.hpp"
-#include "merit/consistent_joints.hpp"
 
 namespace fclib {
 

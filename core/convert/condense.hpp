@@ -33,7 +33,7 @@ class Condensation {
 };
 
 /// The local form of a global problem (M3DFC from GM3DFC), with joints that agree if only rounding
-/// keeps them from it (merit/consistent_joints.hpp).
+/// keeps them from it (joints/consistent.hpp).
 LocalProblem condense(const GlobalProblem& problem);
 LocalRollingProblem condense(const GlobalRollingProblem& problem);
 

@@ -7,7 +7,7 @@
 
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
-#include "merit/consistent_joints.hpp"
+#include "joints/consistent.hpp"
 #include "merit/equations.hpp"
 #include "merit/natural_sums.hpp"
 

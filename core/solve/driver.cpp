@@ -8,8 +8,8 @@
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
+#include "joints/consistent.hpp"
 #include "linalg/cpu_watch.hpp"
-#include "merit/consistent_joints.hpp"
 #include "number_text.hpp"
 #include "solve/plugin.hpp"
 

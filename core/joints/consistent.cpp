@@ -1,4 +1,4 @@
-#include "merit/consistent_joints.hpp"
+#include "joints/consistent.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -66,8 +66,8 @@ std::vector<std::vector<Index>> loops(const SparseColumns& r) {
   for (Eigen::Index col = 0; col < r.cols(); ++col) {
     for (SparseColumns::InnerIterator entry(r, col); entry; ++entry) {
       if (entry.value() == 0) continue;
-      const auto [low, high] = std::minmax(
-          {first(static_cast<Index>(entry.row())), first(static_cast<Index>(col))});
+      const auto [low, high] =
+          std::minmax({first(static_cast<Index>(entry.row())), first(static_cast<Index>(col))});
       above[static_cast<std::size_t>(high)] = low;
     }
   }
@@ -160,8 +160,8 @@ std::optional<ConsistentJoints> consistent_joints(const GlobalProblem& problem) 
     contradicts = true;
     const Vector moved = length.cwiseProduct(z * said);
     std::vector<Eigen::Triplet<double, Index>> entries;
-    const Eigen::MatrixXd back = length.asDiagonal() * z;      // E^-1 Z
-    const Eigen::MatrixXd along = inverse.asDiagonal() * z;    // E Z
+    const Eigen::MatrixXd back = length.asDiagonal() * z;           // E^-1 Z
+    const Eigen::MatrixXd along = inverse.asDiagonal() * z;         // E Z
     Eigen::MatrixXd image = Eigen::MatrixXd::Zero(g.rows(), idle);  // G E Z
     for (Eigen::Index k = 0; k < size; ++k) {
       const Index row = rows[static_cast<std::size_t>(k)];

@@ -17,8 +17,8 @@ namespace {
 
 /// Of single precision, half its last digit.
 constexpr double single_precision = 0x1p-24;
-/// What a problem may state. Finer than this, the squares in R are rounding; coarser than half
-/// precision, any contradiction could hide.
+/// What a problem may state; else it states nothing. Finer than this, the squares in R are
+/// rounding; coarser than half precision, any contradiction could hide.
 constexpr double finest = 4e-9;
 constexpr double coarsest = 0x1p-11;
 /// Roundings of a row: its dozen of entries (two bodies of six velocities), their sum, and b.
@@ -36,7 +36,7 @@ double stated_precision(const std::string& description) {
   const std::size_t at = description.find(key);
   if (at == std::string::npos) return 0;
   const double value = std::strtod(description.c_str() + at + key.size(), nullptr);
-  return value >= finest ? std::min(value, coarsest) : 0;
+  return value >= finest && value <= coarsest ? value : 0;
 }
 
 /// Whether all entries are floats, and some have more digits than what is written by hand.

@@ -100,8 +100,7 @@ std::vector<bool> moving(const Matrix& W, int d) {
 
 /// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
 /// there, beside a large one the reactions of the others round, and none is better than zero.
-void clear_without_effect(const Matrix& W, int d, Vector& r) {
-  const std::vector<bool> moves = moving(W, d);
+void clear_without_effect(const std::vector<bool>& moves, int d, Vector& r) {
   for (std::size_t a = 0; a < moves.size(); ++a) {
     if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
   }
@@ -109,10 +108,9 @@ void clear_without_effect(const Matrix& W, int d, Vector& r) {
 
 /// The contacts that no reaction moves and that close all the same, where that is no proof: joints
 /// hold them, up to rounding. A solver would raise their reactions for ever.
-std::vector<Index> held_contacts(const LocalProblem& plain,
+std::vector<Index> held_contacts(const LocalProblem& plain, const std::vector<bool>& moves,
                                  const std::function<bool(const Vector&)>& proves) {
   std::vector<Index> result;
-  const std::vector<bool> moves = moving(plain.W, plain.spacedim);
   for (std::size_t a = 0; a < moves.size(); ++a) {
     const auto contact = static_cast<Index>(a);
     if (moves[a] || !(plain.q[contact * plain.spacedim] < 0)) continue;
@@ -158,14 +156,15 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
                          .primal = primal,
                          .deadline = &request.deadline,
                          .proves_no_solution = &proves};
-  const std::vector<Index> held = held_contacts(plain, proves);
+  const std::vector<bool> moves = moving(plain.W, plain.spacedim);
+  const std::vector<Index> held = held_contacts(plain, moves, proves);
   result.certificate = {};
   const auto leave_held = [&] {  // the merit judges their velocities, which are not for solvers
     for (const Index a : held) reduced.q.segment(a * plain.spacedim, plain.spacedim).setZero();
   };
   leave_held();
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
-  if (guess.r.size() > 0) clear_without_effect(plain.W, plain.spacedim, r);
+  if (guess.r.size() > 0) clear_without_effect(moves, plain.spacedim, r);
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
@@ -354,8 +353,9 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
   if (!elimination.finished()) {
     return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
   }
+  const std::vector<bool> moves = moving(elimination.plain().W, problem.spacedim);
   const auto judge_expanded = [&](Solution& solution) {
-    clear_without_effect(elimination.plain().W, problem.spacedim, solution.r);
+    clear_without_effect(moves, problem.spacedim, solution.r);
     solution = elimination.expand(solution);
     return judge(solution);
   };
@@ -393,8 +393,9 @@ Result solve_global(const P& problem, const P& given, const Request& request,
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
+  const std::vector<bool> moves = moving(elimination.plain().W, problem.spacedim);
   const auto judge_expanded = [&](Solution& solution) {
-    clear_without_effect(elimination.plain().W, problem.spacedim, solution.r);
+    clear_without_effect(moves, problem.spacedim, solution.r);
     Solution expanded = condensation.expand(elimination.expand(solution));
     solution = expanded;
     const bool held = elimination.hold(problem, condensation, solution);

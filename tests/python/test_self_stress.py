@@ -10,9 +10,9 @@ import scipy.sparse as sp
 
 import fclib
 from fclib import analysis, scenes
+from fclib.analysis._bounds import least_singular, lower_bound, root_above
 from fclib.analysis._data import Data
 from fclib.analysis._existence import Slater, slater
-from fclib.analysis._bounds import least_singular, lower_bound, root_above
 from fclib.analysis._joints import joints_of
 from fclib.analysis._self_stress import self_stress
 

@@ -1,10 +1,15 @@
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "convert/storage.hpp"
+#include "joints/consistent.hpp"
 #include "module.hpp"
 
 namespace fclib::bindings {
@@ -27,6 +32,21 @@ void bind_conversions(nb::module_& m) {
           "condense", [](const P& p) { return condense(p); },
           "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
           "Raises UnsuitableError where M is singular or not positive definite.");
+      const std::string pair =
+          "def consistent(self) -> tuple[" + class_name(P::kind) + ", str] | None";
+      nb::cpp_function_def(
+          [](const P& problem) -> std::optional<std::pair<P, std::string>> {
+            validate(problem);
+            const auto joints = consistent_joints(problem);
+            if (!joints) return std::nullopt;
+            return std::pair{with(problem, *joints), joints->words()};
+          },
+          nb::scope(cls), nb::name("consistent"), nb::is_method(), nb::sig(pair.c_str()),
+          nb::call_guard<Unlocked>(),
+          "The problem that is solved and judged in place of this one, and why, in words: with "
+          "joints that agree, where only the rounding of their source makes them contradict each "
+          "other. None where nothing is changed.\n\n"
+          "Raises UnsuitableError where M is singular.");
     } else {
       method(
           "eliminate", [](const P& p) { return eliminate(p); },

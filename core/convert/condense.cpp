@@ -4,6 +4,7 @@
 #include <optional>
 #include <utility>
 
+#include "joints/consistent.hpp"
 #include "linalg/extended.hpp"
 
 namespace fclib {
@@ -62,7 +63,9 @@ Solution Condensation::expand(const Solution& local) const {
 }
 
 LocalProblem condense(const GlobalProblem& problem) {
-  LocalProblem local = Condensation(problem).local();
+  const std::optional<ConsistentJoints> joints = consistent_joints(problem);
+  LocalProblem local =
+      joints ? Condensation(with(problem, *joints)).local() : Condensation(problem).local();
   for (Matrix* a : {&local.W, &local.V, &local.R}) {
     if (!a->empty()) *a = converted(*a, Storage::csr);
   }

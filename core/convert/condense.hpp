@@ -32,7 +32,8 @@ class Condensation {
   bool finished_ = false;
 };
 
-/// The local form of a global problem (M3DFC from GM3DFC).
+/// The local form of a global problem (M3DFC from GM3DFC), with joints that agree if only rounding
+/// keeps them from it (joints/consistent.hpp).
 LocalProblem condense(const GlobalProblem& problem);
 LocalRollingProblem condense(const GlobalRollingProblem& problem);
 

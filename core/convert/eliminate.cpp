@@ -250,14 +250,25 @@ void Elimination::reduce() {
   });
   const Vector impulse = bilateral_ ? bilateral_->solve(s_) : s_;
   plain_.q = problem_.q - v_ * impulse;
-  // and so is the row of such a component, and its velocity: where W' is semidefinite,
-  // |W'_kj|^2 <= W'_kk W'_jj, and what is larger says that it is not
+
+  // of a diagonal entry the joints' own terms count too: its multipliers x = R^-1 V^T e_k are
+  // taken from an R that is rounded by eps sqrt(R_ii R_jj), which x^T R x feels
+  const Vector lengths = joint_lengths();
+  Vector shares = Vector::Zero(full.rows());  // sum of sqrt(R_ii) |x_i|
+  for (Eigen::Index col = 0; col < coupling.outerSize(); ++col) {
+    for (SparseColumns::InnerIterator entry(coupling, col); entry; ++entry) {
+      shares[col] += lengths[entry.row()] * std::abs(entry.value());
+    }
+  }
   const Vector free = full.diagonal();
   const Vector left = w.diagonal();
-  const Vector terms_of_diagonal = size.diagonal();
-  Eigen::Array<bool, Eigen::Dynamic, 1> held_entirely = left.array() == 0 && free.array() != 0;
+  const Vector terms = Vector(size.diagonal()) + shares.cwiseAbs2();
+  // and so is the row of such a component, and its velocity: where W' is semidefinite,
+  // |W'_kj|^2 <= W'_kk W'_jj, and what is larger says that it is not
+  Eigen::Array<bool, Eigen::Dynamic, 1> held_entirely =
+      left.array().abs() <= rounding * terms.array() && free.array() != 0;
   const auto is_rounding = [&](Eigen::Index k, Eigen::Index j, double value) {
-    return value * value <= 2 * rounding * terms_of_diagonal[k] * terms_of_diagonal[j];
+    return value * value <= 2 * rounding * terms[k] * terms[j];
   };
   for (Eigen::Index col = 0; col < w.outerSize(); ++col) {
     for (SparseColumns::InnerIterator entry(w, col); entry; ++entry) {
@@ -269,12 +280,19 @@ void Elimination::reduce() {
     return !held_entirely[row] && !held_entirely[col];
   });
   // the terms of s, of which `impulse` is a sum, may be larger than it in one place
-  const Vector lengths = (v_.cwiseAbs2() * Vector::Ones(v_.cols())).cwiseSqrt();
-  const Vector terms = problem_.q.cwiseAbs() + impulse.norm() * lengths;
+  const double pushes = lengths.dot(impulse.cwiseAbs());
   for (Eigen::Index k = 0; k < left.size(); ++k) {
-    if (held_entirely[k] && std::abs(plain_.q[k]) <= rounding * terms[k]) plain_.q[k] = 0;
+    const double terms_of_q = std::abs(problem_.q[k]) + pushes * shares[k];
+    if (held_entirely[k] && std::abs(plain_.q[k]) <= rounding * terms_of_q) plain_.q[k] = 0;
   }
   plain_.W = converted(Matrix::from_eigen(w), Storage::csr);
+}
+
+Vector Elimination::joint_lengths() const {
+  Vector lengths = Vector::Ones(v_.cols());
+  if (!bilateral_) return lengths;  // R is the identity
+  const Vector diagonal = to_eigen(problem_.R).diagonal().cwiseAbs().cwiseSqrt();
+  return all_ ? diagonal : selected(diagonal, kept_);
 }
 
 Vector Elimination::multipliers(const Vector& velocity) const {

@@ -61,6 +61,8 @@ class Elimination {
   /// were any.
   bool leave_out_redundant(const SparseColumns& r, const Vector& size);
   void reduce();
+  /// sqrt(R_kk) of the constraints that are left.
+  [[nodiscard]] Vector joint_lengths() const;
   /// The multipliers of the constraints that are left.
   [[nodiscard]] Vector multipliers(const Vector& velocity) const;
 

@@ -1,10 +1,13 @@
 #include "merit/merit.hpp"
 
 #include <cmath>
+#include <optional>
+#include <type_traits>
 
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
 #include "error_size.hpp"
+#include "joints/consistent.hpp"
 #include "merit/equations.hpp"
 #include "merit/natural_sums.hpp"
 
@@ -142,9 +145,14 @@ Grounds grounds_of(const GlobalProblem& problem, const Solution& solution) {
 }
 
 template <class P>
-Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
-  validate(problem);
-  validate(solution, problem);
+Merit judge_valid(const P& given, const Solution& solution, ContactMerits& each) {
+  validate(given);
+  validate(solution, given);
+  std::optional<P> consistent;
+  if constexpr (std::is_base_of_v<GlobalProblem, P>) {
+    if (const auto joints = consistent_joints(given)) consistent = with(given, *joints);
+  }
+  const P& problem = consistent ? *consistent : given;
   const auto [own, found] = grounds_of(problem, solution);
   each.mismatches = found.mismatches;
   each.u = found.u.template cast<double>();

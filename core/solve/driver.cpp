@@ -8,6 +8,7 @@
 
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
+#include "joints/consistent.hpp"
 #include "linalg/cpu_watch.hpp"
 #include "number_text.hpp"
 #include "solve/plugin.hpp"
@@ -88,13 +89,18 @@ struct Measure {
   }
 };
 
-/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
-/// there, and beside a large one the reactions of the others round.
-void clear_without_effect(const Matrix& W, int d, Vector& r) {
-  std::vector<bool> moves(static_cast<std::size_t>(r.size() / d), false);
+/// Of each contact, whether its reaction moves anything.
+std::vector<bool> moving(const Matrix& W, int d) {
+  std::vector<bool> moves(static_cast<std::size_t>(W.cols / d), false);
   for_each_entry(W, [&](Index, Index col, double value) {
     if (value != 0) moves[static_cast<std::size_t>(col / d)] = true;
   });
+  return moves;
+}
+
+/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
+/// there, beside a large one the reactions of the others round, and none is better than zero.
+void clear_without_effect(const std::vector<bool>& moves, int d, Vector& r) {
   for (std::size_t a = 0; a < moves.size(); ++a) {
     if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
   }
@@ -109,6 +115,21 @@ void take_if_better(const Vector& r, const Vector& l, const Judge& judge, Result
   if (!(error < result.error)) return;
   result.error = error;
   result.solution = std::move(other);
+}
+
+/// The contacts that no reaction moves and that close all the same, where that is no proof: joints
+/// hold them, up to rounding. A solver would raise their reactions for ever.
+std::vector<Index> held_contacts(const LocalProblem& plain, const std::vector<bool>& moves,
+                                 const std::function<bool(const Vector&)>& proves) {
+  std::vector<Index> result;
+  for (std::size_t a = 0; a < moves.size(); ++a) {
+    const auto contact = static_cast<Index>(a);
+    if (moves[a] || !(plain.q[contact * plain.spacedim] < 0)) continue;
+    if (!proves(Vector::Unit(static_cast<Eigen::Index>(moves.size()), contact))) {
+      result.push_back(contact);
+    }
+  }
+  return result;
 }
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
@@ -146,8 +167,15 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
                          .primal = primal,
                          .deadline = &request.deadline,
                          .proves_no_solution = &proves};
+  const std::vector<bool> moves = moving(plain.W, plain.spacedim);
+  const std::vector<Index> held = held_contacts(plain, moves, proves);
+  result.certificate = {};
+  const auto leave_held = [&] {  // the merit judges their velocities, which are not for solvers
+    for (const Index a : held) reduced.q.segment(a * plain.spacedim, plain.spacedim).setZero();
+  };
+  leave_held();
   Vector r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(plain.q.size()));
-  if (guess.r.size() > 0) clear_without_effect(plain.W, plain.spacedim, r);
+  if (guess.r.size() > 0) clear_without_effect(moves, plain.spacedim, r);
   Settings settings = request.settings;
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
@@ -236,6 +264,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     Vector u;
     reduced.velocity(r, u);
     reduced.q += result.solution.u - u;
+    leave_held();
     if (rounded) {
       reduced.known_r = r;
       reduced.known_u = result.solution.u;
@@ -342,7 +371,9 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
   if (!elimination.finished()) {
     return out_of_time(problem.q.size(), problem.s.size(), request, guess, judge);
   }
+  const std::vector<bool> moves = moving(elimination.plain().W, problem.spacedim);
   const auto judge_expanded = [&](Solution& solution) {
+    clear_without_effect(moves, problem.spacedim, solution.r);
     solution = elimination.expand(solution);
     return judge(solution);
   };
@@ -352,9 +383,11 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
       elimination, request.settings.tolerance);
 }
 
+/// `given` is the problem as it was given, which proofs are of.
 template <class P>
-Result solve_global(const P& problem, const Request& request, const Solution& guess) {
-  const auto prove = [&](const Vector& y) { return prove_no_solution(problem, y); };
+Result solve_global(const P& problem, const P& given, const Request& request,
+                    const Solution& guess) {
+  const auto prove = [&](const Vector& y) { return prove_no_solution(given, y); };
   const Condensation condensation(problem, &request.deadline);
   const LocalProblem& local = condensation.local();
   const MeritKind kind = request.settings.merit;
@@ -378,7 +411,9 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
   }
   const Elimination elimination(problem, condensation, &request.deadline);
   if (!elimination.finished()) return stop();
+  const std::vector<bool> moves = moving(elimination.plain().W, problem.spacedim);
   const auto judge_expanded = [&](Solution& solution) {
+    clear_without_effect(moves, problem.spacedim, solution.r);
     Solution expanded = condensation.expand(elimination.expand(solution));
     solution = expanded;
     const bool held = elimination.hold(problem, condensation, solution);
@@ -394,6 +429,16 @@ Result solve_global(const P& problem, const Request& request, const Solution& gu
       problem,
       run(elimination.plain(), friction, std::move(measure), request, guess, judge_expanded, prove),
       elimination, request.settings.tolerance);
+}
+
+/// With joints that agree, if only rounding keeps them from it.
+template <class P>
+Result solve_consistent(const P& given, const Request& request, const Solution& guess) {
+  const std::optional<ConsistentJoints> joints = consistent_joints(given);
+  if (!joints) return solve_global(given, given, request, guess);
+  Result result = solve_global(with(given, *joints), given, request, guess);
+  result.message = joints->words() + (result.message.empty() ? "" : "; " + result.message);
+  return result;
 }
 
 /// What every solve does: checks, times.
@@ -434,12 +479,13 @@ Result solve(const LocalRollingProblem& problem, const Solver& solver, const Set
 
 Result solve(const GlobalProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalProblem>);
+  return solve_any(problem, solver, settings, options, guess, solve_consistent<GlobalProblem>);
 }
 
 Result solve(const GlobalRollingProblem& problem, const Solver& solver, const Settings& settings,
              const OptionValues& options, const Solution& guess) {
-  return solve_any(problem, solver, settings, options, guess, solve_global<GlobalRollingProblem>);
+  return solve_any(problem, solver, settings, options, guess,
+                   solve_consistent<GlobalRollingProblem>);
 }
 
 }  // namespace fclib

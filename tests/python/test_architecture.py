@@ -31,6 +31,7 @@ LAYERS: list[set[str]] = [
     {"formulations.hpp"},
     {"problem.hpp"},
     {"problem.cpp"},
+    {"joints"},
     {"merit", "proof", "convert", "io"},
     {"reduced"},
     {"systems"},

@@ -111,6 +111,36 @@ def test_no_solution_with_its_proof(path: Path) -> None:
     assert 1e14 < found.certificate.bound < np.inf
 
 
+@cases("contradictory-joints")
+def test_contradicting_joints_leave_no_solution(path: Path) -> None:
+    problem = fclib.read(path)
+    found = analysis.analyze(problem)
+    assert found.existence.verdict == analysis.PROVEN_NOT
+    assert found.certificate is not None
+    assert found.certificate.exact
+    assert not found.certificate.exact_y
+    assert found.uniqueness.verdict == "undecided"
+    with pytest.raises(fclib.UnsuitableError, match="contradicts the others"):
+        fclib.solve(problem)
+
+
+@cases("closed_chain_step20")
+def test_a_limit_that_loops_hold_gets_no_reaction(path: Path) -> None:
+    problem = fclib.read(path)
+    local = problem.condense()
+    held = fclib.Solution(r=np.zeros(12), l=-np.linalg.solve(local.R.toarray(), local.s))
+    none = fclib.merit(problem, held)
+    for solver in ("auto", "nsgs", "nsn-ac", "admm"):
+        for guess in (None, fclib.Solution(r=np.full(12, 1e3), l=np.zeros(10))):
+            result = fclib.solve(problem, solver, guess=guess)
+            assert np.abs(result.solution.r).max() <= 1e-12, solver
+            assert result.error <= none.error * (1 + 1e-6), solver
+            # the joints ask for 2e-12 m/s there, which is all that is wrong
+            assert result.error * np.linalg.norm(local.q) <= 1e-11
+            assert result.status in ("stalled", "inaccurate"), solver
+            assert fclib.merit(problem, result.solution).error == pytest.approx(result.error)
+
+
 def ring(count: int = 3) -> fclib.GlobalProblem:
     """Walls that close on a body from all sides: no doubles make their normals cancel."""
     angles = 2 * np.pi * np.arange(count) / count + 0.1

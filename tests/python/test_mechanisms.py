@@ -192,3 +192,86 @@ def test_walker_walks(roughness: float) -> None:
     _, x, y, _ = step.position[3:7]
     assert 1 - 2 * (x * x + y * y) > 0.98
     assert violation(step) < 1e-3
+
+
+# ---- a biped with closed loops, whose knees are locked beyond their limits
+
+
+def leg(side: str, sign: int) -> str:
+    """A rod from the thigh to the shin locks the knee; a crank and a link move the foot."""
+    y = 0.12 * sign
+    return f"""
+    <body name="{side}-hip" pos="0 {y} -.05">
+      <joint name="{side}-roll" axis="1 0 0" range="-20 20" damping="1" armature=".03"/>
+      <geom type="sphere" size=".05" mass="1.5" class="bare"/>
+      <body name="{side}-thigh" pos="0 0 -.05">
+        <joint name="{side}-pitch" axis="0 1 0" range="-50 60" damping="1" armature=".09"/>
+        <geom type="capsule" size=".04" fromto="0 0 0 .02 0 -.3" mass="3" class="bare"/>
+        <body name="{side}-rod" pos="-.05 {0.02 * sign} 0">
+          <joint name="{side}-rod" type="ball" damping=".01"/>
+          <geom type="capsule" size=".01" fromto="0 0 0 -.03 {0.013 * sign} -.3" mass=".15"
+            class="bare"/>
+        </body>
+        <body name="{side}-shin" pos=".02 0 -.3">
+          <joint name="{side}-knee" axis="0 1 0" range="5 120" damping="1" armature=".09"/>
+          <geom type="capsule" size=".03" fromto="0 0 0 -.1 0 -.02" mass=".4" class="bare"/>
+          <geom type="capsule" size=".03" fromto="0 0 0 .05 0 -.3" mass=".6" class="bare"/>
+          <body name="{side}-foot" pos=".05 0 -.3">
+            <joint name="{side}-ankle" axis="0 1 0" range="-40 40" damping=".5" stiffness="80"/>
+            <geom type="box" size=".1 .04 .02" mass=".4" friction=".7"/>
+          </body>
+          <body name="{side}-crank" pos=".02 {0.06 * sign} -.05">
+            <joint name="{side}-crank" axis="0 1 0" range="-30 30" damping=".05"/>
+            <geom type="capsule" size=".01" fromto="0 0 0 .06 0 0" mass=".1" class="bare"/>
+            <body name="{side}-link" pos=".06 0 0">
+              <joint name="{side}-link" axis="0 1 0"/>
+              <geom type="capsule" size=".01" fromto="0 0 0 .02 0 -.24" mass=".1" class="bare"/>
+            </body>
+          </body>
+        </body>
+      </body>
+    </body>"""
+
+
+def biped(height: float) -> str:
+    """Falls from a height of its pelvis [m]."""
+    loops = "".join(
+        f'<connect body1="{side}-rod" body2="{side}-shin" anchor="-.03 {0.013 * sign} -.3"/>'
+        f'<connect body1="{side}-link" body2="{side}-foot" anchor=".02 0 -.24"/>'
+        for side, sign in (("left", 1), ("right", -1))
+    )
+    return f"""<mujoco><option timestep=".0005"/><compiler autolimits="true"/>
+    <default><default class="bare"><geom contype="0" conaffinity="0"/></default></default>
+    <worldbody><geom type="plane" size="5 5 .1" friction=".7"/>
+      <body name="pelvis" pos="0 0 {height}"><freejoint/>
+        <geom type="box" size=".1 .15 .08" mass="10" class="bare"/>
+        {leg("left", 1)}{leg("right", -1)}
+      </body>
+    </worldbody><equality>{loops}</equality></mujoco>"""
+
+
+@pytest.mark.parametrize("height", [0.75, 0.95])
+def test_a_robot_with_locked_knees_moves_as_mujocos_does(height: float) -> None:
+    """Loops hold the knees where their limits push: a block of W that is rounding."""
+    mujoco: Any = pytest.importorskip("mujoco")
+    xml = biped(height)
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    fastest, farthest = 1e-3, 1e-3
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+        fastest = max(fastest, float(np.abs(data.qvel).max()))
+        farthest = max(farthest, float(np.abs(data.qpos).max()))
+    unsolved = 0
+    for step in simulate(scenes.Scene(name="biped", xml=xml), 1000, tol=1e-8):
+        assert np.abs(step.velocity).max() <= 100 * fastest, step.index
+        assert np.abs(step.position).max() <= 100 * farthest, step.index
+        assert np.abs(step.result.solution.r).max(initial=0.0) <= 1e3, step.index
+        if step.result.converged:
+            continue
+        # named, and nothing but the rounding of a free fall, in which no contact moves
+        unsolved += 1
+        assert step.result.status in ("stalled", "inaccurate"), step.index
+        assert np.linalg.norm(step.problem.condense().q) <= 1e-12, step.index
+        assert step.result.error * np.linalg.norm(step.problem.condense().q) <= 1e-11, step.index
+    assert unsolved <= 50

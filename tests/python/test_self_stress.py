@@ -10,16 +10,22 @@ import scipy.sparse as sp
 
 import fclib
 from fclib import analysis, scenes
+from fclib.analysis._bounds import least_singular, lower_bound, root_above
 from fclib.analysis._data import Data
 from fclib.analysis._existence import Slater, slater
-from fclib.analysis._self_stress import least_singular, lower_bound, root_above, self_stress
+from fclib.analysis._joints import joints_of
+from fclib.analysis._self_stress import self_stress
 
 pytest.importorskip("clarabel")
 
 
+def judged(data: Data) -> analysis.SelfStress:
+    joints = joints_of(data)
+    return self_stress(data, joints, slater(data, joints, True, False))
+
+
 def verdict(problem: fclib.Problem) -> analysis.SelfStress:
-    data = Data.of(problem)
-    return self_stress(data, slater(data, True, False))
+    return judged(Data.of(problem))
 
 
 def walls(gap: float = 0.0, friction: float = 0.5) -> fclib.GlobalProblem:
@@ -85,21 +91,23 @@ def test_joints_and_local_problems() -> None:
     assert verdict(walls(1.0).replace(G=G, b=[0.0])).verdict == "prestressed"
     along = walls(1.0).replace(G=G[::-1].copy(), b=[1e-3])
     assert verdict(along).verdict == "solvable"
-    # said twice, its rank is not shown; the walls that part may have any stress all the same
+    # said twice, the second row follows from the first exactly
     twice = np.hstack([G[::-1], G[::-1]])
-    assert verdict(along.replace(G=twice, b=[1e-3, 1e-3])).verdict == "prestressed"
+    assert verdict(along.replace(G=twice, b=[1e-3, 1e-3])).verdict == "solvable"
+    # said otherwise, no velocity is there; the walls that part may have any stress all the same
+    assert verdict(along.replace(G=twice, b=[1e-3, 2e-3])).verdict == "prestressed"
 
 
 def test_a_velocity_that_is_not_inside_proves_nothing() -> None:
     data = Data.of(walls(1.0))
     for witness in (np.zeros(3), np.array([-0.5, 0.3, 0.0]), np.array([1.1, 0.0, 0.0])):
         forged = Slater(True, 1.0, np.ones(6), "forged", witness=witness)
-        found = self_stress(data, forged)
+        found = self_stress(data, joints_of(data), forged)
         u = data.matrices["H"].T @ witness + walls(1.0).w
         assert (found.verdict == "solvable") == (data.dual_margin(u).min() > 0)
     # an M that is not positive definite makes W what it is not
     broken = replace(data, problem=walls(1.0).replace(M=np.diag([1.0, 1.0, -1.0])))
-    assert self_stress(broken, slater(data, True, False)).verdict != "solvable"
+    assert judged(broken).verdict != "solvable"
 
 
 def test_a_part_that_is_next_to_nothing_may_have_other_solutions() -> None:
@@ -113,7 +121,7 @@ def test_a_part_that_is_next_to_nothing_may_have_other_solutions() -> None:
     sizes = sorted(float(np.linalg.norm(np.array(one.r, float))) for one in states.isolated)
     assert len(sizes) == 2
     data = Data.of(problem)
-    found = self_stress(data, slater(data, True, False))
+    found = judged(data)
     assert found.verdict == "solvable"
     assert sizes[0] <= found.bound < found.far <= sizes[1]
 

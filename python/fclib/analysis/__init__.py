@@ -9,7 +9,8 @@ Existence is decided by conic programs, for which Clarabel is needed: ``pip inst
 
 _analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _self_stress.py
 _brief.py       what of that is cheap, for every file that is built. Needs _analyze.py
-_existence.py   whether there is a solution. Needs _enumerate.py, _conic.py and _certificate.py
+_existence.py   whether there is a solution. Needs _enumerate.py, _conic.py, _joints.py and
+                _certificate.py
 _self_stress.py whether reactions can grow without moving anything. Needs _existence.py
 _enumerate.py   all solutions of a small problem. Needs _rational.py and _spatial.py
 _spatial.py     all solutions of one spatial contact, by the roots of polynomials
@@ -19,6 +20,8 @@ _reference.py   certified solutions, by two unrelated algorithms. Needs _least_n
 _least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
 _contacts.py    statuses and energies, contact by contact
 _spectrum.py    ranks, singular values, definiteness
+_joints.py      whether joints agree. Needs _rational.py and _bounds.py
+_bounds.py      sums and singular values, with bounds that hold
 _conic.py       conic programs, solved by Clarabel
 _data.py        a problem's matrices and its local form, which all others start from
 """

@@ -11,6 +11,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.csgraph import connected_components
 
 from fclib import _core, _digest, _solve
+from fclib.analysis._bounds import least_singular, lower_bound
 from fclib.analysis._certificate import Certificate
 from fclib.analysis._data import (
     DENSE,
@@ -25,7 +26,8 @@ from fclib.analysis._data import (
 )
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import Existence, Slater, existence, slater
-from fclib.analysis._self_stress import SelfStress, least_singular, lower_bound, self_stress
+from fclib.analysis._joints import Joints, joints_of
+from fclib.analysis._self_stress import SelfStress, self_stress
 from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
 DEFINITE = ("positive definite", "positive semidefinite", "indefinite")
@@ -307,14 +309,15 @@ def analyze(
     full = rank == problem.m and sign.word == DEFINITE[0]
     # W = H^T M^-1 H, whatever its size
     semidefinite = sign.word in DEFINITE[:2] or (sign.word == UNKNOWN and definite_by_bodies(data))
-    condition = slater(data, semidefinite, full, time_limit)
-    unique = uniqueness(data, sign, full, dense)
+    joints = joints_of(data)
+    condition = slater(data, joints, semidefinite, full, time_limit)
+    unique = uniqueness(data, joints, sign, full, dense)
     states = None
     # one solution, by theorems; else the states of the contacts say how many
     if not (condition.holds and unique.verdict == "unique" and unique.reactions):
         states = enumerate_solutions(problem, time_limit=min(time_limit, ENUMERATION))
     unique = _enumerated(unique, states)
-    verdict = existence(data, condition, states, tol, time_limit)
+    verdict = existence(data, joints, condition, states, tol, time_limit)
     numbers = data.local.islands().contact
     return Analysis(
         problem=problem,
@@ -333,7 +336,7 @@ def analyze(
         slater=condition,
         existence=verdict,
         uniqueness=unique,
-        self_stress=self_stress(data, condition, time_limit),
+        self_stress=self_stress(data, joints, condition, time_limit),
         enumeration=states,
     )
 
@@ -380,8 +383,16 @@ def indefinite_in_part(
     return bool(low < -size * max(EPS * max(high, -low), own_rounding))
 
 
-def uniqueness(data: Data, sign: Definiteness, full: bool, dense: int) -> Uniqueness:
-    """By the contraction of the fixed point on s (Acary, Cadoux, Lemarechal & Malick 2011)."""
+def uniqueness(
+    data: Data, joints: Joints, sign: Definiteness, full: bool, dense: int
+) -> Uniqueness:
+    """By the contraction of the fixed point on s (Acary, Cadoux, Lemarechal & Malick 2011).
+
+    Nothing is unique of joints that contradict each other. If their rank is not shown, W' is not
+    either.
+    """
+    if not joints.certain:
+        return Uniqueness("undecided", joints.reason, float("nan"), False)
     if data.problem.nc == 0:
         return Uniqueness("unique", "there is no contact", 0.0, True)
     constant = float("nan")

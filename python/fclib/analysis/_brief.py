@@ -23,10 +23,12 @@ from fclib.analysis._analyze import (
     uniqueness,
 )
 from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
-from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, PROVEN_NOT, slater
+from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, PROVEN_NOT, UNDECIDED, slater
+from fclib.analysis._joints import joints_of
 from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
 
 SIDE = 1000  # of a block that is treated densely
+JOINTS = 0.5  # [s] wall clock, to decide whether joints agree
 
 
 @dataclass(frozen=True)
@@ -81,11 +83,14 @@ def brief(
     rank = found.rank if found is not None else None
     full = rank == problem.m and sign.word == DEFINITE[0]
     semidefinite = sign.word in DEFINITE[:2] or (found is None and definite_by_bodies(data))
-    condition = slater(data, semidefinite, full, conic=False)
-    unique = uniqueness(data, sign, full, SIDE if full else 0)
+    joints = joints_of(data, JOINTS)
+    condition = slater(data, joints, semidefinite, full, conic=False)
+    unique = uniqueness(data, joints, sign, full, SIDE if full else 0)
     existence = reason = None
     if condition.holds:
         existence, reason = EXISTS_SLATER, f"Slater's condition holds ({condition.method})"
+    elif joints.agree is False:
+        existence, reason = UNDECIDED, joints.reason
     elif error is not None and error <= tol:
         existence = EXISTS_AT_HAND
         reason = f"solved to an error of {error:.0e} relative to ||q||, which is no proof"

@@ -11,7 +11,9 @@ contact problems").
 Few contacts are decided by all their states (_enumerate.py).
 
 With bilateral constraints W is W' = W - V R^-1 V^T here: a W that is positive definite says nothing
-where W' is not. A proof that there is no solution is checked in exact arithmetic (_certificate.py).
+where W' is not. There are velocities at all only if the joints agree: nothing is said to exist
+unless that is shown (_joints.py). A proof that there is no solution is checked in exact arithmetic
+(_certificate.py).
 
 The lack of a Slater point proves nothing: jammed packings have solutions under prestress.
 """
@@ -25,10 +27,11 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import lsmr
 
 from fclib import _core, _solve
-from fclib.analysis._certificate import Certificate, farkas
+from fclib.analysis._certificate import Certificate, CertificateError, check, farkas
 from fclib.analysis._conic import Program, add_dual_cones, shares
 from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
 from fclib.analysis._enumerate import EXISTS, NONE, Enumeration
+from fclib.analysis._joints import Joints, joints_of_rows
 
 PAIRS = 500  # of contacts, that are tried as a proof at most
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
@@ -145,12 +148,19 @@ def _refined(
 
 
 def slater(
-    data: Data, semidefinite: bool, full: bool, time_limit: float = 60.0, *, conic: bool = True
+    data: Data,
+    joints: Joints,
+    semidefinite: bool,
+    full: bool,
+    time_limit: float = 60.0,
+    *,
+    conic: bool = True,
 ) -> Slater:
     """Looks for a velocity strictly inside K*.
 
     Args:
         data: the problem.
+        joints: those of `joints_of`.
         semidefinite: whether the symmetric part of W (W' with bilateral constraints) is positive
             semidefinite; else the condition says nothing of solutions, and is not looked at.
         full: whether that part has full rank: each velocity can be reached.
@@ -162,7 +172,11 @@ def slater(
     """
     d, nc, p = data.d, data.problem.nc, data.problem.p
     if nc == 0:
-        return Slater(True, 1.0, np.zeros(0), "there is no contact")
+        if joints.agree:
+            return Slater(True, 1.0, np.zeros(0), "there is no contact")
+        return Slater(None if joints.agree is None else False, np.nan, None, joints.reason)
+    if joints.agree is False:
+        return Slater(False, np.nan, None, joints.reason)
     if not semidefinite:
         word = "W is not positive semidefinite"
         if p:
@@ -170,17 +184,21 @@ def slater(
         return Slater(None, np.nan, None, word)
     inside = np.zeros(data.problem.m)
     inside[::d] = data.speed
-    if full:
+    if full and joints.certain:
         word = "W has full rank" if p == 0 else "W' = W - V R^-1 V^T has full rank"
         return Slater(True, 1.0, inside, word)
     if p == 0 and data.dual_margin(data.local.q).min() > MARGIN * data.speed:
         margin = min(1.0, float(data.dual_margin(data.local.q).min() / data.speed))
         return Slater(True, margin, data.local.q, "the velocity without reactions")
     A, c, B, e = reachable(data)
+    if e.size and (abs(B - joints.B).nnz if B.shape == joints.B.shape else True):
+        joints = joints_of_rows(B, e)  # of a problem that is not symmetric
+    if not joints.certain:
+        return Slater(None, np.nan, None, joints.reason)
     # the velocity that leaves every contact at the same speed, where it can be reached
     if p == 0:
         x = lsmr(A, inside - c, atol=1e-14, btol=1e-14, maxiter=500)[0]
-        if found := _witness(data, A, c, B, e, x, "least squares"):
+        if found := _witness(data, A, c, joints, x, "least squares"):
             return found
     if not conic:
         return Slater(None, np.nan, None, "left out: the conic program")
@@ -199,7 +217,7 @@ def slater(
     goal[k] = -1
     answer = program.solve(goal, time_limit=time_limit)
     x = np.array(answer.x)[:k] * data.speed / row_scale
-    if np.isfinite(x).all() and (found := _witness(data, A, c, B, e, x, "conic program")):
+    if np.isfinite(x).all() and (found := _witness(data, A, c, joints, x, "conic program")):
         return found
     # t is free below, so that there is a solution: t <= 0 is an answer, if it came to an end
     reached = float(answer.x[k])
@@ -235,24 +253,19 @@ def _symmetric_part(a: sp.sparray) -> sp.csr_array:
 
 
 def _witness(
-    data: Data,
-    A: sp.csr_array,
-    c: Array,
-    B: sp.csr_array,
-    e: Array,
-    x: Array,
-    method: str,
+    data: Data, A: sp.csr_array, c: Array, joints: Joints, x: Array, method: str
 ) -> Slater | None:
-    """X as a Slater point, judged from the data; None where it is none."""
-    slack = 0.0
-    if e.size:
-        x = x - lsmr(B, B @ x - e, atol=1e-15, btol=1e-15)[0]
-        # what is left of the equations is put right by an x of this size
-        step = lsmr(B, B @ x - e, atol=1e-15, btol=1e-15)[0]
-        slack = float(np.linalg.norm(A @ step)) * 10
+    """A Slater point near x, judged from the data; None where none is shown to be one."""
+    B, e = joints.B, joints.e
+    for _ in range(2 if e.size else 0):
+        x = x - lsmr(B, B @ x - e, atol=1e-15, btol=1e-15, conlim=0, maxiter=20 * sum(B.shape))[0]
+    off = joints.distance(x) if e.size else 0.0
     u = A @ x + c
+    lengths = np.sqrt(np.asarray(A.multiply(A).sum(axis=1)).ravel())
     rounding = 1e-12 * (abs(A) @ abs(x) + abs(c)).reshape(-1, data.d).sum(axis=1)
-    margin = float((data.dual_margin(u) - rounding).min() - slack) / data.speed
+    if off > 0:  # the velocity that the joints allow is so far from this one
+        rounding = rounding + off * (lengths[:: data.d] + data.resistance(lengths))
+    margin = float((data.dual_margin(u) - rounding).min()) / data.speed
     if not margin > MARGIN:
         return None
     return Slater(True, min(1.0, margin), u, method, witness=x)
@@ -277,7 +290,12 @@ class Existence:
 
 
 def existence(
-    data: Data, condition: Slater, states: Enumeration | None, tol: float, time_limit: float
+    data: Data,
+    joints: Joints,
+    condition: Slater,
+    states: Enumeration | None,
+    tol: float,
+    time_limit: float,
 ) -> Existence:
     """The verdict; `states` is what those of the contacts say, where they were asked.
 
@@ -287,6 +305,10 @@ def existence(
     problem = data.problem
     solution, error, proof = None, float("nan"), None
     why = ""
+    agreed = ""  # why other joints are solved and judged than those of the data
+    if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
+        found = problem.consistent()
+        agreed = found[1] if found is not None else ""
     limit = min(time_limit, LOOK) if condition.holds else time_limit
     try:
         result = _solve.solve(problem, "auto", tol, time_limit=limit)
@@ -298,6 +320,8 @@ def existence(
         why = f"the default solver ended as {result.status}, with an error of {error:.1e}"
         if result.certificate is not None:
             proof = farkas(problem, result.certificate, result.certificate_z)
+    if joints.agree is False:
+        return _contradiction(data, joints, agreed, why, solution, error)
     if condition.holds:
         name = "W'" if problem.p else "W"
         reason = f"Slater's condition holds ({condition.method}), {name} is positive semidefinite"
@@ -317,6 +341,8 @@ def existence(
             f"solved to an error of {error:.1e} relative to ||q|| (tolerance {tol:.0e}), which is "
             "no proof"
         )
+        if agreed:
+            reason = f"{agreed}; {reason}"
         return Existence(EXISTS_AT_HAND, reason, None, solution, error)
     proof = proof or prove(data, time_limit)
     if proof is not None:
@@ -329,3 +355,25 @@ def existence(
     if states is not None and states.states:
         why += f"; {states.reason}"
     return Existence(UNDECIDED, f"{why}; no proof was found that there is no solution", None)
+
+
+def _contradiction(
+    data: Data,
+    joints: Joints,
+    agreed: str,
+    why: str,
+    solution: _core.Solution | None,
+    error: float,
+) -> Existence:
+    """Of joints that contradict each other: a proof, unless it is within rounding."""
+    for sign in () if agreed else (1, -1):
+        z = {k: sign * value for k, value in joints.combination.items()}
+        try:
+            proof = check(data.problem, {}, z)
+        except CertificateError:
+            continue
+        reason = f"{joints.reason}, in exact arithmetic"
+        return Existence(PROVEN_NOT, reason, proof, None, error)
+    rounding = agreed or "which may be the rounding of the data"
+    reason = f"{joints.reason}, exactly; {rounding}; {why}"
+    return Existence(UNDECIDED, reason, None, solution, error)

@@ -18,39 +18,44 @@ solvable    a velocity strictly inside K* is reached, and W is positive semidefi
 prestressed r_bar in K, not zero, with W r_bar = 0 (H r_bar + G l = 0 of a global problem).
 open        neither is proven.
 
-Sums are those of rational numbers, so that nothing is rounded. That a matrix has no eigenvalue
-below a bound is shown by a Cholesky factorisation of it with that bound and its own rounding taken
-off (Rump 2006, "Verification of positive definiteness"). r_bar is near what a conic program gives:
-small ones by elimination in rational numbers, others because H has full row rank on the contacts
-that carry them, so that some r_bar is no farther than what is left of H r over the least singular
-value.
+Sums are those of rational numbers, so that nothing is rounded, and eigenvalues are bounded
+(_bounds.py). r_bar is near what a conic program gives: small ones by elimination in rational
+numbers, others because H has full row rank on the contacts that carry them, so that some r_bar is
+no farther than what is left of H r over the least singular value.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from math import hypot, inf, isfinite, nextafter, sqrt
-from typing import Any
+from math import hypot, inf, isfinite, sqrt
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import qr
-from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import lsmr, spsolve
 
 from fclib import _core
+from fclib.analysis._bounds import (
+    Exact,
+    below,
+    dot,
+    exact_rows,
+    least_singular,
+    length,
+    lower_bound,
+    root_above,
+)
 from fclib.analysis._conic import Program
-from fclib.analysis._data import DENSE, EPS, Array, Data
+from fclib.analysis._data import DENSE, Array, Data
 from fclib.analysis._existence import Slater, reachable
+from fclib.analysis._joints import Joints
 from fclib.analysis._rational import Elimination
 
 SOLVABLE = "solvable"
 PRESTRESSED = "prestressed"
 OPEN = "open"
 FEW = 40  # unknowns that are eliminated in rational numbers: their digits grow with each
-
-Exact = list[dict[int, Fraction]]  # rows
 
 
 @dataclass(frozen=True)
@@ -77,8 +82,10 @@ class SelfStress:
     far: float = inf
 
 
-def self_stress(data: Data, condition: Slater, time_limit: float = 60.0) -> SelfStress:
-    """The verdict.
+def self_stress(
+    data: Data, joints: Joints, condition: Slater, time_limit: float = 60.0
+) -> SelfStress:
+    """The verdict; `joints` are those of `joints_of`.
 
     Raises:
         ImportError: Clarabel is needed, and not installed.
@@ -87,7 +94,7 @@ def self_stress(data: Data, condition: Slater, time_limit: float = 60.0) -> Self
         return SelfStress(SOLVABLE, "there is no contact", np.zeros(0), 1.0, 0.0)
     reason = "no velocity strictly inside K* was found"
     if condition.holds:
-        found, reason = _solvable(data, condition)
+        found, reason = _solvable(data, joints, condition)
         if found is not None:
             return found
     stressed, why = _prestressed(data, time_limit)
@@ -97,7 +104,7 @@ def self_stress(data: Data, condition: Slater, time_limit: float = 60.0) -> Self
 # ---- solvable
 
 
-def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
+def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress | None, str]:
     problem = data.problem
     A, c, B, e = reachable(data)
     x, velocity = condition.witness, condition.velocity
@@ -113,19 +120,19 @@ def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
         if (M != M.T).nnz or not lower_bound(M) > 0:
             return None, "M is not shown to be symmetric positive definite"
         if e.size:
-            off = _off_joints(B, e, x)
+            off = joints.distance(x)
             if not isfinite(off):
-                return None, "G is not shown to have full rank"
-        away = x - _free(data)
+                return None, "the joints are not shown to agree"
+        away = x - _free(data, joints)
         energy = float(away @ (M @ away)) * (1 + 1e-6)
-        rows = _rows(A)
+        rows = exact_rows(A)
     elif e.size:
         return None, "a local problem with bilateral constraints is not decided"
     else:
         delta = max(0.0, -lower_bound(A))
         size = float(np.linalg.norm(x)) * (1 + 1e-12)
         energy = max(0.0, float(x @ (A @ x))) * (1 + 1e-6) + 2 * delta * size**2
-        rows = _rows(data.W, data.W.T)
+        rows = exact_rows(data.W, data.W.T)
     margins, forces = _inside(data, rows, x, c, off)
     if not margins.min() > 0:
         return None, f"in exact arithmetic contact {int(margins.argmin())} is not inside K*"
@@ -141,53 +148,18 @@ def _solvable(data: Data, condition: Slater) -> tuple[SelfStress | None, str]:
     return SelfStress(SOLVABLE, reason, x, margin, energy / (2 * (least + root)), far), ""
 
 
-def _free(data: Data) -> Array:
+def _free(data: Data, joints: Joints) -> Array:
     """The velocity of a global problem without reactions of contacts."""
     problem = data.problem
     assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
-    M, G = data.matrices["M"], data.matrices.get("G")
-    if G is None or problem.b is None:
+    M = data.matrices["M"]
+    if not joints.kept.size:
         return np.asarray(spsolve(M, problem.f))
-    saddle = sp.block_array([[M, -G], [G.T, None]], format="csc")
-    return np.asarray(spsolve(saddle, np.concatenate([problem.f, -problem.b])))[: problem.n]
-
-
-def _off_joints(B: sp.csr_array, e: Array, x: Array) -> float:
-    """From above, how far from x a velocity is that the joints allow."""
-    exact = [Fraction(float(one)) for one in x]
-    rest = [_dot(row, exact) - Fraction(float(one)) for row, one in zip(_rows(B), e, strict=True)]
-    square = sum((one * one for one in rest), Fraction())
-    least = least_singular(B)
-    return float(root_above(square)) * (1 + 1e-15) / least if least > 0 else inf
-
-
-def least_singular(B: Any) -> float:
-    """A number that no singular value of a matrix with more columns than rows is below."""
-    B = sp.csr_array(B)
-    product = sp.csr_array(B @ B.T)
-    # what a sum of so many terms may have lost
-    lost = (int(np.diff(B.indptr).max(initial=0)) + 2) * EPS * (abs(B) @ abs(B).T)
-    off = float(lost.sum(axis=1).max()) if lost.nnz else 0.0
-    product = sp.csr_array((product + product.T) / 2)
-    return sqrt(max(0.0, lower_bound(product) - 2 * off)) * (1 - 1e-14)
-
-
-def _rows(a: Any, other: Any = None) -> Exact:
-    """The rows in rational numbers; of half the sum with another matrix."""
-    rows: Exact = [{} for _ in range(a.shape[0])]
-    for matrix in (a,) if other is None else (a, other):
-        entries = sp.coo_array(matrix)
-        half = Fraction(1) if other is None else Fraction(1, 2)
-        for row, col, value in zip(
-            entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True
-        ):
-            own = rows[row]
-            own[col] = own.get(col, Fraction()) + half * Fraction(value)
-    return rows
-
-
-def _dot(row: dict[int, Fraction], x: list[Fraction]) -> Fraction:
-    return sum((value * x[col] for col, value in row.items()), Fraction())
+    G_T = joints.B[joints.kept]
+    saddle = sp.block_array([[M, -G_T.T], [G_T, None]], format="csc")
+    return np.asarray(spsolve(saddle, np.concatenate([problem.f, joints.e[joints.kept]])))[
+        : problem.n
+    ]
 
 
 def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> tuple[Array, Array]:
@@ -199,85 +171,22 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
     exact = [Fraction(float(one)) for one in x]
     margins, forces = np.zeros(nc), np.zeros(nc)
     for a in range(nc):
-        u = [_dot(rows[d * a + k], exact) + Fraction(float(constant[d * a + k])) for k in range(d)]
+        u = [dot(rows[d * a + k], exact) + Fraction(float(constant[d * a + k])) for k in range(d)]
         steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), whose squares may be beyond doubles
         if off:
-            left -= Fraction(off) * _size(rows[d * a])
+            left -= Fraction(off) * length(rows[d * a])
         for mu, part in data.friction:
             friction = root_above(sum((t * t for t in u[part]), Fraction()))
             if off:
                 friction += Fraction(off) * sum(
-                    (_size(row) for row in rows[d * a : d * a + d][part]), Fraction()
+                    (length(row) for row in rows[d * a : d * a + d][part]), Fraction()
                 )
             left -= Fraction(float(mu[a])) * friction
             steep = hypot(steep, float(mu[a]))
-        margin = _below(left)
+        margin = below(left)
         margins[a] = margin
         forces[a] = margin / (steep * (1 + 1e-15))
     return margins, forces
-
-
-def _size(row: dict[int, Fraction]) -> Fraction:
-    return root_above(sum((one * one for one in row.values()), Fraction()))
-
-
-def _below(x: Fraction) -> float:
-    try:
-        return nextafter(float(x), -inf)
-    except OverflowError:
-        return float(np.finfo(float).max) if x > 0 else -inf
-
-
-def root_above(x: Fraction) -> Fraction:
-    """A rational number not less than the root, by 1e-15 of it."""
-    if x <= 0:
-        return Fraction()
-    shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
-    scale = Fraction(2) ** shift
-    guess = Fraction(sqrt(float(x * scale * scale)) * (1 + 1e-15)) / scale
-    while guess * guess < x:
-        guess *= 1 + Fraction(1, 10**15)
-    return guess
-
-
-def lower_bound(a: Any) -> float:
-    """A number that no eigenvalue of a symmetric matrix is below; -inf where none was found.
-
-    By blocks that nothing links, each up to DENSE.
-    """
-    a = sp.csr_array(a)
-    if a.nnz == 0:
-        return 0.0
-    labels = connected_components(a, directed=False)[1]
-    order = np.argsort(labels, kind="stable")
-    least = inf
-    for block in np.split(order, np.cumsum(np.bincount(labels))[:-1]):
-        if block.size > DENSE:
-            return -inf
-        least = min(least, _lower_bound(a[block][:, block].toarray()))
-    return least
-
-
-def _lower_bound(a: Array) -> float:
-    """Of a dense block: Cholesky's factorisation of a - shift succeeds."""
-    n = len(a)
-    diagonal = np.diag(a)
-    if n == 1:
-        return float(diagonal[0])
-    guess = float(np.linalg.eigvalsh(a)[0])
-    gamma = (n + 2) * EPS  # of n + 1 terms
-    size = n * EPS * float(abs(a).max())
-    for target in (guess / 2, 2 * guess, 0.0, *(-size * 4.0**k for k in range(8))):
-        if target > guess:
-            continue
-        own = gamma * float(np.abs(diagonal - target).sum()) * (1 + 1e-6) + 1e-300
-        shifted = a - (target + 2 * own) * np.eye(n)
-        try:
-            np.linalg.cholesky(shifted)
-        except np.linalg.LinAlgError:
-            continue
-        return target
-    return -inf
 
 
 # ---- prestressed
@@ -346,7 +255,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     how = "in exact arithmetic" if off == 0 else f"some within {off:.1e} of these doubles"
     reason = f"reactions of {kept.size} contacts move nothing, {how}"
     return SelfStress(
-        PRESTRESSED, reason, r_bar, max(0.0, _below(least)) / float(np.linalg.norm(r_bar))
+        PRESTRESSED, reason, r_bar, max(0.0, below(least)) / float(np.linalg.norm(r_bar))
     ), ""
 
 
@@ -369,7 +278,7 @@ def _in_kernel(B: sp.csr_array, y: Array) -> tuple[list[Fraction], float] | None
         y = y - lsmr(B, B @ y, atol=1e-15, btol=1e-15, conlim=0, maxiter=20 * sum(B.shape))[0]
     if B.shape[0] <= B.shape[1] and B.shape[0] <= DENSE and (least := least_singular(B)) > 0:
         exact = [Fraction(float(one)) for one in y]
-        square = sum((_dot(row, exact) ** 2 for row in _rows(B)), Fraction())
+        square = sum((dot(row, exact) ** 2 for row in exact_rows(B)), Fraction())
         return exact, float(root_above(square)) / least * (1 + 1e-14)
     if B.shape[1] > 2 * DENSE or B.shape[0] > DENSE:
         return None
@@ -378,7 +287,7 @@ def _in_kernel(B: sp.csr_array, y: Array) -> tuple[list[Fraction], float] | None
     rank = int((values > 1e-10 * values.max(initial=0)).sum())
     if rank > FEW:
         return None
-    equations = _rows(B)
+    equations = exact_rows(B)
     elimination = Elimination(equations)
     elimination.take_out(order[:rank].tolist())
     if any(equations):

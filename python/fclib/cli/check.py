@@ -46,6 +46,14 @@ def told_of(mismatch: dict[str, Any]) -> str:
     return f"{name} is wrong by {size}: from {source} follows {value:.6g}"
 
 
+def consistent_of(problem: fclib.Problem) -> str:
+    """Why other joints are judged than those of the file, in words; empty where none are."""
+    if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
+        found = problem.consistent()
+        return found[1] if found is not None else ""
+    return ""
+
+
 def check_certificate(report: Report, path: Path, certificate: Path) -> None:
     """Judge a proof that the problem of a file has no solution."""
     from fclib import analysis
@@ -100,7 +108,7 @@ def command(
     If a file has several problems, the global one is taken. The last columns count the contacts
     that are open, stick and slide.
     """
-    report = Report(as_json, hidden=("n", "formulation", "says", "mismatches"))
+    report = Report(as_json, hidden=("n", "formulation", "says", "mismatches", "joints"))
     for path in each_file(files, "checking"):
         if certificate is not None:
             check_certificate(report, path, certificate)
@@ -131,6 +139,9 @@ def command(
         }
         record |= {name: getattr(judged, name) for name in PARTS}
         record["mismatches"] = mismatches
+        if agreed := consistent_of(problem):
+            record["joints"] = agreed
+            err.print(f"{path.name}: {agreed}", highlight=False)
         for one in mismatches:
             err.print(f"{path.name}: {told_of(one)}", highlight=False)
         # what the file says of it is shown, and not believed

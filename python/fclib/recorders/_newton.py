@@ -25,6 +25,7 @@ from fclib.recorders._recorded import Recorded
 
 VERSION: Final = "1.8"  # of which the private data are known
 RANK: Final = 1e-5  # of a joint's row in single precision
+PRECISION: Final = 2.0**-24  # half the last digit of single precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +149,7 @@ def recorded(step: Step, version: str) -> Recorded:
         velocity=step.velocity,
         contacts=contacts,
         notes=("The data are of single precision.",),
-        more={"violated": assembled.violated},
+        more={"violated": assembled.violated, "precision": PRECISION},
     )
 
 

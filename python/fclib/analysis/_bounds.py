@@ -1,0 +1,114 @@
+"""Bounds that hold: sums in rational numbers, eigenvalues and singular values from one side.
+
+That a matrix has no eigenvalue below a bound is shown by a Cholesky factorisation of it with that
+bound and its own rounding taken off (Rump 2006, "Verification of positive definiteness").
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import inf, nextafter, sqrt
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fclib.analysis._data import DENSE, EPS, Array
+
+Exact = list[dict[int, Fraction]]  # rows
+
+
+def exact_rows(a: Any, other: Any = None) -> Exact:
+    """The rows in rational numbers; of half the sum with another matrix."""
+    rows: Exact = [{} for _ in range(a.shape[0])]
+    for matrix in (a,) if other is None else (a, other):
+        entries = sp.coo_array(matrix)
+        half = Fraction(1) if other is None else Fraction(1, 2)
+        for row, col, value in zip(
+            entries.row.tolist(), entries.col.tolist(), entries.data.tolist(), strict=True
+        ):
+            own = rows[row]
+            own[col] = own.get(col, Fraction()) + half * Fraction(value)
+    return rows
+
+
+def dot(row: dict[int, Fraction], x: list[Fraction]) -> Fraction:
+    """Row . x."""
+    return sum((value * x[col] for col, value in row.items()), Fraction())
+
+
+def least_singular(B: Any) -> float:
+    """A number that no singular value of a matrix with more columns than rows is below."""
+    B = sp.csr_array(B)
+    product = sp.csr_array(B @ B.T)
+    # what a sum of so many terms may have lost
+    lost = (int(np.diff(B.indptr).max(initial=0)) + 2) * EPS * (abs(B) @ abs(B).T)
+    off = float(lost.sum(axis=1).max()) if lost.nnz else 0.0
+    product = sp.csr_array((product + product.T) / 2)
+    return sqrt(max(0.0, lower_bound(product) - 2 * off)) * (1 - 1e-14)
+
+
+def length(row: dict[int, Fraction]) -> Fraction:
+    """||row||, from above."""
+    return root_above(sum((one * one for one in row.values()), Fraction()))
+
+
+def below(x: Fraction) -> float:
+    """A double that is not more than x."""
+    try:
+        return nextafter(float(x), -inf)
+    except OverflowError:
+        return float(np.finfo(float).max) if x > 0 else -inf
+
+
+def root_above(x: Fraction) -> Fraction:
+    """A rational number not less than the root, by 1e-15 of it."""
+    if x <= 0:
+        return Fraction()
+    shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
+    scale = Fraction(2) ** shift
+    guess = Fraction(sqrt(float(x * scale * scale)) * (1 + 1e-15)) / scale
+    while guess * guess < x:
+        guess *= 1 + Fraction(1, 10**15)
+    return guess
+
+
+def lower_bound(a: Any) -> float:
+    """A number that no eigenvalue of a symmetric matrix is below; -inf where none was found.
+
+    By blocks that nothing links, each up to DENSE.
+    """
+    a = sp.csr_array(a)
+    if a.nnz == 0:
+        return 0.0
+    labels = connected_components(a, directed=False)[1]
+    order = np.argsort(labels, kind="stable")
+    least = inf
+    for block in np.split(order, np.cumsum(np.bincount(labels))[:-1]):
+        if block.size > DENSE:
+            return -inf
+        least = min(least, _lower_bound(a[block][:, block].toarray()))
+    return least
+
+
+def _lower_bound(a: Array) -> float:
+    """Of a dense block: Cholesky's factorisation of a - shift succeeds."""
+    n = len(a)
+    diagonal = np.diag(a)
+    if n == 1:
+        return float(diagonal[0])
+    guess = float(np.linalg.eigvalsh(a)[0])
+    gamma = (n + 2) * EPS  # of n + 1 terms
+    size = n * EPS * float(abs(a).max())
+    for target in (guess / 2, 2 * guess, 0.0, *(-size * 4.0**k for k in range(8))):
+        if target > guess:
+            continue
+        own = gamma * float(np.abs(diagonal - target).sum()) * (1 + 1e-6) + 1e-300
+        shifted = a - (target + 2 * own) * np.eye(n)
+        try:
+            np.linalg.cholesky(shifted)
+        except np.linalg.LinAlgError:
+            continue
+        return target
+    return -inf

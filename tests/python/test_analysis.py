@@ -548,7 +548,7 @@ def test_heavy_bodies_are_no_rounding_of_light_ones(size: float) -> None:
     assert found.uniqueness.verdict == "not unique"
     assert found.existence.verdict == "exists by enumeration"
     assert found.isolated_solutions == 2
-    said = brief(problem, problem, None, 1e-8)
+    said = brief(problem, problem)
     assert said.record["definiteness"] == "indefinite"
     assert said.record["uniqueness"] is None
     # and what is asymmetric is so beside a part that is not

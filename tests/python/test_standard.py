@@ -346,7 +346,7 @@ def test_no_problem_depends_on_auto(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     solve = _solve.solve
     monkeypatch.setattr(_solve, "solve", nonsense)
-    plans = [collections.plan_of(f"tiny/{name}", tol=1.0) for name in ("FourBar", "PlanarBlocks")]
+    plans = [collections.plan_of(f"tiny/{name}") for name in ("FourBar", "PlanarBlocks")]
     table = collections.build(plans, tmp_path, pictures=False)
     assert {known.origin_of(row) for row in table.to_pylist()} == {"published"}
     assert set(table["solver"].to_pylist()) == {"nsgs"}

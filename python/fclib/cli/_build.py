@@ -13,7 +13,9 @@ import typer
 from fclib import collections, scenes
 from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
+from fclib.collections import catalog
 from fclib.collections.build import BuildError
+from fclib.collections.references import PROVEN
 
 
 class Form(str, Enum):
@@ -76,12 +78,12 @@ def build_plans(
             out.print(Rows(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
-        unsolved = [row for row in rows if row["status"] not in (None, "converged")]
-        if unsolved:
-            worst = max(unsolved, key=lambda row: float(row["error"]))
+        open_ones = [row for row in rows if row["solved"] is False and not proven(row)]
+        if open_ones:
+            worst = max(open_ones, key=lambda row: float(row["error"]))
             out.print(
-                f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
-                f" {worst['id']}, error {worst['error']:.1e}."
+                f"{len(open_ones)} problems have no known solution; the best iterate of each is a"
+                f" guess in its file. The worst is {worst['id']}, error {worst['error']:.1e}."
             )
         other = [row["id"] for row in rows if collections.origin_of(row) == "differs"]
         if other:
@@ -104,13 +106,25 @@ def simulated(plan: collections.Plan) -> bool:
     return isinstance(plan.scene, scenes.Scene)
 
 
+def proven(row: dict[str, Any]) -> bool:
+    """Whether a problem of a catalogue is proven to have no solution."""
+    return bool(row["status"] == PROVEN)
+
+
+def answered(row: dict[str, Any]) -> bool:
+    """Whether its solution is known, or that there is none."""
+    return bool(row["solved"]) or proven(row)
+
+
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """A row for each family of a catalogue: how many problems, and from where to where."""
     found = []
     for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
         own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
         origins = Counter(collections.origin_of(row) for row in own)
-        errors = [row["error"] for row in own if row["error"] is not None]
+        tried = any(row["error"] is not None for row in own)
+        # an iterate of a problem that has no solution has an error of no interest
+        errors = [row["error"] for row in own if row["error"] is not None and not proven(row)]
 
         def span(*keys: str, own: list[dict[str, Any]] = own) -> str:
             values = [row[key] for row in own for key in keys if row[key] is not None]
@@ -126,7 +140,8 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                     for origin, count in sorted(origins.items())
                 ),
                 "problems": len(own),
-                "solved": sum(row["status"] == "converged" for row in own) if errors else "",
+                "distinct": catalog.distinct(own),
+                "solved": sum(answered(row) for row in own) if tried else "",
                 "dof": span("n"),
                 "contacts": span("nc"),
                 "density": span("density"),

@@ -28,7 +28,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog, references
+from fclib.collections import archives, catalog, references, standing
 from fclib.collections.build import BuildError
 from fclib.collections.known import DATA
 from fclib.collections.plan import Plan
@@ -370,6 +370,24 @@ def test_what_is_no_solution_is_a_guess_with_its_error(
     # a file that says nothing of why it has none is an error
     fclib.write(paths[0], read(paths[0]))
     assert invoke("check", paths[0]).exit_code == 1
+
+
+def test_a_solution_that_somebody_sent_in_is_taken(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = {
+        row["digest"]: read_solution(built / row["global_file"])
+        for row in collections.read_catalog(built).to_pylist()[:3]
+    }
+    stored = {digest: (solution, {"by": "somebody"}) for digest, solution in known.items()}
+    monkeypatch.setattr(standing, "stored_solution", stored.get)
+    folder = unsolved(tmp_path, monkeypatch)
+    second, third = collections.read_catalog(folder).to_pylist()
+    assert (second["solver"], second["solved"]) == ("somebody", True)
+    assert third["solved"] is False
+    path = folder / second["global_file"]
+    assert fclib.read_attributes(path, "solution")["solver"] == "somebody"
+    assert np.array_equal(read_solution(path).r, known[second["digest"]].r)
 
 
 def test_a_solution_says_how_good_it_is_and_whose(

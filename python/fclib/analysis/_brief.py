@@ -113,7 +113,8 @@ def brief(
         existence, reason = UNDECIDED, "tried: Slater's condition without a conic program, a solver"
     words = [f"Existence: {existence}: {reason}."]
     if existence != PROVEN_NOT:
-        words.append(f"Velocity: {unique.verdict}: {unique.reason}.")
+        tried = "tried: " if unique.verdict == UNDECIDED else ""
+        words.append(f"Velocity: {unique.verdict}: {tried}{unique.reason}.")
         words.append(f"Reactions: {forces.verdict}: {forces.reason}.")
     if found is not None:
         words.append(f"W is {sign.word}, of rank {rank} of {problem.m}.")

@@ -15,7 +15,6 @@ from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
 from fclib.collections import catalog
 from fclib.collections.build import BuildError
-from fclib.collections.references import PROVEN
 
 
 class Form(str, Enum):
@@ -78,7 +77,7 @@ def build_plans(
             out.print(Rows(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
-        open_ones = [row for row in rows if row["solved"] is False and not proven(row)]
+        open_ones = [row for row in rows if row["solved"] is False and not catalog.is_proven(row)]
         if open_ones:
             worst = max(open_ones, key=lambda row: float(row["error"]))
             out.print(
@@ -106,16 +105,6 @@ def simulated(plan: collections.Plan) -> bool:
     return isinstance(plan.scene, scenes.Scene)
 
 
-def proven(row: dict[str, Any]) -> bool:
-    """Whether a problem of a catalogue is proven to have no solution."""
-    return bool(row["status"] == PROVEN)
-
-
-def answered(row: dict[str, Any]) -> bool:
-    """Whether its solution is known, or that there is none."""
-    return bool(row["solved"]) or proven(row)
-
-
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """A row for each family of a catalogue: how many problems, and from where to where."""
     found = []
@@ -124,7 +113,9 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         origins = Counter(collections.origin_of(row) for row in own)
         tried = any(row["error"] is not None for row in own)
         # an iterate of a problem that has no solution has an error of no interest
-        errors = [row["error"] for row in own if row["error"] is not None and not proven(row)]
+        errors = [
+            row["error"] for row in own if row["error"] is not None and not catalog.is_proven(row)
+        ]
 
         def span(*keys: str, own: list[dict[str, Any]] = own) -> str:
             values = [row[key] for row in own for key in keys if row[key] is not None]
@@ -141,7 +132,7 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                 ),
                 "problems": len(own),
                 "distinct": catalog.distinct(own),
-                "solved": sum(answered(row) for row in own) if tried else "",
+                "solved": sum(map(catalog.is_answered, own)) if tried else "",
                 "dof": span("n"),
                 "contacts": span("nc"),
                 "density": span("density"),

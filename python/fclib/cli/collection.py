@@ -43,7 +43,7 @@ from fclib.cli._output import (
 from fclib.cli._progress import many_bars
 from fclib.collections import catalog, standing
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices, kind_of, problems_of
+from fclib.collections.known import KNOWN, choices, distinct_of, kind_of, problems_of
 from fclib.collections.plan import evenly
 from fclib.collections.verify import LACKING
 
@@ -86,7 +86,11 @@ def list_families(
     of_sets: Annotated[bool, typer.Option("--sets", help="The sets instead.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the families with their numbers of problems, or the sets."""
+    """List the families with their numbers of problems, or the sets.
+
+    Distinct problems have different data. The column is empty if that is not known without a
+    simulation.
+    """
     report = Report(as_json)
     if of_sets:
         for name, folders in collections.sets().items():
@@ -96,6 +100,7 @@ def list_families(
                     "version": collections.version(name),
                     "families": len(folders),
                     "problems": sum(map(problems_of, folders)),
+                    "distinct": distinct_of(folders),
                     "what": KNOWN[name][1] if name in KNOWN else "",
                 }
             )
@@ -108,6 +113,7 @@ def list_families(
                 "family": name,
                 "set": family.collection,
                 "problems": problems_of(f"{family.collection}/{name}"),
+                "distinct": distinct_of([f"{family.collection}/{name}"]),
                 "title": family.title,
                 "application": family.application,
             }
@@ -189,6 +195,7 @@ def show_set(name: str, as_json: bool) -> None:
             "folder": folder,
             "version": collections.version(name),
             "problems": problems_of(folder),
+            "distinct": distinct_of([folder]),
         }
         if numbers:
             record["numbers"] = ", ".join(map(str, numbers))
@@ -396,7 +403,10 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         )
         if lacking:
             out.print(f"{lacking} files or families are not in the catalogue, or not whole")
-        unsolved = sum(row["solved"] is False for row in rows)
+        proven = sum(map(catalog.is_proven, rows))
+        unsolved = sum(row["solved"] is False for row in rows) - proven
+        if proven:
+            out.print(f"{proven} problems are proven to have no solution, and say so")
         if unsolved:
             out.print(f"{unsolved} problems have no known solution, and say so")
         said = {
@@ -618,7 +628,9 @@ def add(
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
         out.print(Rows(report.records))
-        unsolved = [row for row in rows if row["solved"] is False]
+        unsolved = [
+            row for row in rows if row["solved"] is False and not catalog.is_proven(row)
+        ]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
             out.print(f"{len(unsolved)} have no known solution: {names}", highlight=False)

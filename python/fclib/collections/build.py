@@ -33,7 +33,7 @@ import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
 from fclib._judge import TOLERANCE
-from fclib.collections import catalog, references, rights, trajectory
+from fclib.collections import catalog, references, rights, standing, trajectory
 from fclib.collections.catalog import STATE
 from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
@@ -353,7 +353,16 @@ def reference(plan: Plan, problem: Any) -> Found | None:
     """The reference solution of a problem, which follows from it alone; None: not asked for."""
     if not plan.references:
         return None
-    return references.find(problem, plan.solver, plan.tol, **plan.options)
+    found = references.find(problem, plan.solver, plan.tol, **plan.options)
+    if found.ok or found.refuted:
+        return found
+    # of a problem that was open somebody may know more
+    stored = standing.stored_solution(_digest.digest(problem))
+    if stored is None:
+        return found
+    solution, said = stored
+    other = references.finished(problem, references.given(problem, solution, said["by"]))
+    return other if other.error < found.error else found
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 FILE = "catalog.parquet"
+PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution
 # of a family while it is built: where to go on, and in it the rows that are there already
 STATE = ".state"
 KEPT = "kept.json"
@@ -159,6 +160,16 @@ def with_copies(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
         original = first.setdefault(row["digest"], row["id"])
         found.append({**row, "same_as": None if original == row["id"] else original})
     return found
+
+
+def is_proven(row: Mapping[str, Any]) -> bool:
+    """Whether the problem of a row is proven to have no solution."""
+    return bool(row["status"] == PROVEN)
+
+
+def is_answered(row: Mapping[str, Any]) -> bool:
+    """Whether its solution is known, or that there is none."""
+    return bool(row["solved"]) or is_proven(row)
 
 
 def distinct(rows: Iterable[Mapping[str, Any]]) -> int:

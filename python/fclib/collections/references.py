@@ -22,13 +22,14 @@ from typing import Any, Final
 
 from fclib import _core, _solve
 from fclib._judge import MARK, TOLERANCE, Judgement, judge
+from fclib.collections.catalog import PROVEN
 
 # the best that doubles allow of most problems: rounding of a product W r is 1e-14 of its terms
 TARGET: Final = 1e-12
 # Newton's methods, by the equation that they solve; the second one does what the first leaves
 FINISH: Final = ("nsn-jm", "nsn-ac")
 FINISH_ITERATIONS: Final = 30
-PROVEN: Final = "infeasible"  # the status of a solve that has proved that there is no solution
+CONVERGED: Final = "converged"  # the status of what is a solution by both maps
 EPOCH: Final = "SOURCE_DATE_EPOCH"  # environment: the time that files are to carry, in seconds
 
 
@@ -136,7 +137,7 @@ def finished(problem: Any, found: Found) -> Found:
                 solution=result.solution,
                 judgement=judgement,
                 solver=solver,
-                status=str(result.status),
+                status=CONVERGED if judgement.ok else str(result.status),
                 ends=result.message,
             )
     if found.error <= TARGET:
@@ -148,7 +149,7 @@ def finished(problem: Any, found: Found) -> Found:
 def given(problem: Any, solution: _core.Solution, solver: str) -> Found:
     """A solution that is there already."""
     judgement = judge(problem, solution)
-    status = "converged" if judgement.ok else "inaccurate"
+    status = CONVERGED if judgement.ok else "inaccurate"
     return Found(solution, judgement, solver, status, "as it was given")
 
 

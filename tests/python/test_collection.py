@@ -529,7 +529,9 @@ def test_verify_fails_exactly_if_check_does(built: Path, tmp_path: Path) -> None
         own = {"global_file": target.relative_to(tmp_path).as_posix(), "local_file": None}
         own |= {"global_sha256": catalog.sha256(target), "local_sha256": None}
         catalog.write_catalog(tmp_path / catalog.FILE, [row | own])
-        verdict = next(one for one in collections.verify(tmp_path) if one.path == own["global_file"])
+        verdict = next(
+            one for one in collections.verify(tmp_path) if one.path == own["global_file"]
+        )
         ok = invoke("check", target).exit_code == 0
         assert verdict.ok == ok == (fclib.merit(problem, read_solution(target)).error <= 1e-8)
         seen.add(ok)

@@ -111,7 +111,9 @@ def reactions(
             return Reactions(UNIQUE, words)
         return Reactions(UNDECIDED, f"of the stored velocity unique, of others not known: {words}")
     if not (whole.exact and inside.exact):
-        return Reactions(UNDECIDED, "tried: a rank that doubles do not tell, or that costs too much")
+        return Reactions(
+            UNDECIDED, "tried: a rank that doubles do not tell, or that costs too much"
+        )
     return Reactions(
         UNDECIDED,
         f"tried: reactions of dimension {whole.least} move nothing, but some are at the edge of a"

@@ -628,9 +628,7 @@ def add(
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
         out.print(Rows(report.records))
-        unsolved = [
-            row for row in rows if row["solved"] is False and not catalog.is_proven(row)
-        ]
+        unsolved = [row for row in rows if row["solved"] is False and not catalog.is_proven(row)]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
             out.print(f"{len(unsolved)} have no known solution: {names}", highlight=False)

@@ -17,7 +17,8 @@ known.py      the sets, their versions and their families; lists of chosen probl
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
 references.py solutions: found, judged by both maps, put into files. Needs catalog.py
-build.py      a family into files, gone on with after a kill. Needs plan.py, references.py, standing.py
+build.py      a family into files, gone on with after a kill. Needs plan.py, references.py and
+              standing.py
 verify.py     files as the catalogue says, solutions judged anew
 add.py        files that are already there, as a set. Needs build.py, known.py, references.py
 figures.py    distributions and pictures

@@ -57,9 +57,7 @@ def verify(folder: str | Path, progress: Callable[[str], None] | None = None) ->
                 progress(path)
             yield verdict_on(folder, row["id"], path, digest, row)
     for family in catalog.unfinished(folder):
-        message = (
-            f"{folder / family}: its build was cut, or goes on; the same command finishes it"
-        )
+        message = f"{folder / family}: its build was cut, or goes on; the same command finishes it"
         yield Verdict(family, family, "unfinished", None, message)
     for path in catalog.lacking(folder, rows):
         yield Verdict(path, path, "not listed", None, f"{folder / path}: is not in the catalogue")

@@ -261,7 +261,6 @@ def measure(problem: Any, origin: str) -> Contact:
             "nsgs",
             tol=LOCAL_TOLERANCE,
             max_iterations=SWEEPS,
-            merit="natural",
             local_solver=name,
         )
         sweeps[name] = result.iterations if result.converged else SWEEPS + 1

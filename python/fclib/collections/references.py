@@ -7,8 +7,9 @@
     /guesses/K      the best iterate, as the last guess, if no solution is known: attributes alike
     /fclib_*/info   attribute `solution`: why there is none
 
-A solver works to the tolerance that was asked for. Newton's methods then go on from what it found,
-to TARGET: near a solution they take a few iterations, where all others take many.
+A solver works to the tolerance that was asked for. FINISH then goes on from what it found, to TARGET:
+near a solution Newton's methods take a few iterations, where all others take many. Where they do
+not come nearer, as at elastic bodies and in packings, `auto` does.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ from fclib.collections.catalog import PROVEN
 
 # the best that doubles allow of most problems: rounding of a product W r is 1e-14 of its terms
 TARGET: Final = 1e-12
-# Newton's methods, by the equation that they solve; the second one does what the first leaves
-FINISH: Final = ("nsn-jm", "nsn-ac")
-FINISH_ITERATIONS: Final = 30
+# who goes on, and iterations at most; no time, so that all machines end at the same solution
+FINISH: Final = (("nsn-jm", 30), ("auto", 3000))
+AUTO: Final = "auto"
 CONVERGED: Final = "converged"  # the status of what is a solution by both maps
 EPOCH: Final = "SOURCE_DATE_EPOCH"  # environment: the time that files are to carry, in seconds
 
@@ -113,10 +114,11 @@ def find(problem: Any, solver: str, tol: float, **options: Any) -> Found:
 
 
 def finished(problem: Any, found: Found) -> Found:
-    """The same to TARGET, or to the last digit that Newton's methods reach from it."""
+    """The same to TARGET, or to the last digit that FINISH reaches from it."""
     tried = []
-    for name in FINISH:
-        if found.error <= TARGET:
+    for name, iterations in FINISH:
+        # what was no solution for `auto` is none the second time
+        if found.error <= TARGET or (name == AUTO and not found.ok):
             break
         try:
             result = _solve.solve(
@@ -124,14 +126,14 @@ def finished(problem: Any, found: Found) -> Found:
                 name,
                 tol=TARGET,
                 guess=found.solution,
-                max_iterations=FINISH_ITERATIONS,
+                max_iterations=iterations,
             )
         except _core.UnsuitableError:
             continue
         tried.append(name)
         judgement = judge(problem, result.solution)
         if judgement.error < found.error:
-            solver = found.solver if name in found.solver else f"{found.solver}, {name}"
+            solver = found.solver if found.solver.endswith(name) else f"{found.solver}, {name}"
             found = replace(
                 found,
                 solution=result.solution,
@@ -142,7 +144,8 @@ def finished(problem: Any, found: Found) -> Found:
             )
     if found.error <= TARGET:
         return replace(found, ends=f"{TARGET:g} is reached")
-    reached = f"{found.error:.1e} is the least that {', '.join([found.solver, *tried])} reach"
+    names = ", ".join(dict.fromkeys([*found.solver.split(", "), *tried]))
+    reached = f"{found.error:.1e} is the least that {names} reach"
     return replace(found, ends=f"{reached}: {found.ends}" if found.ends else reached)
 
 

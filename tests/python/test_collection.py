@@ -28,7 +28,7 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog, references, standing
+from fclib.collections import archives, catalog, known, published, references, standing
 from fclib.collections.build import BuildError
 from fclib.collections.known import DATA
 from fclib.collections.plan import Plan
@@ -472,6 +472,20 @@ def test_all_known_solutions_are_stored(tmp_path: Path) -> None:
     assert "/solutions/2" in bad.message
 
 
+def test_problems_of_few_contacts_say_what_all_their_states_say(tmp_path: Path) -> None:
+    own = [
+        collections.plan_of("impacts/RockingBlock").only([100]),
+        Plan.of_family("LocalProblems").only([104]),
+    ]
+    table = collections.build(own, tmp_path, pictures=False)
+    for row in table.to_pylist():
+        words = read(tmp_path / row["local_file"]).info.math_info
+        assert "Velocity: unique" in words
+        assert "Reactions: unique" in words
+        assert "states of the contacts" not in words.partition("Left out:")[2]
+        assert (row["uniqueness"], row["reactions_unique"]) == ("unique", True)
+
+
 # ---- verifying
 
 
@@ -820,6 +834,21 @@ def test_a_set_counts_its_families_without_states_too() -> None:
         shown = {row["folder"]: row["problems"] for row in lines("show", name, "--json")}
         assert shown[folder] == problems
         assert listed[name] == sum(shown.values())
+
+
+def test_copies_are_counted_once() -> None:
+    """A tower that rests is one problem, however many steps it does so."""
+    states = published.digests("rt444/KaplasTower", known.version_of("rt444/KaplasTower"))
+    if not states:
+        pytest.skip("its states are not stored here")
+    rows = [json.loads(one) for one in invoke("collection", "list", "--json").output.splitlines()]
+    told = [*map(json.loads, invoke("collection", "list", "--sets", "--json").output.splitlines())]
+    own, sets = {row["family"]: row for row in rows}, {row["set"]: row for row in told}
+    assert own["KaplasTower"]["problems"] == len(states)
+    assert own["KaplasTower"]["distinct"] == len(set(states.values())) < len(states)
+    assert own["LowWall"]["distinct"] is None
+    assert sets["rt444"]["distinct"] < sets["rt444"]["problems"]
+    assert sets["standard"]["distinct"] == sets["standard"]["problems"]
 
 
 def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:

@@ -7,9 +7,9 @@
     /guesses/K      the best iterate, as the last guess, if no solution is known: attributes alike
     /fclib_*/info   attribute `solution`: why there is none
 
-A solver works to the tolerance that was asked for. FINISH then goes on from what it found, to TARGET:
-near a solution Newton's methods take a few iterations, where all others take many. Where they do
-not come nearer, as at elastic bodies and in packings, `auto` does.
+A solver works to the tolerance that was asked for. FINISH then goes on from what it found, to
+TARGET. Near a solution Newton's methods take a few iterations, and all others take many. If they do
+not come nearer, as with elastic bodies, `auto` does.
 """
 
 from __future__ import annotations

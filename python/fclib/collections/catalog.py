@@ -169,7 +169,13 @@ def is_proven(row: Mapping[str, Any]) -> bool:
 
 def is_answered(row: Mapping[str, Any]) -> bool:
     """Whether its solution is known, or that there is none."""
-    return bool(row["solved"]) or is_proven(row)
+    return is_solved(row) or is_proven(row)
+
+
+def is_solved(row: Mapping[str, Any]) -> bool:
+    """Whether its solution is stored; an older catalogue has the word of the solver alone."""
+    solved = row["solved"]
+    return bool(row["status"] == "converged" if solved is None else solved)
 
 
 def distinct(rows: Iterable[Mapping[str, Any]]) -> int:

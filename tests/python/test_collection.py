@@ -410,6 +410,25 @@ def test_a_solution_says_how_good_it_is_and_whose(
     assert fclib.read_attributes(path, "solution")["date"] == "1970-01-02"
 
 
+def test_a_certified_reference_names_both_algorithms(tmp_path: Path) -> None:
+    pytest.importorskip("clarabel")
+    own = dataclasses.replace(plan(problems=6), certify=True).only([5])
+    (row,) = collections.build([own], tmp_path, pictures=False).to_pylist()
+    for form in ("global", "local"):
+        path = tmp_path / row[f"{form}_file"]
+        told = fclib.read_attributes(path, "solution")
+        assert told["certified"] == "yes"
+        first, second = str(told["algorithms"]).split("; ")
+        assert first.partition(" ")[0] != second.partition(" ")[0]
+        assert told["error"] == fclib.merit(read(path), read_solution(path)).error <= 1e-12
+        assert told["ends"] == "1e-12 is reached"
+    assert ("merit_error" in told) == (form == "global")
+    with pytest.raises(BuildError, match="certify"):
+        collections.build([plan(problems=6).only([5])], tmp_path, pictures=False)
+    with pytest.raises(ValueError, match="nothing to certify"):
+        plan(references=False, certify=True)
+
+
 def test_a_reference_that_the_natural_map_alone_takes_is_solved_by_both(tmp_path: Path) -> None:
     """Light bodies: reactions of no size, so that the natural map sees only velocities."""
     whole = read(DATA / "tiny/KaplasTower/0030-global.hdf5")

@@ -241,6 +241,12 @@ def build(
             max=TOLERANCE,
         ),
     ] = collections.Plan.tol,
+    certify: Annotated[
+        bool,
+        typer.Option(
+            "--certify", help="Confirm each solution by a second, unrelated algorithm: seconds."
+        ),
+    ] = False,
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
@@ -267,6 +273,7 @@ def build(
                 select=select.value,
                 analyze=analyze,
                 references=references,
+                certify=certify,
                 tol=tol,
             )
             for own in folders

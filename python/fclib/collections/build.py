@@ -216,8 +216,8 @@ def difference(found: str, asked: str) -> str:
     except json.JSONDecodeError:
         return "which cannot be read"
     old, new = ({**plan.pop("parameters"), **plan} for plan in (old, new))
-    keys = [key for key in new if old.get(key) != new[key]]
-    return ", ".join(f"{key}: {old.get(key)}, now {new[key]}" for key in keys[:3])
+    keys = [key for key in {**new, **old} if old.get(key) != new.get(key)]
+    return ", ".join(f"{key}: {old.get(key)}, now {new.get(key)}" for key in keys[:3])
 
 
 @dataclass
@@ -357,15 +357,14 @@ def reference(plan: Plan, problem: Any) -> Found | None:
     if not plan.references:
         return None
     found = references.find(problem, plan.solver, plan.tol, **plan.options)
-    if found.ok or found.refuted:
-        return found
     # of a problem that was open somebody may know more
-    stored = standing.stored_solution(_digest.digest(problem))
-    if stored is None:
-        return found
-    solution, said = stored
-    other = references.finished(problem, references.given(problem, solution, said["by"]))
-    return other if other.error < found.error else found
+    if not found.ok and not found.refuted:
+        stored = standing.stored_solution(_digest.digest(problem))
+        if stored is not None:
+            solution, said = stored
+            other = references.finished(problem, references.given(problem, solution, said["by"]))
+            found = other if other.error < found.error else found
+    return references.certified(problem, found) if plan.certify and found.ok else found
 
 
 @dataclass(frozen=True)

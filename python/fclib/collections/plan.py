@@ -99,6 +99,7 @@ class Plan:
     trajectory: Path | None = None  # of the scene; None: it is simulated
     simulation: Simulation = field(default_factory=lambda: Simulation(tol=ON_DEMAND))  # then so
     references: bool = True  # whether solutions are found and stored
+    certify: bool = False  # by a second, unrelated algorithm; some seconds a problem
     solver: str = "auto"
     tol: float = TOLERANCE  # that the solver is asked for; references.py goes on from there
     options: dict[str, Any] = field(default_factory=dict)  # of `fclib.solve`
@@ -118,6 +119,8 @@ class Plan:
                 f"reference solutions are asked for at most {TOLERANCE:g}, which fclib check"
                 f" bounds, not {self.tol:g}"
             )
+        if self.certify and not self.references:
+            raise ValueError("there is nothing to certify without reference solutions")
         if self.problems is None and self.steps is None:
             raise ValueError("a plan needs a number of problems or of steps")
         if self.chosen is not None and (self.count is not None or self.select != "every"):
@@ -177,6 +180,7 @@ class Plan:
                 "chosen": self.chosen,
                 "analyze": self.analyze,
                 "references": self.references,
+                **({"certify": True} if self.certify else {}),
                 "solver": self.solver,
                 "tol": self.tol,
                 "options": self.options,

@@ -15,8 +15,8 @@ not come nearer, as with elastic bodies, `auto` does.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, Final
@@ -27,6 +27,7 @@ from fclib.collections.catalog import PROVEN
 
 # the best that doubles allow of most problems: rounding of a product W r is 1e-14 of its terms
 TARGET: Final = 1e-12
+REACHED: Final = f"{TARGET:g} is reached"
 # who goes on, and iterations at most; no time, so that all machines end at the same solution
 FINISH: Final = (("nsn-jm", 30), ("auto", 3000))
 AUTO: Final = "auto"
@@ -43,6 +44,8 @@ class Found:
     solver: str
     status: str  # what the solver said
     ends: str  # why there are no more digits, in words
+    # what `fclib.analysis.reference` says of it, if that was asked for
+    certificate: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
@@ -64,6 +67,7 @@ class Found:
         """What a file says of it."""
         merit = self.judgement.merit
         return {
+            **self.certificate,
             "error": self.error,
             "merit": self.judgement.kind,
             "natural": merit.natural,
@@ -143,10 +147,31 @@ def finished(problem: Any, found: Found) -> Found:
                 ends=result.message,
             )
     if found.error <= TARGET:
-        return replace(found, ends=f"{TARGET:g} is reached")
+        return replace(found, ends=REACHED)
     names = ", ".join(dict.fromkeys([*found.solver.split(", "), *tried]))
     reached = f"{found.error:.1e} is the least that {names} reach"
     return replace(found, ends=f"{reached}: {found.ends}" if found.ends else reached)
+
+
+def certified(problem: Any, found: Found) -> Found:
+    """The solution that two unrelated algorithms agree on; else the same, and why it is not one.
+
+    Raises as `fclib.analysis.reference` does.
+    """
+    from fclib import analysis  # takes a while
+
+    known = analysis.reference(problem)
+    if known.solution is None or not known.error <= TARGET:
+        return replace(found, certificate={"certified": f"no: {known.reason}"})
+    return replace(
+        found,
+        solution=known.solution,
+        judgement=judge(problem, known.solution),
+        solver=known.runs[0].solver,
+        status=CONVERGED,
+        ends=REACHED,
+        certificate=known.attributes,
+    )
 
 
 def given(problem: Any, solution: _core.Solution, solver: str) -> Found:
@@ -164,7 +189,9 @@ def carried(found: Found, local: Any) -> Found:
     if not judgement.ok:
         own = _core.Solution(r=whole.r, l=whole.l)  # u follows
         judgement = judge(local, own)
-    mine = replace(found, solution=own, judgement=judgement)
+    # what a certificate says is of the global form
+    proof = {name: value for name, value in found.certificate.items() if name[:6] != "merit_"}
+    mine = replace(found, solution=own, judgement=judgement, certificate=proof)
     return finished(local, mine) if found.ok and not mine.ok else mine
 
 

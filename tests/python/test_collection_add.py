@@ -105,6 +105,29 @@ def test_what_is_no_solution_is_not_taken_in_as_one(tmp_path: Path) -> None:
     assert "zero.hdf5: the same problem as mine/afar/0000" in " ".join(done.output.split())
 
 
+def test_files_that_held_what_is_no_solution(real_data: Path, tmp_path: Path) -> None:
+    """A wrong reference, one of several solutions, and a problem that has none."""
+    names = ("hand-0040-wrong-reference", "manysolutions-0005-no-word", "squeezed-0000-nonsolution")
+    folder, out = tmp_path / "cases", tmp_path / "out"
+    folder.mkdir()
+    for name in names:
+        path = real_data.parent / "cases" / f"{name}.hdf5"
+        if not path.is_file():
+            pytest.skip("the cases are not there")
+        shutil.copyfile(path, folder / path.name)
+    assert collections.add(folder, out, "cases") == []
+    hand, several, squeezed = (rows_of(out)[f"{name}.hdf5"] for name in names)
+    assert (hand["solver"] != "the file", hand["solved"]) == (True, True)
+    assert hand["error"] <= 1e-12
+    assert (several["solver"], several["solved"]) == ("the file", True)
+    assert len(fclib.read_solutions(out / several["global_file"])) == 3
+    assert (squeezed["status"], squeezed["solved"]) == ("infeasible", False)
+    path = out / squeezed["global_file"]
+    assert fclib.contents(path) == ["global"]
+    assert "there is none" in str(fclib.read_attributes(path, "info")["solution"])
+    assert all(verdict.ok for verdict in collections.verify(out))
+
+
 def rows_of(out: Path) -> dict[str, dict[str, Any]]:
     """The rows of a catalogue by the source of each."""
     return {row["source"]: row for row in collections.read_catalog(out).to_pylist()}

@@ -410,6 +410,17 @@ def test_a_solution_says_how_good_it_is_and_whose(
     assert fclib.read_attributes(path, "solution")["date"] == "1970-01-02"
 
 
+def test_a_local_form_has_its_own_digits() -> None:
+    whole = read(DATA / "tiny/FourBar/0150-global.hdf5")
+    local = whole.condense()
+    found = references.find(whole, "auto", 1e-8)
+    rounded = fclib.Solution(r=(1 + 1e-10) * found.solution.r, l=found.solution.l)
+    assert 1e-12 < fclib.merit(local, rounded).error <= 1e-8
+    mine = references.carried(dataclasses.replace(found, solution=rounded), local)
+    assert mine.error == fclib.merit(local, mine.solution).error <= 1e-12
+    assert mine.ends == "1e-12 is reached"
+
+
 def test_a_certified_reference_names_both_algorithms(tmp_path: Path) -> None:
     pytest.importorskip("clarabel")
     own = dataclasses.replace(plan(problems=6), certify=True).only([5])

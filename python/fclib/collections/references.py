@@ -192,7 +192,8 @@ def carried(found: Found, local: Any) -> Found:
     # what a certificate says is of the global form
     proof = {name: value for name, value in found.certificate.items() if name[:6] != "merit_"}
     mine = replace(found, solution=own, judgement=judgement, certificate=proof)
-    return finished(local, mine) if found.ok and not mine.ok else mine
+    # its own digits end elsewhere
+    return finished(local, replace(mine, ends="")) if found.ok else mine
 
 
 def best_first(found: Found, problem: Any, several: Sequence[_core.Solution]) -> Found:

@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
@@ -21,6 +22,16 @@ import fclib
 Array: TypeAlias = npt.NDArray[np.float64]
 
 STORAGES = ("csr", "csc", "coo", "dense")
+
+CASES = Path(__file__).resolve().parents[2] / "shared" / "data" / "cases"
+
+
+def case(name: str) -> Path:
+    """A recorded problem on which a verdict was wrong. Skips the test if it is not there."""
+    path = CASES / name
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    return path
 
 
 # ---- the judge: the equations, in NumPy

@@ -379,14 +379,16 @@ def test_a_solution_that_somebody_sent_in_is_taken(
         row["digest"]: read_solution(built / row["global_file"])
         for row in collections.read_catalog(built).to_pylist()[:3]
     }
-    stored = {digest: (solution, {"by": "somebody"}) for digest, solution in known.items()}
+    said = {"by": "somebody", "date": "2026-01-02"}
+    stored = {digest: (solution, said) for digest, solution in known.items()}
     monkeypatch.setattr(standing, "stored_solution", stored.get)
     folder = unsolved(tmp_path, monkeypatch)
     second, third = collections.read_catalog(folder).to_pylist()
     assert (second["solver"], second["solved"]) == ("somebody", True)
     assert third["solved"] is False
     path = folder / second["global_file"]
-    assert fclib.read_attributes(path, "solution")["solver"] == "somebody"
+    told = fclib.read_attributes(path, "solution")
+    assert (told["solver"], told["date"]) == ("somebody", "2026-01-02")
     assert np.array_equal(read_solution(path).r, known[second["digest"]].r)
 
 

@@ -261,6 +261,13 @@ def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) 
     own, solution, said = standing.known_solution(name)
     assert fclib.digest(own) == row.digest
     assert fclib.merit(own, solution).error == pytest.approx(said["error"], rel=1e-3)
+    # the best iterate of an open problem is no solution
+    shown = tmp_path / "shown.hdf5"
+    assert invoke("collection", "status", name, "--out", shown).exit_code == 0
+    assert fclib.contents(shown) == [own.kind, "guesses"]
+    told = fclib.read_attributes(shown, "guesses/1")
+    assert (told["solver"], told["date"]) == ("me", said["date"])
+    assert told["error"] == pytest.approx(said["error"], rel=1e-3)
     # not better
     assert take(problem, rough).exit_code == 1
     # another problem, unless it is named

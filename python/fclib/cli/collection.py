@@ -41,7 +41,7 @@ from fclib.cli._output import (
     words_of,
 )
 from fclib.cli._progress import many_bars
-from fclib.collections import catalog, standing
+from fclib.collections import catalog, references, standing
 from fclib.collections.archives import FetchError
 from fclib.collections.known import KNOWN, choices, distinct_of, kind_of, problems_of
 from fclib.collections.plan import evenly
@@ -441,7 +441,9 @@ def status(
     ] = None,
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Write the problem with the best solution known."),
+        typer.Option(
+            "--out", help="Write the problem with the best solution known, or iterate, as a guess."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -541,8 +543,9 @@ def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
         )
     if target is not None:
         problem, solution, said = standing.known_solution(name)
-        fclib.write(target, problem, solution)
-        err.print(f"error {said['error']:.3g}, by {said['by']}, {said['date']}", highlight=False)
+        best = references.given(problem, solution, said["by"], said["date"])
+        references.write(target, problem, best)
+        err.print(f"error {best.error:.3g}, by {said['by']}, {said['date']}", highlight=False)
     report = Report(as_json)
     report.add(record_of(found[0]))
     if not as_json:

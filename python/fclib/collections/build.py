@@ -362,7 +362,8 @@ def reference(plan: Plan, problem: Any) -> Found | None:
         stored = standing.stored_solution(_digest.digest(problem))
         if stored is not None:
             solution, said = stored
-            other = references.finished(problem, references.given(problem, solution, said["by"]))
+            other = references.given(problem, solution, said["by"], said["date"])
+            other = references.finished(problem, other)
             found = other if other.error < found.error else found
     return references.certified(problem, found) if plan.certify and found.ok else found
 

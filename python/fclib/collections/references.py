@@ -44,6 +44,7 @@ class Found:
     solver: str
     status: str  # what the solver said
     ends: str  # why there are no more digits, in words
+    date: str = ""  # when it was found; empty: today
     # what `fclib.analysis.reference` says of it, if that was asked for
     certificate: Mapping[str, float | str] = field(default_factory=dict)
 
@@ -75,7 +76,7 @@ class Found:
             "solver": self.solver,
             "status": self.status,
             "ends": self.ends,
-            "date": today(),
+            "date": self.date or today(),
             "fclib": _core.version,
         }
 
@@ -174,11 +175,11 @@ def certified(problem: Any, found: Found) -> Found:
     )
 
 
-def given(problem: Any, solution: _core.Solution, solver: str) -> Found:
-    """A solution that is there already."""
+def given(problem: Any, solution: _core.Solution, solver: str, date: str = "") -> Found:
+    """A solution that is there already, and who found it."""
     judgement = judge(problem, solution)
     status = CONVERGED if judgement.ok else "inaccurate"
-    return Found(solution, judgement, solver, status, "as it was given")
+    return Found(solution, judgement, solver, status, "as it was given", date)
 
 
 def carried(found: Found, local: Any) -> Found:

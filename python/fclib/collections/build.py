@@ -48,6 +48,7 @@ COMPRESSION = 1  # 2 % more bytes than 6, two thirds of the time
 # lambda of two bodies are taken out in rational arithmetic
 SMALL_PLANAR, SMALL_UNKNOWNS = 3, 12
 CHECKPOINT = 5.0  # seconds between two checkpoints
+LISTING = 0.05  # of the time of a build that may go into the catalogue of all
 TOLD = 0.1  # seconds between two messages of progress
 
 Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, of how many
@@ -227,6 +228,8 @@ class Kept:
     plan: Plan
     looked: int = 0
     rows: dict[int, dict[str, Any]] = field(default_factory=dict)  # by number
+    listed: float = 0.0  # when the catalogue of all was written last, and how long that took [s]
+    listing: float = 0.0
 
     def wants(self, number: int) -> bool:
         """Whether the rule takes this number; with `hard` each is looked at."""
@@ -330,7 +333,7 @@ def build_scene(
             kept.looked += 1
             report(plan.name, kept.looked, plan.total)
     except BaseException:  # Control-C too
-        write_checkpoint(state_folder, kept, out)
+        write_checkpoint(state_folder, kept, out, last=True)
         raise
 
     if pictures:
@@ -544,15 +547,20 @@ def nnz(matrix: Any) -> int:
     return int(getattr(matrix, "nnz", np.size(matrix)))
 
 
-def write_checkpoint(folder: Path, kept: Kept, out: Path) -> None:
+def write_checkpoint(folder: Path, kept: Kept, out: Path, *, last: bool = False) -> None:
     """Store where to go on: the problems that were looked at, and what was kept of them.
 
-    The catalogue has them too from then on.
+    The catalogue has them too from then on; of a large collection it is written less often, but for
+    the last time.
     """
     _core.sync_files(folder)
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
     write_text(folder / catalog.KEPT, known)
-    catalog.gather(out)
+    start = time.monotonic()
+    if last or LISTING * (start - kept.listed) >= kept.listing:
+        catalog.gather(out)
+        kept.listed = time.monotonic()
+        kept.listing = kept.listed - start
 
 
 def read_checkpoint(folder: Path, kept: Kept) -> None:

@@ -81,7 +81,7 @@ def test_catalog_says_what_the_files_hold(built: Path) -> None:
         merit = fclib.merit(problem, solution)
         assert fclib.digest(problem) == row["digest"]
         assert merit.error == row["error"] <= 1e-12
-        assert row["solved"] is True
+        assert row["has_solution"] is True
         assert (merit.open, merit.stick, merit.slide) == (row["open"], row["stick"], row["slide"])
         assert (problem.n, problem.nc, problem.p) == (row["n"], row["nc"], row["p"])
         assert (problem.M.nnz, problem.H.nnz) == (row["nnz_M"], row["nnz_H"])
@@ -331,7 +331,7 @@ def test_a_file_says_that_its_problem_has_no_solution(tmp_path: Path) -> None:
         assert ("there is none, by a checked proof" in str(told.get("solution"))) == proven
     row = collections.read_catalog(tmp_path).to_pylist()[0]
     assert (row["number"], row["existence"]) == (2, "proven not to exist")
-    assert (row["status"], row["solved"]) == ("infeasible", False)
+    assert (row["status"], row["has_solution"]) == ("infeasible", False)
     assert {verdict.status for verdict in collections.verify(tmp_path)} == {"ok"}
     shown = invoke("check", *sorted((tmp_path / "existence/Squeezed").glob("*.hdf5")))
     assert shown.exit_code == 0, shown.output
@@ -351,7 +351,7 @@ def test_what_is_no_solution_is_a_guess_with_its_error(
 ) -> None:
     folder = unsolved(tmp_path, monkeypatch)
     for row in collections.read_catalog(folder).to_pylist():
-        assert row["solved"] is False
+        assert row["has_solution"] is False
         assert row["error"] > 1e-8
         for form in ("global", "local"):
             path = folder / row[f"{form}_file"]
@@ -384,8 +384,8 @@ def test_a_solution_that_somebody_sent_in_is_taken(
     monkeypatch.setattr(standing, "stored_solution", stored.get)
     folder = unsolved(tmp_path, monkeypatch)
     second, third = collections.read_catalog(folder).to_pylist()
-    assert (second["solver"], second["solved"]) == ("somebody", True)
-    assert third["solved"] is False
+    assert (second["solver"], second["has_solution"]) == ("somebody", True)
+    assert third["has_solution"] is False
     path = folder / second["global_file"]
     told = fclib.read_attributes(path, "solution")
     assert (told["solver"], told["date"]) == ("somebody", "2026-01-02")

@@ -87,7 +87,7 @@ def test_what_is_no_solution_is_not_taken_in_as_one(tmp_path: Path) -> None:
         for row in collections.read_catalog(out).to_pylist():
             path = out / row["local_file"]
             kept, guesses = read_solution(path), fclib.read_guesses(path)
-            assert row["solved"] == rules.references == (kept is not None)
+            assert row["has_solution"] == rules.references == (kept is not None)
             if rules.references:
                 assert fclib.merit(problem, kept).error <= 1e-12
                 assert len(guesses) == 1
@@ -117,11 +117,11 @@ def test_files_that_held_what_is_no_solution(real_data: Path, tmp_path: Path) ->
         shutil.copyfile(path, folder / path.name)
     assert collections.add(folder, out, "cases") == []
     hand, several, squeezed = (rows_of(out)[f"{name}.hdf5"] for name in names)
-    assert (hand["solver"] != "the file", hand["solved"]) == (True, True)
+    assert (hand["solver"] != "the file", hand["has_solution"]) == (True, True)
     assert hand["error"] <= 1e-12
-    assert (several["solver"], several["solved"]) == ("the file", True)
+    assert (several["solver"], several["has_solution"]) == ("the file", True)
     assert len(fclib.read_solutions(out / several["global_file"])) == 3
-    assert (squeezed["status"], squeezed["solved"]) == ("infeasible", False)
+    assert (squeezed["status"], squeezed["has_solution"]) == ("infeasible", False)
     path = out / squeezed["global_file"]
     assert fclib.contents(path) == ["global"]
     assert "there is none" in str(fclib.read_attributes(path, "info")["solution"])

@@ -77,7 +77,9 @@ def build_plans(
             out.print(Rows(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
-        open_ones = [row for row in rows if row["solved"] is False and not catalog.is_proven(row)]
+        open_ones = [
+            row for row in rows if row["has_solution"] is False and not catalog.is_proven(row)
+        ]
         if open_ones:
             worst = max(open_ones, key=lambda row: float(row["error"]))
             out.print(

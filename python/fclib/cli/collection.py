@@ -411,7 +411,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         if lacking:
             out.print(f"{lacking} files or families are not in the catalogue, or not whole")
         proven = sum(map(catalog.is_proven, rows))
-        unsolved = sum(row["solved"] is False for row in rows) - proven
+        unsolved = sum(row["has_solution"] is False for row in rows) - proven
         if proven:
             out.print(f"{proven} problems are proven to have no solution, and say so")
         if unsolved:
@@ -638,7 +638,9 @@ def add(
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
         out.print(Rows(report.records))
-        unsolved = [row for row in rows if row["solved"] is False and not catalog.is_proven(row)]
+        unsolved = [
+            row for row in rows if row["has_solution"] is False and not catalog.is_proven(row)
+        ]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
             out.print(f"{len(unsolved)} have no known solution: {names}", highlight=False)

@@ -517,7 +517,9 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "seed": plan.scene.seed,
         **facts_of(item.problem),
         "bodies": item.bodies,
-        **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error", "solved")),
+        **dict.fromkeys(
+            ("open", "stick", "slide", "solver", "status", "tol", "error", "has_solution")
+        ),
         "left_out": "; ".join(item.left_out) or None,
         **rights.of(plan),
     }

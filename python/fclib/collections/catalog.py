@@ -52,7 +52,11 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("status", "string", "what it said"),
     ("tol", "float64", "what it was asked for"),
     ("error", "float64", "of it, by both natural maps, relative; of the global form"),
-    ("solved", "bool", "whether that is a solution, and stored as one; null: none was looked for"),
+    (
+        "has_solution",
+        "bool",
+        "whether that is a solution, and stored as one; null: none was looked for",
+    ),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
     ("left_out", "string", "what the scene asked for and no problem holds; null: nothing"),
     ("digest", "string", "fclib.digest of the global form, or the only one"),
@@ -174,8 +178,8 @@ def is_answered(row: Mapping[str, Any]) -> bool:
 
 def is_solved(row: Mapping[str, Any]) -> bool:
     """Whether its solution is stored; an older catalogue has the word of the solver alone."""
-    solved = row["solved"]
-    return bool(row["status"] == "converged" if solved is None else solved)
+    stored = row["has_solution"]
+    return bool(row["status"] == "converged" if stored is None else stored)
 
 
 def distinct(rows: Iterable[Mapping[str, Any]]) -> int:

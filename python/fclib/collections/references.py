@@ -91,7 +91,7 @@ class Found:
             "solver": self.solver,
             "status": self.status,
             "error": self.error,
-            "solved": self.ok,
+            "has_solution": self.ok,
         }
 
 

@@ -91,7 +91,9 @@ def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, A
                 return Verdict(name, path, "not published", None, message, origin, apart)
     if solution is None:
         # a catalogue of before had no word for what is not a solution
-        expected = row["solved"] if row["solved"] is not None else row["solver"] is not None
+        expected = row["has_solution"]
+        if expected is None:
+            expected = row["solver"] is not None
         if expected:
             return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
         return Verdict(name, path, "ok", None, "", origin, apart)

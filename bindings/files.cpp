@@ -176,12 +176,10 @@ void bind_hdf5(nb::module_& m) {
         return read_attributes(path.string(), group);
       },
       "path"_a, "group"_a,
-      nb::sig(signature("read_attributes", ", group: typing.Literal['solution', 'info']",
-                        "dict[str, float | str]")
-                  .c_str()),
+      nb::sig(signature("read_attributes", ", group: str", "dict[str, float | str]").c_str()),
       nb::call_guard<Unlocked>(),
-      "What a file says of its solution, or of its problem (\"info\"), beside the data: numbers "
-      "and texts by their names. Raises FileError.");
+      "What a file says of its solution, of its problem (\"info\"), or of a guess (\"guesses/1\"), "
+      "beside the data: numbers and texts by their names. Raises FileError.");
   m.def(
       "write_attributes",
       [](const fs::path& path, const std::string& group, const Attributes& attributes) {
@@ -189,14 +187,14 @@ void bind_hdf5(nb::module_& m) {
       },
       "path"_a, "group"_a, "attributes"_a,
       nb::sig(signature("write_attributes",
-                        ", group: typing.Literal['solution', 'info'], attributes: "
-                        "collections.abc.Mapping[str, float | str]",
+                        ", group: str, attributes: collections.abc.Mapping[str, float | str]",
                         "None")
                   .c_str()),
       nb::call_guard<Unlocked>(),
-      "Gives the solution of a file, or its problem (\"info\"), attributes, in place of those of "
-      "the same names, atomically. They go where the solution, or the problem, is replaced.\n\n"
-      "Raises FileError where there is no solution in the file.");
+      "Gives the solution of a file, its problem (\"info\") or a guess (\"guesses/1\") attributes, "
+      "in place of those of the same names, atomically. They go if what they are of is "
+      "replaced.\n\n"
+      "Raises FileError if the file has no solution, or no such guess.");
   m.def(
       "write_guesses",
       [](const fs::path& path, const nb::object& given, const std::string& mode, int compression) {

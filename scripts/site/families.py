@@ -11,7 +11,8 @@ from typing import Any
 
 from fclib import scenes, simulate
 from fclib.collections import plan
-from fclib.collections.known import KNOWN
+from fclib.collections.known import KNOWN, distinct_of
+from fclib.collections.references import TARGET
 
 SIZE = (720, 540)  # of a picture [pixels]
 Kind = type[scenes.Described]
@@ -49,13 +50,19 @@ def index(families: dict[str, Kind], drawn: set[str], report: str) -> str:
         "|---|---|---|",
     ]
     lines += [f"| {name} | {version} | {what} |" for name, (version, what) in KNOWN.items()]
-    lines += ["", "| | set | family | problems | what |", "|---|---|---|---:|---|"]
+    lines += ["", "| | set | family | problems | distinct | what |", "|---|---|---|---:|---:|---|"]
     lines += [
         f"| {f'![{name}]({name}.png){{width=96px}}' if name in drawn else ''}"
-        f" | {kind.collection} | [{name}]({name}.md) | {kind.problems} | {kind.description} |"
+        f" | {kind.collection} | [{name}]({name}.md) | {kind.problems}"
+        f" | {distinct(name, kind) or ''} | {kind.description} |"
         for name, kind in families.items()
     ]
     return "\n".join(lines) + "\n"
+
+
+def distinct(name: str, kind: Kind) -> int | None:
+    """How many of its problems differ, if that is known without a simulation."""
+    return distinct_of([f"{kind.collection}/{name}"])
 
 
 def browsed(report: str, place: str, text: str) -> list[str]:
@@ -72,6 +79,8 @@ def page(name: str, kind: Kind, drawn: bool, report: str) -> str:
         lines += [f"![The scene of {name} at its start]({name}.png){{width=480px}}", ""]
     lines += browsed(report, f"#/family/{name}", "Its problems and runs in the report")
     number = f"the first {kind.problems} steps with contact" if simulated else f"{kind.problems}"
+    if different := distinct(name, kind):
+        number += f", {different} of them distinct"
     lines += [inspect.getdoc(kind) or "", "", "| | |", "|---|---|"]
     lines += [
         f"| set | {kind.collection} |",
@@ -80,7 +89,8 @@ def page(name: str, kind: Kind, drawn: bool, report: str) -> str:
         f"| authors of the original | {kind.authors} |",
         f"| made by | {'simulation' if simulated else 'assembly, without a simulation'} |",
         f"| problems | {number}, seed {planned.scene.seed} |",
-        f"| forms | {', '.join(planned.forms)}; solved by `{planned.solver}` to {planned.tol:g} |",
+        f"| forms | {', '.join(planned.forms)} |",
+        f"| solved by | `{planned.solver}`, and finished to {TARGET:g} |",
         "",
         "## Parameters",
         "",

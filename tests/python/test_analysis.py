@@ -548,7 +548,7 @@ def test_heavy_bodies_are_no_rounding_of_light_ones(size: float) -> None:
     assert found.uniqueness.verdict == "not unique"
     assert found.existence.verdict == "exists by enumeration"
     assert found.isolated_solutions == 2
-    said = brief(problem, problem, None, 1e-8)
+    said = brief(problem, problem)
     assert said.record["definiteness"] == "indefinite"
     assert said.record["uniqueness"] is None
     # and what is asymmetric is so beside a part that is not
@@ -783,8 +783,20 @@ def test_attributes_of_a_file(tmp_path: Path) -> None:
     fclib.write_solution(path, case.solution)
     assert fclib.read_attributes(path, "solution") == {}
     assert fclib.read_attributes(path, "info") == {"rank": 3.0}
+    # a guess has its own, and they go with it
+    with pytest.raises(fclib.FileError, match="/guesses"):
+        fclib.write_attributes(path, "guesses/1", {"error": 1.0})
+    fclib.write_guesses(path, [case.solution, case.solution])
+    fclib.write_attributes(path, "guesses/2", {"error": 0.5})
+    assert fclib.read_attributes(path, "guesses/1") == {}
+    assert fclib.read_attributes(path, "guesses/2") == {"error": 0.5}
+    assert fclib.read_attributes(path, "guesses/3") == {}
+    with pytest.raises(fclib.FileError, match="/guesses/3"):
+        fclib.write_attributes(path, "guesses/3", {"error": 1.0})
+    fclib.write_guesses(path, [case.solution, case.solution])
+    assert fclib.read_attributes(path, "guesses/2") == {}
     with pytest.raises(fclib.OptionError, match="solution, info"):
-        fclib.read_attributes(path, "guesses")  # type: ignore[arg-type]
+        fclib.read_attributes(path, "guesses")
 
 
 def test_the_command_analyses_stores_and_checks(tmp_path: Path) -> None:

@@ -2,8 +2,10 @@
 
 import contextlib
 import dataclasses
+import datetime
 import functools
 import http.server
+import importlib
 import json
 import signal
 import subprocess
@@ -26,8 +28,9 @@ pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 
 from fclib import collections
-from fclib.collections import archives, catalog
+from fclib.collections import archives, catalog, known, published, references, standing
 from fclib.collections.build import BuildError
+from fclib.collections.known import DATA
 from fclib.collections.plan import Plan
 from fclib.simulate import control_of
 
@@ -77,7 +80,8 @@ def test_catalog_says_what_the_files_hold(built: Path) -> None:
         solution = read_solution(built / row["global_file"])
         merit = fclib.merit(problem, solution)
         assert fclib.digest(problem) == row["digest"]
-        assert merit.error_by("natural") == row["error"] <= 1e-8
+        assert merit.error == row["error"] <= 1e-12
+        assert row["has_solution"] is True
         assert (merit.open, merit.stick, merit.slide) == (row["open"], row["stick"], row["slide"])
         assert (problem.n, problem.nc, problem.p) == (row["n"], row["nc"], row["p"])
         assert (problem.M.nnz, problem.H.nnz) == (row["nnz_M"], row["nnz_H"])
@@ -245,7 +249,7 @@ def test_hard_keeps_what_costs_nsgs_most(built: Path, tmp_path: Path) -> None:
     sweeps = {}
     for row in collections.read_catalog(built).to_pylist():
         local = read(built / row["local_file"])
-        result = fclib.solve(local, "nsgs", tol=1e-6, max_iterations=2000, merit="natural")
+        result = fclib.solve(local, "nsgs", tol=1e-6, max_iterations=2000)
         sweeps[row["number"]] = result.iterations
     hardest = sorted(sweeps, key=lambda number: (-sweeps[number], number))[:3]
     assert table["number"].to_pylist() == sorted(hardest)
@@ -298,6 +302,9 @@ def test_files_say_what_is_cheaply_known(built: Path, tmp_path: Path) -> None:
         for problem in (whole, local):
             assert "Existence: exists by Slater" in problem.info.math_info
             assert "Left out: conditioning of H" in problem.info.math_info
+            # of u and of r apart: four contacts under a box move nothing in more than one way
+            assert "Velocity: u" in problem.info.math_info
+            assert "Reactions: not unique: at the solution at hand" in problem.info.math_info
         assert row["existence"] == "exists by Slater"
         assert row["conditioning_H"] is None
         # the digest is of the data
@@ -315,9 +322,136 @@ def test_a_file_says_that_its_problem_has_no_solution(tmp_path: Path) -> None:
     }
     assert len(words) == 4
     for name, text in words.items():
-        assert ("Existence: proven not to exist" in text) == name.startswith("0002"), text
+        proven = name.startswith("0002")
+        assert ("Existence: proven not to exist" in text) == proven, text
+        path = tmp_path / "existence/Squeezed" / name
+        # nothing that is no solution stands where solutions do
+        assert (read_solution(path) is None) == proven
+        told = fclib.read_attributes(path, "info")
+        assert ("there is none, by a checked proof" in str(told.get("solution"))) == proven
     row = collections.read_catalog(tmp_path).to_pylist()[0]
     assert (row["number"], row["existence"]) == (2, "proven not to exist")
+    assert (row["status"], row["has_solution"]) == ("infeasible", False)
+    assert {verdict.status for verdict in collections.verify(tmp_path)} == {"ok"}
+    shown = invoke("check", *sorted((tmp_path / "existence/Squeezed").glob("*.hdf5")))
+    assert shown.exit_code == 0, shown.output
+    assert shown.output.count("no solution") == 2
+
+
+def unsolved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of two problems of which a solver of one sweep knows no solution."""
+    monkeypatch.setattr(references, "FINISH", ())
+    own = plan(problems=4, solver="nsgs", options={"max_iterations": 1}).only([2, 3])
+    collections.build([own], tmp_path, pictures=False)
+    return tmp_path
+
+
+def test_what_is_no_solution_is_a_guess_with_its_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = unsolved(tmp_path, monkeypatch)
+    for row in collections.read_catalog(folder).to_pylist():
+        assert row["has_solution"] is False
+        assert row["error"] > 1e-8
+        for form in ("global", "local"):
+            path = folder / row[f"{form}_file"]
+            problem, guesses = read(path), fclib.read_guesses(path)
+            assert read_solution(path) is None
+            told = fclib.read_attributes(path, f"guesses/{len(guesses)}")
+            error = fclib.merit(problem, guesses[-1]).error
+            assert told["error"] == pytest.approx(error, rel=1e-6)
+            assert error > 1e-8
+            assert (told["merit"], told["solver"]) == ("both", "nsgs")
+            assert "none is known: guess" in str(fclib.read_attributes(path, "info")["solution"])
+            assert "Existence" in problem.info.math_info
+    assert {verdict.status for verdict in collections.verify(folder)} == {"ok"}
+    paths = sorted(folder.glob("small/*/*.hdf5"))
+    assert invoke("check", *paths).exit_code == 0
+    # a file that says nothing of why it has none is an error
+    fclib.write(paths[0], read(paths[0]))
+    assert invoke("check", paths[0]).exit_code == 1
+
+
+def test_a_solution_that_somebody_sent_in_is_taken(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    known = {
+        row["digest"]: read_solution(built / row["global_file"])
+        for row in collections.read_catalog(built).to_pylist()[:3]
+    }
+    said = {"by": "somebody", "date": "2026-01-02"}
+    stored = {digest: (solution, said) for digest, solution in known.items()}
+    monkeypatch.setattr(standing, "stored_solution", stored.get)
+    folder = unsolved(tmp_path, monkeypatch)
+    second, third = collections.read_catalog(folder).to_pylist()
+    assert (second["solver"], second["has_solution"]) == ("somebody", True)
+    assert third["has_solution"] is False
+    path = folder / second["global_file"]
+    told = fclib.read_attributes(path, "solution")
+    assert (told["solver"], told["date"]) == ("somebody", "2026-01-02")
+    assert np.array_equal(read_solution(path).r, known[second["digest"]].r)
+
+
+def test_a_solution_says_how_good_it_is_and_whose(
+    built: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row = collections.read_catalog(built).to_pylist()[7]
+    for form in ("global", "local"):
+        path = built / row[f"{form}_file"]
+        told = fclib.read_attributes(path, "solution")
+        merit = fclib.merit(read(path), read_solution(path))
+        assert told["error"] == merit.error
+        assert (told["natural"], told["scaled_natural"]) == (merit.natural, merit.scaled_natural)
+        assert (told["merit"], told["solver"]) == ("both", row["solver"])
+        assert told["ends"] == "1e-12 is reached"
+        assert datetime.date.fromisoformat(str(told["date"]))
+    # files that do not tell the day
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    collections.build([plan(problems=1)], tmp_path, pictures=False)
+    path = next(tmp_path.rglob("0000-global.hdf5"))
+    assert fclib.read_attributes(path, "solution")["date"] == "1970-01-02"
+
+
+def test_a_local_form_has_its_own_digits() -> None:
+    whole = read(DATA / "tiny/FourBar/0150-global.hdf5")
+    local = whole.condense()
+    found = references.find(whole, "auto", 1e-8)
+    rounded = fclib.Solution(r=(1 + 1e-10) * found.solution.r, l=found.solution.l)
+    assert 1e-12 < fclib.merit(local, rounded).error <= 1e-8
+    mine = references.carried(dataclasses.replace(found, solution=rounded), local)
+    assert mine.error == fclib.merit(local, mine.solution).error <= 1e-12
+    assert mine.ends == "1e-12 is reached"
+
+
+def test_a_certified_reference_names_both_algorithms(tmp_path: Path) -> None:
+    pytest.importorskip("clarabel")
+    own = dataclasses.replace(plan(problems=6), certify=True).only([5])
+    (row,) = collections.build([own], tmp_path, pictures=False).to_pylist()
+    for form in ("global", "local"):
+        path = tmp_path / row[f"{form}_file"]
+        told = fclib.read_attributes(path, "solution")
+        assert told["certified"] == "yes"
+        first, second = str(told["algorithms"]).split("; ")
+        assert first.partition(" ")[0] != second.partition(" ")[0]
+        assert told["error"] == fclib.merit(read(path), read_solution(path)).error <= 1e-12
+        assert told["ends"] == "1e-12 is reached"
+    assert ("merit_error" in told) == (form == "global")
+    with pytest.raises(BuildError, match="certify"):
+        collections.build([plan(problems=6).only([5])], tmp_path, pictures=False)
+    with pytest.raises(ValueError, match="nothing to certify"):
+        plan(references=False, certify=True)
+
+
+def test_a_reference_that_the_natural_map_alone_takes_is_solved_by_both(tmp_path: Path) -> None:
+    """Light bodies: reactions of no size, so that the natural map sees only velocities."""
+    whole = read(DATA / "tiny/KaplasTower/0030-global.hdf5")
+    factor = 1e-7
+    light = whole.replace(M=factor * whole.M, f=factor * whole.f)
+    loose = fclib.solve(light, tol=1e-8, merit="natural").solution
+    assert fclib.merit(light, loose).error_by("natural") <= 1e-8
+    found = references.find(light, "auto", 1e-8)
+    assert found.ok
+    assert found.error == fclib.merit(light, found.solution).error <= 1e-12
 
 
 def test_what_is_cheaply_known_is_what_the_analysis_finds(built: Path) -> None:
@@ -328,7 +462,7 @@ def test_what_is_cheaply_known_is_what_the_analysis_finds(built: Path) -> None:
     whole = read(built / row["global_file"])
     for problem in (whole, read(built / row["local_file"]), whole.replace(mu=0 * whole.mu)):
         local = problem.condense() if problem.n else problem
-        found = analysis.brief(problem, local, None, 1e-8)
+        found = analysis.brief(problem, local)
         known = analysis.analyze(problem).record
         for name, value in found.record.items():
             if isinstance(value, (bool, str)):
@@ -338,9 +472,13 @@ def test_what_is_cheaply_known_is_what_the_analysis_finds(built: Path) -> None:
 
 
 def test_all_known_solutions_are_stored(tmp_path: Path) -> None:
-    own = collections.plan_of("existence/ManySolutions", count=6)
+    own = collections.plan_of("existence/ManySolutions").only([0, 5, 8, 20, 35])
     table = collections.build([own], tmp_path, pictures=False)
     counts = set()
+    words = {row["number"]: read(tmp_path / row["global_file"]).info for row in table.to_pylist()}
+    for part in ("Velocity", "Reactions"):
+        assert f"{part}: not unique: enumeration of contact states" in words[5].math_info
+        assert f"{part}: unique: " in words[0].math_info
     for row in table.to_pylist():
         for form in ("global", "local"):
             path = tmp_path / row[f"{form}_file"]
@@ -349,7 +487,35 @@ def test_all_known_solutions_are_stored(tmp_path: Path) -> None:
             for k, one in enumerate(solutions):
                 assert fclib.merit(problem, one).error < 1e-12
                 assert all(np.abs(one.r - other.r).max() > 1e-6 for other in solutions[:k])
+            # and nothing touching is not the one that stands for them
+            assert not solutions or read_solution(path).r.any()
     assert counts >= {0, 3}
+    assert {verdict.status for verdict in collections.verify(tmp_path)} == {"ok"}
+    # one of several that is none is found too
+    path = tmp_path / "existence/ManySolutions/0005-local.hdf5"
+    several = fclib.read_solutions(path)
+    wrong = several[1].replace(r=1.5 * several[1].r + 1.0, u=None)
+    fclib.write_solutions(path, [several[0], wrong])
+    rows = table.to_pylist()
+    rows[1]["local_sha256"] = catalog.sha256(path)
+    catalog.write_catalog(tmp_path / catalog.FILE, rows)
+    (bad,) = (verdict for verdict in collections.verify(tmp_path) if not verdict.ok)
+    assert bad.status == "wrong"
+    assert "/solutions/2" in bad.message
+
+
+def test_problems_of_few_contacts_say_what_all_their_states_say(tmp_path: Path) -> None:
+    own = [
+        collections.plan_of("impacts/RockingBlock").only([100]),
+        Plan.of_family("LocalProblems").only([104]),
+    ]
+    table = collections.build(own, tmp_path, pictures=False)
+    for row in table.to_pylist():
+        words = read(tmp_path / row["local_file"]).info.math_info
+        assert "Velocity: unique" in words
+        assert "Reactions: unique" in words
+        assert "states of the contacts" not in words.partition("Left out:")[2]
+        assert (row["uniqueness"], row["reactions_unique"]) == ("unique", True)
 
 
 # ---- verifying
@@ -392,8 +558,101 @@ def test_verify_judges_what_the_hash_does_not_tell(built: Path, tmp_path: Path, 
     row |= {"local_file": None, "local_sha256": None, "global_sha256": catalog.sha256(target)}
     catalog.write_catalog(tmp_path / catalog.FILE, [row])
     (verdict,) = collections.verify(tmp_path)
-    expected = {"solution": "worse", "problem": "wrong digest", "nonsense": "unreadable"}
+    expected = {"solution": "wrong", "problem": "wrong digest", "nonsense": "unreadable"}
     assert verdict.status == expected[fault]
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-9])
+def test_verify_fails_exactly_if_check_does(built: Path, tmp_path: Path, mass: float) -> None:
+    """From a solution that is one to one that is none, by ever larger changes of its reactions.
+
+    Where bodies are light, the natural map alone takes them all.
+    """
+    row = dict(collections.read_catalog(built).to_pylist()[5])
+    problem, solution = read(built / row["global_file"]), read_solution(built / row["global_file"])
+    problem = problem.replace(M=mass * problem.M, f=mass * problem.f)
+    row |= {"local_file": None, "local_sha256": None, "digest": fclib.digest(problem)}
+    seen = set()
+    for power in range(-14, 0):
+        target = tmp_path / f"small/BoxesStack/{-power:04d}-global.hdf5"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        changed = fclib.Solution(r=mass * (1 + 10.0**power) * solution.r)
+        fclib.write(target, problem, changed)
+        path = target.relative_to(tmp_path).as_posix()
+        own = {"global_file": path, "global_sha256": catalog.sha256(target)}
+        catalog.write_catalog(tmp_path / catalog.FILE, [row | own])
+        (verdict,) = (one for one in collections.verify(tmp_path) if one.path == path)
+        ok = invoke("check", target).exit_code == 0
+        assert verdict.ok == ok == (fclib.merit(problem, read_solution(target)).error <= 1e-8)
+        seen.add(ok)
+    assert seen == {True, False}
+
+
+def test_a_cut_build_leaves_a_catalogue_of_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = scenes.Scene.of(scenes.get("BoxesStack")(boxes=2), 0, stack(2).xml)
+    plans = [Plan(scene=other, collection="first", problems=3), plan()]
+    module = importlib.import_module("fclib.collections.build")
+    store = module.store
+
+    def cut(own: Plan, kept: Any, *rest: Any) -> Any:
+        before = store(own, kept, *rest)
+        if (own.collection, kept.looked) == ("small", 5):
+            raise KeyboardInterrupt
+        return before
+
+    monkeypatch.setattr(module, "store", cut)
+    with pytest.raises(KeyboardInterrupt):
+        collections.build(plans, tmp_path, pictures=False)
+    monkeypatch.undo()
+    rows = collections.read_catalog(tmp_path).to_pylist()
+    names = {"first": [0, 1, 2], "small": [0, 1, 2, 3, 4, 5]}
+    found = [row["id"] for row in rows]
+    assert found == [f"{own}/BoxesStack/{k:04d}" for own, ks in names.items() for k in ks]
+    # what came after the last checkpoint is named, and what is not whole
+    stray = tmp_path / "first/BoxesStack/0009-local.hdf5"
+    stray.write_bytes((tmp_path / rows[0]["local_file"]).read_bytes())
+    said = {one.path: one.status for one in collections.verify(tmp_path) if not one.ok}
+    assert said == {
+        "small/BoxesStack": "unfinished",
+        "first/BoxesStack/0009-local.hdf5": "not listed",
+    }
+    told = invoke("collection", "verify", tmp_path)
+    assert told.exit_code == 1
+    site = tmp_path / "site"
+    published = invoke("collection", "publish", tmp_path, "--out", site)
+    assert published.exit_code == 1
+    for shown in (told, published):
+        assert "0009-local.hdf5: is not in the catalogue" in " ".join(shown.stderr.split())
+        assert "small/BoxesStack: its build was cut" in " ".join(shown.stderr.split())
+    assert sorted(path.name for path in site.glob("*.zip")) == ["first-BoxesStack.zip"]
+    assert len(collections.read_catalog(site)) == 3
+    # the same command ends it
+    stray.unlink()
+    collections.build(plans, tmp_path, pictures=False)
+    assert all(one.ok for one in collections.verify(tmp_path))
+    assert len(collections.read_catalog(tmp_path)) == 15
+
+
+def test_equal_problems_are_told(tmp_path: Path) -> None:
+    twins = [plan(problems=2), dataclasses.replace(plan(problems=2), collection="twin")]
+    table = collections.build(twins, tmp_path, pictures=False)
+    rows = {row["id"]: row["same_as"] for row in table.to_pylist()}
+    assert rows == {
+        "small/BoxesStack/0000": None,
+        "small/BoxesStack/0001": None,
+        "twin/BoxesStack/0000": "small/BoxesStack/0000",
+        "twin/BoxesStack/0001": "small/BoxesStack/0001",
+    }
+    assert catalog.distinct(table.to_pylist()) == 2
+
+
+def test_no_doi_before_there_is_one(built: Path) -> None:
+    path = built / collections.read_catalog(built).to_pylist()[0]["global_file"]
+    origin = json.loads(read(path).info.description.splitlines()[-1])
+    assert origin["license"] == "CC-BY-4.0"
+    assert "doi" not in origin
 
 
 def test_no_catalogue_is_named(tmp_path: Path) -> None:
@@ -607,6 +866,21 @@ def test_a_set_counts_its_families_without_states_too() -> None:
         shown = {row["folder"]: row["problems"] for row in lines("show", name, "--json")}
         assert shown[folder] == problems
         assert listed[name] == sum(shown.values())
+
+
+def test_copies_are_counted_once() -> None:
+    """A tower that rests is one problem, however many steps it does so."""
+    states = published.digests("rt444/KaplasTower", known.version_of("rt444/KaplasTower"))
+    if not states:
+        pytest.skip("its states are not stored here")
+    rows = [json.loads(one) for one in invoke("collection", "list", "--json").output.splitlines()]
+    told = [*map(json.loads, invoke("collection", "list", "--sets", "--json").output.splitlines())]
+    own, sets = {row["family"]: row for row in rows}, {row["set"]: row for row in told}
+    assert own["KaplasTower"]["problems"] == len(states)
+    assert own["KaplasTower"]["distinct"] == len(set(states.values())) < len(states)
+    assert own["LowWall"]["distinct"] is None
+    assert sets["rt444"]["distinct"] < sets["rt444"]["problems"]
+    assert sets["standard"]["distinct"] == sets["standard"]["problems"]
 
 
 def test_simulate_makes_problems_of_any_scene(tmp_path: Path) -> None:
@@ -826,6 +1100,8 @@ def test_build_verify_and_publish_by_commands(tmp_path: Path) -> None:
     assert "Chain" in done.output
     rows = collections.read_catalog(out).to_pylist()
     assert all(row["tol"] == 1e-12 and row["error"] <= 1e-12 for row in rows)
+    refused = invoke("collection", "build", "Chain", "--out", out, "--tol", "1e-7")
+    assert refused.exit_code == 2
     assert len(list(out.glob("rt444/Chain/*.hdf5"))) == 2
     assert (out / "rt444/Chain/distribution.svg").is_file()
     assert invoke("collection", "verify", out).exit_code == 0

@@ -61,13 +61,76 @@ def test_files_become_a_set(source: Path, tmp_path: Path, monkeypatch: pytest.Mo
         own = read_solution(source / row["source"])
         kept = read_solution(out / row["local_file"])
         assert own is None or np.array_equal(own.r, kept.r)
-        assert fclib.merit(problem, kept).error_by("natural") == row["error"] <= 1e-8
+        assert fclib.merit(problem, kept).error == row["error"] <= 1e-8
+        told = fclib.read_attributes(out / row["local_file"], "solution")
+        assert (told["error"], told["solver"]) == (row["error"], row["solver"])
     assert [row["solver"] for row in rows].count("the file") == 2
     assert all(verdict.ok for verdict in collections.verify(out))
     monkeypatch.setenv("FCLIB_COLLECTION", str(out))
     assert len(fclib.collection("from_afar")) == 3
     with pytest.raises(KeyError, match="no set"):
         fclib.collection("from_nowhere")
+
+
+def test_what_is_no_solution_is_not_taken_in_as_one(tmp_path: Path) -> None:
+    """Files that hold reactions of zero as their solution, as real ones do."""
+    folder, out = tmp_path / "afar", tmp_path / "collection"
+    folder.mkdir()
+    problem = read(DATA / "tiny/Wall/0003-local.hdf5")
+    zero = fclib.Solution(r=np.zeros(problem.m))
+    for name in ("zero", "again"):
+        fclib.write(folder / f"{name}.hdf5", problem, zero, [zero])
+    fclib.write_attributes(folder / "zero.hdf5", "info", {"numberOfInvolvedDS": 3})
+    for rules in (collections.Rules(references=False), collections.Rules()):
+        shutil.rmtree(out, ignore_errors=True)
+        assert collections.add(folder, out, "mine", rules) == []
+        for row in collections.read_catalog(out).to_pylist():
+            path = out / row["local_file"]
+            kept, guesses = read_solution(path), fclib.read_guesses(path)
+            assert row["has_solution"] == rules.references == (kept is not None)
+            if rules.references:
+                assert fclib.merit(problem, kept).error <= 1e-12
+                assert len(guesses) == 1
+            else:
+                told = fclib.read_attributes(path, "guesses/2")
+                assert (told["error"], told["solver"]) == (row["error"], "the file")
+                assert len(guesses) == 2
+        info = fclib.read_attributes(out / rows_of(out)["zero.hdf5"]["local_file"], "info")
+        assert info["numberOfInvolvedDS"] == 3
+        assert all(verdict.ok for verdict in collections.verify(out))
+    assert rows_of(out)["zero.hdf5"]["same_as"] == "mine/afar/0000"
+    done = CliRunner().invoke(
+        app, ["collection", "add", str(folder), "--name", "mine", "--out", str(out)]
+    )
+    assert "zero.hdf5: the same problem as mine/afar/0000" in " ".join(done.output.split())
+
+
+def test_files_that_held_what_is_no_solution(real_data: Path, tmp_path: Path) -> None:
+    """A wrong reference, one of several solutions, and a problem that has none."""
+    names = ("hand-0040-wrong-reference", "manysolutions-0005-no-word", "squeezed-0000-nonsolution")
+    folder, out = tmp_path / "cases", tmp_path / "out"
+    folder.mkdir()
+    for name in names:
+        path = real_data.parent / "cases" / f"{name}.hdf5"
+        if not path.is_file():
+            pytest.skip("the cases are not there")
+        shutil.copyfile(path, folder / path.name)
+    assert collections.add(folder, out, "cases") == []
+    hand, several, squeezed = (rows_of(out)[f"{name}.hdf5"] for name in names)
+    assert (hand["solver"] != "the file", hand["has_solution"]) == (True, True)
+    assert hand["error"] <= 1e-12
+    assert (several["solver"], several["has_solution"]) == ("the file", True)
+    assert len(fclib.read_solutions(out / several["global_file"])) == 3
+    assert (squeezed["status"], squeezed["has_solution"]) == ("infeasible", False)
+    path = out / squeezed["global_file"]
+    assert fclib.contents(path) == ["global"]
+    assert "there is none" in str(fclib.read_attributes(path, "info")["solution"])
+    assert all(verdict.ok for verdict in collections.verify(out))
+
+
+def rows_of(out: Path) -> dict[str, dict[str, Any]]:
+    """The rows of a catalogue by the source of each."""
+    return {row["source"]: row for row in collections.read_catalog(out).to_pylist()}
 
 
 def test_it_goes_on_and_keeps_what_it_has(source: Path, tmp_path: Path) -> None:

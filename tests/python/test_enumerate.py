@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections import Counter
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import numpy as np
@@ -18,6 +20,8 @@ from scipy.optimize import linprog
 import fclib
 from fclib import analysis
 from fclib.analysis import _enumerate
+from fclib.analysis._data import Data
+from fclib.analysis._reactions import reactions
 from helpers import Array, dense, local_problem, planted_global, planted_local
 
 some = hypothesis.settings(deadline=None, max_examples=25, derandomize=True)
@@ -364,7 +368,7 @@ def test_a_box_at_rest_has_one_velocity_and_many_reactions() -> None:
     assert found.enumeration.complete
     assert names(found.enumeration) == [("stick",) * 8]
     assert found.uniqueness.verdict == "unique"
-    assert found.uniqueness.one_reaction is False
+    assert found.reactions.known is False
     assert found.isolated_solutions == 0
     slides = analysis.enumerate_solutions(box(8, (2.0, -1.0, 0.5)))
     assert names(slides) == [("slide +",) * 8]
@@ -604,3 +608,35 @@ def test_analyze_tells_how_many_solutions_there_are(tmp_path: Path) -> None:
     assert "enumeration of contact states" in first["uniqueness_reason"]
     assert second["existence"] == analysis.PROVEN_NOT
     assert second["isolated_solutions"] == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_contacts_of_a_solution_never_contradict_all_states(seed: int) -> None:
+    """Uniqueness of reactions from one solution and a rank, against exact enumeration."""
+    rng = np.random.default_rng(seed)
+    seen: Counter[tuple[str, bool | None]] = Counter()
+    for k in range(60):
+        nc, n = int(rng.integers(1, 4)), int(rng.integers(1, 5))
+        problem: Any = fclib.GlobalProblem(
+            M=np.eye(n),
+            H=rng.integers(-2, 3, size=(n, 2 * nc)).astype(float),
+            f=rng.integers(-3, 4, size=n).astype(float),
+            w=np.zeros(2 * nc),
+            mu=rng.choice([0.0, 0.3, 0.7], size=nc),
+            spacedim=2,
+        )
+        problem = problem if k % 2 else problem.condense()
+        states = analysis.enumerate_solutions(problem)
+        found = [one.solution for one in states.sound]
+        found += [fclib.solve(problem, name, 1e-12).solution for name in ("nsgs", "apgd")]
+        for solution in found:
+            error = fclib.merit(problem, solution).error
+            if not error <= 1e-8:
+                continue
+            velocity = "unique" if states.velocity_unique else "undecided"
+            said = reactions(Data.of(problem), velocity, False, None, solution, error, 100)
+            exact = states.reaction_unique
+            assert said.known is None or exact is None or said.known == exact, said.reason
+            seen[said.verdict, exact] += 1
+    assert seen["unique", True] > 10
+    assert seen["not unique", False] > 10

@@ -1148,6 +1148,15 @@ def test_several_solutions_are_kept_beside_the_one(written: Path) -> None:
     assert len(fclib.read_solutions(path)) == 2
     fclib.write(path, planted_local(2).problem, mode="replace")
     assert fclib.read_solutions(path) == []
+    # also from a file of which something stays
+    fclib.write_solutions(path, [planted_local(2).solution] * 2)
+    with h5py.File(path, "a") as file:
+        file.create_group("mine")
+    fclib.write(path, planted_local(1).problem, mode="replace")
+    assert fclib.read_solutions(path) == []
+    assert fclib.contents(path) == ["local"]
+    with h5py.File(path) as file:
+        assert set(file) == {"fclib_local", "mine"}
     fclib.write_solutions(path, [])
     with pytest.raises(fclib.ProblemError, match="solutions"):
         fclib.write_solutions(path, [r, "r"])

@@ -261,6 +261,13 @@ def test_a_better_solution_is_verified_and_taken(results: Path, tmp_path: Path) 
     own, solution, said = standing.known_solution(name)
     assert fclib.digest(own) == row.digest
     assert fclib.merit(own, solution).error == pytest.approx(said["error"], rel=1e-3)
+    # the best iterate of an open problem is no solution
+    shown = tmp_path / "shown.hdf5"
+    assert invoke("collection", "status", name, "--out", shown).exit_code == 0
+    assert fclib.contents(shown) == [own.kind, "guesses"]
+    told = fclib.read_attributes(shown, "guesses/1")
+    assert (told["solver"], told["date"]) == ("me", said["date"])
+    assert told["error"] == pytest.approx(said["error"], rel=1e-3)
     # not better
     assert take(problem, rough).exit_code == 1
     # another problem, unless it is named
@@ -346,7 +353,7 @@ def test_no_problem_depends_on_auto(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     solve = _solve.solve
     monkeypatch.setattr(_solve, "solve", nonsense)
-    plans = [collections.plan_of(f"tiny/{name}", tol=1.0) for name in ("FourBar", "PlanarBlocks")]
+    plans = [collections.plan_of(f"tiny/{name}") for name in ("FourBar", "PlanarBlocks")]
     table = collections.build(plans, tmp_path, pictures=False)
     assert {known.origin_of(row) for row in table.to_pylist()} == {"published"}
     assert set(table["solver"].to_pylist()) == {"nsgs"}

@@ -14,10 +14,12 @@ namespace {
 
 /// The path of a group that has attributes, by its short name.
 std::string group_with_attributes(const Group& root, std::string_view name) {
-  if (name == "solution") return "solution";
+  if (name == "solution" || name.starts_with("guesses/")) return std::string(name);
   if (name == "info") return "fclib_" + owner_of(kinds_of(root)) + "/info";
   throw Error(ErrorKind::option,
-              "there is no group '" + std::string(name) + "'; there are: solution, info", "group");
+              "there is no group '" + std::string(name) +
+                  "'; there are: solution, info, guesses/1, guesses/2, ...",
+              "group");
 }
 
 /// Whether a path of one or two names is there.
@@ -99,8 +101,8 @@ void write_attributes(const std::string& path, std::string_view group,
   change_file(path, Start::existing, WriteOptions{}.compression, [&](const Target& root) {
     const std::string name = group_with_attributes(root, group);
     const bool there = has_group(root, name);
-    const Handle handle =
-        there || group == "solution" ? open_group(root, name) : create_group(root, name);
+    const bool made = group == "info" && !there;
+    const Handle handle = made ? create_group(root, name) : open_group(root, name);
     const Group target{handle.id(), root.child(name)};
     for (const auto& [key, value] : attributes) {
       make_room_for(target, key, true);

@@ -9,6 +9,7 @@ Existence is decided by conic programs, for which Clarabel is needed: ``pip inst
 
 _analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _self_stress.py
 _brief.py       what of that is cheap, for every file that is built. Needs _analyze.py
+_reactions.py   whether reactions are unique, by the contacts of a solution. Needs _enumerate.py
 _existence.py   whether there is a solution. Needs _enumerate.py, _conic.py, _joints.py and
                 _certificate.py
 _self_stress.py whether reactions can grow without moving anything. Needs _existence.py
@@ -48,6 +49,7 @@ from fclib.analysis._existence import (
     Existence,
     Slater,
 )
+from fclib.analysis._reactions import Reactions
 from fclib.analysis._reference import Confirmation, Reference, reference
 from fclib.analysis._self_stress import OPEN, PRESTRESSED, SOLVABLE, SelfStress
 from fclib.analysis._spectrum import Spectrum
@@ -71,6 +73,7 @@ __all__ = [
     "Energy",
     "Enumeration",
     "Existence",
+    "Reactions",
     "Reference",
     "SelfStress",
     "Slater",

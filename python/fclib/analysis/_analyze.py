@@ -27,6 +27,7 @@ from fclib.analysis._data import (
 from fclib.analysis._enumerate import Enumeration, enumerate_solutions
 from fclib.analysis._existence import Existence, Slater, existence, slater
 from fclib.analysis._joints import Joints, joints_of
+from fclib.analysis._reactions import Reactions, reactions
 from fclib.analysis._self_stress import SelfStress, self_stress
 from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
@@ -66,14 +67,12 @@ class Uniqueness:
             problem with q + [s, 0, 0], in the norm of s: below 1 its fixed point is unique. nan
             where W is not symmetric positive definite.
         reactions: whether they follow from the velocity: W is nonsingular.
-        one_reaction: whether all solutions have the same reactions; None where that is not known.
     """
 
     verdict: str
     reason: str
     contraction: float
     reactions: bool
-    one_reaction: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class Analysis:
         hyperstaticity: m - rank W, the dimension of the reactions that move nothing; None where
             the rank is not known.
         hyperstaticity_ratio: m / rank W.
-        units, slater, existence, uniqueness, self_stress: see there.
+        units, slater, existence, uniqueness, reactions, self_stress: see there.
         enumeration: what the states of all contacts say; None where theorems say it all.
         isolated_solutions: how many there are; None where that is not known.
     """
@@ -137,6 +136,7 @@ class Analysis:
     slater: Slater
     existence: Existence
     uniqueness: Uniqueness
+    reactions: Reactions
     self_stress: SelfStress
     enumeration: Enumeration | None = field(default=None, repr=False)
 
@@ -215,7 +215,8 @@ class Analysis:
             "uniqueness_reason": self.uniqueness.reason,
             "contraction": self.uniqueness.contraction,
             "reactions_follow": self.uniqueness.reactions,
-            "reactions_unique": self.uniqueness.one_reaction,
+            "reactions_unique": self.reactions.known,
+            "reactions_reason": self.reactions.reason,
             "isolated_solutions": self.isolated_solutions,
         }
         if self.certificate is not None:
@@ -238,6 +239,7 @@ class Analysis:
             f"Existence: {self.existence.verdict}: {self.existence.reason}.",
             f"Self-stress: {self.self_stress.verdict}: {self.self_stress.reason}.",
             f"Velocity: {self.uniqueness.verdict}: {self.uniqueness.reason}.",
+            f"Reactions: {self.reactions.verdict}: {self.reactions.reason}.",
             sign,
         ]
         if self.units.trouble:
@@ -316,7 +318,7 @@ def analyze(
     # one solution, by theorems; else the states of the contacts say how many
     if not (condition.holds and unique.verdict == "unique" and unique.reactions):
         states = enumerate_solutions(problem, time_limit=min(time_limit, ENUMERATION))
-    unique = _enumerated(unique, states)
+        unique = enumerated(unique, states)
     verdict = existence(data, joints, condition, states, tol, time_limit)
     numbers = data.local.islands().contact
     return Analysis(
@@ -336,6 +338,15 @@ def analyze(
         slater=condition,
         existence=verdict,
         uniqueness=unique,
+        reactions=reactions(
+            data,
+            unique.verdict,
+            unique.reactions,
+            states,
+            verdict.solution,
+            verdict.error,
+            dense,
+        ),
         self_stress=self_stress(data, joints, condition, time_limit),
         enumeration=states,
     )
@@ -420,11 +431,8 @@ def uniqueness(
     return Uniqueness("undecided", reason, constant, full)
 
 
-def _enumerated(found: Uniqueness, states: Enumeration | None) -> Uniqueness:
+def enumerated(found: Uniqueness, states: Enumeration) -> Uniqueness:
     """With what the states of the contacts say."""
-    if states is None:
-        return replace(found, one_reaction=True)
-    found = replace(found, one_reaction=states.reaction_unique)
     if found.verdict == "unique" or states.velocity_unique is None:
         return found
     return replace(

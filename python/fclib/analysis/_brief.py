@@ -14,17 +14,28 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 from fclib import _core, _solve
+from fclib._judge import judge
 from fclib.analysis._analyze import (
     DEFINITE,
     UNKNOWN,
     Definiteness,
     definite_by_bodies,
+    enumerated,
     indefinite_in_part,
     uniqueness,
 )
 from fclib.analysis._data import SYMMETRIC, Data, Local, asymmetry, columns
-from fclib.analysis._existence import EXISTS_AT_HAND, EXISTS_SLATER, PROVEN_NOT, UNDECIDED, slater
+from fclib.analysis._enumerate import Enumeration
+from fclib.analysis._existence import (
+    EXISTS_AT_HAND,
+    EXISTS_ENUMERATED,
+    EXISTS_SLATER,
+    PROVEN_NOT,
+    UNDECIDED,
+    slater,
+)
 from fclib.analysis._joints import joints_of
+from fclib.analysis._reactions import reactions
 from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
 
 SIDE = 1000  # of a block that is treated densely
@@ -51,23 +62,25 @@ class Brief:
 def brief(
     problem: _solve.Problem,
     local: Local,
-    error: float | None,
-    tol: float,
+    solution: _core.Solution | None = None,
     *,
     refuted: bool = False,
+    states: Enumeration | None = None,
 ) -> Brief:
     """What is known of a problem, its local form at hand.
 
     Args:
         problem: any formulation.
         local: its local form, or itself.
-        error: of the solution at hand; None without one.
-        tol: up to which it is a solution.
+        solution: one that is at hand.
         refuted: whether a solver has proved that there is none.
+        states: what the states of the contacts say, if they were looked at.
     """
     data = Data(problem, local)
     matrices = data.matrices
-    left_out = ["conditioning of H", "conic programs", "states of the contacts"]
+    left_out = ["conditioning of H", "conic programs"]
+    if states is None:
+        left_out.append("states of the contacts")
     skewness = asymmetry(matrices["W"])
     found = spectrum_of_W(data, skewness)
     spectra: dict[str, Spectrum] = {}
@@ -86,19 +99,28 @@ def brief(
     joints = joints_of(data, JOINTS)
     condition = slater(data, joints, semidefinite, full, conic=False)
     unique = uniqueness(data, joints, sign, full, SIDE if full else 0)
-    existence = reason = None
+    if states is not None:
+        unique = enumerated(unique, states)
+    error = judge(problem, solution).error if solution is not None else np.nan
+    forces = reactions(data, unique.verdict, full, states, solution, error, SIDE)
     if condition.holds:
         existence, reason = EXISTS_SLATER, f"Slater's condition holds ({condition.method})"
-    elif joints.agree is False:
-        existence, reason = UNDECIDED, joints.reason
-    elif error is not None and error <= tol:
-        existence = EXISTS_AT_HAND
-        reason = f"solved to an error of {error:.0e} relative to ||q||, which is no proof"
     elif refuted:
         existence, reason = PROVEN_NOT, "a proof by Farkas' lemma, checked on the data"
-    words = [f"Existence: {existence}: {reason}."] if existence else []
-    if unique.verdict == "unique":
-        words.append(f"Velocity: unique: {unique.reason}.")
+    elif joints.agree is False:
+        existence, reason = UNDECIDED, joints.reason
+    elif states is not None and states.sound:
+        existence, reason = EXISTS_ENUMERATED, states.reason
+    elif solution is not None:
+        existence = EXISTS_AT_HAND
+        reason = f"solved to an error of {error:.0e} relative to ||q||, which is no proof"
+    else:
+        existence, reason = UNDECIDED, "tried: Slater's condition without a conic program, a solver"
+    words = [f"Existence: {existence}: {reason}."]
+    if existence != PROVEN_NOT:
+        tried = "tried: " if unique.verdict == UNDECIDED else ""
+        words.append(f"Velocity: {unique.verdict}: {tried}{unique.reason}.")
+        words.append(f"Reactions: {forces.verdict}: {forces.reason}.")
     if found is not None:
         words.append(f"W is {sign.word}, of rank {rank} of {problem.m}.")
     words.append(f"Left out: {', '.join(left_out)}.")
@@ -115,8 +137,9 @@ def brief(
             "conditioning_W": None if found is None else digits(found.conditioning),
             "hyperstaticity": None if rank is None else problem.m - rank,
             "slater": condition.holds,
-            "existence": existence,
-            "uniqueness": unique.verdict if unique.verdict == "unique" else None,
+            "existence": None if existence == UNDECIDED else existence,
+            "uniqueness": None if unique.verdict == UNDECIDED else unique.verdict,
+            "reactions_unique": forces.known,
         },
         tuple(left_out),
     )

@@ -132,6 +132,9 @@ class Reference:
         ]
         now = datetime.datetime.now(datetime.timezone.utc)
         return {
+            "error": self.merit.error,
+            "merit": "both",
+            "solver": self.runs[0].solver,
             **merits,
             "merit_1": _core.merit_1(self.problem, self.solution),
             "algorithms": "; ".join(said[:1] + said[-1:] if self.confirmed else said[:1]),

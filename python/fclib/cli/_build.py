@@ -13,6 +13,7 @@ import typer
 from fclib import collections, scenes
 from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
+from fclib.collections import catalog
 from fclib.collections.build import BuildError
 
 
@@ -76,12 +77,14 @@ def build_plans(
             out.print(Rows(report.records))
         else:
             out.print("Nothing touches in any step: no problem was stored.")
-        unsolved = [row for row in rows if row["status"] not in (None, "converged")]
-        if unsolved:
-            worst = max(unsolved, key=lambda row: float(row["error"]))
+        open_ones = [
+            row for row in rows if row["has_solution"] is False and not catalog.is_proven(row)
+        ]
+        if open_ones:
+            worst = max(open_ones, key=lambda row: float(row["error"]))
             out.print(
-                f"{len(unsolved)} problems were not solved to {worst['tol']:g}; the worst is"
-                f" {worst['id']}, error {worst['error']:.1e}."
+                f"{len(open_ones)} problems have no known solution; the best iterate of each is a"
+                f" guess in its file. The worst is {worst['id']}, error {worst['error']:.1e}."
             )
         other = [row["id"] for row in rows if collections.origin_of(row) == "differs"]
         if other:
@@ -110,7 +113,11 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
         own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
         origins = Counter(collections.origin_of(row) for row in own)
-        errors = [row["error"] for row in own if row["error"] is not None]
+        tried = any(row["error"] is not None for row in own)
+        # an iterate of a problem that has no solution has an error of no interest
+        errors = [
+            row["error"] for row in own if row["error"] is not None and not catalog.is_proven(row)
+        ]
 
         def span(*keys: str, own: list[dict[str, Any]] = own) -> str:
             values = [row[key] for row in own for key in keys if row[key] is not None]
@@ -126,7 +133,8 @@ def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
                     for origin, count in sorted(origins.items())
                 ),
                 "problems": len(own),
-                "solved": sum(row["status"] == "converged" for row in own) if errors else "",
+                "distinct": catalog.distinct(own),
+                "solved": sum(map(catalog.is_answered, own)) if tried else "",
                 "dof": span("n"),
                 "contacts": span("nc"),
                 "density": span("density"),

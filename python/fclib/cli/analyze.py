@@ -45,7 +45,8 @@ def store(path: Path, found: Any) -> None:
     """
     problem, info = found.problem, found.problem.info
     solution, guesses = fclib.read_solution(path), fclib.read_guesses(path)
-    told = fclib.read_attributes(path, "solution")
+    groups = ["solution", *(f"guesses/{k}" for k in range(1, len(guesses) + 1))]
+    told = {group: fclib.read_attributes(path, group) for group in groups}
     kept = fclib.read_attributes(path, "info")
     fclib.write(
         path,
@@ -61,8 +62,9 @@ def store(path: Path, found: Any) -> None:
     )
     values = {key: _attribute(value) for key, value in found.record.items() if value is not None}
     fclib.write_attributes(path, "info", {**kept, **values})
-    if told:
-        fclib.write_attributes(path, "solution", told)
+    for group, said in told.items():
+        if said:
+            fclib.write_attributes(path, group, said)
 
 
 def _attribute(value: Any) -> float | str:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
+from fclib._judge import MARK, TOLERANCE, judge
 from fclib._solve import MERITS
 from fclib.cli._files import read_owner
 from fclib.cli._output import (
@@ -89,7 +90,7 @@ def check_certificate(report: Report, path: Path, certificate: Path) -> None:
 
 def command(
     files: Files,
-    tol: Tolerance = 1e-8,
+    tol: Tolerance = TOLERANCE,
     merit: Merit = MeritKind.both,
     contacts: Annotated[
         bool, typer.Option("--contacts", help="Show each contact too: status, r, u, error.")
@@ -116,28 +117,44 @@ def command(
         try:
             problem = read_owner(path)
             solution = fclib.read_solution(path)
+            if solution is None and (said := fclib.read_attributes(path, "info").get(MARK)):
+                report.add(
+                    {
+                        "problem": str(path),
+                        "formulation": problem.formulation,
+                        "n": problem.n,
+                        "nc": problem.nc,
+                        "status": "no solution",
+                        "error": None,
+                        **dict.fromkeys(PARTS),
+                        "mismatches": [],
+                        "says": {MARK: said},
+                    }
+                )
+                err.print(f"{path.name}: {said}", highlight=False)
+                continue
             if solution is None:
                 raise fclib.FileError(f"{path}: /solution: there is no solution to check")
             try:
-                judged = fclib.merit(problem, solution)
+                judgement = judge(problem, solution, tol, merit.value)
                 found = fclib.contact_merits(problem, solution)["mismatches"]
             except fclib.Error as error:
                 raise fclib.FileError(f"{path}: {error}") from None
         except fclib.Error as error:
             report.error(path, error)
             continue
-        size = judged.error_by(merit.value)
-        good = size <= tol
         mismatches = [one for one in found if not one["error"] <= tol]
         record: dict[str, Any] = {
             "problem": str(path),
             "formulation": problem.formulation,
             "n": problem.n,
             "nc": problem.nc,
-            "status": "ok" if good else "wrong",
-            "error": size,
+            "status": "ok" if judgement.ok else "wrong",
+            "error": judgement.error,
         }
-        record |= {name: getattr(judged, name) for name in PARTS}
+        if merit is MeritKind.natural:
+            record["merit"] = merit.value  # the scaled map was left out, as was asked
+        record |= {name: getattr(judgement.merit, name) for name in PARTS}
         record["mismatches"] = mismatches
         if agreed := consistent_of(problem):
             record["joints"] = agreed
@@ -152,5 +169,5 @@ def command(
             record["contacts"] = rows
         elif rows:
             out.print(Rows(rows, title=path.name))
-        report.add(record, good)
+        report.add(record, judgement.ok)
     report.finish()

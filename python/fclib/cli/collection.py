@@ -14,6 +14,7 @@ import typer
 
 import fclib
 from fclib import collections
+from fclib._judge import TOLERANCE
 from fclib.bench import Store
 from fclib.cli import choose
 from fclib.cli._build import (
@@ -40,16 +41,19 @@ from fclib.cli._output import (
     words_of,
 )
 from fclib.cli._progress import many_bars
-from fclib.collections import standing
+from fclib.collections import catalog, references, standing
 from fclib.collections.archives import FetchError
-from fclib.collections.known import KNOWN, choices, kind_of, problems_of
+from fclib.collections.known import KNOWN, choices, distinct_of, kind_of, problems_of
 from fclib.collections.plan import evenly
+from fclib.collections.verify import LACKING
 
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
 )
 app.add_typer(choose.app, name="choose")
 
+
+MOST_COPIES = 10  # that are named; the catalogue has all
 
 Rating = Enum("Rating", {name: name for name in standing.CLASSES}, type=str)  # type: ignore[misc]
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
@@ -82,7 +86,11 @@ def list_families(
     of_sets: Annotated[bool, typer.Option("--sets", help="The sets instead.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List the families with their numbers of problems, or the sets."""
+    """List the families with their numbers of problems, or the sets.
+
+    Distinct problems have different data. The column is empty if that is not known without a
+    simulation.
+    """
     report = Report(as_json)
     if of_sets:
         for name, folders in collections.sets().items():
@@ -92,6 +100,7 @@ def list_families(
                     "version": collections.version(name),
                     "families": len(folders),
                     "problems": sum(map(problems_of, folders)),
+                    "distinct": distinct_of(folders),
                     "what": KNOWN[name][1] if name in KNOWN else "",
                 }
             )
@@ -104,6 +113,7 @@ def list_families(
                 "family": name,
                 "set": family.collection,
                 "problems": problems_of(f"{family.collection}/{name}"),
+                "distinct": distinct_of([f"{family.collection}/{name}"]),
                 "title": family.title,
                 "application": family.application,
             }
@@ -185,6 +195,7 @@ def show_set(name: str, as_json: bool) -> None:
             "folder": folder,
             "version": collections.version(name),
             "problems": problems_of(folder),
+            "distinct": distinct_of([folder]),
         }
         if numbers:
             record["numbers"] = ", ".join(map(str, numbers))
@@ -222,9 +233,20 @@ def build(
         typer.Option(help="Simulate families without stored states; otherwise that is an error."),
     ] = True,
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
-    tol: Annotated[float, typer.Option(help="Of these, relative; the best is 1e-12.", min=0.0)] = (
-        collections.Plan.tol
-    ),
+    tol: Annotated[
+        float,
+        typer.Option(
+            help="Error that the solver of these is asked for; they are finished to 1e-12 then.",
+            min=0.0,
+            max=TOLERANCE,
+        ),
+    ] = collections.Plan.tol,
+    certify: Annotated[
+        bool,
+        typer.Option(
+            "--certify", help="Confirm each solution by a second, unrelated algorithm: seconds."
+        ),
+    ] = False,
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
@@ -251,6 +273,7 @@ def build(
                 select=select.value,
                 analyze=analyze,
                 references=references,
+                certify=certify,
                 tol=tol,
             )
             for own in folders
@@ -348,19 +371,22 @@ def thinned(plan: collections.Plan, count: int | None) -> collections.Plan:
 def verify(folder: Folder, as_json: Json = False) -> None:
     """Check all files, their solutions, and what is published.
 
-    All files are hashed again. All solutions are judged again, from the data alone. A problem whose
+    All files are hashed again. All solutions are judged again, from the data alone and as fclib
+    check does. What the catalogue lacks is named: families whose build was cut, and files that no
+    row has. A problem whose
     data differ from the published ones is named, with the relative difference of each matrix. A
     small difference is rounding on another machine. A larger one is another problem.
     """
     report = Report(as_json)
     origins: Counter[str] = Counter()
-    bad = 0
+    bad = lacking = 0
     try:
         rows = collections.read_catalog(folder).to_pylist()
-        files = sum(len(collections.catalog.files_of(row)) for row in rows)
+        files = sum(len(catalog.files_of(row)) for row in rows)
         with progress_bar(files) as bar:
             for verdict in collections.verify(folder, bar):
                 origins[verdict.origin] += 1
+                lacking += verdict.status in LACKING
                 if not verdict.ok:
                     err.print(f"fclib: {verdict.message}", style="red")
                 if not verdict.ok or verdict.differences or as_json:
@@ -373,7 +399,7 @@ def verify(folder: Folder, as_json: Json = False) -> None:
                         "differences": ", ".join(f"{name} {size}" for name, size in apart.items()),
                     }
                     report.add(record, verdict.ok)
-                    bad += not verdict.ok
+                    bad += not verdict.ok and verdict.status not in LACKING
     except (collections.CatalogError, ImportError) as error:
         fail(str(error))
     if not as_json:
@@ -382,6 +408,14 @@ def verify(folder: Folder, as_json: Json = False) -> None:
         out.print(
             f"{files} files, {files - bad} as the catalogue says" + (f", {bad} not" if bad else "")
         )
+        if lacking:
+            out.print(f"{lacking} files or families are not in the catalogue, or not whole")
+        proven = sum(map(catalog.is_proven, rows))
+        unsolved = sum(row["has_solution"] is False for row in rows) - proven
+        if proven:
+            out.print(f"{proven} problems are proven to have no solution, and say so")
+        if unsolved:
+            out.print(f"{unsolved} problems have no known solution, and say so")
         said = {
             "published": "have the data of the published version",
             "differs": "differ from the published version",
@@ -407,7 +441,9 @@ def status(
     ] = None,
     target: Annotated[
         Path | None,
-        typer.Option("--out", help="Write the problem with the best solution known."),
+        typer.Option(
+            "--out", help="Write the problem with the best solution known, or iterate, as a guess."
+        ),
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -507,8 +543,9 @@ def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
         )
     if target is not None:
         problem, solution, said = standing.known_solution(name)
-        fclib.write(target, problem, solution)
-        err.print(f"error {said['error']:.3g}, by {said['by']}, {said['date']}", highlight=False)
+        best = references.given(problem, solution, said["by"], said["date"])
+        references.write(target, problem, best)
+        err.print(f"error {best.error:.3g}, by {said['by']}, {said['date']}", highlight=False)
     report = Report(as_json)
     report.add(record_of(found[0]))
     if not as_json:
@@ -557,8 +594,8 @@ def add(
     ),
     references: Annotated[bool, typer.Option(help="Find and store reference solutions.")] = True,
     tol: Annotated[
-        float, typer.Option(help="Bound on the error of a solution in a file.", min=0.0)
-    ] = 1e-8,
+        float, typer.Option(help="Error that the solver is asked for.", min=0.0, max=TOLERANCE)
+    ] = TOLERANCE,
     time_limit: Annotated[
         float, typer.Option(help="Time limit of each solve [s].", min=0.001)
     ] = 20.0,
@@ -573,8 +610,9 @@ def add(
     """Make a set of your own FCLIB files.
 
     The files are copied, and never changed. Each folder becomes a family. A solution in a file
-    stays if its error is at most --tol, or if it is better than the one found. A file without a
-    valid problem is named and left out, and the exit status is 1.
+    stays if it is one: its error by both natural maps is at most 1e-8. What is no solution goes to
+    the guesses of the copy, unless a better one is found. Files with equal problems are named. A
+    file without a valid problem is named and left out, and the exit status is 1.
     """
     rules = collections.Rules(
         references=references,
@@ -600,10 +638,17 @@ def add(
         report.error(refusal.path, fclib.Error(refusal.reason))
     if not as_json and rows:
         out.print(Rows(report.records))
-        unsolved = [row for row in rows if row["status"] not in (None, "converged")]
+        unsolved = [
+            row for row in rows if row["has_solution"] is False and not catalog.is_proven(row)
+        ]
         if unsolved:
             names = ", ".join(f"{row['id']} ({row['error']:.1e})" for row in unsolved[:3])
-            out.print(f"{len(unsolved)} were not solved to {tol:g}: {names}", highlight=False)
+            out.print(f"{len(unsolved)} have no known solution: {names}", highlight=False)
+        copies = [row for row in rows if row["same_as"] is not None]
+        for row in copies[:MOST_COPIES]:
+            out.print(f"{row['source']}: the same problem as {row['same_as']}", highlight=False)
+        if len(copies) > MOST_COPIES:
+            out.print(f"... {len(copies)} copies in all; the catalogue's column same_as has them")
         out.print(f"FCLIB_COLLECTION={folder} makes set:{mine} known to fclib bench, and to load")
     raise typer.Exit(int(report.failed))
 
@@ -614,8 +659,19 @@ def publish(
     site: Annotated[Path, typer.Option("--out", help="Folder that a web server serves.")],
     as_json: Json = False,
 ) -> None:
-    """Make an archive of each family, and their checksums."""
+    """Make an archive of each family, and their checksums.
+
+    What the catalogue lacks is named and left out: families whose build was cut, and files that no
+    row has. The exit status is then 1.
+    """
     try:
+        lacking = [
+            *(f"{name}: its build was cut" for name in catalog.unfinished(folder)),
+            *(
+                f"{path}: is not in the catalogue"
+                for path in catalog.lacking(folder, collections.read_catalog(folder).to_pylist())
+            ),
+        ]
         files = collections.publish(folder, site)
     except (collections.CatalogError, FetchError, ImportError) as error:
         fail(str(error))
@@ -625,6 +681,9 @@ def publish(
     if not as_json:
         out.print(Rows(report.records))
         out.print(f"Serve {site}, then: fclib collection get NAME --from URL")
+    for line in lacking:
+        err.print(f"fclib: {folder / line}; left out", style="red", highlight=False)
+    raise typer.Exit(int(bool(lacking)))
 
 
 @app.command()

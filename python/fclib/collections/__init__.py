@@ -16,9 +16,11 @@ published.py  the trajectories of all published versions. Needs trajectory.py
 known.py      the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
 catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
-build.py      a family into files, gone on with after a kill. Needs plan.py, catalog.py, figures.py
+references.py solutions: found, judged by both maps, put into files. Needs catalog.py
+build.py      a family into files, gone on with after a kill. Needs plan.py, references.py and
+              standing.py
 verify.py     files as the catalogue says, solutions judged anew
-add.py        files that are already there, as a set. Needs build.py, figures.py, known.py
+add.py        files that are already there, as a set. Needs build.py, known.py, references.py
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
 guesses.py    what a solution says of the next step's problem

@@ -1,12 +1,13 @@
 """Files that are already there, as a set of a collection.
 
-    OUT/NAME/FAMILY/0000-local.hdf5   a copy, with a reference solution
+    OUT/NAME/FAMILY/0000-local.hdf5   a copy, with a reference solution (references.py)
                     catalog.parquet   of the family; column `source` has the file's path
                     distribution.*    histograms of its problems
 
 The family is the folder that a file lies in. The files themselves are read and never written. A
 row is known by path and SHA-256 of its file: what was taken in is left as it is, a file that has
-changed is another problem, and a run that was killed goes on.
+changed is another problem, and a run that was killed goes on. Files of equal problems are all
+taken in; column `same_as` names the first of them.
 """
 
 from __future__ import annotations
@@ -19,10 +20,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fclib import _core, _solve
-from fclib.collections import catalog, known
-from fclib.collections.build import CHECKPOINT, facts_of, judged, nnz
+from fclib import _core
+from fclib._judge import MARK, TOLERANCE, judge
+from fclib.collections import catalog, known, references
+from fclib.collections.build import CHECKPOINT, facts_of, nnz
 from fclib.collections.figures import draw_distribution
+from fclib.collections.references import Found
 
 SUFFIXES = (".hdf5", ".h5")
 VERSION = "own"
@@ -34,7 +37,7 @@ class Rules:
     """How files are taken in."""
 
     references: bool = True  # whether solutions are looked for
-    tol: float = 1e-8  # of these
+    tol: float = TOLERANCE  # that the solver is asked for
     time_limit: float = 20.0  # [s] of each
     license: str | None = None  # of the data
     citation: str | None = None  # how to name them
@@ -95,7 +98,7 @@ def add(
         for done, refusal in enumerate(part.take(paths), 1):
             refused += [refusal] if refusal is not None else []
             report(f"{collection}/{family}", done, len(paths))
-    catalog.gather(out)
+        catalog.gather(out)
     return refused
 
 
@@ -175,17 +178,25 @@ class Part:
         kind = "global" if "global" in kinds else kinds[0]
         problem: Any = _core.read(path, kind)
         own = _core.read_solution(path)
-        judgement, solution = self._reference(problem, own)
+        found = self._reference(problem, own)
         form = "global" if problem.kind.startswith("global") else "local"
         file = self.catalogue.parent / f"{number:04d}-{form}.hdf5"
 
         def copy(beside: Path) -> None:
-            if len(kinds) > 1:
-                _core.write(beside, problem, solution, _core.read_guesses(path))
+            stored = _core.read_solutions(path)
+            several = [one for one in stored if judge(problem, one).ok]
+            kept = own is None if found is None else found.ok and found.solver == OF_FILE
+            if len(kinds) == 1 and kept and len(several) == len(stored):
+                shutil.copyfile(path, beside)
+                if found is not None:
+                    _core.write_attributes(beside, "solution", found.attributes)
                 return
-            shutil.copyfile(path, beside)
-            if solution is not None and solution is not own:
-                _core.write_solution(beside, solution)
+            # what is no solution goes, and with it what was said of it
+            told = _core.read_attributes(path, "info")
+            told.pop(MARK, None)
+            references.write(beside, problem, found, _core.read_guesses(path), several)
+            if told:
+                _core.write_attributes(beside, "info", told)
 
         file.parent.mkdir(parents=True, exist_ok=True)
         catalog.replace_file(file, copy)
@@ -201,36 +212,22 @@ class Part:
             "number": number,
             **facts_of(problem),
             "nnz_W": nnz(problem.W) if form == "local" else None,
-            **judgement,
+            **(found.row | {"tol": self.rules.tol} if found is not None else {}),
             **dict.fromkeys(catalog.FILES),
             **stored,
             "license": self.rules.license,
             "citation": self.rules.citation,
         }
 
-    def _reference(
-        self, problem: Any, own: _core.Solution | None
-    ) -> tuple[dict[str, Any], _core.Solution | None]:
-        """What a row says of the solution, and that: the file's own, or a better one."""
+    def _reference(self, problem: Any, own: _core.Solution | None) -> Found | None:
+        """The best that is known: the file's own solution, or a better one; None: there is none."""
         rules = self.rules
-        of_file: dict[str, Any] = {}
-        if own is not None:
-            merit = _core.merit(problem, own)
-            error = merit.error_by("natural")
-            of_file = {"open": merit.open, "stick": merit.stick, "slide": merit.slide}
-            of_file |= {"solver": OF_FILE, "error": error, "tol": rules.tol}
-            of_file["status"] = "converged" if error <= rules.tol else "inaccurate"
-            if error <= rules.tol:
-                return of_file, own
-        if not rules.references:
-            return of_file, own
+        of_file = references.given(problem, own, OF_FILE) if own is not None else None
+        if not rules.references or (of_file is not None and of_file.ok):
+            return of_file
         try:
-            result = _solve.solve(
-                problem, "auto", tol=rules.tol, time_limit=rules.time_limit, merit="natural"
-            )
+            found = references.find(problem, "auto", rules.tol, time_limit=rules.time_limit)
         except _core.Error:  # a singular M: the problem is there all the same
-            return of_file, own
-        found = judged(problem, result) | {"tol": rules.tol}
-        if of_file and not found["error"] < of_file["error"]:
-            return of_file, own
-        return found, result.solution
+            return of_file
+        better = of_file is None or found.refuted or found.error < of_file.error
+        return found if better else of_file

@@ -47,6 +47,8 @@ def cache_folder() -> Path:
 def publish(folder: str | Path, site: str | Path) -> list[Path]:
     """Make the archives of all finished families of a folder, and their registry.
 
+    Families whose build was cut are left out, of the catalogue too (`catalog.unfinished`).
+
     Args:
         folder: what `build` made.
         site: the folder that a web server serves; made where it is not there.
@@ -59,7 +61,12 @@ def publish(folder: str | Path, site: str | Path) -> list[Path]:
         FetchError: a file is missing, or is not the one of the catalogue.
     """
     folder, site = Path(folder), Path(site)
-    rows = catalog.read_catalog(folder).to_pylist()
+    cut = catalog.unfinished(folder)
+    rows = [
+        row
+        for row in catalog.read_catalog(folder).to_pylist()
+        if f"{row['collection']}/{row['family']}" not in cut
+    ]
     site.mkdir(parents=True, exist_ok=True)
     families: dict[str, list[dict[str, Any]]] = {}
     for row in rows:
@@ -87,7 +94,7 @@ def publish(folder: str | Path, site: str | Path) -> list[Path]:
 
         catalog.replace_file(archive, pack)
         written.append(archive)
-    shutil.copyfile(folder / catalog.FILE, site / catalog.FILE)
+    catalog.write_catalog(site / catalog.FILE, rows)
     written.append(site / catalog.FILE)
     lines = [f"{path.name} sha256:{catalog.sha256(path)}\n" for path in sorted(written)]
     registry = site / REGISTRY

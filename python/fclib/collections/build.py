@@ -5,11 +5,11 @@
                    states.trajectory    where the states were simulated for this build
                    catalog.parquet      of the family; there when it is finished
                    .state/              while it is not: where to go on
-    OUT/catalog.parquet                 of all that is finished
+    OUT/catalog.parquet                 of all problems that are finished
 
 Problems are assembled from the states of a trajectory, each by itself. The reference solution of
-each is found from nothing, and no problem depends on it. A build that was killed goes on from its
-last checkpoint, and ends with the same files.
+each is found from nothing, and no problem depends on it (references.py). A build that was killed
+goes on from its last checkpoint, and ends with the same files.
 """
 
 from __future__ import annotations
@@ -27,20 +27,29 @@ from dataclasses import dataclass, field, replace
 from multiprocessing import connection
 from pathlib import Path
 from queue import Empty
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
-from fclib.collections import catalog, rights, trajectory
+from fclib._judge import TOLERANCE
+from fclib.collections import catalog, references, rights, standing, trajectory
+from fclib.collections.catalog import STATE
 from fclib.collections.guesses import guess_of
 from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
 from fclib.collections.record import record
+from fclib.collections.references import Found
+
+if TYPE_CHECKING:
+    from fclib.analysis import Enumeration
 
 COMPRESSION = 1  # 2 % more bytes than 6, two thirds of the time
+# up to here the states of all contacts are looked at: of three planar contacts there are 64; v and
+# lambda of two bodies are taken out in rational arithmetic
+SMALL_PLANAR, SMALL_UNKNOWNS = 3, 12
 CHECKPOINT = 5.0  # seconds between two checkpoints
+LISTING = 0.05  # of the time of a build that may go into the catalogue of all
 TOLD = 0.1  # seconds between two messages of progress
-STATE = ".state"
 
 Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, of how many
 
@@ -208,8 +217,8 @@ def difference(found: str, asked: str) -> str:
     except json.JSONDecodeError:
         return "which cannot be read"
     old, new = ({**plan.pop("parameters"), **plan} for plan in (old, new))
-    keys = [key for key in new if old.get(key) != new[key]]
-    return ", ".join(f"{key}: {old.get(key)}, now {new[key]}" for key in keys[:3])
+    keys = [key for key in {**new, **old} if old.get(key) != new.get(key)]
+    return ", ".join(f"{key}: {old.get(key)}, now {new.get(key)}" for key in keys[:3])
 
 
 @dataclass
@@ -219,6 +228,8 @@ class Kept:
     plan: Plan
     looked: int = 0
     rows: dict[int, dict[str, Any]] = field(default_factory=dict)  # by number
+    listed: float = 0.0  # when the catalogue of all was written last, and how long that took [s]
+    listing: float = 0.0
 
     def wants(self, number: int) -> bool:
         """Whether the rule takes this number; with `hard` each is looked at."""
@@ -306,20 +317,24 @@ def build_scene(
     before: Before | None = None
     last = time.monotonic()
     numbers = range(plan.total) if states is None else states.number.tolist()
-    for number in numbers:
-        if number < kept.looked or number >= plan.total:
-            continue
-        if time.monotonic() - last > CHECKPOINT:
-            write_checkpoint(state_folder, kept)
-            last = time.monotonic()
-        kept.looked = number
-        if kept.wants(number):
-            item = item_of(plan, states, number)
-            if before is None and number and plan.references:
-                before = stored_before(plan, kept, out)
-            before = store(plan, kept, item, before, out)
-        kept.looked += 1
-        report(plan.name, kept.looked, plan.total)
+    try:
+        for number in numbers:
+            if number < kept.looked or number >= plan.total:
+                continue
+            if time.monotonic() - last > CHECKPOINT:
+                write_checkpoint(state_folder, kept, out)
+                last = time.monotonic()
+            kept.looked = number
+            if kept.wants(number):
+                item = item_of(plan, states, number)
+                if before is None and number and plan.references:
+                    before = stored_before(plan, kept, out)
+                before = store(plan, kept, item, before, out)
+            kept.looked += 1
+            report(plan.name, kept.looked, plan.total)
+    except BaseException:  # Control-C too
+        write_checkpoint(state_folder, kept, out, last=True)
+        raise
 
     if pictures:
         from fclib.collections import figures
@@ -332,20 +347,28 @@ def build_scene(
 
 
 def finish(plan: Plan, out: Path, rows: list[dict[str, Any]]) -> None:
-    """Write the part of the catalogue that says that a plan is built."""
+    """Write the part of the catalogue that says that a plan is built, and the whole one."""
     folder = out / plan.name
     fingerprint = {catalog.FINGERPRINT: plan.fingerprint().encode()}
     catalog.write_catalog(folder / catalog.FILE, rows, fingerprint)
     shutil.rmtree(folder / STATE)
+    catalog.gather(out)
 
 
-def reference(plan: Plan, problem: Any) -> _core.Result | None:
+def reference(plan: Plan, problem: Any) -> Found | None:
     """The reference solution of a problem, which follows from it alone; None: not asked for."""
     if not plan.references:
         return None
-    # as the simulations do: the published sets were made so
-    options: dict[str, Any] = {"merit": "natural"} | dict(plan.options)
-    return _solve.solve(problem, plan.solver, tol=plan.tol, **options)
+    found = references.find(problem, plan.solver, plan.tol, **plan.options)
+    # of a problem that was open somebody may know more
+    if not found.ok and not found.refuted:
+        stored = standing.stored_solution(_digest.digest(problem))
+        if stored is not None:
+            solution, said = stored
+            other = references.given(problem, solution, said["by"], said["date"])
+            other = references.finished(problem, other)
+            found = other if other.error < found.error else found
+    return references.certified(problem, found) if plan.certify and found.ok else found
 
 
 @dataclass(frozen=True)
@@ -389,24 +412,24 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
     local = item.problem.condense() if is_global else item.problem
     sweeps = None
     if plan.select == "hard":
-        trial = _solve.solve(
-            local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS, merit="natural"
-        )
+        trial = _solve.solve(local, "nsgs", tol=HARD_TOLERANCE, max_iterations=HARD_SWEEPS)
         sweeps = trial.iterations
-    result = reference(plan, item.problem)
+    found = reference(plan, item.problem)
     guesses = guesses_of(plan, item, before)
     row = describe(plan, kept.looked, item) | {"nnz_W": nnz(local.W), "nsgs_sweeps": sweeps}
-    if result is not None:
-        row |= judged(item.problem, result) | {"tol": plan.tol}
-    words, known = known_of(plan, item.problem, local, row)
-    several = several_of(plan, item.problem)
+    states = states_of_contacts(plan, item.problem)
+    several = solutions_of(states)
+    if found is not None:
+        found = references.best_first(found, item.problem, several)
+        row |= found.row | {"tol": plan.tol}
+    words, known = known_of(plan, item.problem, local, found, states, row)
     info = rights.stamped(item.problem.info, plan, kept.looked, words)
     for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = item.problem if form == "global" else local
-        solution = result.solution if result is not None else None
-        if solution is not None and form == "local":
-            solution = _core.Solution(r=solution.r, u=solution.u, l=solution.l)
+        mine = found
+        if found is not None and is_global and form == "local":
+            mine = references.carried(found, local)
         stamped = problem.replace(
             info=info,
             matrix_info={
@@ -416,20 +439,25 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
             },
         )
         own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
-        _core.write(out / path, stamped, solution, own, compression=COMPRESSION, sync=False)
-        if len(several) > 1:
-            _core.write_solutions(out / path, several, compression=COMPRESSION)
+        references.write(
+            out / path, stamped, mine, own, several, compression=COMPRESSION, sync=False
+        )
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
         for file, _ in catalog.files_of({**dict.fromkeys(catalog.FILES), **gone}):
             (out / file).unlink(missing_ok=True)
-    if result is None:
+    if found is None or not found.ok:
         return None
-    return Before(item.step, item.problem, result.solution)
+    return Before(item.step, item.problem, found.solution)
 
 
 def known_of(
-    plan: Plan, problem: Any, local: Any, row: dict[str, Any]
+    plan: Plan,
+    problem: Any,
+    local: Any,
+    found: Found | None,
+    states: Enumeration | None,
+    row: dict[str, Any],
 ) -> tuple[str, dict[str, _core.MatrixInfo]]:
     """MATH_INFO and MATRIX_INFO of a problem, and into its row what is known of it.
 
@@ -440,24 +468,40 @@ def known_of(
     from fclib import analysis  # takes a while
 
     if plan.analyze:
-        whole = analysis.analyze(problem, tol=plan.tol)
+        whole = analysis.analyze(problem, tol=TOLERANCE)
         row |= {name: whole.record.get(name) for name in catalog.ANALYSIS}
         return whole.words, whole.matrix_info
-    refuted = row["status"] == "infeasible"
-    found = analysis.brief(problem, local, row["error"], plan.tol, refuted=refuted)
-    row |= {name: found.record.get(name) for name in catalog.ANALYSIS}
-    return found.words, found.matrix_info
+    brief = analysis.brief(
+        problem,
+        local,
+        found.solution if found is not None and found.ok else None,
+        refuted=found is not None and found.refuted,
+        states=states,
+    )
+    row |= {name: brief.record.get(name) for name in catalog.ANALYSIS}
+    return brief.words, brief.matrix_info
 
 
-def several_of(plan: Plan, problem: Any) -> list[_core.Solution]:
-    """All isolated solutions, of a family that says that its problems have several."""
+def states_of_contacts(plan: Plan, problem: Any) -> Enumeration | None:
+    """What the states of all contacts say, of a family with several solutions or a few contacts."""
     family = getattr(plan.scene, "family", None)
-    if not plan.references or not getattr(family, "several", False):
-        return []
+    if not plan.references or not (getattr(family, "several", False) or is_small(problem)):
+        return None
     from fclib import analysis
 
-    found = analysis.enumerate_solutions(problem)
-    return [_core.Solution(r=one.solution.r, l=one.solution.l) for one in found.isolated]
+    return analysis.enumerate_solutions(problem)
+
+
+def is_small(problem: Any) -> bool:
+    """Whether the states of all contacts cost less than the solve: a tenth of a second."""
+    most = SMALL_PLANAR if problem.spacedim == 2 else 1
+    return bool(problem.nc <= most and problem.n + problem.p <= SMALL_UNKNOWNS)
+
+
+def solutions_of(states: Enumeration | None) -> list[_core.Solution]:
+    """All isolated solutions."""
+    isolated = states.isolated if states is not None else ()
+    return [_core.Solution(r=one.solution.r, l=one.solution.l) for one in isolated]
 
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
@@ -473,7 +517,9 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         "seed": plan.scene.seed,
         **facts_of(item.problem),
         "bodies": item.bodies,
-        **dict.fromkeys(("open", "stick", "slide", "solver", "status", "tol", "error")),
+        **dict.fromkeys(
+            ("open", "stick", "slide", "solver", "status", "tol", "error", "has_solution")
+        ),
         "left_out": "; ".join(item.left_out) or None,
         **rights.of(plan),
     }
@@ -498,34 +544,30 @@ def facts_of(problem: Any) -> dict[str, Any]:
     }
 
 
-def judged(problem: Any, result: _core.Result) -> dict[str, Any]:
-    """What a row says of a problem's solution."""
-    merit = _core.merit(problem, result.solution)
-    return {
-        "open": merit.open,
-        "stick": merit.stick,
-        "slide": merit.slide,
-        "solver": result.solver,
-        "status": str(result.status),
-        "error": merit.error_by("natural"),
-    }
-
-
 def nnz(matrix: Any) -> int:
     """Entries of a sparse or dense matrix."""
     return int(getattr(matrix, "nnz", np.size(matrix)))
 
 
-def write_checkpoint(folder: Path, kept: Kept) -> None:
-    """Store where to go on: the problems that were looked at, and what was kept of them."""
+def write_checkpoint(folder: Path, kept: Kept, out: Path, *, last: bool = False) -> None:
+    """Store where to go on: the problems that were looked at, and what was kept of them.
+
+    The catalogue has them too from then on; of a large collection it is written less often, but for
+    the last time.
+    """
     _core.sync_files(folder)
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
-    write_text(folder / "kept.json", known)
+    write_text(folder / catalog.KEPT, known)
+    start = time.monotonic()
+    if last or LISTING * (start - kept.listed) >= kept.listing:
+        catalog.gather(out)
+        kept.listed = time.monotonic()
+        kept.listing = kept.listed - start
 
 
 def read_checkpoint(folder: Path, kept: Kept) -> None:
     """Take what was stored, if anything was."""
-    path = folder / "kept.json"
+    path = folder / catalog.KEPT
     if path.is_file():
         known = json.loads(path.read_text(encoding="utf-8"))
         kept.looked = known["looked"]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
+import json
 import os
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -14,6 +15,10 @@ from pathlib import Path
 from typing import Any
 
 FILE = "catalog.parquet"
+PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution
+# of a family while it is built: where to go on, and in it the rows that are there already
+STATE = ".state"
+KEPT = "kept.json"
 # in a family's own part: what it was built by, as JSON
 FINGERPRINT = b"fclib.plan"
 
@@ -40,16 +45,22 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("nnz_M", "int64", "entries of M"),
     ("nnz_H", "int64", "entries of H"),
     ("nnz_W", "int64", "entries of W"),
-    ("open", "int32", "contacts without reaction in the stored solution"),
-    ("stick", "int32", "sticking contacts in the stored solution"),
-    ("slide", "int32", "sliding contacts in the stored solution"),
-    ("solver", "string", "that found the stored solution"),
+    ("open", "int32", "contacts without reaction in the best solution known"),
+    ("stick", "int32", "sticking contacts in the best solution known"),
+    ("slide", "int32", "sliding contacts in the best solution known"),
+    ("solver", "string", "that found it"),
     ("status", "string", "what it said"),
     ("tol", "float64", "what it was asked for"),
-    ("error", "float64", "relative natural-map error of the stored solution, global form"),
+    ("error", "float64", "of it, by both natural maps, relative; of the global form"),
+    (
+        "has_solution",
+        "bool",
+        "whether that is a solution, and stored as one; null: none was looked for",
+    ),
     ("nsgs_sweeps", "int32", "that NSGS takes to 1e-6; null where the hard ones were not selected"),
     ("left_out", "string", "what the scene asked for and no problem holds; null: nothing"),
     ("digest", "string", "fclib.digest of the global form, or the only one"),
+    ("same_as", "string", "the first problem of this catalogue with the same data; null: itself"),
     ("global_file", "string", "path from the catalogue's folder"),
     ("global_sha256", "string", "of that file"),
     ("local_file", "string", "path from the catalogue's folder"),
@@ -78,6 +89,7 @@ ANALYSIS: tuple[str, ...] = (
     "slater",
     "existence",
     "uniqueness",
+    "reactions_unique",
 )
 
 
@@ -110,7 +122,7 @@ def write_catalog(
         metadata=dict(metadata or {}),
     )
     extra = sorted({key for row in records for key in row} - {name for name, *_ in COLUMNS})
-    rows = sorted(records, key=lambda row: str(row["id"]))
+    rows = with_copies(sorted(records, key=lambda row: str(row["id"])))
     for key in extra:
         values = pa.array([row.get(key) for row in rows])
         schema = schema.append(pa.field(key, values.type))
@@ -144,13 +156,75 @@ def read_catalog(path: str | Path) -> Any:
     return table
 
 
+def with_copies(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """The rows, each of which names the first one with the same data, if that is another one."""
+    first: dict[str, str] = {}
+    found = []
+    for row in rows:
+        original = first.setdefault(row["digest"], row["id"])
+        found.append({**row, "same_as": None if original == row["id"] else original})
+    return found
+
+
+def is_proven(row: Mapping[str, Any]) -> bool:
+    """Whether the problem of a row is proven to have no solution."""
+    return bool(row["status"] == PROVEN)
+
+
+def is_answered(row: Mapping[str, Any]) -> bool:
+    """Whether its solution is known, or that there is none."""
+    return is_solved(row) or is_proven(row)
+
+
+def is_solved(row: Mapping[str, Any]) -> bool:
+    """Whether its solution is stored; an older catalogue has the word of the solver alone."""
+    stored = row["has_solution"]
+    return bool(row["status"] == "converged" if stored is None else stored)
+
+
+def distinct(rows: Iterable[Mapping[str, Any]]) -> int:
+    """How many different problems there are."""
+    return len({row["digest"] for row in rows})
+
+
 def gather(out: Path) -> Any:
-    """Join the catalogues of all finished scenes of a folder into its own."""
+    """Join the catalogues of all families of a folder into its own.
+
+    Of a family whose build goes on, or was cut, it has the problems up to the last checkpoint.
+    """
     rows = [
         row for part in sorted(out.glob(f"*/*/{FILE}")) for row in read_catalog(part).to_pylist()
     ]
+    for family in unfinished(out):
+        rows += kept_rows(out, family)
     write_catalog(out / FILE, rows)
     return read_catalog(out)
+
+
+def unfinished(out: Path) -> list[str]:
+    """The families SET/FAMILY of a folder whose build goes on, or was cut."""
+    return sorted(
+        state.parent.relative_to(out).as_posix()
+        for state in out.glob(f"*/*/{STATE}")
+        if not (state.parent / FILE).is_file()
+    )
+
+
+def kept_rows(out: Path, family: str) -> list[dict[str, Any]]:
+    """The rows that a family has so far, of problems whose files are there."""
+    try:
+        known = json.loads((out / family / STATE / KEPT).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return []
+    rows = [dict.fromkeys(FILES) | row for row in known["rows"]]
+    return [row for row in rows if all((out / path).is_file() for path, _ in files_of(row))]
+
+
+def lacking(out: Path, rows: Iterable[Mapping[str, Any]]) -> list[str]:
+    """The files of problems below a folder that rows of its catalogue have not."""
+    known = {path for row in rows for path, _ in files_of(row)}
+    found = (path.relative_to(out).as_posix() for path in out.glob("*/*/[!.]*.hdf5"))
+    return sorted(path for path in found if path not in known)
 
 
 def replace_file(path: Path, write: Any) -> None:

@@ -261,7 +261,6 @@ def measure(problem: Any, origin: str) -> Contact:
             "nsgs",
             tol=LOCAL_TOLERANCE,
             max_iterations=SWEEPS,
-            merit="natural",
             local_solver=name,
         )
         sweeps[name] = result.iterations if result.converged else SWEEPS + 1
@@ -283,6 +282,8 @@ def contacts_of(path: Path) -> Iterator[tuple[int, Any]]:
     """
     problem: Any = _core.read(path)
     solution: Any = _core.read_solution(path)
+    if solution is None:  # none is known
+        return
     d = problem.spacedim
     W = problem.W.tocsr() if hasattr(problem.W, "tocsr") else problem.W
     r, u = solution.r.reshape(-1, d), solution.u.reshape(-1, d)

@@ -130,6 +130,31 @@ def problems_of(folder: str) -> int:
     return chosen or len(stored) or families()[family].problems
 
 
+def digests_of(folder: str) -> dict[int, str]:
+    """The digests of SET/FAMILY that are stored, by the problems' numbers; none of a simulation."""
+    name, _, family = folder.partition("/")
+    stored = published.digests(folder, version_of(folder))
+    chosen = {c.number: c.digest for c in choices(name) if c.family == family}
+    if chosen:
+        return {number: stored.get(number, digest) for number, digest in chosen.items()}
+    whole = getattr(families().get(family), "digests", None)
+    return stored or (dict(enumerate(whole())) if whole is not None else {})
+
+
+def distinct_of(wanted: Sequence[str]) -> int | None:
+    """How many different problems folders SET/FAMILY have together; None where that is not known.
+
+    Of families that would be simulated, or assembled, it is not.
+    """
+    found: set[str] = set()
+    for folder in wanted:
+        own = digests_of(folder)
+        if len(own) < problems_of(folder) or not all(own.values()):
+            return None
+        found.update(own.values())
+    return len(found)
+
+
 def sets() -> dict[str, list[str]]:
     """The folders SET/FAMILY of each set, by its name."""
     found: dict[str, list[str]] = {}

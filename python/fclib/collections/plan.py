@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core, scenes
+from fclib._judge import TOLERANCE
 
 Form = Literal["global", "local", "both"]
 Selection = Literal["every", "hard"]
@@ -98,8 +99,9 @@ class Plan:
     trajectory: Path | None = None  # of the scene; None: it is simulated
     simulation: Simulation = field(default_factory=lambda: Simulation(tol=ON_DEMAND))  # then so
     references: bool = True  # whether solutions are found and stored
+    certify: bool = False  # by a second, unrelated algorithm; some seconds a problem
     solver: str = "auto"
-    tol: float = 1e-8
+    tol: float = TOLERANCE  # that the solver is asked for; references.py goes on from there
     options: dict[str, Any] = field(default_factory=dict)  # of `fclib.solve`
 
     @classmethod
@@ -112,6 +114,13 @@ class Plan:
     def __post_init__(self) -> None:
         if self.count is not None and self.count < 1:
             raise ValueError(f"the count of problems must be at least 1, not {self.count}")
+        if not 0 <= self.tol <= TOLERANCE:
+            raise ValueError(
+                f"reference solutions are asked for at most {TOLERANCE:g}, which fclib check"
+                f" bounds, not {self.tol:g}"
+            )
+        if self.certify and not self.references:
+            raise ValueError("there is nothing to certify without reference solutions")
         if self.problems is None and self.steps is None:
             raise ValueError("a plan needs a number of problems or of steps")
         if self.chosen is not None and (self.count is not None or self.select != "every"):
@@ -171,6 +180,7 @@ class Plan:
                 "chosen": self.chosen,
                 "analyze": self.analyze,
                 "references": self.references,
+                **({"certify": True} if self.certify else {}),
                 "solver": self.solver,
                 "tol": self.tol,
                 "options": self.options,

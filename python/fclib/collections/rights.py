@@ -14,7 +14,6 @@ CITATION = (
     "V. Acary, M. Bremond, T. Koziara, F. Perignon, FCLIB: a collection of discrete 3D Frictional"
     " Contact problems, Inria RT-0444, 2014; set {set}, version {version}"
 )
-DOI = "to be assigned"
 
 
 @functools.cache
@@ -44,9 +43,7 @@ def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -
         origin: Any = json.loads(last)
     except ValueError:
         return info
-    own: dict[str, Any] = {name: value for name, value in of(plan).items() if value is not None}
-    if own:
-        own["doi"] = DOI
+    own = {name: value for name, value in of(plan).items() if value is not None}
     known = {"collection": plan.collection, "version": plan.version, "number": number}
     text = "\n".join([*words, json.dumps(origin | known | own)])
     return info.replace(description=text)

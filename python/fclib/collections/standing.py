@@ -308,14 +308,20 @@ def known_solution(name: str) -> tuple[Any, _core.Solution, dict[str, Any]]:
     digest = members(name.split("/")[0]).get(name)
     if digest is None:
         raise StandingError(f"{name}: there is no such problem")
-    path = solution_path(digest)
-    if not path.is_file():
+    stored = stored_solution(digest)
+    if stored is None:
         raise StandingError(f"{name}: no solution of it is stored")
+    return problem_of(name), *stored
+
+
+def stored_solution(digest: str) -> tuple[_core.Solution, dict[str, Any]] | None:
+    """The best solution known of an open problem, and who found it, if one is stored here."""
+    if published.root() is None or not (path := solution_path(digest)).is_file():
+        return None
     with np.load(path) as arrays:
         said: dict[str, Any] = json.loads(str(arrays["origin"]))
-        r = arrays["r"]
         multipliers = arrays["l"] if "l" in arrays.files else None
-    return problem_of(name), solution_of(r, multipliers), said
+        return solution_of(arrays["r"], multipliers), said
 
 
 def solution_of(r: Any, multipliers: Any) -> _core.Solution:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from fclib import _core, _digest
+from fclib._judge import Judgement, judge
 from fclib.collections import catalog, known, published, trajectory
 
+LACKING = ("unfinished", "not listed")  # the words on what a catalogue lacks
 ROUNDING = 1e-9  # relative difference of a matrix that another machine may make
 
 
@@ -19,10 +21,10 @@ ROUNDING = 1e-9  # relative difference of a matrix that another machine may make
 class Verdict:
     """What was found of one file."""
 
-    id: str  # of the problem
+    id: str  # of the problem; of a file or a family that the catalogue lacks its path
     path: str  # from the catalogue's folder
     status: str  # "ok", or what is wrong: missing, changed, unreadable, ...
-    error: float | None  # of the stored solution, where it could be judged
+    error: float | None  # of the stored solution, by both maps, if it could be judged
     message: str = ""
     # of the form that the digest is of: "published", "differs" from what is, or "yours"
     origin: str = ""
@@ -36,24 +38,32 @@ class Verdict:
 
 
 def verify(folder: str | Path, progress: Callable[[str], None] | None = None) -> Iterator[Verdict]:
-    """Hash each file of a folder again, read it, and judge its solution from the data alone.
+    """Hash each file of a folder again, read it, and judge its solutions from the data alone.
 
-    A stored solution must be as good as the catalogue says, and the data of the form that the
-    catalogue describes must have the digest that stands there. A problem that has the name and
-    version of a published one must be that one, up to rounding on another machine (ROUNDING).
+    A stored solution must be one, by the same judgement as `fclib check`, and so must each of
+    several. The data of the form that the catalogue describes must have the digest that stands
+    there. A problem that has the name and version of a published one must be that one, up to
+    rounding on another machine (ROUNDING). What the catalogue lacks comes last: families whose
+    build was cut, and files that no row has.
 
     Raises:
         CatalogError: the folder has no catalogue.
     """
     folder = Path(folder)
-    for row in catalog.read_catalog(folder).to_pylist():
+    rows = catalog.read_catalog(folder).to_pylist()
+    for row in rows:
         for path, digest in catalog.files_of(row):
             if progress is not None:
                 progress(path)
-            yield judge(folder, row["id"], path, digest, row)
+            yield verdict_on(folder, row["id"], path, digest, row)
+    for family in catalog.unfinished(folder):
+        message = f"{folder / family}: its build was cut, or goes on; the same command finishes it"
+        yield Verdict(family, family, "unfinished", None, message)
+    for path in catalog.lacking(folder, rows):
+        yield Verdict(path, path, "not listed", None, f"{folder / path}: is not in the catalogue")
 
 
-def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) -> Verdict:
+def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) -> Verdict:
     """The verdict on one file."""
     file = folder / path
     if not file.is_file():
@@ -79,19 +89,32 @@ def judge(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) 
                     f" largest relative difference is {apart.get(worst, math.inf):.1e}, in {worst}"
                 )
                 return Verdict(name, path, "not published", None, message, origin, apart)
-    if solution is None and row["solver"] is None:
-        return Verdict(name, path, "ok", None, "", origin, apart)
     if solution is None:
-        return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
-    # the sets were made by this merit
-    error = _core.merit(problem, solution).error_by("natural")
-    stored = float(row["error"])
-    # the local form is another problem by rounding, and its error another number
-    bound = max(2 * stored, float(row["tol"]))
-    if not error <= bound:
-        message = f"{file}: the solution's error is {error:.1e}, the catalogue says {stored:.1e}"
-        return Verdict(name, path, "worse", error, message)
-    return Verdict(name, path, "ok", error, "", origin, apart)
+        # a catalogue of before had no word for what is not a solution
+        expected = row["has_solution"]
+        if expected is None:
+            expected = row["solver"] is not None
+        if expected:
+            return Verdict(name, path, "no solution", None, f"{file}: its solution is not there")
+        return Verdict(name, path, "ok", None, "", origin, apart)
+    try:
+        judgement = judge(problem, solution)
+        others = [judge(problem, one) for one in _core.read_solutions(file)]
+    except _core.Error as reason:
+        return Verdict(name, path, "unreadable", None, f"{file}: {reason}")
+    for where, one in [("/solution", judgement), *numbered(others)]:
+        if not one.ok:
+            message = (
+                f"{file}: {where}: is no solution, its error by both maps is {one.error:.1e};"
+                f" it may be {one.tol:g}"
+            )
+            return Verdict(name, path, "wrong", one.error, message, origin, apart)
+    return Verdict(name, path, "ok", judgement.error, "", origin, apart)
+
+
+def numbered(several: Sequence[Judgement]) -> list[tuple[str, Judgement]]:
+    """Of all known solutions each with its place in the file."""
+    return [(f"/solutions/{k}", one) for k, one in enumerate(several, 1)]
 
 
 def distance(problem: Any, row: Mapping[str, Any]) -> dict[str, float]:

@@ -207,6 +207,7 @@ def origin(scene: Source) -> dict[str, Any]:
         "restitution": scene.restitution,
         "law": scene.law,
         "activation": scene.activation,
+        **({"allowance": True} if scene.allowance else {}),
         "begin": scene.begin,
         "theta": scene.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),

@@ -20,12 +20,14 @@ theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the en
 
 Two unilateral laws:
 
-velocity (default)  a contact is active where g + h/2 u_N^- <= 0, with Newton's law of impact
+velocity (default)  a contact is active if g + h/2 u_N^- <= a, with Newton's law of impact
                     u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
-                    penetration (of order h u_N at an impact) is kept and not amplified. Of
-                    two geometries that touch in one point, the others with g + h/2 u_N^- <= a are
-                    active too: a is the activation [m], 0 by default. Without it a box at rest on
-                    three corners loses the fourth to the last digits of its gap.
+                    penetration (of order h u_N at an impact) is kept and not amplified.
+                    a [m] is the allowance of a contact (`allowances`): what its gap changes by if
+                    each coordinate is off by the rounding of stored states, and by a small share
+                    of its free motion in a step. With a = 0 a held body falls if the last digit of
+                    a gap is positive. Of two geometries that touch in one point so, the others are
+                    active too if g + h/2 u_N^- is at most the activation [m], 0 by default.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -87,6 +89,9 @@ from fclib.simulate.arrays import (
 __all__ = ["Sparse", "Vector"]
 
 LONGEST = 1e9  # [s] of a step: what is made of h^2 stays finite
+# benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has what it found
+ROUNDINGS = 4.0  # roundings of stored states, of each coordinate, that a closed gap may show
+MOTION = 1e-3  # share of the free motion of a step, of each coordinate, that it may show
 
 
 @dataclass(frozen=True)
@@ -208,6 +213,7 @@ class System:
     violation: Vector  # (p) of the bilateral constraints
     tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
     dry: DryFriction | None = None
+    rounding: float = 0.0  # of each coordinate, where a state is stored [m], [rad]
 
 
 class ContactModel(Protocol):
@@ -246,6 +252,7 @@ class MoreauJean:
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
     activation: float = 0.0  # [m], of the velocity law: points of a pair that touches, within this
+    allowance: bool = True  # of the velocity law: whether gaps within `allowances` are closed
     all_bodies: bool = False  # whether problems have those that nothing touches too
 
     def __post_init__(self) -> None:
@@ -279,7 +286,9 @@ class MoreauJean:
         d = contacts.dimension
         if self.law == "velocity":
             before = transposed_times(H, v)[0::d]
-            active = closing(contacts.pair, contacts.gap + 0.5 * h * before, self.activation)
+            middle = contacts.gap + 0.5 * h * before
+            closed = allowances(system, h, v) if self.allowance else np.zeros(len(middle))
+            active = closing(contacts.pair, middle, closed, self.activation)
             if len(active) < len(contacts):
                 contacts, H = contacts[active], take(H, block_columns(active, d))
                 before = before[active]
@@ -414,12 +423,29 @@ def with_dry_friction(
     )
 
 
-def closing(pair: npt.NDArray[np.int64], middle: Vector, activation: float) -> npt.NDArray[np.intp]:
+def allowances(system: System, h: float, v: Vector) -> Vector:
+    """The gaps (nc) [m] that count as closed: what rounding and solvers may leave of gaps of 0.
+
+    Coordinate i is taken to be off by ROUNDINGS of a stored state, and by the share MOTION of its
+    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are a share of that, too.
+    """
+    M, H = system.M, system.H
+    own = M.indices == columns_of(M)
+    free = np.abs(v) + h * np.abs(system.force) / M.data[own]
+    off = ROUNDINGS * system.rounding + MOTION * h * free
+    sizes = by_columns(np.abs(H.data), H.indices, H.indptr, H.shape)
+    return transposed_times(sizes, off)[0 :: system.contacts.dimension]
+
+
+def closing(
+    pair: npt.NDArray[np.int64], middle: Vector, closed: Vector, activation: float
+) -> npt.NDArray[np.intp]:
     """Which contacts are active, by their gaps in the middle of the step (nc) [m].
 
-    Those that close, and of their pairs (nc x 2) those that are open by the activation at most.
+    Those that close, a gap of `closed` (nc) or less, and of their pairs (nc x 2) those that are
+    open by the activation at most.
     """
-    touches = middle <= 0
+    touches = middle <= closed
     if activation > 0:
         _, which = np.unique(pair, axis=0, return_inverse=True)
         which = which.reshape(-1)

@@ -38,7 +38,7 @@ from fclib.simulate.arrays import (
     without_zeros,
 )
 from fclib.simulate.equalities import Equalities
-from fclib.simulate.moreau_jean import Contacts, DryFriction, System, components
+from fclib.simulate.moreau_jean import ROUNDINGS, Contacts, DryFriction, System, components
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,
@@ -52,6 +52,7 @@ from fclib.simulate.mujoco_scene import (
     refuse_unknown,
 )
 from fclib.simulate.plane import in_plane
+from fclib.simulate.rounding import exponent_of
 
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
 LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
@@ -97,6 +98,7 @@ class MujocoModel:
         self._first = m.body_geomadr[self._owners].astype(np.intp)
         self._pattern = mass_pattern(m)
         self._ties = Equalities(m)
+        self._rounding = 2.0 ** exponent_of(self.smallest_size)
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         # these change with no configuration where no actuator feeds back
         feeds = (m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE).any()
@@ -230,6 +232,7 @@ class MujocoModel:
             violation,
             self.trees,
             self._dry,
+            self._rounding,
         )
 
     def equalities(self) -> tuple[list[str], Vector]:
@@ -310,8 +313,12 @@ class MujocoModel:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
             speed = speed[self._cell.geometry]
+        reach = h * speed + h**2 * self._gravity
         # half of the activation for each of the two
-        reach = h * speed + h**2 * self._gravity + 0.5 * self.scene.activation
+        reach += 0.5 * self.scene.activation
+        if self.scene.allowance:
+            # gaps that rounding opens, by the lengths that it turns
+            reach += ROUNDINGS * self._rounding * (1 + m.geom_rbound)
 
         margin = np.maximum(self._margin, reach)
         m.geom_margin[:] = margin

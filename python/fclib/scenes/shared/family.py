@@ -37,6 +37,7 @@ class Scene:
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
     activation: float = 0.0  # [m], of the velocity law, see `fclib.simulate.MoreauJean`
+    allowance: bool = True  # of the velocity law, see there: gaps that rounding explains are closed
     begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     gyroscopic: bool = False  # their derivative is part of M, which is then not symmetric
@@ -69,6 +70,7 @@ class Scene:
             time_step=family.time_step,
             restitution=family.restitution,
             activation=getattr(family, "activation", 0.0),
+            allowance=getattr(family, "allowance", True),
             begin=getattr(family, "begin", 0.0),
             gyroscopic=getattr(family, "gyroscopic", False),
             all_bodies=getattr(family, "all_bodies", False),
@@ -94,6 +96,7 @@ class Scene:
         keyframe: str | None = None,
         packages: Mapping[str, str | Path] | None = None,
         ignore: tuple[str, ...] = (),
+        activation: float = 0.0,
     ) -> Scene:
         """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
 
@@ -108,6 +111,7 @@ class Scene:
             keyframe: where it starts, by name; None: start, home or stand where there is one.
             packages: folders of the names in package://NAME/... of a URDF file.
             ignore: features that are left out.
+            activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
 
         Raises:
             OSError: it cannot be read.
@@ -131,6 +135,7 @@ class Scene:
             title=path.stem,
             description=f"Problems of the scene {path.name}.",
             ignore=tuple(ignore),
+            activation=activation,
             # the text tells all where packages were resolved
             path=path if resolved == xml else None,
             includes=includes,
@@ -288,6 +293,7 @@ class Family(Described, Protocol):
 
     Where it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
+    A published family sets `allowance` to False, since its states were simulated without.
 
     Where the default scene takes long, `small` holds parameters of a quick one of the kind.
     """

@@ -9,8 +9,8 @@ step before are not needed: they are a guess for a solver and no part of a probl
 
 States are rounded to multiples of a power of 2 (`simulate/rounding.py`), and problems are assembled
 from the rounded ones: nothing adds up, since each problem starts from its own state. Multiples of a
-fixed quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the same
-resolution of its gap as one on it, and because what rests is then 0 and takes no room.
+fixed quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the
+same resolution of its gap as one on it, and because what rests is then 0 and takes no room.
 
 The file is a ZIP archive, which any tool opens, compressed by LZMA, which Python's own library has:
 

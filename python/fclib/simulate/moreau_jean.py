@@ -27,7 +27,9 @@ velocity (default)  a contact is active if g + h/2 u_N^- <= a, with Newton's law
                     each coordinate is off by the rounding of stored states, and by a small share
                     of its free motion in a step. With a = 0 a held body falls if the last digit of
                     a gap is positive. Of two geometries that touch in one point so, the others are
-                    active too if g + h/2 u_N^- is at most the activation [m], 0 by default.
+                    active too if g + h/2 u_N^- is at most the activation [m], 0 by default. Of
+                    points in a line, within the allowance, the ends are taken: where edges lie on
+                    each other, rounding says how many others there are and where.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -289,6 +291,8 @@ class MoreauJean:
             middle = contacts.gap + 0.5 * h * before
             closed = allowances(system, h, v) if self.allowance else np.zeros(len(middle))
             active = closing(contacts.pair, middle, closed, self.activation)
+            if self.allowance:
+                active = active[ends(contacts[active], closed[active])]
             if len(active) < len(contacts):
                 contacts, H = contacts[active], take(H, block_columns(active, d))
                 before = before[active]
@@ -453,6 +457,35 @@ def closing(
         pairs[which[touches]] = True
         touches |= pairs[which] & (middle <= activation)
     return np.flatnonzero(touches)
+
+
+def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
+    """Which contacts are not between two others of their pair, within `off` (nc) [m].
+
+    What reactions there do, reactions at the two others do as well.
+    """
+    kept = contacts.pair[:, 0] < 0
+    _, group = np.unique(contacts.pair, axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    counts = np.bincount(group)
+    kept |= counts[group] <= 2
+    order = np.argsort(group, kind="stable")
+    for count in np.unique(counts[counts > 2]).tolist():
+        own = order[counts[group[order]] == count].reshape(-1, count)
+        own = own[~kept[own[:, 0]]]
+        there = np.ones(own.shape, dtype=bool)
+        x = contacts.point[own]
+        first, second = np.triu_indices(count, 1)
+        along = x[:, second] - x[:, first]
+        squares = np.maximum((along * along).sum(axis=2), np.finfo(float).tiny)
+        for i in range(count):
+            arm = x[:, i, None] - x[:, first]
+            share = np.clip((arm * along).sum(axis=2) / squares, 0, 1)
+            far = np.linalg.norm(arm - share[:, :, None] * along, axis=2)
+            others = there[:, first] & there[:, second] & (first != i) & (second != i)
+            there[:, i] = ~(others & (far <= off[own[:, i], None])).any(axis=1)
+        kept[own] = there
+    return np.flatnonzero(kept)
 
 
 def linked(

@@ -54,6 +54,8 @@ class Simulation:
     options: dict[str, Any] = field(default_factory=dict)  # its further ones
     # a state with a deeper penetration is relaxed before it is stored; None: none is
     deepest: float | None = DEEPEST
+    # what follows a step that is not solved, see `fclib.simulate.simulate`
+    unsolved: Literal["best", "stop"] = "best"
     control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
@@ -61,6 +63,8 @@ class Simulation:
         known = asdict(self)
         if self.deepest is None:
             del known["deepest"]
+        if self.unsolved == "best":
+            del known["unsolved"]
         if not self.control:
             del known["control"]
         elif Path(self.control).is_file():

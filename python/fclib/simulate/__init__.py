@@ -19,6 +19,7 @@ relax.py          a state whose bodies are deep in each other, with these moved 
 control.py        controls from outside: a file's rows, a function of time and state
 simulation.py     the loop, warm starts, and what each problem says of its origin
 geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
+terrain.py        all contacts of height fields, of which MuJoCo keeps 50 a pair
 servos.py         actuators that feed back, and the limits of their forces
 rounding.py       how states are rounded where they are stored
 render.py         a picture of a state with its reactions
@@ -40,6 +41,7 @@ from fclib.simulate.simulation import (
     Model,
     State,
     Step,
+    StoppedError,
     descriptions,
     engine,
     model_of,
@@ -60,6 +62,7 @@ __all__ = [
     "NoRenderer",
     "State",
     "Step",
+    "StoppedError",
     "System",
     "UnsupportedSceneError",
     "control_of",

@@ -29,7 +29,8 @@ velocity (default)  a contact is active if g + h/2 u_N^- <= a, with Newton's law
                     a gap is positive. Of two geometries that touch in one point so, the others are
                     active too if g + h/2 u_N^- is at most the activation [m], 0 by default. Of
                     points in a line, within the allowance, the ends are taken: where edges lie on
-                    each other, rounding says how many others there are and where.
+                    each other, rounding says how many others there are and where. Of many points in
+                    a plane, as of a box on a terrain, the corners are.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -93,6 +94,7 @@ __all__ = ["Sparse", "Vector"]
 LONGEST = 1e9  # [s] of a step: what is made of h^2 stays finite
 # benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has what it found
 ROUNDINGS = 4.0  # roundings of stored states, of each coordinate, that a closed gap may show
+FACE = 16  # points of a pair that may be corners of two faces; of more, the corners are found
 MOTION = 1e-3  # share of the free motion of a step, of each coordinate, that it may show
 
 
@@ -460,9 +462,10 @@ def closing(
 
 
 def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
-    """Which contacts are not between two others of their pair, within `off` (nc) [m].
+    """Which contacts are not between others of their pair, within `off` (nc) [m].
 
-    What reactions there do, reactions at the two others do as well.
+    What reactions there do, reactions at the others do as well. Between two of them, of any pair;
+    of a pair with many points also inside of those that have the same plane.
     """
     kept = contacts.pair[:, 0] < 0
     _, group = np.unique(contacts.pair, axis=0, return_inverse=True)
@@ -473,19 +476,52 @@ def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
     for count in np.unique(counts[counts > 2]).tolist():
         own = order[counts[group[order]] == count].reshape(-1, count)
         own = own[~kept[own[:, 0]]]
-        there = np.ones(own.shape, dtype=bool)
-        x = contacts.point[own]
-        first, second = np.triu_indices(count, 1)
-        along = x[:, second] - x[:, first]
-        squares = np.maximum((along * along).sum(axis=2), np.finfo(float).tiny)
-        for i in range(count):
-            arm = x[:, i, None] - x[:, first]
-            share = np.clip((arm * along).sum(axis=2) / squares, 0, 1)
-            far = np.linalg.norm(arm - share[:, :, None] * along, axis=2)
-            others = there[:, first] & there[:, second] & (first != i) & (second != i)
-            there[:, i] = ~(others & (far <= off[own[:, i], None])).any(axis=1)
-        kept[own] = there
+        if count <= FACE:
+            kept[own] = not_between(contacts.point[own], off[own])
+            continue
+        for one in own:
+            for part in corners(contacts.point[one], contacts.frame[one, 0], off[one].max()):
+                which = one[part]
+                kept[which] = not_between(contacts.point[which[None]], off[which[None]])[0]
     return np.flatnonzero(kept)
+
+
+def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:
+    """Which of k points (g x k x 3) are not on the way from one to another, within off (g x k)."""
+    count = x.shape[1]
+    there = np.ones(off.shape, dtype=bool)
+    first, second = np.triu_indices(count, 1)
+    along = x[:, second] - x[:, first]
+    squares = np.maximum((along * along).sum(axis=2), np.finfo(float).tiny)
+    for i in range(count):
+        arm = x[:, i, None] - x[:, first]
+        share = np.clip((arm * along).sum(axis=2) / squares, 0, 1)
+        far = np.linalg.norm(arm - share[:, :, None] * along, axis=2)
+        others = there[:, first] & there[:, second] & (first != i) & (second != i)
+        there[:, i] = ~(others & (far <= off[:, i, None])).any(axis=1)
+    return there
+
+
+def corners(x: Vector, normal: Vector, off: float) -> list[npt.NDArray[np.intp]]:
+    """Of points (k x 3) with one normal (k x 3) in one plane, within off [m], the convex hulls."""
+    from scipy.spatial import ConvexHull  # takes a while
+
+    size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)
+    turned = np.rint(normal * size / off)  # a turn by which no point moves further
+    height = np.rint((x * normal).sum(axis=1) / off)
+    _, group = np.unique(np.column_stack((turned, height)), axis=0, return_inverse=True)
+    found = []
+    for one in range(int(group.max(initial=-1)) + 1):
+        own = np.flatnonzero(group.reshape(-1) == one)
+        arm = x[own] - x[own].mean(axis=0)
+        _, _, axes = np.linalg.svd(arm, full_matrices=False)
+        flat = arm @ axes[:2].T
+        if len(own) > 2 and np.ptp(flat[:, 1]) > off:
+            own = own[ConvexHull(flat).vertices]
+        elif len(own) > 2:
+            own = own[[flat[:, 0].argmin(), flat[:, 0].argmax()]]
+        found.append(own)
+    return found
 
 
 def linked(

@@ -51,6 +51,7 @@ from fclib.simulate.mujoco_scene import (
 from fclib.simulate.plane import in_plane
 from fclib.simulate.rounding import exponent_of
 from fclib.simulate.servos import Held, Servos
+from fclib.simulate.terrain import CrowdedPairError, complete
 
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
 LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
@@ -191,6 +192,8 @@ class MujocoModel:
         mujoco.mj_comVel(m, d)
         self._set_reach(h, shared_speed)
         mujoco.mj_collision(m, d)
+        if m.nhfield:
+            self._complete_terrain()
         frictionless_to_frictional(d)
         mujoco.mj_makeConstraint(m, d)
         self._check_warnings()
@@ -355,6 +358,12 @@ class MujocoModel:
             own, held = self._servos.within_limits(d, h, M, force)
             force += own
         return force, held
+
+    def _complete_terrain(self) -> None:
+        try:
+            complete(self.model, self.data)
+        except CrowdedPairError as error:
+            raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
 
     def _check_warnings(self) -> None:
         warned = self.data.warning.number

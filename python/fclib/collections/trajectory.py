@@ -332,6 +332,8 @@ def record(scene: Scene) -> dict[str, Any]:
         del known["includes"]
     if scene.view is None:
         del known["view"]
+    if scene.ground is None:
+        del known["ground"]
     if not scene.allowance:
         del known["allowance"]
     return known

@@ -37,6 +37,7 @@ from fclib.simulate.mujoco_scene import UnsupportedSceneError
 from fclib.simulate.relax import relaxed
 from fclib.simulate.render import NoRenderer, render
 from fclib.simulate.simulation import (
+    ALLOWANCE,
     Control,
     Model,
     State,
@@ -52,6 +53,7 @@ from fclib.simulate.simulation import (
 )
 
 __all__ = [
+    "ALLOWANCE",
     "ContactModel",
     "Contacts",
     "Control",

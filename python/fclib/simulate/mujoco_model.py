@@ -40,6 +40,7 @@ from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,
     UnsupportedSceneError,
+    cannot_touch,
     compile_scene,
     has_condim,
     keyframe_of,
@@ -76,9 +77,11 @@ class MujocoModel:
         UnsupportedSceneError.
         """
         self.scene = scene
-        self.model: Any = compile_scene(scene)
+        self.model: Any
+        self.model, dropped = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
-        self.left_out = left_out(scene, self.model)
+        self.left_out = (*left_out(scene, self.model), *dropped)
+        self.untouchable = cannot_touch(self.model)  # in words
         if strict:
             refuse_unknown(scene, self.left_out)
         if scene.planar:

@@ -218,6 +218,7 @@ class System:
     tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
     dry: DryFriction | None = None
     rounding: float = 0.0  # of each coordinate, where a state is stored [m], [rad]
+    shape_rounding: Vector | None = None  # of the surface of each geometry [m]; None: exact
 
 
 class ContactModel(Protocol):
@@ -433,14 +434,20 @@ def allowances(system: System, h: float, v: Vector) -> Vector:
     """The gaps (nc) [m] that count as closed: what rounding and solvers may leave of gaps of 0.
 
     Coordinate i is taken to be off by ROUNDINGS of a stored state, and by the share MOTION of its
-    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are a share of that, too.
+    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are a share of that, too. A
+    surface is off by ROUNDINGS of its own.
     """
     M, H = system.M, system.H
     own = M.indices == columns_of(M)
     free = np.abs(v) + h * np.abs(system.force) / M.data[own]
     off = ROUNDINGS * system.rounding + MOTION * h * free
     sizes = by_columns(np.abs(H.data), H.indices, H.indptr, H.shape)
-    return transposed_times(sizes, off)[0 :: system.contacts.dimension]
+    found = transposed_times(sizes, off)[0 :: system.contacts.dimension]
+    if system.shape_rounding is not None:
+        pair = system.contacts.pair
+        shapes = np.flatnonzero(pair[:, 0] >= 0)
+        found[shapes] += ROUNDINGS * system.shape_rounding[pair[shapes]].sum(axis=1)
+    return found
 
 
 def closing(

@@ -101,6 +101,9 @@ class MujocoModel:
         self._pattern = mass_pattern(m)
         self._ties = Equalities(m)
         self._rounding = 2.0 ** exponent_of(self.smallest_size)
+        # vertices of meshes and heights of fields are floats of 32 bits
+        single = np.isin(m.geom_type, (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD))
+        self._shape_rounding = np.finfo(np.float32).eps * np.where(single, m.geom_rbound, 0.0)
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         self._servos = Servos(m)
         # these change with no configuration if no actuator feeds back
@@ -238,6 +241,7 @@ class MujocoModel:
             self.trees,
             self._dry,
             self._rounding,
+            self._shape_rounding,
         )
 
     def equalities(self) -> tuple[list[str], Vector]:
@@ -323,7 +327,7 @@ class MujocoModel:
         reach += 0.5 * self.scene.activation
         if self.scene.allowance:
             # gaps that rounding opens, by the lengths that it turns
-            reach += ROUNDINGS * self._rounding * (1 + m.geom_rbound)
+            reach += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + self._shape_rounding)
 
         margin = np.maximum(self._margin, reach)
         m.geom_margin[:] = margin

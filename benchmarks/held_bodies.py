@@ -27,6 +27,8 @@ import numpy as np
 from fclib import scenes
 from fclib.scenes import Scene
 from fclib.simulate import moreau_jean, simulate
+from fclib.simulate.geometry import places_of
+from fclib.simulate.simulation import same_contacts
 
 HEAD = '<mujoco><option timestep="0.002"/>'
 ROD = f"""{HEAD}<default><geom friction="0.7"/></default><worldbody>
@@ -90,11 +92,14 @@ def run(scene: Scene, seconds: float) -> dict[str, Any]:
             break
         if step.time < 0.1 * seconds:
             continue
-        r = np.array(step.result.solution.r)
-        first = first or (step.position, r)
+        r = np.reshape(step.result.solution.r, (-1, step.contacts.dimension))
+        pair, place = step.contacts.pair, places_of(step.model, step.contacts)
+        first = first or (step.position, r, pair, place)
         creep = max(creep, float(np.abs(step.position - first[0]).max()))
-        if len(r) == len(first[1]):
-            unsteady = max(unsteady, float(np.abs(r - first[1]).max()))
+        # MuJoCo changes the order of points
+        source = same_contacts(first[2], first[3], pair, place)
+        if len(r) == len(first[1]) and (source >= 0).all():
+            unsteady = max(unsteady, float(np.abs(r - first[1][source]).max()))
         else:
             unsteady = float("inf")
     largest = max(float(np.abs(first[1]).max(initial=0.0)), 1e-300)

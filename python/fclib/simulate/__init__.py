@@ -19,6 +19,7 @@ relax.py          a state whose bodies are deep in each other, with these moved 
 control.py        controls from outside: a file's rows, a function of time and state
 simulation.py     the loop, warm starts, and what each problem says of its origin
 geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
+faces.py          the corners of flat faces, of which MuJoCo keeps four
 terrain.py        all contacts of height fields, of which MuJoCo keeps 50 a pair
 servos.py         actuators that feed back, and the limits of their forces
 rounding.py       how states are rounded where they are stored

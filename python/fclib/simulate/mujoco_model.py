@@ -35,6 +35,7 @@ from fclib.simulate.arrays import (
     without_zeros,
 )
 from fclib.simulate.equalities import Equalities
+from fclib.simulate.faces import complete_faces
 from fclib.simulate.moreau_jean import ROUNDINGS, Contacts, DryFriction, System, components
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
@@ -104,6 +105,7 @@ class MujocoModel:
         # vertices of meshes and heights of fields are floats of 32 bits
         single = np.isin(m.geom_type, (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD))
         self._shape_rounding = np.finfo(np.float32).eps * np.where(single, m.geom_rbound, 0.0)
+        self._flat = bool((m.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any())
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         self._servos = Servos(m)
         # these change with no configuration if no actuator feeds back
@@ -200,6 +202,8 @@ class MujocoModel:
         mujoco.mj_collision(m, d)
         if m.nhfield:
             self._complete_terrain()
+        if self.scene.allowance and self._flat:
+            complete_faces(m, d, ROUNDINGS * (self._rounding + self._shape_rounding))
         frictionless_to_frictional(d)
         mujoco.mj_makeConstraint(m, d)
         self._check_warnings()

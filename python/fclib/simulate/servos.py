@@ -14,7 +14,7 @@ of its range.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -41,6 +41,12 @@ class Held:
     dofs: Mask  # (n) joints
     force: Vector  # (k) of the outputs, within their limits
     joint: Vector  # (n) of the joints, within theirs
+
+    def after(self, before: Held) -> Held:
+        """The same, but what was at the other limit before is at none: its range is between."""
+        crossed = before.outputs & (np.sign(self.force) != np.sign(before.force))
+        passed = before.dofs & (np.sign(self.joint) != np.sign(before.joint))
+        return replace(self, outputs=self.outputs & ~crossed, dofs=self.dofs & ~passed)
 
     def same(self, other: Held) -> bool:
         """Whether the same ones are at the same limits."""
@@ -157,7 +163,7 @@ class Servos:
             after = v + solved(A, h * (other + force - h * (K @ v)))
             reached = raw - self.stiffness * (moment @ (h * after))
             reached -= self.damping * (moment @ (after - v))
-            found = self._clipped(reached, moment, rest)
+            found = self._clipped(reached, moment, rest).after(held)
             if found.same(held):
                 break
             held = found

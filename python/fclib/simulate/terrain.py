@@ -33,23 +33,24 @@ def complete(m: Any, d: Any) -> None:
     """
     if d.ncon < MOST:
         return
-    pairs, first, counts = np.unique(d.contact.geom, axis=0, return_index=True, return_counts=True)
-    crowded = {
-        tuple(pair): int(start)
-        for pair, start, count in zip(pairs.tolist(), first, counts, strict=True)
-        if count >= MOST
-    }
+    pairs, counts = np.unique(d.contact.geom, axis=0, return_counts=True)
+    crowded = [(int(one), int(other)) for one, other in pairs[counts >= MOST]]
     if not crowded:
         return
-    known = [copy.copy(contact) for contact in d.contact]
-    of_pair = {pair: contacts_of(m, d, *pair) for pair in crowded}
+    replace_contacts(m, d, {pair: contacts_of(m, d, *pair) for pair in crowded})
+
+
+def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) -> None:
+    """Give pairs of geometries other contacts, in the place of those that they have."""
     contacts: list[Any] = []
-    for i, contact in enumerate(known):
-        pair = tuple(contact.geom.tolist())
-        if pair not in crowded:
-            contacts.append(contact)
-        elif i == crowded[pair]:
-            contacts += of_pair[pair]
+    done = set()
+    for contact, pair in zip(d.contact, d.contact.geom.tolist(), strict=True):
+        key = (pair[0], pair[1])
+        if key not in of_pair:
+            contacts.append(copy.copy(contact))
+        elif key not in done:
+            contacts += of_pair[key]
+            done.add(key)
     with colliding(m, []):
         mujoco.mj_collision(m, d)  # makes room
     if any(mujoco.mj_addContact(m, d, contact) for contact in contacts):

@@ -1,8 +1,9 @@
 """The corners where two flat faces meet, of which MuJoCo keeps four at most.
 
 Where edges lie on each other, as those of equal stones do, rounding makes points on the edges, and
-the four that are kept may be these instead of corners: the stones lose their hold. Such pairs are
-looked at again: one face is cut by the other in the plane between them.
+the four that are kept may be these instead of corners: the stones lose their hold. Pairs with four
+points are looked at again: one face is cut by the other in the plane between them. The scheme takes
+of the corners those that are not between others.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ import numpy as np
 
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.arrays import Vector
-from fclib.simulate.moreau_jean import not_between
 from fclib.simulate.terrain import replace_contacts
 
 KEPT: Final = 4  # points of two faces that MuJoCo keeps
@@ -23,11 +23,8 @@ PARALLEL: Final = 1e-6  # 1 - cos of the angle of two faces that have points all
 MESH, BOX = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("MESH", "BOX"))
 
 
-def complete_faces(m: Any, d: Any, off: Vector) -> None:
-    """Right after `mj_collision`: all corners, where one of four points is between two others.
-
-    off   (ngeom) [m] what counts as between, of each geometry
-    """
+def complete_faces(m: Any, d: Any) -> None:
+    """Right after `mj_collision`: all corners of two faces, of which one is a mesh's."""
     contact = d.contact
     if len(contact.dist) < KEPT:
         return
@@ -44,10 +41,8 @@ def complete_faces(m: Any, d: Any, off: Vector) -> None:
     same = (geom[own] == pairs[:, None]).all(axis=(1, 2))
     same &= np.ptp(contact.frame[own][:, :, :3], axis=1).max(axis=1) <= SAME
     same &= (m.geom_type[pairs] == MESH).any(axis=1)
-    bounds = np.repeat(off[pairs].sum(axis=1)[:, None], KEPT, axis=1)
-    lost = same & ~not_between(contact.pos[own], bounds).all(axis=1)
     found = {}
-    for k in np.flatnonzero(lost):
+    for k in np.flatnonzero(same):
         one, other = (int(g) for g in pairs[k])
         made = corners_of(m, d, one, other, contact[int(own[k, 0])])
         if made:

@@ -203,7 +203,7 @@ class MujocoModel:
         if m.nhfield:
             self._complete_terrain()
         if self.scene.allowance and self._flat:
-            complete_faces(m, d, ROUNDINGS * (self._rounding + self._shape_rounding))
+            complete_faces(m, d)
         frictionless_to_frictional(d)
         mujoco.mj_makeConstraint(m, d)
         self._check_warnings()

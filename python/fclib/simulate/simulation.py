@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,6 +10,7 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from fclib import _core, _geometry, _solve
 from fclib.scenes import Scene
@@ -36,6 +38,10 @@ STABILIZATION: Final = 0.2  # share of a violation undone in a step
 NONSENSE: Final = 1.0
 # of states, in roundings of stored ones: doubles hold integers up to here
 LARGEST: Final = 2.0**53
+
+# of the reactions that are nearest to the last ones: the accuracy asked for, and steps towards it
+EXACT: Final = 1e-14
+MOST: Final = 1000
 
 Unsolved: TypeAlias = Literal["best", "stop"]
 
@@ -205,9 +211,15 @@ def _march(
         if settings["warm_start"] and problem.nc and len(state.r):
             options["guess"] = _core.Solution(r=carry_over(state, contacts, places))
         try:
-            result = _solve.solve(
-                problem, solver=settings["solver"], tol=settings["tol"], **options
+            solve = functools.partial(
+                _solve.solve, problem, settings["solver"], tol=settings["tol"]
             )
+            result = solve(**options)
+            if "guess" in options and result.converged and result.iterations:
+                near = nearest(problem, result.solution, options["guess"].r)
+                if near is not None:
+                    again = solve(**options | {"guess": _core.Solution(r=near)})
+                    result = again if again.converged else result
             after = part.after(result.solution.v)
         except _core.UnsuitableError as error:
             word = contradiction(model, system)
@@ -240,6 +252,29 @@ def _march(
                 f"{model.scene.name}, step {index}: leads to a position that is out of range"
                 f" ({largest(state.position):.3g})"
             )
+
+
+def nearest(
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem, solution: _core.Solution, r: Vector
+) -> Vector | None:
+    """Of the reactions of bodies at rest those nearest to r (m), but for the cones; None: moving.
+
+    Reactions of contacts that stick may change by what moves nothing, H dr = 0. A solver returns
+    any of them, so that the reactions of a body at rest would change from step to step.
+    """
+    status = np.asarray(_core.contact_merits(problem, solution)["status"])
+    if (status == "slide").any() or not (status == "stick").any():
+        return None
+    sticks = np.repeat(status == "stick", problem.spacedim)
+    H = sp.csc_array(problem.H)[:, sticks]
+    if H.shape[1] <= np.count_nonzero(np.diff(sp.csr_array(H).indptr)):
+        return None  # they are as few as the directions that they push
+    change = r[sticks] - solution.r[sticks]
+    # the part of the change that moves something
+    moving = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
+    found: Vector = np.array(solution.r)
+    found[sticks] += change - moving
+    return found
 
 
 def in_range(values: Vector, bound: float) -> bool:

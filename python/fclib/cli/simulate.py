@@ -167,7 +167,7 @@ def command(
                 tol=ON_DEMAND,
                 control=control,
                 deepest=None,
-                unsolved=unsolved.value,  # type: ignore[arg-type]
+                unsolved=unsolved.value,
                 options=options,
             ),
             options=options,

@@ -77,10 +77,10 @@ def face_of(m: Any, d: Any, geom: int, normal: Vector) -> Vector | None:
     if m.geom_type[geom] == BOX:
         axis = int(np.abs(along).argmax())
         others = np.array([(axis + 1) % 3, (axis + 2) % 3])
-        ring = np.zeros((4, 3))
-        ring[:, axis] = np.sign(along[axis])
-        ring[:, others] = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
-        local, best = ring * m.geom_size[geom], float(np.abs(along[axis]))
+        signs = np.zeros((4, 3))
+        signs[:, axis] = np.sign(along[axis])
+        signs[:, others] = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+        local, best = signs * m.geom_size[geom], float(np.abs(along[axis]))
     else:
         mesh = int(m.geom_dataid[geom])
         faces = slice(m.mesh_polyadr[mesh], m.mesh_polyadr[mesh] + m.mesh_polynum[mesh])
@@ -93,7 +93,7 @@ def face_of(m: Any, d: Any, geom: int, normal: Vector) -> Vector | None:
         best = float(dots.max())
     if best < 1 - PARALLEL:
         return None
-    ring = local @ turn.T + place
+    ring: Vector = np.asarray(local @ turn.T + place)
     return ring
 
 

@@ -104,7 +104,8 @@ class MujocoModel:
         self._rounding = 2.0 ** exponent_of(self.smallest_size)
         # vertices of meshes and heights of fields are floats of 32 bits
         single = np.isin(m.geom_type, (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD))
-        self._shape_rounding = np.finfo(np.float32).eps * np.where(single, m.geom_rbound, 0.0)
+        single_eps = float(np.finfo(np.float32).eps)
+        self._shape_rounding = single_eps * np.where(single, m.geom_rbound, 0.0)
         self._flat = bool((m.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any())
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         self._servos = Servos(m)

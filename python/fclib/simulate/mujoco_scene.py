@@ -128,7 +128,8 @@ def add_ground(scene: Scene, spec: Any) -> None:
     if keyframe:
         mujoco.mj_resetDataKeyframe(m, d, m.key(keyframe).id)
     mujoco.mj_kinematics(m, d)
-    lowest = [bottom(m, d, g) for g in np.flatnonzero(m.geom_contype | m.geom_conaffinity)]
+    collide = np.flatnonzero(m.geom_contype | m.geom_conaffinity).tolist()
+    lowest = [bottom(m, d, g) for g in collide]
     spec.worldbody.add_geom(
         name="ground" if all(m.geom(g).name != "ground" for g in range(m.ngeom)) else "",
         type=mujoco.mjtGeom.mjGEOM_PLANE,

@@ -133,7 +133,7 @@ class Servos:
         n = len(own)
         acting = np.flatnonzero(gain if held is None else gain * ~held.outputs)
         places, values = [], []
-        for k in acting:
+        for k in acting.tolist():
             columns, moment = moments(d, k)
             if held is not None:
                 moves = ~held.dofs[columns]

@@ -20,7 +20,13 @@ from helpers_cli import run as command
 mujoco = pytest.importorskip("mujoco")
 
 from fclib.collections import trajectory  # noqa: E402
-from fclib.simulate import StoppedError, UnsupportedSceneError, simulate  # noqa: E402
+from fclib.simulate import (  # noqa: E402
+    MujocoModel,
+    StoppedError,
+    UnsupportedSceneError,
+    logged,
+    simulate,
+)
 from fclib.simulate import simulation as module  # noqa: E402
 from fclib.simulate.geometry import places_of  # noqa: E402
 from fclib.simulate.simulation import (  # noqa: E402
@@ -576,3 +582,94 @@ def test_a_policy_by_its_file(tmp_path: Path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[0.0]"
+
+
+# ---- logged states
+
+PUSHED = document(
+    '<geom type="plane" size="1 1 0.1"/><body pos="0 0 0.1"><joint type="slide" axis="1 0 0"'
+    ' name="j"/><joint type="slide" axis="0 0 1"/><geom type="box" size="0.1 0.1 0.1" mass="1"/>'
+    '</body><body pos="1 0 0.1"><freejoint/><geom size="0.1" mass="1"/></body>',
+    '<actuator><position joint="j" kp="100"/></actuator>',
+)
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> dict[str, Any]:
+    """Ten states of a simulation of MuJoCo's own, and the scene in a file."""
+    (tmp_path / "pushed.xml").write_text(PUSHED, encoding="utf-8")
+    m = mujoco.MjModel.from_xml_string(PUSHED)
+    d = mujoco.MjData(m)
+    rows: dict[str, Any] = {"qpos": [], "qvel": [], "ctrl": []}
+    for k in range(10):
+        d.ctrl[:] = 0.01 * k
+        mujoco.mj_step(m, d)
+        for name, values in rows.items():
+            values.append(getattr(d, name).copy())
+    return {name: np.array(values) for name, values in rows.items()}
+
+
+def as_csv(log: dict[str, Any]) -> str:
+    names = [f"{name}{i}" for name, values in log.items() for i in range(values.shape[1])]
+    table = np.hstack(list(log.values())).tolist()
+    lines = [",".join(["note", *names])]
+    lines += [",".join(["x", *map(repr, row)]) for row in table]
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("kind", ["npz", "csv"])
+def test_logged_states_become_problems(kind: str, log: dict[str, Any], tmp_path: Path) -> None:
+    path = tmp_path / f"log.{kind}"
+    if kind == "npz":
+        np.savez(path, time=np.arange(10), **log)
+    else:
+        path.write_text(as_csv(log), encoding="utf-8")
+    out = tmp_path / "out"
+    scene = tmp_path / "pushed.xml"
+    done = command("simulate", scene, "--states", path, "--out", out, "--no-pictures")
+    assert done.returncode == 0, done.stderr
+    states = trajectory.read(out / "scenes" / "pushed" / trajectory.OWN)
+    assert states.step.tolist() == list(range(10))
+    both = np.hstack((log["qpos"], log["ctrl"]))
+    np.testing.assert_allclose(states.position, both, rtol=0, atol=2.0**-30)
+    np.testing.assert_allclose(states.velocity, log["qvel"], rtol=0, atol=2.0**-30)
+    for file, place in zip(sorted(out.rglob("*-global.hdf5")), range(10), strict=True):
+        assert fclib.digest(fclib.read(file)) == fclib.digest(states.problem(place).problem)
+
+
+@pytest.mark.parametrize(
+    ("change", "word"),
+    [
+        ({"qvel": None}, "has no qvel"),
+        ({"qpos": np.zeros((10, 3))}, r"qpos has the shape \(10, 3\), and pushed needs \(10, 9\)"),
+        ({"ctrl": np.zeros((9, 1))}, r"ctrl has the shape \(9, 1\)"),
+        ({"qvel": np.full((10, 8), np.nan)}, "qvel, row 0: is not finite"),
+    ],
+)
+def test_a_log_that_does_not_fit_is_said(
+    change: dict[str, Any], word: str, log: dict[str, Any], tmp_path: Path
+) -> None:
+    log = {name: values for name, values in (log | change).items() if values is not None}
+    np.savez(tmp_path / "log.npz", **log)
+    model = MujocoModel(Scene(name="pushed", xml=PUSHED))
+    with pytest.raises(ValueError, match=f"log.npz: {word}"):
+        logged(tmp_path / "log.npz", model)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("", "has no qpos"),
+        ("qpos0,qpos2\n1,2\n", r"its columns of qpos are \[0, 2\]"),
+        ("qpos0,qvel0\n1,\n", "line 2: qvel is not a row of numbers"),
+        ("qpos0,qvel0\n", "has no state"),
+    ],
+)
+def test_a_table_that_is_no_log_is_said(text: str, word: str, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=f"log.csv: {word}"):
+        logged(path, MujocoModel(Scene(name="pushed", xml=PUSHED)))
+    (tmp_path / "log.npz").write_text("no", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"log.npz: is no \.npz file"):
+        logged(tmp_path / "log.npz", MujocoModel(Scene(name="pushed", xml=PUSHED)))

@@ -66,6 +66,13 @@ def command(
         Path | None,
         typer.Option(help="Controls, one step a row: a .csv or .npy file. The last row goes on."),
     ] = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            help="Take the states of a log instead: an .npz file of qpos, qvel, ctrl, act, or a"
+            " .csv file with columns qpos0, ..., qvel0, ... Nothing is simulated."
+        ),
+    ] = None,
     policy: Annotated[
         str | None,
         typer.Option(
@@ -127,12 +134,14 @@ def command(
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')
     if ctrl is not None and policy is not None:
         raise typer.BadParameter("the controls are those of --ctrl or of --policy, not of both")
+    if states is not None and (ctrl is not None or policy is not None):
+        raise typer.BadParameter("with --states the controls are the log's own, ctrl")
     pairs = [entry.partition("=") for entry in package or []]
     for name, equals, place in pairs:
         if not (name and equals and place):
             raise typer.BadParameter("--package takes NAME=DIR")
     try:
-        from fclib.simulate import ALLOWANCE, MujocoModel, control_of
+        from fclib.simulate import ALLOWANCE, MujocoModel, control_of, logged
     except ImportError as error:
         fail(str(error))
     options = {} if merit is MeritKind.both else {"merit": merit.value}
@@ -154,6 +163,8 @@ def command(
         control = str(ctrl) if ctrl is not None else policy or ""
         if control:
             control_of(control)
+        if states is not None:
+            steps = len(logged(states, model)[0])
         plan = collections.Plan(
             scene=loaded,
             collection="scenes",
@@ -166,6 +177,7 @@ def command(
             simulation=collections.Simulation(
                 tol=ON_DEMAND,
                 control=control,
+                states=str(states) if states is not None else "",
                 deepest=None,
                 unsolved=unsolved.value,
                 options=options,
@@ -195,7 +207,8 @@ def command(
         )
     if model.keyframe:
         err.print(f"From the keyframe {model.keyframe!r}", highlight=False)
-    err.print(f"Simulating {loaded.name}, {steps} steps ...", highlight=False)
+    doing = f"Simulating {loaded.name}" if states is None else f"{states}: {loaded.name}"
+    err.print(f"{doing}, {steps} steps ...", highlight=False)
     build_plans([plan], folder, 1, pictures, as_json)
 
 

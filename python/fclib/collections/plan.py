@@ -56,6 +56,7 @@ class Simulation:
     deepest: float | None = DEEPEST
     # what follows a step that is not solved, see `fclib.simulate.simulate`
     unsolved: Literal["best", "stop"] = "best"
+    states: str = ""  # FILE.npz or FILE.csv of `fclib.simulate.logged`, instead of a simulation
     control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
@@ -65,10 +66,12 @@ class Simulation:
             del known["deepest"]
         if self.unsolved == "best":
             del known["unsolved"]
-        if not self.control:
-            del known["control"]
-        elif Path(self.control).is_file():
-            known["control_sha256"] = hashlib.sha256(Path(self.control).read_bytes()).hexdigest()
+        for name in ("control", "states"):
+            if not known[name]:
+                del known[name]
+            elif Path(known[name]).is_file():
+                content = Path(known[name]).read_bytes()
+                known[f"{name}_sha256"] = hashlib.sha256(content).hexdigest()
         return known
 
 

@@ -12,7 +12,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,17 +99,24 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
     first = math.ceil(plan.scene.begin / scheme.h - 1e-6)
     done = start.index if start is not None else 0
     last = time.monotonic()
-    march = simulate(
-        plan.scene,
-        most - done,
-        solver=way.solver,
-        tol=way.tol,
-        stabilization=way.stabilization,
-        start=start,
-        control=control_of(way.control) if way.control else None,
-        unsolved=way.unsolved,
-        **way.options,
-    )
+    march: Iterator[At]
+    if way.states:
+        march = logged_ones(model, Path(way.states), most, done)
+    else:
+        march = (
+            At(step.index, step.start, step.result.converged)
+            for step in simulate(
+                plan.scene,
+                most - done,
+                solver=way.solver,
+                tol=way.tol,
+                stabilization=way.stabilization,
+                start=start,
+                control=control_of(way.control) if way.control else None,
+                unsolved=way.unsolved,
+                **way.options,
+            )
+        )
     stopped = ""
     while True:
         try:
@@ -124,7 +131,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         if time.monotonic() - last > CHECKPOINT:
             write_checkpoint(checkpoint, kept, step.start)
             last = time.monotonic()
-        if not step.result.converged:
+        if not step.solved:
             kept.unsolved.append(step.index)
         if step.index < first:
             continue
@@ -167,6 +174,26 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         ),
     )
     checkpoint.unlink(missing_ok=True)
+
+
+@dataclass(frozen=True)
+class At:
+    """The start of a step."""
+
+    index: int
+    start: State
+    solved: bool
+
+
+def logged_ones(model: Any, path: Path, most: int, done: int) -> Iterator[At]:
+    """The states of a file that come after so many: nothing is solved."""
+    from fclib.simulate import State, logged
+
+    none = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3))
+    states = zip(*logged(path, model), strict=True)
+    for index, (position, velocity) in enumerate(states):
+        if done <= index < most:
+            yield At(index, State(index, position, velocity, *none), solved=True)
 
 
 def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:

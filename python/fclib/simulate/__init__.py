@@ -17,6 +17,7 @@ plane.py          contacts of bodies that move in a plane
 periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
 relax.py          a state whose bodies are deep in each other, with these moved apart
 control.py        controls from outside: a file's rows, a function of time and state
+logged.py         states from outside: a file's rows
 simulation.py     the loop, warm starts, and what each problem says of its origin
 geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
 faces.py          the corners of flat faces, of which MuJoCo keeps four
@@ -32,6 +33,7 @@ scikit-fem, in that of `_skfem.py`.
 from fclib.simulate.control import control_of
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.geometry import geometry_of
+from fclib.simulate.logged import logged
 from fclib.simulate.moreau_jean import ContactModel, Contacts, MoreauJean, System
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.mujoco_scene import UnsupportedSceneError
@@ -72,6 +74,7 @@ __all__ = [
     "descriptions",
     "engine",
     "geometry_of",
+    "logged",
     "model_of",
     "problem_at",
     "provenance",

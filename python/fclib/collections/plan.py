@@ -215,6 +215,7 @@ def origin(scene: Source) -> dict[str, Any]:
         "law": scene.law,
         "activation": scene.activation,
         **({"allowance": True} if scene.allowance else {}),
+        **({} if scene.ground is None else {"ground": scene.ground}),
         "begin": scene.begin,
         "theta": scene.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),

@@ -468,6 +468,11 @@ def closing(
     return np.flatnonzero(touches)
 
 
+def keys(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """A number for each pair (nc x 2), the same for the same: faster to compare than rows."""
+    return (pair[:, 0] << 32) + pair[:, 1]
+
+
 def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
     """Which contacts are not between others of their pair, within `off` (nc) [m].
 
@@ -475,8 +480,7 @@ def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
     of a pair with many points also inside of those that have the same plane.
     """
     kept = contacts.pair[:, 0] < 0
-    _, group = np.unique(contacts.pair, axis=0, return_inverse=True)
-    group = group.reshape(-1)
+    _, group = np.unique(keys(contacts.pair), return_inverse=True)
     counts = np.bincount(group)
     kept |= counts[group] <= 2
     order = np.argsort(group, kind="stable")

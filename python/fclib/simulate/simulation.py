@@ -26,6 +26,7 @@ from fclib.simulate.moreau_jean import (
     StepProblem,
     System,
     Vector,
+    keys,
 )
 from fclib.simulate.mujoco_model import MujocoModel
 
@@ -346,8 +347,8 @@ def same_contacts(
     a corner stays where it is on one of the shapes: the smaller of two distances counts.
     """
     source = np.full(len(now), -1)
-    pairs, group = np.unique(np.concatenate((before, now)), axis=0, return_inverse=True)
-    old, new = np.split(group.reshape(-1), [len(before)])
+    pairs, group = np.unique(keys(np.concatenate((before, now))), return_inverse=True)
+    old, new = np.split(group, [len(before)])
     counts = [np.bincount(own, minlength=len(pairs)) for own in (old, new)]
     order = np.argsort(old, kind="stable")
     first = np.cumsum(counts[0]) - counts[0]
@@ -395,6 +396,7 @@ def descriptions(
         "theta": scheme.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),
         **({"all_bodies": True} if scene.all_bodies else {}),
+        **({} if scene.ground is None else {"ground": scene.ground}),
         "stabilization": scheme.stabilization,
         **settings,
     }

@@ -65,7 +65,7 @@ def policy_of(name: str) -> Control:
     if module.endswith(".py"):
         file = Path(module).resolve()
         if not file.is_file():
-            raise ValueError(f"{name!r}: there is no file {file}")
+            raise ValueError(f"{name!r}: the module cannot be imported: there is no file {file}")
         folder, module = file.parent, file.stem
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
@@ -75,12 +75,12 @@ def policy_of(name: str) -> Control:
         missing = error.name or module
         if module == missing or module.startswith(f"{missing}."):
             raise ValueError(
-                f"{name!r}: no module {missing!r} is installed, nor is there a file"
-                f" {folder / missing.replace('.', '/')}.py"
+                f"{name!r}: the module cannot be imported: no module {missing!r} is installed, nor"
+                f" is there a file {folder / missing.replace('.', '/')}.py"
             ) from None
         raise ValueError(
-            f"{name!r}: the module itself imports {missing!r}, which is not installed"
-            f"{place_of(error)}; install it for {sys.executable}"
+            f"{name!r}: the module cannot be imported: it imports {missing!r}, which is not"
+            f" installed{place_of(error)}; install it for {sys.executable}"
         ) from error
     except Exception as error:
         raise ValueError(f"{name!r}: the module cannot be imported: {raised(error)}") from error

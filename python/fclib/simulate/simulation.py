@@ -40,6 +40,8 @@ NONSENSE: Final = 1.0
 # of states, in roundings of stored ones: doubles hold integers up to here
 LARGEST: Final = 2.0**53
 
+# speed at contacts, of the largest one without reactions, below which bodies are at rest
+STILL: Final = 1e-6
 # of the reactions that are nearest to the last ones: the accuracy asked for, and steps towards it
 EXACT: Final = 1e-14
 MOST: Final = 1000
@@ -263,10 +265,14 @@ def nearest(
     Reactions of contacts that stick may change by what moves nothing, H dr = 0. A solver returns
     any of them, so that the reactions of a body at rest would change from step to step.
     """
-    status = np.asarray(_core.contact_merits(problem, solution)["status"])
-    if (status == "slide").any() or not (status == "stick").any():
+    d = problem.spacedim
+    u = np.abs(np.asarray(_core.contact_merits(problem, solution)["u"])).reshape(-1, d)
+    # velocities without reactions, but for coupled degrees of freedom
+    free = np.abs(problem.f) / np.abs(sp.csc_array(problem.M).diagonal())
+    closed = solution.r[::d] > 0
+    if not closed.any() or u[closed].max() > STILL * free.max():
         return None
-    sticks = np.repeat(status == "stick", problem.spacedim)
+    sticks = np.repeat(closed, d)
     H = sp.csc_array(problem.H)[:, sticks]
     if H.shape[1] <= np.count_nonzero(np.diff(sp.csr_array(H).indptr)):
         return None  # they are as few as the directions that they push

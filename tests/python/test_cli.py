@@ -533,3 +533,67 @@ def test_a_long_text_of_a_table_is_folded() -> None:
     assert (
         " ".join(" ".join(lines[1:]).split()) == "rt444 the four families of the 5 report RT-0444"
     )
+
+
+# ---- conventions
+
+
+def permuted(problem: fclib.LocalProblem, order: list[int]) -> fclib.LocalProblem:
+    """The same with the components of each contact in another order."""
+    rows = np.arange(3 * problem.nc).reshape(-1, 3)[:, order].ravel()
+    W = np.asarray(problem.W.toarray())[np.ix_(rows, rows)]
+    return fclib.LocalProblem(W=W, q=np.array(problem.q)[rows], mu=problem.mu)
+
+
+def resting(shape: str, pulled: float) -> Any:
+    """The problem of bodies that lie on a plane, or that one pulls along."""
+    pytest.importorskip("mujoco")
+    from fclib.scenes import Scene
+    from fclib.simulate import simulate
+
+    bodies = "".join(
+        f'<body pos="{k} 0 0.1"><freejoint/><geom {shape} mass="1"/></body>' for k in range(3)
+    )
+    speeds = " ".join(f"{pulled} 0 0 0 0 0" for _ in range(3))
+    places = " ".join(f"{k} 0 0.1 1 0 0 0" for k in range(3))
+    xml = (
+        f'<mujoco><worldbody><geom type="plane" size="9 9 1"/>{bodies}</worldbody><keyframe>'
+        f'<key name="start" qpos="{places}" qvel="{speeds}"/></keyframe></mujoco>'
+    )
+    (step,) = simulate(Scene(name="rest", xml=xml), 1)
+    return step.problem.replace(contacts=None, bodies=None).condense()
+
+
+@pytest.mark.parametrize("pulled", [0.0, -1.0, 1.0])
+@pytest.mark.parametrize("shape", ['type="box" size=".2 .1 .1"', 'size=".1"'])
+def test_a_normal_that_is_not_first_is_asked_for(shape: str, pulled: float, tmp_path: Path) -> None:
+    problem = resting(shape, pulled)
+    files = {}
+    for name, order in {"right": [0, 1, 2], "wrong": [1, 2, 0]}.items():
+        other = permuted(problem, order)
+        files[name] = tmp_path / f"{name}.hdf5"
+        fclib.write(files[name], other, fclib.solve(other).solution)
+    assert "is the normal first?" not in run("check", files["right"]).stderr
+    assert "is the normal first?" not in run("analyze", files["right"]).stderr
+    if pulled < 0 and "box" in shape:
+        return  # what seems to be the normal closes
+    assert "wrong.hdf5: " in run("check", files["wrong"]).stderr
+    for command in ("check", "analyze"):
+        assert "is the normal first?" in run(command, files["wrong"]).stderr
+
+
+def test_contacts_are_shown_with_the_names_of_their_bodies(tmp_path: Path) -> None:
+    pytest.importorskip("mujoco")
+    xml = tmp_path / "ball.xml"
+    xml.write_text(
+        '<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 0.1">'
+        '<freejoint/><geom size="0.1"/></body></worldbody></mujoco>',
+        encoding="utf-8",
+    )
+    out = tmp_path / "out"
+    assert run("simulate", xml, "--steps", 1, "--out", out, "--no-pictures").returncode == 0
+    (file,) = out.rglob("*-global.hdf5")
+    shown = run("check", "--contacts", file).stdout
+    assert {"first", "second", "world", "ball"} <= set(shown.split())
+    (record,) = records(run("check", "--contacts", "--json", file))
+    assert (record["contacts"][0]["first"], record["contacts"][0]["second"]) == ("world", "ball")

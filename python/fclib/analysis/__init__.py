@@ -19,6 +19,7 @@ _rational.py    linear systems and linear programs in exact arithmetic
 _certificate.py a proof that there is none, checked in exact arithmetic
 _reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
 _least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
+_conventions.py whether the normal seems not to be first
 _contacts.py    statuses and energies, contact by contact
 _spectrum.py    ranks, singular values, definiteness
 _joints.py      whether joints agree. Needs _rational.py and _bounds.py
@@ -38,6 +39,7 @@ from fclib.analysis._certificate import (
     read_certificate,
 )
 from fclib.analysis._contacts import Energy, contacts, energy
+from fclib.analysis._conventions import conventions
 from fclib.analysis._enumerate import Enumeration, SolutionSet, enumerate_solutions
 from fclib.analysis._existence import (
     EXISTS_AT_HAND,
@@ -86,6 +88,7 @@ __all__ = [
     "check",
     "check_arrays",
     "contacts",
+    "conventions",
     "energy",
     "enumerate_solutions",
     "farkas",

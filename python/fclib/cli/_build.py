@@ -13,7 +13,7 @@ import typer
 from fclib import collections, scenes
 from fclib.cli._output import Report, Rows, err, fail, out, words_of
 from fclib.cli._progress import many_bars
-from fclib.collections import catalog
+from fclib.collections import catalog, trajectory
 from fclib.collections.build import BuildError
 
 
@@ -72,6 +72,10 @@ def build_plans(
     report = Report(as_json)
     for row in ranges_of(rows):
         report.add(row, row["solved"] in ("", row["problems"]))
+    steps = [line for plan in plans for line in steps_of(plan, folder)]
+    for line in steps:
+        err.print(line, style="red", highlight=False)
+    report.failed |= bool(steps)
     if not as_json:
         if report.records:
             out.print(Rows(report.records))
@@ -105,6 +109,30 @@ def build_plans(
 def simulated(plan: collections.Plan) -> bool:
     """Whether the problems of a plan come from a simulation."""
     return isinstance(plan.scene, scenes.Scene)
+
+
+def steps_of(plan: collections.Plan, folder: Path) -> list[str]:
+    """What went wrong in the simulation of a plan, if it was simulated here: a line each."""
+    states = folder / plan.name / trajectory.OWN
+    if plan.trajectory is not None or not simulated(plan) or not states.is_file():
+        return []
+    _, origin = trajectory.read_origin(states)
+    lines = []
+    if numbers := origin.get("unsolved"):
+        lines.append(
+            f"{plan.name}: {len(numbers)} steps were not solved to {plan.simulation.tol:g}, and the"
+            f" simulation went on with the best that was found: {spans(numbers)}"
+        )
+    if word := origin.get("stopped"):
+        lines.append(f"Stopped: {word}; the steps before are stored")
+    return lines
+
+
+def spans(numbers: list[int]) -> str:
+    """Increasing numbers, those in a row together: 3, 5-9."""
+    ends = [number for number in numbers if number + 1 not in set(numbers)]
+    starts = [number for number in numbers if number - 1 not in set(numbers)]
+    return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in zip(starts, ends, strict=True))
 
 
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:

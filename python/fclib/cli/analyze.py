@@ -136,7 +136,11 @@ def command(
             record["certificate"] = found.certificate.record(problem)
         shown = COLUMNS + tuple(key for key in record if key in REFERENCE)
         report.add(record if as_json else {key: record[key] for key in shown}, good)
-        for line in [*found.units.trouble, *([] if good else [record["reference_reason"]])]:
+        for line in [
+            *found.units.trouble,
+            *analysis.conventions(problem),
+            *([] if good else [record["reference_reason"]]),
+        ]:
             words.append(f"{path.name}: {line}")
         if found.existence.verdict in (analysis.PROVEN_NOT, analysis.UNDECIDED):
             words.append(f"{path.name}: {found.existence.reason}")

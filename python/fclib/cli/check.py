@@ -33,7 +33,15 @@ def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, 
 
     table = analysis.contacts(problem, solution)
     names = table.dtype.names or ()
-    return [dict(zip(names, row.tolist(), strict=True)) for row in table]
+    rows = [dict(zip(names, row.tolist(), strict=True)) for row in table]
+    if problem.contacts is None or problem.bodies is None:
+        return rows
+    bodies = problem.bodies.name.split("\n")
+    pairs = ([bodies[k] if k >= 0 else "" for k in pair] for pair in problem.contacts.body.tolist())
+    return [
+        {"contact": row["contact"], "first": first, "second": second, **row}
+        for row, (first, second) in zip(rows, pairs, strict=True)
+    ]
 
 
 def told_of(mismatch: dict[str, Any]) -> str:
@@ -93,7 +101,7 @@ def command(
     tol: Tolerance = TOLERANCE,
     merit: Merit = MeritKind.both,
     contacts: Annotated[
-        bool, typer.Option("--contacts", help="Show each contact too: status, r, u, error.")
+        bool, typer.Option("--contacts", help="Show each contact too: bodies, status, r, u, error.")
     ] = False,
     certificate: Annotated[
         Path | None,
@@ -106,9 +114,12 @@ def command(
 ) -> None:
     """Judge the stored solutions from the data alone.
 
-    If a file has several problems, the global one is taken. The last columns count the contacts
+    A line says if the data suggest that the normal is not the first component of a contact. If a
+    file has several problems, the global one is taken. The last columns count the contacts
     that are open, stick and slide.
     """
+    from fclib import analysis  # takes a while
+
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches", "joints"))
     for path in each_file(files, "checking"):
         if certificate is not None:
@@ -161,6 +172,8 @@ def command(
             err.print(f"{path.name}: {agreed}", highlight=False)
         for one in mismatches:
             err.print(f"{path.name}: {told_of(one)}", highlight=False)
+        for line in analysis.conventions(problem):
+            err.print(f"{path.name}: {line}", highlight=False)
         # what the file says of it is shown, and not believed
         if told := fclib.read_attributes(path, "solution"):
             record["says"] = told

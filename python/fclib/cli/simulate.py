@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,12 +19,21 @@ from fclib.cli._build import (
     SelectOption,
     build_plans,
 )
-from fclib.cli._output import Json, err, fail, words_of
+from fclib.cli._output import Json, Merit, MeritKind, err, fail, words_of
 from fclib.collections.plan import ON_DEMAND
 
 
+class Unsolved(str, Enum):
+    """What follows a step that is not solved."""
+
+    BEST = "best"
+    STOP = "stop"
+
+
 def command(
-    scene: Annotated[Path, typer.Argument(help="An MJCF file.", show_default=False)],
+    scene: Annotated[
+        Path, typer.Argument(help="An MJCF file, or a URDF file.", show_default=False)
+    ],
     steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 500,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the problems.")] = Path(
         "problems"
@@ -37,6 +47,13 @@ def command(
     law: Annotated[
         str, typer.Option(help='Unilateral law: "velocity" (impacts) or "gap" (no penetration).')
     ] = "velocity",
+    activation: Annotated[
+        float,
+        typer.Option(
+            help="Of two shapes that touch, points with a gap below this are contacts too [m].",
+            min=0.0,
+        ),
+    ] = 0.0,
     planar: Annotated[
         bool,
         typer.Option("--planar", help="The scene moves in the plane x, z: contacts of N and T."),
@@ -48,6 +65,13 @@ def command(
     ctrl: Annotated[
         Path | None,
         typer.Option(help="Controls, one step a row: a .csv or .npy file. The last row goes on."),
+    ] = None,
+    states: Annotated[
+        Path | None,
+        typer.Option(
+            help="Take the states of a log instead: an .npz file of qpos, qvel, ctrl, act, or a"
+            " .csv file with columns qpos0, ..., qvel0, ... Nothing is simulated."
+        ),
     ] = None,
     policy: Annotated[
         str | None,
@@ -68,6 +92,24 @@ def command(
         list[str] | None,
         typer.Option(help="Leave out a feature knowingly: limits, frictionloss, ..."),
     ] = None,
+    floating: Annotated[
+        bool,
+        typer.Option("--floating", help="The root of a URDF file moves, it is not welded."),
+    ] = False,
+    ground: Annotated[
+        float | None,
+        typer.Option(
+            help="Add a plane of this friction, below all at the start.",
+            metavar="MU",
+            min=0.0,
+            show_default=False,
+        ),
+    ] = None,
+    merit: Merit = MeritKind.both,
+    unsolved: Annotated[
+        Unsolved,
+        typer.Option(help="After a step that is not solved: go on with the best found, or stop."),
+    ] = Unsolved.BEST,
     form: FormOption = Form.BOTH,
     count: Count = None,
     select: SelectOption = Select.EVERY,
@@ -75,26 +117,34 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF file, and store the problem of each step.
+    """Simulate an MJCF or a URDF file, and store the problem of each step.
 
-    The scene may also be a URDF file. What no problem can hold is left out. The command prints a
+    What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.
 
     The scheme is that of Moreau and Jean. The solutions are stored too. Steps without contact give
     no problem. What is stored is a collection, which fclib collection verify and publish take.
+
+    A gap counts as closed if rounding or a small share of the motion explains it. A step is solved
+    if both errors of its solution are at most the tolerance. A simulation stops if a step makes no
+    sense, and says so; the steps before are stored. The exit status is then 1, as it is if a step
+    was not solved.
     """
     if law not in ("velocity", "gap"):
         raise typer.BadParameter(f'the law is "velocity" or "gap", not {law!r}')
     if ctrl is not None and policy is not None:
         raise typer.BadParameter("the controls are those of --ctrl or of --policy, not of both")
+    if states is not None and (ctrl is not None or policy is not None):
+        raise typer.BadParameter("with --states the controls are the log's own, ctrl")
     pairs = [entry.partition("=") for entry in package or []]
     for name, equals, place in pairs:
         if not (name and equals and place):
             raise typer.BadParameter("--package takes NAME=DIR")
     try:
-        from fclib.simulate import MujocoModel, control_of
+        from fclib.simulate import ALLOWANCE, MujocoModel, control_of, logged
     except ImportError as error:
         fail(str(error))
+    options = {} if merit is MeritKind.both else {"merit": merit.value}
     try:
         loaded = scenes.Scene.from_file(
             scene,
@@ -105,11 +155,16 @@ def command(
             keyframe=keyframe,
             packages={name: place for name, _, place in pairs},
             ignore=tuple(ignore or ()),
+            activation=activation,
+            floating=floating,
+            ground=ground,
         )
         model = MujocoModel(loaded, strict=strict)
         control = str(ctrl) if ctrl is not None else policy or ""
         if control:
             control_of(control)
+        if states is not None:
+            steps = len(logged(states, model)[0])
         plan = collections.Plan(
             scene=loaded,
             collection="scenes",
@@ -119,7 +174,15 @@ def command(
             count=count,
             select=select.value,
             analyze=analyze,
-            simulation=collections.Simulation(tol=ON_DEMAND, control=control, deepest=None),
+            simulation=collections.Simulation(
+                tol=ON_DEMAND,
+                control=control,
+                states=str(states) if states is not None else "",
+                deepest=None,
+                unsolved=unsolved.value,
+                options=options,
+            ),
+            options=options,
         )
     except UnicodeDecodeError:
         fail(f"{scene}: is no text, hence no MJCF file")
@@ -127,7 +190,28 @@ def command(
         fail(words_of(error))
     for line in model.left_out:
         err.print(f"Left out: {line}", highlight=False)
+    if model.untouchable:
+        remedy = (
+            " (the root of a URDF file is welded to the world, and there is no ground: --floating,"
+            " --ground)"
+            if "<robot" in loaded.xml and not floating and ground is None
+            else ""
+        )
+        err.print(f"Note: {model.untouchable}{remedy}", highlight=False)
+    if law == "velocity":
+        err.print(f"Closed gaps: within {ALLOWANCE}{further(activation)}", highlight=False)
+    if merit is MeritKind.natural:
+        err.print(
+            "Solved: by the error of the natural map alone; the scaled one is not looked at",
+            highlight=False,
+        )
     if model.keyframe:
         err.print(f"From the keyframe {model.keyframe!r}", highlight=False)
-    err.print(f"Simulating {loaded.name}, {steps} steps ...", highlight=False)
+    doing = f"Simulating {loaded.name}" if states is None else f"{states}: {loaded.name}"
+    err.print(f"{doing}, {steps} steps ...", highlight=False)
     build_plans([plan], folder, 1, pictures, as_json)
+
+
+def further(activation: float) -> str:
+    """What an activation adds, in words."""
+    return f", and {activation:g} m of further points" if activation else ""

@@ -55,6 +55,9 @@ class Simulation:
     options: dict[str, Any] = field(default_factory=dict)  # its further ones
     # a state with a deeper penetration is relaxed before it is stored; None: none is
     deepest: float | None = DEEPEST
+    # what follows a step that is not solved, see `fclib.simulate.simulate`
+    unsolved: Literal["best", "stop"] = "best"
+    states: str = ""  # FILE.npz or FILE.csv of `fclib.simulate.logged`, instead of a simulation
     control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
@@ -62,10 +65,14 @@ class Simulation:
         known = asdict(self)
         if self.deepest is None:
             del known["deepest"]
-        if not self.control:
-            del known["control"]
-        elif Path(self.control).is_file():
-            known["control_sha256"] = hashlib.sha256(Path(self.control).read_bytes()).hexdigest()
+        if self.unsolved == "best":
+            del known["unsolved"]
+        for name in ("control", "states"):
+            if not known[name]:
+                del known[name]
+            elif Path(known[name]).is_file():
+                content = Path(known[name]).read_bytes()
+                known[f"{name}_sha256"] = hashlib.sha256(content).hexdigest()
         return known
 
 
@@ -217,6 +224,8 @@ def origin(scene: Source) -> dict[str, Any]:
         "restitution": scene.restitution,
         "law": scene.law,
         "activation": scene.activation,
+        **({"allowance": True} if scene.allowance else {}),
+        **({} if scene.ground is None else {"ground": scene.ground}),
         "begin": scene.begin,
         "theta": scene.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),

@@ -12,7 +12,7 @@ import io
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,7 @@ class Recorded:
     """The states that are kept, and how many problems were looked at."""
 
     looked: int = 0
+    unsolved: list[int] = field(default_factory=list)  # steps of the simulation
     number: list[int] = field(default_factory=list)
     step: list[int] = field(default_factory=list)
     position: list[Any] = field(default_factory=list)
@@ -64,6 +65,9 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         checkpoint: a file to go on from; removed at the end.
         report: called with the plan's name, the problems that were looked at and their number.
 
+    A simulation that cannot go on ends a plan that says how many steps there are: what came before
+    is stored, and `stopped` of the trajectory's origin says why. A plan of so many problems fails.
+
     Raises:
         TypeError: the plan is of a family that is assembled directly, which has no states.
         FileExistsError, OSError: the file is there already, or cannot be written.
@@ -73,7 +77,15 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
         raise TypeError(f"{plan.name} is assembled directly: there is nothing to simulate")
     if target.exists():
         raise FileExistsError(f"{target}: is there already, and a trajectory is never rewritten")
-    from fclib.simulate import control_of, model_of, problem_at, relaxed, scheme_of, simulate
+    from fclib.simulate import (
+        StoppedError,
+        control_of,
+        model_of,
+        problem_at,
+        relaxed,
+        scheme_of,
+        simulate,
+    )
 
     way = plan.simulation
     # the states are assembled by a model of their own, as they are from the file
@@ -87,19 +99,40 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
     first = math.ceil(plan.scene.begin / scheme.h - 1e-6)
     done = start.index if start is not None else 0
     last = time.monotonic()
-    for step in simulate(
-        plan.scene,
-        most - done,
-        solver=way.solver,
-        tol=way.tol,
-        stabilization=way.stabilization,
-        start=start,
-        control=control_of(way.control) if way.control else None,
-        **way.options,
-    ):
+    march: Iterator[At]
+    if way.states:
+        march = logged_ones(model, Path(way.states), most, done)
+    else:
+        march = (
+            At(step.index, step.start, step.result.converged)
+            for step in simulate(
+                plan.scene,
+                most - done,
+                solver=way.solver,
+                tol=way.tol,
+                stabilization=way.stabilization,
+                start=start,
+                control=control_of(way.control) if way.control else None,
+                unsolved=way.unsolved,
+                **way.options,
+            )
+        )
+    stopped = ""
+    while True:
+        try:
+            step = next(march, None)
+        except StoppedError as error:
+            if plan.problems is not None or not kept.number:
+                raise
+            stopped = str(error)
+            break
+        if step is None:
+            break
         if time.monotonic() - last > CHECKPOINT:
             write_checkpoint(checkpoint, kept, step.start)
             last = time.monotonic()
+        if not step.solved:
+            kept.unsolved.append(step.index)
         if step.index < first:
             continue
         position, velocity = step.start.position, step.start.velocity
@@ -126,6 +159,8 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
                 "collection": plan.collection,
                 "version": plan.version,
                 "settings": {"fclib": _core.version, **way.record()},
+                **({"unsolved": kept.unsolved} if kept.unsolved else {}),
+                **({"stopped": stopped} if stopped else {}),
             },
             exponent=exponent,
             number=np.array(kept.number, dtype=np.int64),
@@ -141,9 +176,29 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
     checkpoint.unlink(missing_ok=True)
 
 
+@dataclass(frozen=True)
+class At:
+    """The start of a step."""
+
+    index: int
+    start: State
+    solved: bool
+
+
+def logged_ones(model: Any, path: Path, most: int, done: int) -> Iterator[At]:
+    """The states of a file that come after so many: nothing is solved."""
+    from fclib.simulate import State, logged
+
+    none = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3))
+    states = zip(*logged(path, model), strict=True)
+    for index, (position, velocity) in enumerate(states):
+        if done <= index < most:
+            yield At(index, State(index, position, velocity, *none), solved=True)
+
+
 def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
     """Store where to go on: the start of a step, and what was kept before it."""
-    known = {name: getattr(kept, name) for name in ("looked", "number", "step")}
+    known = {name: getattr(kept, name) for name in ("looked", "unsolved", "number", "step")}
     known |= {name: getattr(kept, name) for name in ("digest", "structure")}
     arrays: dict[str, Any] = {
         name: np.array(getattr(kept, name)) for name in ("position", "velocity", "sketch")

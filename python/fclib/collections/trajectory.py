@@ -7,10 +7,10 @@ loads or controls change with it. All else that the assembly needs is the scene'
 file: the MJCF text or the elastic blocks, time step, law, restitution, activation. Impulses of the
 step before are not needed: they are a guess for a solver and no part of a problem.
 
-States are rounded to multiples of a power of 2 (`exponent_of`), and problems are assembled from the
-rounded ones: nothing adds up, since each problem starts from its own state. Multiples of a fixed
-quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the same
-resolution of its gap as one on it, and because what rests is then 0 and takes no room.
+States are rounded to multiples of a power of 2 (`simulate/rounding.py`), and problems are assembled
+from the rounded ones: nothing adds up, since each problem starts from its own state. Multiples of a
+fixed quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the
+same resolution of its gap as one on it, and because what rests is then 0 and takes no room.
 
 The file is a ZIP archive, which any tool opens, compressed by LZMA, which Python's own library has:
 
@@ -60,11 +60,6 @@ FORMAT: Final = 1
 SUFFIX: Final = ".trajectory"
 OWN: Final = f"states{SUFFIX}"  # beside the problems of a build that simulated it
 EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # so that equal trajectories make equal files
-# quanta 2^e in m, rad, m/s, rad/s, s: about 1 nm; for bodies below 16 mm finer in proportion
-RIGID: Final = -30
-PER_SIZE: Final = -24  # of the smallest body's size
-# elastic displacements are small: 1e-12 m
-ELASTIC: Final = -40
 LARGEST: Final = 2**53  # integers that a double holds
 DIFFERENCES: Final = 2  # along the steps
 # of a trajectory, with a row for each state
@@ -170,10 +165,9 @@ def part(states: Trajectory, numbers: Iterable[int], collection: str, version: s
 
 def exponent_of(model: Model) -> int:
     """The quantum 2^e to which the states of a model are rounded."""
-    size = model.smallest_size
-    if size is None:
-        return ELASTIC
-    return min(RIGID, PER_SIZE + math.floor(math.log2(size)))
+    from fclib.simulate.rounding import exponent_of
+
+    return exponent_of(model.smallest_size)
 
 
 def rounded(values: Vector, exponent: int) -> Vector:
@@ -338,12 +332,17 @@ def record(scene: Scene) -> dict[str, Any]:
         del known["includes"]
     if scene.view is None:
         del known["view"]
+    if scene.ground is None:
+        del known["ground"]
+    if not scene.allowance:
+        del known["allowance"]
     return known
 
 
 def scene_of(known: Mapping[str, Any]) -> Scene:
     """The scene of a record."""
-    values = {
+    # without one: simulated before there were allowances, or as such a scene
+    values: dict[str, Any] = {"allowance": False} | {
         name: tuples(value) if name != "parameters" else value for name, value in known.items()
     }
     if known["solids"] is not None:

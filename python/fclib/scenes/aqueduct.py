@@ -35,6 +35,7 @@ class Aqueduct:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 60
+    allowance: ClassVar[bool] = False  # as published
     # of a scene of this kind that is quickly simulated
     small: ClassVar[Mapping[str, Any]] = {"spans": 2, "tiers": 1}
 

@@ -31,6 +31,7 @@ class Arch:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "masonry"
     problems: ClassVar[int] = 500
+    allowance: ClassVar[bool] = False  # as published
 
     voussoirs: int = parameter(24, "1", "number of voussoirs, at least 2")
     radius: float = parameter(2.0, "m", "radius of the middle line")

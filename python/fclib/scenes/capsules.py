@@ -31,6 +31,7 @@ class Capsules:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "rt444"
     problems: ClassVar[int] = 1705
+    allowance: ClassVar[bool] = False  # as published
 
     capsules: int = parameter(100, "1", "number of capsules, at least 1")
     length: float = parameter(5.0, "m", "length of a capsule, caps included")

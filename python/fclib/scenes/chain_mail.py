@@ -31,6 +31,7 @@ class ChainMail:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
+    allowance: ClassVar[bool] = False  # as published
 
     across: int = parameter(6, "1", "flat rings of a row and of a column, the fast ones too, >= 3")
     spacing: float = parameter(0.05, "m", "from a flat ring to the next one")

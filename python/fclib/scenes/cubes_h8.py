@@ -35,6 +35,7 @@ class CubesH8:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "deformable"
     problems: ClassVar[int] = 40
+    allowance: ClassVar[bool] = False  # as published
 
     elements: int = parameter(5, "1", "elements along an edge of a cube, at least 1")
     size: float = parameter(1.0, "m", "edge of the lower cube")

@@ -26,6 +26,7 @@ class DiscFlow:
     friction: ClassVar[str] = "Coulomb in the plane, the same coefficient everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 500
+    allowance: ClassVar[bool] = False  # as published
 
     discs: int = parameter(150, "1", "number of discs, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a disc")

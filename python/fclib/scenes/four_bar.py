@@ -33,6 +33,7 @@ class FourBar:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "mixed"
     problems: ClassVar[int] = 500
+    allowance: ClassVar[bool] = False  # as published
 
     linkages: int = parameter(3, "1", "number of linkages, at least 1")
     blocks: int = parameter(3, "1", "blocks of the stack before a linkage, at least 1")

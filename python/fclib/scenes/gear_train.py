@@ -40,6 +40,7 @@ class GearTrain:
     friction: ClassVar[str] = "Coulomb, one coefficient for teeth and pins"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
+    allowance: ClassVar[bool] = False  # as published
 
     gears: int = parameter(5, "1", "number of gears, at least 2")
     teeth: int = parameter(18, "1", "teeth of the first gear, and of every second one, at least 12")

@@ -43,6 +43,7 @@ class Hand:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 600
+    allowance: ClassVar[bool] = False  # as published
 
     fingers: int = parameter(6, "1", "number of fingers and of the object's sides, at least 3")
     size: float = parameter(0.04, "m", "from the object's axis to its sides")

@@ -26,6 +26,7 @@ class NewtonsCradle:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "impacts"
     problems: ClassVar[int] = 60
+    allowance: ClassVar[bool] = False  # as published
 
     balls: int = parameter(7, "1", "number of balls, at least 2")
     struck: int = parameter(1, "1", "how many swing in, at least 1")

@@ -29,6 +29,7 @@ class RollingDiscs:
     friction: ClassVar[str] = "Coulomb and rolling in the plane, the same coefficients everywhere"
     collection: ClassVar[str] = "planar"
     problems: ClassVar[int] = 350
+    allowance: ClassVar[bool] = False  # as published
 
     discs: int = parameter(80, "1", "number of discs, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a disc")

@@ -30,6 +30,7 @@ class RollingSpheres:
     friction: ClassVar[str] = "Coulomb and rolling, the same coefficients everywhere"
     collection: ClassVar[str] = "rolling"
     problems: ClassVar[int] = 500
+    allowance: ClassVar[bool] = False  # as published
 
     spheres: int = parameter(100, "1", "number of spheres, at least 1")
     radius: float = parameter(0.05, "m", "largest radius of a sphere")

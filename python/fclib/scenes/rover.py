@@ -41,6 +41,7 @@ class Rover:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 1000
+    allowance: ClassVar[bool] = False  # as published
 
     stones: int = parameter(80, "1", "number of stones, 0 for even ground")
     across: int = parameter(8, "1", "stones side by side, at least 1")

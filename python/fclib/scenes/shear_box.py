@@ -41,6 +41,7 @@ class ShearBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "machines"
     problems: ClassVar[int] = 800
+    allowance: ClassVar[bool] = False  # as published
 
     across: int = parameter(24, "1", "discs side by side, at least 4")
     layers: int = parameter(10, "1", "layers of discs, at least 2")

@@ -31,6 +31,7 @@ class SpheresBox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 32
+    allowance: ClassVar[bool] = False  # as published
     # of a scene of this kind that is quickly simulated
     small: ClassVar[Mapping[str, Any]] = {"spheres": 36, "along_x": 4, "along_y": 3}
 

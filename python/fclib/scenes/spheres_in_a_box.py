@@ -29,6 +29,7 @@ class SpheresInABox:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "granular"
     problems: ClassVar[int] = 240
+    allowance: ClassVar[bool] = False  # as published
 
     spheres: int = parameter(150, "1", "number of spheres, at least 1")
     radius: float = parameter(1.0, "m", "largest radius of a sphere")

@@ -26,6 +26,7 @@ class SpinningBodies:
     friction: ClassVar[str] = "Coulomb, the same coefficient everywhere"
     collection: ClassVar[str] = "dynamics"
     problems: ClassVar[int] = 150
+    allowance: ClassVar[bool] = False  # as published
 
     bodies: int = parameter(48, "1", "number of bodies, at least 1")
     across: int = parameter(4, "1", "bodies of a layer along x and along y, at least 1")

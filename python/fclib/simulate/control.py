@@ -54,17 +54,34 @@ def read_rows(path: Path) -> np.ndarray:
 
 
 def policy_of(name: str) -> Control:
-    """The function MODULE:FUNCTION; a module may lie in the current folder. ValueError."""
-    module, _, function = name.partition(":")
-    if not function:
+    """The function MODULE:FUNCTION; a module may lie in the current folder. ValueError.
+
+    It may be given by its file, too, whose folder is looked in first then.
+    """
+    module, _, function = name.rpartition(":")
+    if not function or not module:
         raise ValueError(f"{name!r}: is no MODULE:FUNCTION, and no .csv or .npy file")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
+    folder = Path.cwd()
+    if module.endswith(".py"):
+        file = Path(module).resolve()
+        if not file.is_file():
+            raise ValueError(f"{name!r}: the module cannot be imported: there is no file {file}")
+        folder, module = file.parent, file.stem
+    if str(folder) not in sys.path:
+        sys.path.insert(0, str(folder))
     try:
-        found = importlib.import_module(module.removesuffix(".py"))
-    except ImportError as error:
-        raise ValueError(f"{name!r}: the module cannot be imported: {error}") from None
+        found = importlib.import_module(module)
+    except ModuleNotFoundError as error:
+        missing = error.name or module
+        if module == missing or module.startswith(f"{missing}."):
+            raise ValueError(
+                f"{name!r}: the module cannot be imported: no module {missing!r} is installed, nor"
+                f" is there a file {folder / missing.replace('.', '/')}.py"
+            ) from None
+        raise ValueError(
+            f"{name!r}: the module cannot be imported: it imports {missing!r}, which is not"
+            f" installed{place_of(error)}; install it for {sys.executable}"
+        ) from error
     except Exception as error:
         raise ValueError(f"{name!r}: the module cannot be imported: {raised(error)}") from error
     policy = getattr(found, function, None)
@@ -83,8 +100,16 @@ def policy_of(name: str) -> Control:
 
 def raised(error: Exception) -> str:
     """What code of others raised, and where, in a line."""
-    last = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {' '.join(str(error).split())}{place_of(error)}"
+
+
+def place_of(error: Exception) -> str:
+    """The last line of code of others that an error went through, in words; empty if none did."""
     # what cannot be called, or read, has no line of its own
-    theirs = last.filename not in (__file__, "<frozen importlib._bootstrap>")
-    place = f", {Path(last.filename).name}, line {last.lineno}" if theirs else ""
-    return f"{type(error).__name__}: {' '.join(str(error).split())}{place}"
+    ours = (__file__, importlib.__file__)
+    theirs = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename not in ours and not frame.filename.startswith("<frozen ")
+    ]
+    return f", {Path(theirs[-1].filename).name}, line {theirs[-1].lineno}" if theirs else ""

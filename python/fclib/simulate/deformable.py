@@ -44,6 +44,7 @@ from fclib.scenes.shared.solids import Block, Load, Solids
 from fclib.simulate import _skfem
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Contacts, Sparse, System, Vector
+from fclib.simulate.rounding import ELASTIC
 
 Indices = npt.NDArray[np.int64]
 
@@ -167,7 +168,18 @@ class DeformableModel:
         H, contacts = self.contacts(reach)
         n = len(v)
         nothing = sp.csc_array((n, 0))
-        return System(self.M, force, self.C, self.K, H, contacts, nothing, np.zeros(0), self.trees)
+        return System(
+            self.M,
+            force,
+            self.C,
+            self.K,
+            H,
+            contacts,
+            nothing,
+            np.zeros(0),
+            self.trees,
+            rounding=2.0**ELASTIC,
+        )
 
     def loads(self, time: float) -> Vector:
         """Forces of the loads (n) at a time [N]."""

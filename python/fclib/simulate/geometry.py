@@ -24,14 +24,15 @@ from fclib.simulate import moreau_jean
 from fclib.simulate._mujoco import mujoco
 from fclib.simulate.deformable import FACES, DeformableModel
 from fclib.simulate.mujoco_model import MujocoModel
+from fclib.simulate.rounding import ELASTIC, RIGID
 
 Integers = npt.NDArray[np.int32]
 Vector = npt.NDArray[np.float64]
 
 PARTS: Final = 3  # of an axis of a shape
 LIMITS: Final = 16  # more than MuJoCo has kinds of constraints
-ROUNDED: Final = 2.0**-30  # what is stored is a multiple of it [m], as states are
-ELASTIC: Final = 2.0**-40  # displacements likewise
+ROUNDED: Final = 2.0**RIGID  # what is stored is a multiple of it [m], as states are
+DISPLACED: Final = 2.0**ELASTIC  # displacements likewise
 KIND_OF: Final = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): KINDS.index("plane"),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): KINDS.index("sphere"),
@@ -91,12 +92,12 @@ def rigid(model: MujocoModel, contacts: moreau_jean.Contacts) -> tuple[Contacts,
     )
     limit = contacts.pair[:, 0] < 0
     geom = np.where(limit[:, None], 0, contacts.pair)
-    shape = np.where(limit[:, None], -1, static.shape_of[geom])
-    body = static.body_of[m.geom_bodyid[geom]]
+    shape, body = np.full(geom.shape, -1), np.zeros(geom.shape, np.int64)
+    shape[~limit] = static.shape_of[geom[~limit]]
+    body[~limit] = static.body_of[m.geom_bodyid[geom[~limit]]]
     # of a joint's limit or dry friction the joint's body and its parent; of a tendon's the world
     kind = -1 - contacts.pair[:, 0]
     number = contacts.pair[:, 1]
-    body[limit] = 0
     types = mujoco.mjtConstraint
     for which, bodies_of in (
         (types.mjCNSTR_LIMIT_JOINT, m.jnt_bodyid),
@@ -126,16 +127,14 @@ def features(
     model: MujocoModel, contacts: moreau_jean.Contacts, geom: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int64]:
     """Where on its two shapes (nc x 2) each contact lies, as a number (nc); different in a pair."""
-    m, d = model.model, model.data
     count = len(contacts)
+    if not model.model.ngeom:
+        # limits and dry friction alone
+        return np.zeros(count, np.int64)
     # both sides at once, the second shapes after the first ones
     which = geom.T.ravel()
-    arm = np.concatenate((contacts.point, contacts.point)) - d.geom_xpos[which]
-    if model.scene.period is not None:
-        edges = np.array(model.scene.period)
-        arm[:, :2] -= edges * np.rint(arm[:, :2] / edges)
-    local = np.einsum("cji,cj->ci", d.geom_xmat[which].reshape(-1, 3, 3), arm)
-    box = m.geom_aabb[which]
+    local = on_shapes(model, contacts, geom).swapaxes(0, 1).reshape(-1, 3)
+    box = model.model.geom_aabb[which]
     # a third of the half width and more is an end of its own
     place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
     third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
@@ -149,6 +148,33 @@ def features(
     number = np.zeros(count, np.int64)
     number[order] = repeated_in_order(key)
     return code + PARTS**6 * number
+
+
+def on_shapes(
+    model: MujocoModel, contacts: moreau_jean.Contacts, geom: npt.NDArray[np.int64]
+) -> Vector:
+    """The points of contacts in the frames of their two shapes (nc x 2 x 3) [m]."""
+    d = model.data
+    arm = contacts.point[:, None] - d.geom_xpos[geom]
+    if model.scene.period is not None:
+        edges = np.array(model.scene.period)
+        arm[..., :2] -= edges * np.rint(arm[..., :2] / edges)
+    local: Vector = np.einsum("csji,csj->csi", d.geom_xmat[geom].reshape(-1, 2, 3, 3), arm)
+    return local
+
+
+def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contacts) -> Vector:
+    """Where contacts lie on their two shapes (nc x 2 x 3) [m], right after they were assembled.
+
+    0 for limits, and for elastic bodies, whose nodes tell contacts apart.
+    """
+    places = np.zeros((len(contacts), 2, 3))
+    if isinstance(model, MujocoModel):
+        bodies = np.flatnonzero(contacts.pair[:, 0] >= 0)
+        if len(bodies):
+            own = contacts[bodies]
+            places[bodies] = on_shapes(model, own, own.pair)
+    return places
 
 
 def repeated_in_order(rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -299,7 +325,7 @@ def elastic(model: DeformableModel, contacts: moreau_jean.Contacts) -> tuple[Con
         shape_mesh=np.arange(-int(floor), count, dtype=np.int32),
         mesh_first=first.cumsum(axis=0).astype(np.int32),
         vertex=rounded(np.concatenate(vertices)),
-        displacement=rounded(np.concatenate(moved), ELASTIC),
+        displacement=rounded(np.concatenate(moved), DISPLACED),
         face=np.concatenate(faces).astype(np.int32),
     )
     slave = contacts.pair[:, 1]

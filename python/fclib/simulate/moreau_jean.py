@@ -20,12 +20,17 @@ theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the en
 
 Two unilateral laws:
 
-velocity (default)  a contact is active where g + h/2 u_N^- <= 0, with Newton's law of impact
+velocity (default)  a contact is active if g + h/2 u_N^- <= a, with Newton's law of impact
                     u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
-                    penetration (of order h u_N at an impact) is kept and not amplified. Of
-                    two geometries that touch in one point, the others with g + h/2 u_N^- <= a are
-                    active too: a is the activation [m], 0 by default. Without it a box at rest on
-                    three corners loses the fourth to the last digits of its gap.
+                    penetration (of order h u_N at an impact) is kept and not amplified.
+                    a [m] is the allowance of a contact (`allowances`): what its gap changes by if
+                    each coordinate is off by the rounding of stored states, and by a small share
+                    of its free motion in a step. With a = 0 a held body falls if the last digit of
+                    a gap is positive. Of two geometries that touch in one point so, the others are
+                    active too if g + h/2 u_N^- is at most the activation [m], 0 by default. Of
+                    points in a line, within the allowance, the ends are taken: where edges lie on
+                    each other, rounding says how many others there are and where. Of many points in
+                    a plane, as of a box on a terrain, the corners are.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
                     step. Where g_m < 0 only a share of it, the stabilization, is undone in a
@@ -87,6 +92,10 @@ from fclib.simulate.arrays import (
 __all__ = ["Sparse", "Vector"]
 
 LONGEST = 1e9  # [s] of a step: what is made of h^2 stays finite
+# benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has what it found
+ROUNDINGS = 4.0  # roundings of stored states, of each coordinate, that a closed gap may show
+FACE = 16  # points of a pair that may be corners of two faces; of more, the corners are found
+MOTION = 1e-3  # share of the free motion of a step, of each coordinate, that it may show
 
 
 @dataclass(frozen=True)
@@ -208,6 +217,8 @@ class System:
     violation: Vector  # (p) of the bilateral constraints
     tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
     dry: DryFriction | None = None
+    rounding: float = 0.0  # of each coordinate, where a state is stored [m], [rad]
+    shape_rounding: Vector | None = None  # of the surface of each geometry [m]; None: exact
 
 
 class ContactModel(Protocol):
@@ -246,6 +257,7 @@ class MoreauJean:
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
     activation: float = 0.0  # [m], of the velocity law: points of a pair that touches, within this
+    allowance: bool = True  # of the velocity law: whether gaps within `allowances` are closed
     all_bodies: bool = False  # whether problems have those that nothing touches too
 
     def __post_init__(self) -> None:
@@ -279,7 +291,11 @@ class MoreauJean:
         d = contacts.dimension
         if self.law == "velocity":
             before = transposed_times(H, v)[0::d]
-            active = closing(contacts.pair, contacts.gap + 0.5 * h * before, self.activation)
+            middle = contacts.gap + 0.5 * h * before
+            closed = allowances(system, h, v) if self.allowance else np.zeros(len(middle))
+            active = closing(contacts.pair, middle, closed, self.activation)
+            if self.allowance:
+                active = active[ends(contacts[active], closed[active])]
             if len(active) < len(contacts):
                 contacts, H = contacts[active], take(H, block_columns(active, d))
                 before = before[active]
@@ -414,12 +430,35 @@ def with_dry_friction(
     )
 
 
-def closing(pair: npt.NDArray[np.int64], middle: Vector, activation: float) -> npt.NDArray[np.intp]:
+def allowances(system: System, h: float, v: Vector) -> Vector:
+    """The gaps (nc) [m] that count as closed: what rounding and solvers may leave of gaps of 0.
+
+    Coordinate i is taken to be off by ROUNDINGS of a stored state, and by the share MOTION of its
+    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are a share of that, too. A
+    surface is off by ROUNDINGS of its own.
+    """
+    M, H = system.M, system.H
+    own = M.indices == columns_of(M)
+    free = np.abs(v) + h * np.abs(system.force) / M.data[own]
+    off = ROUNDINGS * system.rounding + MOTION * h * free
+    sizes = by_columns(np.abs(H.data), H.indices, H.indptr, H.shape)
+    found = transposed_times(sizes, off)[0 :: system.contacts.dimension]
+    if system.shape_rounding is not None:
+        pair = system.contacts.pair
+        shapes = np.flatnonzero(pair[:, 0] >= 0)
+        found[shapes] += ROUNDINGS * system.shape_rounding[pair[shapes]].sum(axis=1)
+    return found
+
+
+def closing(
+    pair: npt.NDArray[np.int64], middle: Vector, closed: Vector, activation: float
+) -> npt.NDArray[np.intp]:
     """Which contacts are active, by their gaps in the middle of the step (nc) [m].
 
-    Those that close, and of their pairs (nc x 2) those that are open by the activation at most.
+    Those that close, a gap of `closed` (nc) or less, and of their pairs (nc x 2) those that are
+    open by the activation at most.
     """
-    touches = middle <= 0
+    touches = middle <= closed
     if activation > 0:
         _, which = np.unique(pair, axis=0, return_inverse=True)
         which = which.reshape(-1)
@@ -427,6 +466,73 @@ def closing(pair: npt.NDArray[np.int64], middle: Vector, activation: float) -> n
         pairs[which[touches]] = True
         touches |= pairs[which] & (middle <= activation)
     return np.flatnonzero(touches)
+
+
+def keys(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """A number for each pair (nc x 2), the same for the same: faster to compare than rows."""
+    return (pair[:, 0] << 32) + pair[:, 1]
+
+
+def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
+    """Which contacts are not between others of their pair, within `off` (nc) [m].
+
+    What reactions there do, reactions at the others do as well. Between two of them, of any pair;
+    of a pair with many points also inside of those that have the same plane.
+    """
+    kept = contacts.pair[:, 0] < 0
+    _, group = np.unique(keys(contacts.pair), return_inverse=True)
+    counts = np.bincount(group)
+    kept |= counts[group] <= 2
+    order = np.argsort(group, kind="stable")
+    for count in np.unique(counts[counts > 2]).tolist():
+        own = order[counts[group[order]] == count].reshape(-1, count)
+        own = own[~kept[own[:, 0]]]
+        if count <= FACE:
+            kept[own] = not_between(contacts.point[own], off[own])
+            continue
+        for one in own:
+            for part in corners(contacts.point[one], contacts.frame[one, 0], off[one].max()):
+                which = one[part]
+                kept[which] = not_between(contacts.point[which[None]], off[which[None]])[0]
+    return np.flatnonzero(kept)
+
+
+def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:
+    """Which of k points (g x k x 3) are not on the way from one to another, within off (g x k)."""
+    count = x.shape[1]
+    there = np.ones(off.shape, dtype=bool)
+    first, second = np.triu_indices(count, 1)
+    along = x[:, second] - x[:, first]
+    squares = np.maximum((along * along).sum(axis=2), np.finfo(float).tiny)
+    for i in range(count):
+        arm = x[:, i, None] - x[:, first]
+        share = np.clip((arm * along).sum(axis=2) / squares, 0, 1)
+        far = np.linalg.norm(arm - share[:, :, None] * along, axis=2)
+        others = there[:, first] & there[:, second] & (first != i) & (second != i)
+        there[:, i] = ~(others & (far <= off[:, i, None])).any(axis=1)
+    return there
+
+
+def corners(x: Vector, normal: Vector, off: float) -> list[npt.NDArray[np.intp]]:
+    """Of points (k x 3) with one normal (k x 3) in one plane, within off [m], the convex hulls."""
+    from scipy.spatial import ConvexHull  # takes a while
+
+    size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)
+    turned = np.rint(normal * size / off)  # a turn by which no point moves further
+    height = np.rint((x * normal).sum(axis=1) / off)
+    _, group = np.unique(np.column_stack((turned, height)), axis=0, return_inverse=True)
+    found = []
+    for one in range(int(group.max(initial=-1)) + 1):
+        own = np.flatnonzero(group.reshape(-1) == one)
+        arm = x[own] - x[own].mean(axis=0)
+        _, _, axes = np.linalg.svd(arm, full_matrices=False)
+        flat = arm @ axes[:2].T
+        if len(own) > 2 and np.ptp(flat[:, 1]) > off:
+            own = own[ConvexHull(flat).vertices]
+        elif len(own) > 2:
+            own = own[[flat[:, 0].argmin(), flat[:, 0].argmax()]]
+        found.append(own)
+    return found
 
 
 def linked(

@@ -29,20 +29,19 @@ from fclib.simulate._mujoco import mujoco
 from fclib.simulate.arrays import (
     Sparse,
     Vector,
-    added,
-    diagonal,
     lengths_of,
     pointers,
-    summed,
     take,
     without_zeros,
 )
 from fclib.simulate.equalities import Equalities
-from fclib.simulate.moreau_jean import Contacts, DryFriction, System, components
+from fclib.simulate.faces import complete_faces
+from fclib.simulate.moreau_jean import ROUNDINGS, Contacts, DryFriction, System, components
 from fclib.simulate.mujoco_scene import (
     DYNAMICS,
     Gait,
     UnsupportedSceneError,
+    cannot_touch,
     compile_scene,
     has_condim,
     keyframe_of,
@@ -52,6 +51,9 @@ from fclib.simulate.mujoco_scene import (
     refuse_unknown,
 )
 from fclib.simulate.plane import in_plane
+from fclib.simulate.rounding import exponent_of
+from fclib.simulate.servos import Held, Servos
+from fclib.simulate.terrain import CrowdedPairError, complete
 
 REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
 LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
@@ -76,9 +78,11 @@ class MujocoModel:
         UnsupportedSceneError.
         """
         self.scene = scene
-        self.model: Any = compile_scene(scene)
+        self.model: Any
+        self.model, dropped = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
-        self.left_out = left_out(scene, self.model)
+        self.left_out = (*left_out(scene, self.model), *dropped)
+        self.untouchable = cannot_touch(self.model)  # in words
         if strict:
             refuse_unknown(scene, self.left_out)
         if scene.planar:
@@ -97,10 +101,16 @@ class MujocoModel:
         self._first = m.body_geomadr[self._owners].astype(np.intp)
         self._pattern = mass_pattern(m)
         self._ties = Equalities(m)
+        self._rounding = 2.0 ** exponent_of(self.smallest_size)
+        # vertices of meshes and heights of fields are floats of 32 bits
+        single = np.isin(m.geom_type, (mujoco.mjtGeom.mjGEOM_MESH, mujoco.mjtGeom.mjGEOM_HFIELD))
+        single_eps = float(np.finfo(np.float32).eps)
+        self._shape_rounding = single_eps * np.where(single, m.geom_rbound, 0.0)
+        self._flat = bool((m.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any())
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
-        # these change with no configuration where no actuator feeds back
-        feeds = (m.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE).any()
-        self._linear = None if feeds else linear_forces(m, self.data)
+        self._servos = Servos(m)
+        # these change with no configuration if no actuator feeds back
+        self._linear = None if self._servos.feed_back else self._servos.linear(self.data)
         # nor that of joints, alone
         self._dry: DryFriction | None = None
         self._rubbing_tendons = bool(m.tendon_frictionloss.any())
@@ -191,6 +201,10 @@ class MujocoModel:
         mujoco.mj_comVel(m, d)
         self._set_reach(h, shared_speed)
         mujoco.mj_collision(m, d)
+        if m.nhfield:
+            self._complete_terrain()
+        if self.scene.allowance and self._flat:
+            complete_faces(m, d)
         frictionless_to_frictional(d)
         mujoco.mj_makeConstraint(m, d)
         self._check_warnings()
@@ -213,14 +227,15 @@ class MujocoModel:
         if self._gait:
             # at the end of the step, where its springs are taken too
             d.ctrl[:] = self._gait.controls(d.time + h)
-        force = self._force()
-        C, K = self._linear or linear_forces(m, d)
+        M = self._pattern.fill(d.M)
+        force, held = self._force(h, M)
+        C, K = self._linear or self._servos.linear(d, held)
         if self._dry is None or self._rubbing_tendons:
             self._dry = dry_friction(m, d, rows)
         if self.scene.gyroscopic:
             C = sp.csc_array(C + gyroscopic(m, d))
         return System(
-            self._pattern.fill(d.M),
+            M,
             force,
             C,
             K,
@@ -230,6 +245,8 @@ class MujocoModel:
             violation,
             self.trees,
             self._dry,
+            self._rounding,
+            self._shape_rounding,
         )
 
     def equalities(self) -> tuple[list[str], Vector]:
@@ -310,8 +327,12 @@ class MujocoModel:
             speed[:] = speed.max(initial=0.0)
         if self._cell:
             speed = speed[self._cell.geometry]
+        reach = h * speed + h**2 * self._gravity
         # half of the activation for each of the two
-        reach = h * speed + h**2 * self._gravity + 0.5 * self.scene.activation
+        reach += 0.5 * self.scene.activation
+        if self.scene.allowance:
+            # gaps that rounding opens, by the lengths that it turns
+            reach += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + self._shape_rounding)
 
         margin = np.maximum(self._margin, reach)
         m.geom_margin[:] = margin
@@ -322,8 +343,11 @@ class MujocoModel:
             pair = np.column_stack((m.pair_geom1, m.pair_geom2))
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
 
-    def _force(self) -> Vector:
-        """F (n): passive, actuator and applied forces less the bias c(q, v)."""
+    def _force(self, h: float, M: Sparse) -> tuple[Vector, Held | None]:
+        """F (n): passive, actuator and applied forces less the bias c(q, v).
+
+        And the servos that reach a limit within h.
+        """
         m, d = self.model, self.data
         if m.nu:
             mujoco.mj_transmission(m, d)
@@ -334,13 +358,24 @@ class MujocoModel:
             mujoco.mj_passive(m, d)
             mujoco.mj_rne(m, d, 0, d.qfrc_bias)
         force: Vector = d.qfrc_passive + d.qfrc_applied - d.qfrc_bias
+        held = None
         if m.nu:
             mujoco.mj_fwdActuation(m, d)
+        if m.nu and not self._servos.limited:
             force += d.qfrc_actuator
         for body in np.flatnonzero(d.xfrc_applied.any(axis=1)):
             push = d.xfrc_applied[body]
             mujoco.mj_applyFT(m, d, push[:3], push[3:], d.xipos[body], body, force)
-        return force
+        if self._servos.limited:
+            own, held = self._servos.within_limits(d, h, M, force)
+            force += own
+        return force, held
+
+    def _complete_terrain(self) -> None:
+        try:
+            complete(self.model, self.data)
+        except CrowdedPairError as error:
+            raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
 
     def _check_warnings(self) -> None:
         warned = self.data.warning.number
@@ -363,53 +398,6 @@ def crossed(a: Vector, b: Vector) -> Vector:
     ahead = a.take(second, axis=1) * b.take(third, axis=1)
     product: Vector = ahead - a.take(third, axis=1) * b.take(second, axis=1)
     return product
-
-
-def linear_forces(m: Any, d: Any) -> tuple[Sparse, Sparse]:
-    """Damping and stiffness (n x n) of joints and of actuators that feed back their own state.
-
-    Both symmetric and positive semidefinite: what would push the body on stays explicit. What the
-    scene disables is not there.
-    """
-    disabled, bits = m.opt.disableflags, mujoco.mjtDisableBit
-    # springs of hinges and slides; those of balls and free bodies turn with the frame
-    plain = np.isin(m.jnt_type, (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE))
-    springs = np.zeros(m.nv)
-    springs[m.jnt_dofadr[plain]] = m.jnt_stiffness[plain]
-    # the actuator of each output
-    owner = np.repeat(np.arange(len(m.actuator_outnum)), m.actuator_outnum)
-    affine = m.actuator_biastype[owner] == mujoco.mjtBias.mjBIAS_AFFINE
-    group = m.actuator_group[owner]  # those from 0 to 30 can be disabled
-    off = (m.opt.disableactuator >> np.clip(group, 0, 30)) & 1
-    affine &= (off == 0) | (group < 0) | (group > 30)
-    if disabled & bits.mjDSBL_ACTUATION:
-        affine[:] = False
-    damping = m.dof_damping
-    if disabled & bits.mjDSBL_SPRING:
-        springs[:] = 0
-    if disabled & bits.mjDSBL_DAMPER:
-        damping = np.zeros(m.nv)
-
-    n = m.nv
-
-    def linear(own: Vector, gain: Vector) -> Sparse:
-        feedback = np.where(affine, np.maximum(-gain, 0), 0.0)
-        acting = np.flatnonzero(feedback)
-        if not acting.size:
-            return diagonal(own)
-        # sums of the outer products of the rows of moments, actuator by actuator
-        places, values = [], []
-        for k in acting:
-            row = slice(d.moment_rowadr[k], d.moment_rowadr[k] + d.moment_rownnz[k])
-            columns, moment = d.moment_colind[row].astype(np.int64), d.actuator_moment[row]
-            places.append((columns[:, None] * n + columns).ravel())
-            values.append((moment[:, None] * (moment * feedback[k])).ravel())
-        products = summed(np.concatenate(values), np.concatenate(places), (n, n))
-        return added(diagonal(own), 1.0, products)
-
-    # the bias of an actuator is p0 + p1 length + p2 velocity
-    bias = m.actuator_biasprm[owner]
-    return linear(damping, bias[:, 2]), linear(springs, bias[:, 1])
 
 
 def advance_actuators(m: Any, d: Any, h: float) -> None:

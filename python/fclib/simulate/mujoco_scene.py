@@ -8,6 +8,8 @@ A planar scene moves in a plane y = const: slides along x and z, hinges about y 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -37,34 +39,33 @@ IGNORABLE: Final = {
     "anisotropy": None,  # two coefficients: their geometric mean
     "activation": None,  # actuators with a state: it stays as it is at the start
 }
+# data of a model that must be finite, those of geometries, bodies, joints, degrees of freedom
+NUMBERS: Final = {
+    "geom": ("friction", "size", "pos", "quat", "margin", "gap"),
+    "body": ("mass", "inertia", "pos", "quat", "ipos", "iquat"),
+    "jnt": ("stiffness", "range", "pos", "axis"),
+    "dof": ("damping", "armature", "frictionloss"),
+}
 
 
 class UnsupportedSceneError(ValueError):
     """The scene holds something that these problems cannot represent yet."""
 
 
-def compile_scene(scene: Scene) -> Any:
-    """The MjModel of a scene, with the options that problems need. ValueError for bad MJCF."""
+def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
+    """The MjModel of a scene, with the options that problems need. ValueError for bad MJCF.
+
+    And what MuJoCo's compiler says that it drops or replaces.
+    """
     unknown = set(scene.ignore) - set(IGNORABLE)
     if unknown:
         raise ValueError(
             f"{scene.name}: cannot ignore {', '.join(sorted(unknown))};"
             f" only {', '.join(sorted(IGNORABLE))}"
         )
-    try:
-        if scene.path is not None:
-            spec = mujoco.MjSpec.from_file(str(scene.path))
-        else:
-            included = {name: text.encode() for name, text in scene.includes.items()}
-            spec = mujoco.MjSpec.from_string(scene.xml, include=included or None)
-        if scene.period is not None:
-            add_ghosts(spec)
-        if spec.memory < 0:
-            spec.memory = MEMORY
-        m = spec.compile()
-    except (ValueError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(f"{scene.name}: MuJoCo refuses the MJCF: {reason}") from error
+    with warnings_of() as said:
+        m = compiled(scene)
+    refuse_no_numbers(scene, m)
 
     m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
@@ -81,7 +82,143 @@ def compile_scene(scene: Scene) -> Any:
         flag = IGNORABLE[feature]
         if flag is not None:
             m.opt.disableflags |= int(flag)
-    return m
+    return m, tuple(dict.fromkeys(f"MuJoCo's compiler: {line}" for line in said))
+
+
+def compiled(scene: Scene) -> Any:
+    """The MjModel of a scene as its text says. ValueError for bad MJCF."""
+    try:
+        if scene.path is not None and scene.path.read_text(encoding="utf-8") == scene.xml:
+            spec = mujoco.MjSpec.from_file(str(scene.path))
+        else:
+            included = {name: text.encode() for name, text in scene.includes.items()}
+            spec = mujoco.MjSpec.from_string(scene.xml, include=included or None)
+            if scene.path is not None:
+                # meshes are beside the file, whose text has changed
+                spec.modelfiledir = str(scene.path.resolve().parent)
+        if scene.period is not None:
+            add_ghosts(spec)
+        if spec.memory < 0:
+            spec.memory = MEMORY
+        if scene.ground is not None:
+            add_ground(scene, spec)
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise ValueError(f"{scene.name}: MuJoCo refuses the MJCF: {reason}") from error
+
+
+@contextmanager
+def warnings_of() -> Iterator[list[str]]:
+    """MuJoCo's warnings meanwhile, a line each."""
+    said: list[str] = []
+    usual = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda text: said.append(" ".join(text.split())))
+    try:
+        yield said
+    finally:
+        mujoco.set_mju_user_warning(usual)
+
+
+def add_ground(scene: Scene, spec: Any) -> None:
+    """A plane below all that collides at the start, whose friction is that of its contacts."""
+    m = spec.copy().compile()
+    d = mujoco.MjData(m)
+    keyframe = keyframe_of(scene, m)
+    if keyframe:
+        mujoco.mj_resetDataKeyframe(m, d, m.key(keyframe).id)
+    mujoco.mj_kinematics(m, d)
+    collide = np.flatnonzero(m.geom_contype | m.geom_conaffinity).tolist()
+    lowest = [bottom(m, d, g) for g in collide]
+    spec.worldbody.add_geom(
+        name="ground" if all(m.geom(g).name != "ground" for g in range(m.ngeom)) else "",
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=[0, 0, min(lowest, default=0.0)],
+        size=[0, 0, 1],
+        friction=[scene.ground, 0, 0],
+        priority=1 + int(m.geom_priority.max(initial=0)),
+    )
+
+
+def bottom(m: Any, d: Any, geom: int) -> float:
+    """The lowest z of a geometry [m]; of what is round that of its box, of a plane its place."""
+    turn, place = d.geom_xmat[geom].reshape(3, 3), d.geom_xpos[geom]
+    size, kind = m.geom_size[geom], mujoco.mjtGeom(m.geom_type[geom])
+    up = turn[2]
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return float(place[2] - size[0])
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return float(place[2] - size[0] - abs(up[2]) * size[1])
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return float(place[2] - np.hypot(up[0], up[1]) * size[0] - abs(up[2]) * size[1])
+    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+        return float(place[2] - np.linalg.norm(up * size))
+    if kind == mujoco.mjtGeom.mjGEOM_PLANE:
+        return float(place[2])
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = m.geom_dataid[geom]
+        vertices = m.mesh_vert[m.mesh_vertadr[mesh] :][: m.mesh_vertnum[mesh]]
+        return float(place[2] + (vertices @ up).min())
+    middle, half = m.geom_aabb[geom].reshape(2, 3)
+    return float(place[2] + up @ middle - np.abs(up) @ half)
+
+
+def refuse_no_numbers(scene: Scene, m: Any) -> None:
+    """ValueError that names data of a model that are not finite, if any: MuJoCo takes others."""
+    for kind, count in (("geom", m.ngeom), ("body", m.nbody), ("jnt", m.njnt), ("dof", m.nv)):
+        for name in NUMBERS[kind]:
+            values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
+            values = values.reshape(count, values.size // max(count, 1))
+            bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+            if bad.size:
+                refuse(scene, m, kind, int(bad[0]), name, values[bad[0]])
+    for i in np.flatnonzero(~np.isfinite(m.pair_friction).all(axis=1)):
+        raise ValueError(f"{scene.name}: pair {i}: its friction is not finite")
+
+
+def refuse(scene: Scene, m: Any, kind: str, i: int, name: str, values: Vector) -> None:
+    """ValueError for a value that is not finite."""
+    word = {"geom": "geom", "body": "body"}.get(kind, "joint")
+    number = int(m.dof_jntid[i]) if kind == "dof" else i
+    own = getattr(m, word)(number).name
+    raise ValueError(
+        f"{scene.name}: {word} {own or number}: its {name} is not finite"
+        f" ({' '.join(f'{value:g}' for value in values)})"
+    )
+
+
+def cannot_touch(m: Any) -> str:
+    """That nothing of a model can touch, in words; empty if something can."""
+    if m.npair:
+        return ""
+    kinds = np.column_stack(
+        (
+            m.body_weldid[m.geom_bodyid],
+            m.body_weldid[m.body_parentid[m.body_weldid[m.geom_bodyid]]],
+            m.geom_contype,
+            m.geom_conaffinity,
+        )
+    )
+    weld, parent, kind, affinity = np.unique(kinds, axis=0).T
+    filters = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
+    for i in range(len(weld)):
+        other = (kind[i] & affinity) | (kind & affinity[i])
+        meets = (other != 0) & (weld != weld[i])
+        if filters:
+            meets &= ~((weld == parent[i]) & (weld != 0)) & ~((parent == weld[i]) & (weld[i] != 0))
+        if meets.any():
+            return ""
+    rest = [
+        word
+        for word, there in (
+            ("limits", m.jnt_limited.any() or m.tendon_limited.any()),
+            ("dry friction", m.dof_frictionloss.any() or m.tendon_frictionloss.any()),
+        )
+        if there
+    ]
+    if rest:
+        return f"no two shapes can touch: all contacts are of {' and '.join(rest)}"
+    return "nothing can touch: no two shapes that collide, no limits, no dry friction"
 
 
 def periodic_cell(scene: Scene, m: Any) -> PeriodicCell:

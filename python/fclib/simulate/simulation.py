@@ -2,25 +2,55 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Final, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from fclib import _core, _geometry, _solve
 from fclib.scenes import Scene
 from fclib.simulate import _mujoco, _skfem
 from fclib.simulate.deformable import DeformableModel
 from fclib.simulate.equalities import RANK, dependence, gaps_of
-from fclib.simulate.moreau_jean import Contacts, MoreauJean, StepProblem, System, Vector
+from fclib.simulate.geometry import places_of
+from fclib.simulate.moreau_jean import (
+    MOTION,
+    ROUNDINGS,
+    Contacts,
+    MoreauJean,
+    StepProblem,
+    System,
+    Vector,
+    keys,
+)
 from fclib.simulate.mujoco_model import MujocoModel
 
 Model: TypeAlias = MujocoModel | DeformableModel
+# gaps that count as closed
+ALLOWANCE: Final = f"{ROUNDINGS:g} roundings of a state and {MOTION:g} of the free motion"
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
 STABILIZATION: Final = 0.2  # share of a violation undone in a step
+# error of an unsolved step, relative, that ends a simulation: reactions of 0 leave as much
+NONSENSE: Final = 1.0
+# of states, in roundings of stored ones: doubles hold integers up to here
+LARGEST: Final = 2.0**53
+
+# speed at contacts, of the largest one without reactions, below which bodies are at rest
+STILL: Final = 1e-6
+# of the reactions that are nearest to the last ones: the accuracy asked for, and steps towards it
+EXACT: Final = 1e-14
+MOST: Final = 1000
+
+Unsolved: TypeAlias = Literal["best", "stop"]
+
+
+class StoppedError(FloatingPointError):
+    """A simulation that cannot go on: a step was not solved, or a state makes no sense."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +63,7 @@ class State:
     pair: npt.NDArray[np.int64]  # (nc x 2) of the last step's contacts
     frame: Vector  # (nc x 3 x 3)
     r: Vector  # (nc x d) their impulses [N s]
+    place: Vector = field(default_factory=lambda: np.zeros((0, 2, 3)))  # on their two shapes [m]
 
 
 Control: TypeAlias = Callable[[float, State], npt.ArrayLike]
@@ -65,6 +96,7 @@ def simulate(
     start: State | None = None,
     control: Control | None = None,
     strict: bool = False,
+    unsolved: Unsolved = "best",
     **options: Any,
 ) -> Iterator[Step]:
     """Yield the steps of a scene, as they are computed.
@@ -73,7 +105,7 @@ def simulate(
     start          where to begin, as the `start` of a step that was: what follows is the same, bit
                    for bit; by default the scene's own start
     solver, tol    of `fclib.solve`, with its further options
-    warm_start     begin from the impulses that the same pairs of bodies had in the step before
+    warm_start     begin from the impulses that contacts of the same shapes and place had before
     stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
 
     control        called at the start of each step with the time [s] and the state there; returns
@@ -81,18 +113,23 @@ def simulate(
     strict         refuse a scene that asks for what no problem holds; by default that is left out,
                    `step.model.left_out` names it, and so does each problem's description
 
-    The tolerance bounds the natural map alone (merit="natural" of `fclib.solve`) unless the options
-    say otherwise: the published sets were made so, and each step depends on those before it.
+    unsolved       what follows a step whose solver misses the tolerance: "best" goes on with the
+                   best solution that was found, which `step.result` tells and later problems
+                   depend on; "stop" ends the simulation there
 
-    A step whose solver misses the tolerance goes on with what it reached, and says so in
-    `step.result`: later problems then depend on it.
+    The tolerance bounds both errors of the merit, as that of `fclib.solve` does; with
+    merit="natural" among the options that of the natural map alone.
 
     Raises at once ValueError (bad MJCF, bad parameters), UnsupportedSceneError, and ImportError
-    where a deformable scene lacks scikit-fem in the pinned version; while stepping,
-    FloatingPointError where a velocity is no longer finite, and what `fclib.solve` raises.
+    if a deformable scene lacks scikit-fem in the pinned version; while stepping, what `fclib.solve`
+    raises, and StoppedError, a FloatingPointError, if the simulation cannot go on: a step is not
+    solved that must be, the error of one is as large as that of no reactions (NONSENSE), or a state
+    is not finite or too large to be stored.
     """
     if steps < 0:
         raise ValueError(f"the number of steps must be >= 0, not {steps}")
+    if unsolved not in get_args(Unsolved):
+        raise ValueError(f'unsolved is "best" or "stop", not {unsolved!r}')
     model = model_of(scene, strict=strict)
     scheme = scheme_of(model, stabilization)
     if control is not None:
@@ -104,7 +141,7 @@ def simulate(
     settings = {"solver": solver, "tol": tol, "warm_start": warm_start, "options": options}
     if start is not None:
         model.set_state(start.position, start.velocity)
-    return _march(model, scheme, steps, settings, start, control)
+    return _march(model, scheme, steps, settings, start, control, stop=unsolved == "stop")
 
 
 def model_of(scene: Scene, *, strict: bool = False) -> Model:
@@ -124,6 +161,7 @@ def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
         stabilization=stabilization,
         theta=scene.theta,
         activation=scene.activation,
+        allowance=scene.allowance,
         all_bodies=scene.all_bodies,
     )
 
@@ -150,6 +188,8 @@ def _march(
     settings: dict[str, Any],
     start: State | None,
     control: Control | None,
+    *,
+    stop: bool,
 ) -> Iterator[Step]:
     state = start or State(
         0,
@@ -169,13 +209,20 @@ def _march(
         part = scheme.problem(system, model.velocity, info_of(index))
         problem, contacts = part.problem, part.contacts
 
-        options: dict[str, Any] = {"merit": "natural"} | settings["options"]
+        options: dict[str, Any] = dict(settings["options"])
+        places = places_of(model, contacts)
         if settings["warm_start"] and problem.nc and len(state.r):
-            options["guess"] = _core.Solution(r=carry_over(state, contacts))
+            options["guess"] = _core.Solution(r=carry_over(state, contacts, places))
         try:
-            result = _solve.solve(
-                problem, solver=settings["solver"], tol=settings["tol"], **options
+            solve = functools.partial(
+                _solve.solve, problem, settings["solver"], tol=settings["tol"]
             )
+            result = solve(**options)
+            if "guess" in options and result.converged and result.iterations:
+                near = nearest(problem, result.solution, options["guess"].r)
+                if near is not None:
+                    again = solve(**options | {"guess": _core.Solution(r=near)})
+                    result = again if again.converged else result
             after = part.after(result.solution.v)
         except _core.UnsuitableError as error:
             word = contradiction(model, system)
@@ -183,11 +230,9 @@ def _march(
                 raise
             raise _core.UnsuitableError(f"{model.scene.name}, step {index}: {word}") from error
 
-        if not np.isfinite(after).all():
-            raise FloatingPointError(
-                f"{model.scene.name}, step {index}: {settings['solver']} returned a velocity that"
-                f" is not finite ({result.status})"
-            )
+        word = trouble(result, after, LARGEST * system.rounding, stop=stop)
+        if word:
+            raise StoppedError(f"{model.scene.name}, step {index}: {word}")
         yield Step(
             index,
             index * scheme.h,
@@ -202,7 +247,65 @@ def _march(
         )
         model.integrate(scheme.h, after, scheme.theta)
         r = np.reshape(result.solution.r, (-1, contacts.dimension))
-        state = State(index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r)
+        state = State(
+            index + 1, model.position, model.velocity, contacts.pair, contacts.frame, r, places
+        )
+        if not in_range(state.position, LARGEST * system.rounding):
+            raise StoppedError(
+                f"{model.scene.name}, step {index}: leads to a position that is out of range"
+                f" ({largest(state.position):.3g})"
+            )
+
+
+def nearest(
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem, solution: _core.Solution, r: Vector
+) -> Vector | None:
+    """Of the reactions of bodies at rest those nearest to r (m), but for the cones; None: moving.
+
+    Reactions of contacts that stick may change by what moves nothing, H dr = 0. A solver returns
+    any of them, so that the reactions of a body at rest would change from step to step.
+    """
+    d = problem.spacedim
+    u = np.abs(np.asarray(_core.contact_merits(problem, solution)["u"])).reshape(-1, d)
+    # velocities without reactions, but for coupled degrees of freedom
+    free = np.abs(problem.f) / np.abs(sp.csc_array(problem.M).diagonal())
+    closed = solution.r[::d] > 0
+    if not closed.any() or u[closed].max() > STILL * free.max():
+        return None
+    sticks = np.repeat(closed, d)
+    H = sp.csc_array(problem.H)[:, sticks]
+    if H.shape[1] <= np.count_nonzero(np.diff(sp.csr_array(H).indptr)):
+        return None  # they are as few as the directions that they push
+    change = r[sticks] - solution.r[sticks]
+    # the part of the change that moves something
+    moving = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
+    found: Vector = np.array(solution.r)
+    found[sticks] += change - moving
+    return found
+
+
+def in_range(values: Vector, bound: float) -> bool:
+    """Whether all are finite and below a bound, as those of a state that can be stored are."""
+    return bool((np.abs(values) < bound).all())
+
+
+def largest(values: Vector) -> float:
+    """The largest size of a value; NaN if one is."""
+    return float(np.abs(values).max(initial=0.0))
+
+
+def trouble(result: _core.Result, velocity: Vector, bound: float, *, stop: bool) -> str:
+    """Why a simulation cannot go on after a step, in words; empty if it can."""
+    found = f"{result.solver}: {result.status}, error {result.error:.2g}"
+    if not in_range(velocity, bound):
+        return f"its velocity is out of range ({largest(velocity):.3g}; {found})"
+    if result.converged:
+        return ""
+    if stop:
+        return f"it was not solved ({found})"
+    if not result.error < NONSENSE:
+        return f"it was not solved, and what was found is no better than no reactions ({found})"
+    return ""
 
 
 def contradiction(model: Model, system: System) -> str:
@@ -226,25 +329,49 @@ def contradiction(model: Model, system: System) -> str:
     )
 
 
-def carry_over(state: State, contacts: Contacts) -> Vector:
-    """A guess of r (d nc): the last step's impulses, pair by pair in the order of their points.
+def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:
+    """A guess of r (d nc): the last step's impulses of the same shapes at the same place.
 
     They are carried over in the world and turned into the new frames, forces and moments alike.
+
+    places   (nc x 2 x 3) of the contacts on their shapes, as `places_of` gives them
     """
     limits = contacts.pair[:, 0] < 0
-    if np.array_equal(state.pair, contacts.pair):
-        own = _geometry.rotated(state.r, state.frame, contacts.frame, contacts.parts, limits)
-        return own.ravel()
-    known: dict[tuple[int, int], list[int]] = {}
-    for i, (first, second) in enumerate(state.pair.tolist()):
-        known.setdefault((first, second), []).append(i)
-
-    source = np.full(len(contacts), -1)
-    for i, (first, second) in enumerate(contacts.pair.tolist()):
-        candidates = known.get((first, second))
-        if candidates:
-            source[i] = candidates.pop(0)
+    source = same_contacts(state.pair, state.place, contacts.pair, places)
     return _geometry.turned(state.r, source, state.frame, contacts.frame, contacts.parts, limits)
+
+
+def same_contacts(
+    before: npt.NDArray[np.int64],
+    old_places: Vector,
+    now: npt.NDArray[np.int64],
+    places: Vector,
+) -> npt.NDArray[np.intp]:
+    """Which contact of the step before each one is (nc), -1 for none.
+
+    Of a pair of shapes that have several, those that are nearest to each other go first. An edge or
+    a corner stays where it is on one of the shapes: the smaller of two distances counts.
+    """
+    source = np.full(len(now), -1)
+    pairs, group = np.unique(keys(np.concatenate((before, now))), return_inverse=True)
+    old, new = np.split(group, [len(before)])
+    counts = [np.bincount(own, minlength=len(pairs)) for own in (old, new)]
+    order = np.argsort(old, kind="stable")
+    first = np.cumsum(counts[0]) - counts[0]
+    # every old contact of its pair beside each new one
+    repeats = counts[0][new]
+    later = np.arange(len(now)).repeat(repeats)
+    number = np.arange(len(later)) - (np.cumsum(repeats) - repeats).repeat(repeats)
+    earlier = order[first[new[later]] + number]
+    alone = (counts[0] == 1)[new[later]] & (counts[1] == 1)[new[later]]
+    source[later[alone]] = earlier[alone]
+    later, earlier = later[~alone], earlier[~alone]
+    far = np.linalg.norm(places[later] - old_places[earlier], axis=2).min(axis=1)
+    taken = np.zeros(len(before), dtype=bool)
+    for k in np.argsort(far, kind="stable").tolist():
+        if source[later[k]] < 0 and not taken[earlier[k]]:
+            source[later[k]], taken[earlier[k]] = earlier[k], True
+    return source
 
 
 def descriptions(
@@ -271,9 +398,11 @@ def descriptions(
         "restitution": scheme.restitution,
         "law": scheme.law,
         **({"activation": scheme.activation} if scheme.activation else {}),
+        **({"allowance": ALLOWANCE} if scheme.allowance and scheme.law == "velocity" else {}),
         "theta": scheme.theta,
         **({"gyroscopic": True} if scene.gyroscopic else {}),
         **({"all_bodies": True} if scene.all_bodies else {}),
+        **({} if scene.ground is None else {"ground": scene.ground}),
         "stabilization": scheme.stabilization,
         **settings,
     }

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
+from xml.etree import ElementTree
+from xml.sax.saxutils import escape, quoteattr
 
 from fclib import _core
 from fclib.scenes.shared.solids import Solids
@@ -37,6 +39,7 @@ class Scene:
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
     activation: float = 0.0  # [m], of the velocity law, see `fclib.simulate.MoreauJean`
+    allowance: bool = True  # of the velocity law, see there: gaps that rounding explains are closed
     begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
     gyroscopic: bool = False  # their derivative is part of M, which is then not symmetric
@@ -53,6 +56,7 @@ class Scene:
     # where it is seen from: azimuth and elevation [deg]; None: as all others
     view: tuple[float, float] | None = None
     keyframe: str | None = None  # of the MJCF, where it starts; None: start, home or stand
+    ground: float | None = None  # mu of a plane below all at the start; None: there is none
     planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
@@ -69,6 +73,7 @@ class Scene:
             time_step=family.time_step,
             restitution=family.restitution,
             activation=getattr(family, "activation", 0.0),
+            allowance=getattr(family, "allowance", True),
             begin=getattr(family, "begin", 0.0),
             gyroscopic=getattr(family, "gyroscopic", False),
             all_bodies=getattr(family, "all_bodies", False),
@@ -94,6 +99,9 @@ class Scene:
         keyframe: str | None = None,
         packages: Mapping[str, str | Path] | None = None,
         ignore: tuple[str, ...] = (),
+        activation: float = 0.0,
+        floating: bool = False,
+        ground: float | None = None,
     ) -> Scene:
         """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
 
@@ -108,10 +116,13 @@ class Scene:
             keyframe: where it starts, by name; None: start, home or stand where there is one.
             packages: folders of the names in package://NAME/... of a URDF file.
             ignore: features that are left out.
+            activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
+            floating: of a URDF file, whose root is welded to the world otherwise.
+            ground: coefficient of friction of a plane below all at the start; None: no plane.
 
         Raises:
             OSError: it cannot be read.
-            ValueError: a package is not known.
+            ValueError: a package is not known, or nothing can float.
             ImportError: it refers to files, and MuJoCo is missing.
         """
         path = Path(path)
@@ -121,16 +132,24 @@ class Scene:
         files, includes = references_of(path, resolved)
         return cls(
             name=path.stem,
-            xml=resolved,
+            xml=floated(path.name, resolved) if floating else resolved,
             time_step=time_step,
             restitution=restitution,
             law=law,
             planar=planar,
             keyframe=keyframe,
-            parameters={"file": path.name, "sha256": digest, **({"files": files} if files else {})},
+            parameters={
+                "file": path.name,
+                "sha256": digest,
+                **({"files": files} if files else {}),
+                **({"floating": True} if floating else {}),
+                **({} if ground is None else {"ground": ground}),
+            },
             title=path.stem,
             description=f"Problems of the scene {path.name}.",
             ignore=tuple(ignore),
+            activation=activation,
+            ground=ground,
             # the text tells all where packages were resolved
             path=path if resolved == xml else None,
             includes=includes,
@@ -189,6 +208,33 @@ def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) ->
             r"(<robot\b[^>]*>)", r'\1<mujoco><compiler strippath="false"/></mujoco>', xml, count=1
         )
     return xml
+
+
+def floated(name: str, xml: str) -> str:
+    """A URDF text whose root moves freely. ValueError if it is none, or its root is the world."""
+    try:
+        robot = ElementTree.fromstring(xml.encode())
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{name}: is no XML: {error}") from None
+    if robot.tag != "robot":
+        raise ValueError(
+            f"{name}: floating is for URDF files; in an MJCF file write <freejoint/> into the body"
+        )
+    children = {child.get("link") for child in robot.iterfind("joint/child")}
+    roots = [link.get("name") for link in robot.iterfind("link")]
+    roots = [root for root in roots if root not in children]
+    if len(roots) != 1 or roots[0] is None:
+        raise ValueError(f"{name}: has {len(roots)} links that are no child of a joint, not one")
+    if roots[0] == "world":
+        raise ValueError(
+            f'{name}: its root is the link "world", to which a joint ties the rest: make that'
+            ' joint type="floating" in the file'
+        )
+    joint = (
+        f'<link name="world"/><joint name="world to {escape(roots[0])}" type="floating">'
+        f'<parent link="world"/><child link={quoteattr(roots[0])}/></joint>'
+    )
+    return re.sub(r"(<robot\b[^>]*>)", lambda found: found[0] + joint, xml, count=1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,6 +334,7 @@ class Family(Described, Protocol):
 
     Where it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
+    A published family sets `allowance` to False, since its states were simulated without.
 
     Where the default scene takes long, `small` holds parameters of a quick one of the kind.
     """

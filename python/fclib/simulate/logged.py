@@ -1,0 +1,96 @@
+"""States from outside, of a real robot or of another simulator: a file's rows."""
+
+from __future__ import annotations
+
+import csv
+import re
+import zipfile
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from fclib.simulate.arrays import Vector
+from fclib.simulate.mujoco_model import MujocoModel
+
+NEEDED: Final = ("qpos", "qvel")
+OPTIONAL: Final = ("act", "ctrl")
+
+
+def logged(path: Path, model: MujocoModel) -> tuple[Vector, Vector]:
+    """The states of a file, as a model's `position` (K x nq) and `velocity` (K x n) are.
+
+    An .npz file has arrays qpos (K x nq), qvel (K x nv) and, if the forces depend on them, ctrl
+    (K x nu) and act (K x na), as MuJoCo's MjData has them. A .csv file has them in columns that are
+    called qpos0, qpos1, ..., qvel0, ... in its first line; others are not read.
+
+    Raises:
+        OSError: it cannot be read.
+        ValueError: what it has does not fit the model, or is not finite.
+    """
+    known = of_columns(path) if path.suffix == ".csv" else of_arrays(path)
+    m = model.model
+    if model.has_gait:
+        raise ValueError(
+            f"{path}: {model.scene.name} takes no states, its gait depends on the time"
+        )
+    sizes = {"qpos": m.nq, "qvel": m.nv, "act": m.na, "ctrl": m.nu}
+    missing = [name for name in NEEDED if name not in known]
+    if missing:
+        raise ValueError(f"{path}: has no {missing[0]} (it has {', '.join(known) or 'nothing'})")
+    rows = len(known["qpos"])
+    if not rows:
+        raise ValueError(f"{path}: has no state")
+    for name, values in known.items():
+        if values.shape != (rows, sizes[name]):
+            raise ValueError(
+                f"{path}: {name} has the shape {values.shape}, and {model.scene.name} needs"
+                f" ({rows}, {sizes[name]})"
+            )
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if bad.size:
+            raise ValueError(f"{path}: {name}, row {bad[0]}: is not finite")
+    act = known.get("act", np.tile(model.data.act, (rows, 1)))
+    parts = [known["qpos"], act]
+    if m.nu:
+        # those of the start, if the file has none
+        parts.append(known.get("ctrl", np.tile(model.data.ctrl, (rows, 1))))
+    return np.hstack(parts), known["qvel"]
+
+
+def of_arrays(path: Path) -> dict[str, Vector]:
+    """The arrays of an .npz file. OSError, ValueError."""
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            return {
+                name: np.atleast_2d(np.asarray(arrays[name], dtype=float))
+                for name in (*NEEDED, *OPTIONAL)
+                if name in arrays
+            }
+    except (ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise ValueError(f"{path}: is no .npz file of states: {error}") from None
+
+
+def of_columns(path: Path) -> dict[str, Vector]:
+    """The columns of a .csv file. OSError, ValueError."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    names = [name.strip() for name in rows[0]] if rows else []
+    found: dict[str, list[tuple[int, int]]] = {}
+    for column, name in enumerate(names):
+        match = re.fullmatch(rf"({'|'.join((*NEEDED, *OPTIONAL))})[_\[]?(\d+)\]?", name)
+        if match:
+            found.setdefault(match[1], []).append((int(match[2]), column))
+    known: dict[str, Any] = {}
+    for name, places in found.items():
+        places.sort()
+        numbers = [number for number, _ in places]
+        if numbers != list(range(len(numbers))):
+            raise ValueError(f"{path}: its columns of {name} are {numbers}, not 0, 1, ...")
+        known[name] = np.zeros((len(rows) - 1, len(places)))
+        for i, row in enumerate(rows[1:]):
+            try:
+                known[name][i] = [float(row[column]) for _, column in places]
+            except (ValueError, IndexError):
+                raise ValueError(f"{path}: line {i + 2}: {name} is not a row of numbers") from None
+    return known

@@ -12,8 +12,6 @@ std::vector<std::string> kinds_of(const Group& root) {
   return kinds;
 }
 
-namespace {
-
 Index count_of(const Group& root, const Numbered& list) {
   if (!root.has(list.group)) return 0;
   const Handle handle = open_group(root, list.group);
@@ -23,14 +21,24 @@ Index count_of(const Group& root, const Numbered& list) {
   return count;
 }
 
+namespace {
+
+Index count_if_known(const Group& root, const Numbered& list) {
+  try {
+    return count_of(root, list);
+  } catch (const Error&) {
+    return 0;
+  }
+}
+
 }  // namespace
 
 Contents contents_of(const Group& root) {
   Contents contents;
   contents.kinds = kinds_of(root);
-  contents.solution = root.has("solution");
-  contents.guesses = count_of(root, guesses_list);
-  contents.solutions = count_of(root, solutions_list);
+  contents.solution = root.lists("solution");
+  contents.guesses = count_if_known(root, guesses_list);
+  contents.solutions = count_if_known(root, solutions_list);
   return contents;
 }
 
@@ -52,7 +60,7 @@ P read_sizes(const Group& root) {
       group, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
         const std::string name(field.name);
         if constexpr (std::is_same_v<Member, Vector>) {
-          if (field.member == &P::mu) contacts = open_numbers(place, name, false).size;
+          if (field.member == &P::mu) contacts = open_numbers(place, name).size;
         } else if constexpr (std::is_same_v<Member, Matrix>) {
           const Handle matrix = open_group(place, name);
           problem.*field.member = read_matrix_sizes<Matrix>({matrix.id(), place.child(name)});

@@ -153,12 +153,12 @@ Numbers open_numbers(const Group& group, const std::string& name) {
   const auto entry_size = static_cast<double>(H5Tget_size(type.id()));
   const double bytes = static_cast<double>(size) * entry_size;
   const Handle properties = properties_of(dataset.id(), path);
-  require_chunks(properties, dataset.id(), static_cast<double>(size), entry_size, path);
-  require_written(dataset, properties, space, size, path);
   if (bytes > static_cast<double>(small_dataset) &&
       bytes > best_compression * stored_bytes(dataset.id())) {
     fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
   }
+  require_chunks(properties, dataset.id(), static_cast<double>(size), entry_size, path);
+  require_written(dataset, properties, space, size, path);
   if (size > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
     fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
   }
@@ -227,8 +227,8 @@ std::string read_text(const Group& group, const std::string& name) {
   const Handle properties = properties_of(dataset.id(), path);
   const double entries = as_bytes ? static_cast<double>(points) : 1;
   require_chunks(properties, dataset.id(), entries, static_cast<double>(length) / entries, path);
-  require_written(dataset, properties, space, points, path);
   if (H5Tis_variable_str(type.id()) > 0) {
+    require_written(dataset, properties, space, points, path);
     char* value = nullptr;
     if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
       fail(path, "cannot be read");
@@ -241,6 +241,7 @@ std::string read_text(const Group& group, const std::string& name) {
     fail(path,
          "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
   }
+  require_written(dataset, properties, space, points, path);
   std::string text(length, '\0');
   if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) < 0) {
     fail(path, "cannot be read");

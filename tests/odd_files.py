@@ -168,33 +168,39 @@ def attribute(name: str, value: Any) -> Change:
     return change
 
 
+def rewrite(group: h5py.Group, make: Callable[[Any], Any]) -> None:
+    """The matrix of a group as another one: csc_array or coo_array."""
+    shape = int(group["m"][0]), int(group["n"][0])
+    nz = int(group["nz"][0])
+    p, i, x = (group[name][()] for name in ("p", "i", "x"))
+    if nz < 0:
+        a = make((sp.csc_array if nz == -1 else sp.csr_array)((x, i, p), shape=shape))
+    else:
+        a = make(sp.coo_array((x, (i, p)), shape=shape))
+    p, i = (a.col, a.row) if a.format == "coo" else (a.indptr, a.indices)
+    counts = {"nz": [-1 if a.format == "csc" else a.nnz], "nzmax": [a.nnz]}
+    for name, values in {"p": p, "i": i, **counts}.items():
+        put(group.file, f"{group.name}/{name}", np.array(values, "<i4"))
+    put(group.file, f"{group.name}/x", a.data)
+
+
 def half_a_triangle(file: h5py.File, root: str) -> None:
     """The lower triangle of a symmetric matrix alone, and the attribute that says so."""
     group = file[main_matrix(root)]
-    m, nz = int(group["m"][0]), int(group["nz"][0])
-    p, i, x = (group[name][()] for name in ("p", "i", "x"))
-    if nz < 0:
-        make = sp.csc_array if nz == -1 else sp.csr_array
-        lower = np.tril(make((x, i, p), shape=(m, m)).toarray())
-    else:
-        lower = np.tril(sp.coo_array((x, (i, p)), shape=(m, m)).toarray())
-    rows, cols = np.nonzero(lower)
-    order = np.lexsort((rows, cols))
-    rows, cols = rows[order], cols[order]
-    starts = np.searchsorted(cols, np.arange(lower.shape[1] + 1))
-    for name, values in (("p", starts), ("i", rows), ("x", lower[rows, cols])):
-        put(file, f"{group.name}/{name}", values.astype("<f8" if name == "x" else "<i4"))
-    put(file, f"{group.name}/nz", np.array([-1], "<i4"))
-    put(file, f"{group.name}/nzmax", np.array([rows.size], "<i4"))
+    rewrite(group, lambda a: sp.csc_array(sp.tril(a)))
     group.attrs["symmetric_packed"] = 1
 
 
 def zero_pointers(file: h5py.File, root: str) -> None:
     group = file[main_matrix(root)]
-    if group["nz"][0] >= 0:
-        group["nz"][0] = 0
-    else:
-        group["p"][:] = 0
+    rewrite(group, sp.csc_array)
+    group["p"][:] = 0
+
+
+def no_triplets(file: h5py.File, root: str) -> None:
+    group = file[main_matrix(root)]
+    rewrite(group, sp.coo_array)
+    group["nz"][0] = 0
 
 
 def never_written(name: str, **layout: Any) -> Change:
@@ -316,6 +322,7 @@ CHANGES: dict[str, Change] = {
     "a vector never written": never_written("vector"),
     "values half written": half_written,
     "pointers all zero": zero_pointers,
+    "triplets not counted": no_triplets,
     "a triangle": half_a_triangle,
     "a whole that says so": attribute("symmetric_packed", 0),
     # links and strangers

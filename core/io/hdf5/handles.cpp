@@ -130,7 +130,7 @@ std::string what_is_wrong_with(const std::string& path) {
 std::string what_else_is(const std::string& path) {
   constexpr std::size_t enough = 256;
   const std::string start = bytes_of(path, 0, enough);
-  if (start.empty()) return "is empty, expected an HDF5 file";
+  if (start.empty()) return "is not an HDF5 file: it is empty";
   if (start.starts_with("version https://git-lfs.github.com/spec/")) {
     return "is a pointer of Git LFS, not the file itself: run 'git lfs pull'";
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <utility>
 #include <variant>
 
@@ -81,6 +82,11 @@ std::optional<MatrixInfo> read_matrix_info(const Group& group, const std::string
   return known ? std::optional(info) : std::nullopt;
 }
 
+template <class Values>
+std::span<const double> span_of(Values& values) {
+  return {values.data(), values.size()};
+}
+
 /// Notes entries that no pointer and no count names. CSparse has such room, with anything in it.
 void note_uncounted(const std::vector<double>& x, std::size_t counted, const Group& group,
                     LeftOut* left_out) {
@@ -123,6 +129,8 @@ A read_matrix(const Group& parent, const std::string& name, LeftOut* left_out) {
     auto entries = static_cast<std::size_t>(std::max(nz, 0));
     if (nz >= 0) {
       a.storage = Storage::triplet;
+      // CSparse has room in x alone: 3.1 writes as many places as are counted
+      if (a.p.size() > 0) require_counted(span_of(a.x), entries, group.child("nz"));
       shorten(a.p, entries, group.child("p"));
     } else {
       a.storage = nz == nz_csc ? Storage::csc : Storage::csr;
@@ -135,7 +143,7 @@ A read_matrix(const Group& parent, const std::string& name, LeftOut* left_out) {
       }
     }
     if constexpr (!raw) {
-      require_counted(a.x, entries, group.child(nz >= 0 ? "nz" : "p"));
+      if (nz < 0) require_counted(a.x, entries, group.child("p"));
       note_uncounted(a.x, entries, group, left_out);
     }
     // nzmax may leave room at the end

@@ -40,6 +40,10 @@ class Columns {
     Integers copied = copy(column, values, rows, width, otherwise);
     for (std::size_t k = 0; k < copied.size(); ++k) {
       if (copied[k] >= lowest && copied[k] < count) continue;
+      if (count <= 0) {
+        fail(place(name_, column) + "[" + std::to_string(k) + "]",
+             "is " + std::to_string(copied[k]) + ", but there is none");
+      }
       fail(place(name_, column) + "[" + std::to_string(k) + "]",
            "is " + std::to_string(copied[k]) + ", but must be " + std::to_string(lowest) + " to " +
                std::to_string(count - 1));

@@ -12,8 +12,10 @@ import scipy.sparse as sp
 from scipy.linalg import cholesky, solve_triangular
 
 from fclib import _core, _solve
-from fclib._symmetry import asymmetry, columns, largest
 from fclib._symmetry import SYMMETRIC as SYMMETRIC
+from fclib._symmetry import asymmetry as asymmetry
+from fclib._symmetry import columns as columns
+from fclib._symmetry import largest as largest
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem

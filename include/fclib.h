@@ -212,8 +212,8 @@ struct fclib_local* fclib_read_local(const char* path);
 struct fclib_global_rolling* fclib_read_global_rolling(const char* path); /* new */
 struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new */
 
-/** Reads the solution. Its arrays have the lengths of the problem in the file. Returns NULL on
- *  failure, and where there is none. Free it with fclib_delete_solutions(solution, 1). */
+/** Reads the solution. Its arrays have the lengths of the problem in the file. If the file lacks u
+ *  or v, it follows from r. Returns NULL on failure, and where there is none. Free it with fclib_delete_solutions(solution, 1). */
 struct fclib_solution* fclib_read_solution(const char* path);
 
 /** Reads the guesses, and stores how many there are. Returns their array, to be freed with

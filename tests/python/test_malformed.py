@@ -811,7 +811,7 @@ SOLUTIONS: dict[str, tuple[Spoil, str]] = {
     "nan in r": (change("solution/r", 2, np.nan), "/solution/r[2]"),
     "inf in u": (change("solution/u", 0, np.inf), "/solution/u[0]"),
     "text in r": (replace("solution/r", "text"), "/solution/r"),
-    "a huge r": (declare("solution/r", "<f8"), "/solution/r"),
+    "r never written": (declare("solution/r", "<f8"), "no solution"),
     "a dataset in place of the solution": (replace("solution", [1.0]), "/solution"),
     "a dangling link in place of l": (
         replace("solution/l", h5py.SoftLink("/nowhere")),

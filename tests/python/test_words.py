@@ -212,3 +212,48 @@ def test_pointers_that_are_all_zero_in_memory() -> None:
     whole.indptr[:] = 0
     with pytest.raises(fclib.ProblemError, match=r"W\.indptr: says that there is no entry"):
         fclib.LocalProblem(W=whole, q=[-1, 0, 0], mu=[0.5])
+
+
+# ---- what 3.1 stores of vectors that it is not given
+
+
+def unwrite(file: h5py.File, name: str) -> None:
+    shape = file[name].shape
+    del file[name]
+    file.create_dataset(name, shape=shape, dtype="<f8")
+
+
+@pytest.mark.parametrize("form", ["local", "global"])
+def test_vectors_that_were_never_written_are_absent(tmp_path: Path, form: str) -> None:
+    path = tmp_path / "p.hdf5"
+    case = (planted_local if form == "local" else planted_global)(1, nc=2, p=1)
+    fclib.write(path, case.problem, case.solution)
+    fclib.write_guesses(path, [case.solution])
+    velocities = ("u",) if form == "local" else ("u", "v")
+    with h5py.File(path, "r+") as file:
+        for name in velocities:
+            unwrite(file, f"solution/{name}")
+            unwrite(file, f"guesses/1/{name}")
+    (guess,) = fclib.read_guesses(path)
+    for found in (fclib.read_solution(path), guess):
+        assert found is not None
+        assert all(getattr(found, name) is None for name in velocities)
+        assert fclib.merit(case.problem, found).error <= 1e-8  # they follow from r
+    assert helpers_cli.run("check", str(path)).returncode == 0
+
+    with h5py.File(path, "r+") as file:
+        unwrite(file, "solution/r")
+    assert fclib.read_solution(path) is None
+    assert fclib.contents(path) == [form, "guesses"]
+    run = helpers_cli.run("check", str(path))
+    assert run.returncode == 1
+    assert "no solution" in run.stderr
+    run = helpers_cli.run("info", str(path))
+    assert run.stderr == (f"fclib: {path}: /solution/r: was declared and never written: left out\n")
+    with h5py.File(path, "r+") as file:
+        unwrite(file, "guesses/1/r")
+    with pytest.raises(fclib.FileError, match=r"/guesses/1/r: was declared and never written"):
+        fclib.read_guesses(path)
+    # it gives way to one
+    fclib.write_solution(path, case.solution)
+    assert fclib.read_solution(path) is not None

@@ -12,6 +12,12 @@ std::vector<std::string> kinds_of(const Group& root) {
   return kinds;
 }
 
+bool has_solution(const Group& root) {
+  if (!root.has("solution")) return false;
+  const Handle group(H5Gopen2(root.id, "solution", H5P_DEFAULT), H5Gclose);
+  return !group.ok() || !is_unwritten({group.id(), root.child("solution")}, "r");
+}
+
 Index count_of(const Group& root, const Numbered& list) {
   if (!root.has(list.group)) return 0;
   const Handle handle = open_group(root, list.group);
@@ -23,11 +29,13 @@ Index count_of(const Group& root, const Numbered& list) {
 
 namespace {
 
-Index count_if_known(const Group& root, const Numbered& list) {
+/// What `read` returns, or this where it fails.
+template <class Value, class Read>
+Value value_or(Value otherwise, const Read& read) {
   try {
-    return count_of(root, list);
+    return read();
   } catch (const Error&) {
-    return 0;
+    return otherwise;
   }
 }
 
@@ -36,9 +44,9 @@ Index count_if_known(const Group& root, const Numbered& list) {
 Contents contents_of(const Group& root) {
   Contents contents;
   contents.kinds = kinds_of(root);
-  contents.solution = root.lists("solution");
-  contents.guesses = count_if_known(root, guesses_list);
-  contents.solutions = count_if_known(root, solutions_list);
+  contents.solution = value_or(true, [&] { return has_solution(root); });
+  contents.guesses = value_or(0, [&] { return count_of(root, guesses_list); });
+  contents.solutions = value_or(0, [&] { return count_of(root, solutions_list); });
   return contents;
 }
 

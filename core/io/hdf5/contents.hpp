@@ -22,6 +22,9 @@ struct Numbered {
 constexpr Numbered guesses_list{"guesses", "number_of_guesses"};
 constexpr Numbered solutions_list{"solutions", "number_of_solutions"};
 
+/// Whether there is a solution: a group whose reactions were never written is none.
+bool has_solution(const Group& root);
+
 /// How many a list has; 0 where it is not there.
 Index count_of(const Group& root, const Numbered& list);
 

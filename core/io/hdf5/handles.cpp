@@ -180,16 +180,12 @@ std::string Group::child(std::string_view name) const {
   return (path == "/" ? "/" : path + "/") + std::string(name);
 }
 
-bool Group::lists(const std::string& name) const {
-  const htri_t found = H5Lexists(id, name.c_str(), H5P_DEFAULT);
-  // what cannot be looked up is not what is not there
-  if (found < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
-  return found > 0;
-}
-
 bool Group::has(const std::string& name) const {
   if (H5Oexists_by_name(id, name.c_str(), Session::link_access()) > 0) return true;
-  if (lists(name)) fail(child(name), words_of_link(id, name));
+  // what cannot be looked up is not what is not there, nor is a link to nothing
+  const htri_t found = H5Lexists(id, name.c_str(), H5P_DEFAULT);
+  if (found < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+  if (found > 0) fail(child(name), words_of_link(id, name));
   return false;
 }
 

@@ -72,8 +72,6 @@ struct Group {
   [[nodiscard]] std::string child(std::string_view name) const;
   /// Whether there is an object of this name. Fails where the name is a link to nothing.
   [[nodiscard]] bool has(const std::string& name) const;
-  /// Whether there is anything of this name, be it a link to nothing.
-  [[nodiscard]] bool lists(const std::string& name) const;
 };
 
 Handle open_group(const Group& parent, const std::string& name);

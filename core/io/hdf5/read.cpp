@@ -248,7 +248,8 @@ Solution read_solution_group(const Group& parent, const std::string& name) {
   Solution solution;
   for_each_field<Solution>([&](const auto& field) {
     const std::string member(field.name);
-    if (field.presence == Presence::required || group.has(member)) {
+    const bool required = field.presence == Presence::required;
+    if (required || (group.has(member) && !is_unwritten(group, member))) {
       solution.*field.member = read_doubles<Vector>(group, member);
     }
   });
@@ -284,7 +285,11 @@ std::vector<std::string> read_left_out(const std::string& path) {
     for_each_formulation([&]<class P>(std::type_identity<P>) {
       if (root.has(group_name<P>())) read_fields<P>(root, &left_out);
     });
-    read_if_possible(&left_out, [&] { static_cast<void>(root.has("solution")); });
+    read_if_possible(&left_out, [&] {
+      if (root.has("solution") && !has_solution(root)) {
+        left_out.push_back("/solution/r: was declared and never written");
+      }
+    });
     for (const Numbered& list : {guesses_list, solutions_list}) {
       read_if_possible(&left_out, [&] { static_cast<void>(count_of(root, list)); });
     }
@@ -327,7 +332,7 @@ RawProblem read_raw_problem(const std::string& path, std::string_view kind) {
 
 std::optional<Solution> read_solution(const std::string& path, Problem* outline) {
   return read_from(path, [&](const Group& root) -> std::optional<Solution> {
-    if (!root.has("solution")) return std::nullopt;
+    if (!has_solution(root)) return std::nullopt;
     if (outline != nullptr) *outline = outline_of(root);
     return read_solution_group(root, "solution");
   });

@@ -78,19 +78,22 @@ double chunks_needed(const Handle& properties, const Handle& space) {
   return count;
 }
 
+/// Whether the file has no room for a dataset that has entries, and properties.
+bool is_unwritten(const Handle& dataset, const Handle& properties, std::size_t size) {
+  H5D_space_status_t status = H5D_SPACE_STATUS_ERROR;
+  return size > 0 && H5Pget_layout(properties.id()) != H5D_COMPACT &&
+         H5Dget_space_status(dataset.id(), &status) >= 0 &&
+         status == H5D_SPACE_STATUS_NOT_ALLOCATED;
+}
+
 /// Throws where entries were declared and never written: HDF5 would read its fill value for them.
 void require_written(const Handle& dataset, const Handle& properties, const Handle& space,
                      std::size_t size, const std::string& path) {
   if (size == 0 || !properties.ok()) return;
-  const H5D_layout_t layout = H5Pget_layout(properties.id());
-  if (layout == H5D_COMPACT) return;
-  H5D_space_status_t status = H5D_SPACE_STATUS_ERROR;
-  if (H5Dget_space_status(dataset.id(), &status) < 0) {
-    fail(path, "cannot be read (the file is damaged or cut short)");
-  }
-  if (status == H5D_SPACE_STATUS_NOT_ALLOCATED) {
+  if (is_unwritten(dataset, properties, size)) {
     fail(path, "was declared and never written: its data are missing");
   }
+  const H5D_layout_t layout = H5Pget_layout(properties.id());
 #if H5_VERSION_GE(1, 10, 5)
   hsize_t written = 0;
   if (layout == H5D_CHUNKED && H5Dget_num_chunks(dataset.id(), space.id(), &written) >= 0 &&
@@ -171,6 +174,15 @@ Numbers open_numbers(const Group& group, const std::string& name) {
           narrow,
           is_flat(space),
           properties.ok() ? packing_of(properties.id()) : Packing()};
+}
+
+bool is_unwritten(const Group& group, const std::string& name) {
+  if (!group.has(name)) return false;
+  const Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!dataset.ok()) return false;
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  const Handle properties = properties_of(dataset.id(), group.child(name));
+  return properties.ok() && is_unwritten(dataset, properties, size_of(space, group.child(name)));
 }
 
 void read_into(const Numbers& dataset, double* values) {

@@ -26,6 +26,10 @@ struct Numbers {
 /// Fails also where the numbers, or some of them, were never written.
 Numbers open_numbers(const Group& group, const std::string& name);
 
+/// Whether a dataset was declared and never written: so libfclib 3.1 stores a vector that it is not
+/// given.
+bool is_unwritten(const Group& group, const std::string& name);
+
 /// All the numbers of the dataset, into memory that has room for them.
 void read_into(const Numbers& dataset, double* values);
 void read_into(const Numbers& dataset, std::int32_t* values);

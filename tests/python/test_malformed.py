@@ -482,12 +482,12 @@ OPTIONAL: dict[str, tuple[Spoil, str]] = {
     "a group in place of title": (make_group(f"{ROOT}/info/title"), "info/title: is not a dataset"),
     "a title elsewhere": (
         replace(f"{ROOT}/info/title", h5py.ExternalLink("nothing.hdf5", "/title")),
-        "info/title: is an external link to /title of the file nothing.hdf5",
+        "info/title: is an external link to '/title' of the file 'nothing.hdf5'",
     ),
     "a dataset in place of info": (replace(f"{ROOT}/info", [1.0]), f"{ROOT}/info: is not a group"),
     "no such info": (
         replace(f"{ROOT}/info", h5py.SoftLink("/nowhere")),
-        f"{ROOT}/info: is a link to /nowhere",
+        f"{ROOT}/info: is a link to '/nowhere'",
     ),
     "words for a rank": (replace(f"{ROOT}/W/rank", "full"), "W/rank: does not hold numbers"),
     "several ranks": (replace(f"{ROOT}/W/rank", [1, 2]), "W/rank: has 2 entries"),
@@ -495,7 +495,7 @@ OPTIONAL: dict[str, tuple[Spoil, str]] = {
     "contacts of no table": (spoil_contacts, "/contacts/gap: was declared and never written"),
     "no such solution": (
         replace("solution", h5py.SoftLink("/nowhere")),
-        "/solution: is a link to /nowhere",
+        "/solution: is a link to '/nowhere'",
     ),
     "guesses of others": (make_guesses, "/guesses/number_of_guesses: the dataset is missing"),
     "entries that nobody counts": (room_with_numbers, "R/x: has 6 entries, of which 4"),
@@ -852,5 +852,5 @@ def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) 
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )
-    words = "is an external link to /there of the file pipe, which cannot be followed"
+    words = "is an external link to '/there' of the file 'pipe', which cannot be followed"
     assert f"/{name}: {words}" in run.stderr

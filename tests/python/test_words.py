@@ -108,7 +108,7 @@ def test_links_to_other_files(tmp_path: Path) -> None:
             file["fclib_local"] = h5py.ExternalLink(target, where)
         words = refusal(path)
         assert words.startswith(
-            f"/fclib_local: is an external link to {where} of the file {target}, which "
+            f"/fclib_local: is an external link to '{where}' of the file '{target}', which "
         )
         there = target == good.name
         assert words.endswith(
@@ -116,6 +116,20 @@ def test_links_to_other_files(tmp_path: Path) -> None:
             if there
             else "is not there: put that file beside this one"
         )
+
+
+def test_the_names_in_links_do_not_steer_the_terminal(tmp_path: Path) -> None:
+    path = written(tmp_path / "good.hdf5")
+    for link in (
+        h5py.SoftLink("/no\x1b[31m\nwhere" + 300 * "x"),
+        h5py.ExternalLink("no\x1b[31m\nfile" + 300 * "y", "/no\twhere" + 300 * "z"),
+    ):
+        with h5py.File(path, "r+") as file:
+            del file["fclib_local/W"]
+            file["fclib_local/W"] = link
+        words = refusal(path)
+        assert words.isprintable()
+        assert len(words) < 250
 
 
 # ---- triangles, and matrices that are not symmetric

@@ -14,6 +14,7 @@
 #include <sstream>
 
 #include "io/hdf5/library.hpp"
+#include "number_text.hpp"
 
 namespace fclib::hdf5 {
 
@@ -64,7 +65,7 @@ std::string words_of_link(hid_t group, const std::string& name) {
     return "is a link that HDF5 cannot read";
   }
   if (link.type == H5L_TYPE_SOFT) {
-    return "is a link to " + std::string(value.c_str()) + ", which is not there";
+    return "is a link to " + quoted(value.c_str()) + ", which is not there";
   }
   const char* file = nullptr;
   const char* object = nullptr;
@@ -81,7 +82,7 @@ std::string words_of_link(hid_t group, const std::string& name) {
     there = there || fs::exists(target, error);
   }
   const std::string words =
-      "is an external link to " + std::string(object) + " of the file " + file + ", ";
+      "is an external link to " + quoted(object) + " of the file " + quoted(file) + ", ";
   return words + (there ? "which cannot be followed: put the data into this file"
                         : "which is not there: put that file beside this one");
 }

@@ -87,8 +87,9 @@ void require_counted(std::span<const double> x, std::size_t counted, const std::
   if (counted > 0 || x.size() <= 1) return;
   const auto given = std::count_if(x.begin(), x.end(), [](double value) { return value != 0; });
   if (given > 0) {
-    invalid(counter, "says that there is no entry, but x has " + std::to_string(x.size()) + ", of which " +
-                         std::to_string(given) + " are not 0: the pointers or the count are missing");
+    invalid(counter, "says that there is no entry, but x has " + std::to_string(x.size()) +
+                         ", of which " + std::to_string(given) +
+                         " are not 0: the pointers or the count are missing");
   }
 }
 

@@ -214,7 +214,7 @@ def test_what_other_programs_write_is_read(path: Path) -> None:
 @cases("external_broken", "git_lfs_pointer")
 def test_what_a_file_is_that_holds_no_problem(path: Path) -> None:
     words = {
-        "external_broken": "/fclib_local: is an external link to '/fclib_local' of the file 'nowhere",
+        "external_broken": "/fclib_local: is an external link to '/fclib_local' of the file",
         "git_lfs_pointer": "is a pointer of Git LFS, not the file itself: run 'git lfs pull'",
     }[path.stem]
     with pytest.raises(fclib.FileError, match=re.escape(f"{path}: {words}")):

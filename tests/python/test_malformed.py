@@ -852,5 +852,5 @@ def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) 
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )
-    words = "is an external link to '/there' of the file 'pipe', which cannot be followed"
+    words = "is an external link to '/there' of the file 'pipe', which is not followed"
     assert f"/{name}: {words}" in run.stderr

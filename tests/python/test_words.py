@@ -112,9 +112,7 @@ def test_links_to_other_files(tmp_path: Path) -> None:
         )
         there = target == good.name
         assert words.endswith(
-            "cannot be followed: put the data into this file"
-            if there
-            else "is not there: put that file beside this one"
+            f"is not {'followed' if there else 'there'}: copy what it links to into this file"
         )
 
 

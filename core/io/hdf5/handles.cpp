@@ -42,15 +42,9 @@ std::array<fs::path, 2> places_of(const char* from, const char* to) {
   return {fs::path(to), fs::path(from).parent_path() / to};
 }
 
-/// Whether an external link may be followed: HDF5 would wait for ever at the end of a pipe.
-herr_t follow_to_files_alone(const char* from, const char*, const char* to, const char*, unsigned*,
-                             hid_t, void*) {
-  for (const fs::path& target : places_of(from, to)) {
-    std::error_code error;
-    const auto status = fs::status(target, error);
-    if (fs::exists(status) && !fs::is_regular_file(status)) return -1;
-  }
-  return 0;
+/// No external link is followed: a file from elsewhere could name any file of its reader's.
+herr_t follow_none(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
+  return -1;
 }
 
 /// What is wrong with a name that leads to no object.
@@ -83,8 +77,8 @@ std::string words_of_link(hid_t group, const std::string& name) {
   }
   const std::string words =
       "is an external link to " + quoted(object) + " of the file " + quoted(file) + ", ";
-  return words + (there ? "which cannot be followed: put the data into this file"
-                        : "which is not there: put that file beside this one");
+  return words + (there ? "which is not followed" : "which is not there") +
+         ": copy what it links to into this file";
 }
 
 Session* current = nullptr;  // under the lock
@@ -172,7 +166,7 @@ hid_t Session::link_access() {
   std::optional<Handle>& made = current->link_access_;
   if (!made) {
     made.emplace(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
-    H5Pset_elink_cb(made->id(), follow_to_files_alone, nullptr);
+    H5Pset_elink_cb(made->id(), follow_none, nullptr);
   }
   return made->id();
 }

@@ -141,6 +141,7 @@ Matrix matrix_from(nb::handle object, const char* what) {
   // SciPy may leave room at the end of its arrays
   if (a.storage != Storage::triplet && !a.p.empty()) {
     const auto used = static_cast<std::size_t>(a.p.back());
+    require_counted(a.x, used, std::string(what) + ".indptr");
     if (used < a.i.size()) a.i.resize(used);
     if (used < a.x.size()) a.x.resize(used);
   }

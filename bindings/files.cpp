@@ -153,6 +153,12 @@ void bind_hdf5(nb::module_& m) {
       "What a file holds: the kinds of its problems, \"solution\", \"guesses\", and \"solutions\"\n"
       "where several are known. Raises FileError.");
   m.def(
+      "left_out", [](const fs::path& path) { return read_left_out(path.string()); }, "path"_a,
+      nb::sig(signature("left_out", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
+      "What a file has beside its problems that cannot be read, such as a title of another type,\n"
+      "and why. read() leaves it out. Raises FileError or ProblemError where a problem cannot be\n"
+      "read.");
+  m.def(
       "write_solution",
       [](const fs::path& path, const nb::object& given, int compression) {
         const Solution solution = solution_from(given, "solution");

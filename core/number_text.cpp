@@ -15,6 +15,13 @@
 
 namespace fclib {
 
+std::string quoted(std::string_view text) {
+  constexpr std::size_t longest = 40;  // as long as the name of a file or of a dataset
+  std::string result = "'";
+  for (const char c : text.substr(0, longest)) result += c >= ' ' && c <= '~' ? c : '?';
+  return result + (text.size() > longest ? "...'" : "'");
+}
+
 namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }

@@ -212,8 +212,9 @@ struct fclib_local* fclib_read_local(const char* path);
 struct fclib_global_rolling* fclib_read_global_rolling(const char* path); /* new */
 struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new */
 
-/** Reads the solution. Its arrays have the lengths of the problem in the file. Returns NULL on
- *  failure, and where there is none. Free it with fclib_delete_solutions(solution, 1). */
+/** Reads the solution. Its arrays have the lengths of the problem in the file. If the file lacks u
+ *  or v, it follows from r. Returns NULL on failure, and where there is none. Free it with
+ * fclib_delete_solutions(solution, 1). */
 struct fclib_solution* fclib_read_solution(const char* path);
 
 /** Reads the guesses, and stores how many there are. Returns their array, to be freed with
@@ -535,6 +536,66 @@ int fclib_write_siconos_global_rolling(const struct fclib_global_rolling* proble
                                        const char* path);
 struct fclib_local_rolling* fclib_read_siconos_local_rolling(const char* path);
 int fclib_write_siconos_local_rolling(const struct fclib_local_rolling* problem, const char* path);
+
+/* ---- pictures -------------------------------------------------------------------------------- */
+
+/** New. What a shape is, and what its three sizes are. It lies about the origin of its frame. */
+enum fclib_shape {
+  FCLIB_PLANE,     /**< z = 0; half edges of what is to be drawn, 0 where it has no end; z is up */
+  FCLIB_SPHERE,    /**< radius */
+  FCLIB_CAPSULE,   /**< radius, half length along z without the caps */
+  FCLIB_ELLIPSOID, /**< half axes */
+  FCLIB_CYLINDER,  /**< radius, half length along z */
+  FCLIB_BOX,       /**< half edges */
+  FCLIB_MESH       /**< none: its vertices say it */
+};
+
+/** New. Where the contacts of a problem are, and the bodies that touch there: what pictures show
+ *  (`fclib view FILE`). No solver looks at it. The arrays are the caller's, and by rows. Lengths
+ * are in m unless `unit` says otherwise. Turns are unit quaternions w, x, y, z. Numbers of bodies,
+ *  shapes and meshes count from 0. Members may be added at the end: set it to zeros first, and
+ *  `size` to sizeof(struct fclib_geometry). */
+struct fclib_geometry {
+  size_t size;
+  int nc;                  /**< contacts, in the order of the problem */
+  const int* body;         /**< (nc x 2) the two; the normal points from the first to the second */
+  const int* shape;        /**< (nc x 2) their shapes that touch, -1 for the limit of a joint; NULL:
+                                the first shape of each body */
+  const int* feature;      /**< (nc) which contact of these two shapes it is, or NULL: 0, 1, ... */
+  const double* point;     /**< (nc x 3) midway between the two surfaces, in the world */
+  const double* normal;    /**< (nc x 3) N, 0 for the limit of a joint */
+  const double* tangent;   /**< (nc x 3) T1; T2 is N x T1. In the plane T1 is T */
+  const double* gap;       /**< (nc) signed distance, negative where they overlap; or NULL: 0 */
+  int nb;                  /**< bodies */
+  const char* const* name; /**< (nb) each one line, or NULL: "1", "2", ... */
+  const int* moves;        /**< (nb) 1 where something can move it, 0 where it is fixed */
+  const double* place;     /**< (nb x 3) of the body's frame in the world */
+  const double* turn;      /**< (nb x 4) of the body's frame, or NULL: not turned */
+  int ns;                  /**< shapes */
+  const int* shape_body;   /**< (ns) the body of each, or NULL: shape k is that of body k */
+  const int* shape_kind;   /**< (ns) of enum fclib_shape */
+  const double* shape_size;  /**< (ns x 3) as fclib_shape says, the others 0 */
+  const double* shape_place; /**< (ns x 3) of its frame in its body, or NULL: 0 */
+  const double* shape_turn;  /**< (ns x 4) of its frame in its body, or NULL: not turned */
+  const int* shape_mesh;     /**< (ns) its mesh, -1 for another kind, or NULL: no meshes */
+  int nm;                    /**< meshes */
+  const int*
+      mesh_first;       /**< ((nm + 1) x 2) first vertex and first face of each; last the numbers */
+  const double* vertex; /**< (x 3) of all meshes, in the frame of the shape */
+  const int* face;      /**< (x 4) vertices of a face, counted in its mesh, about the outward
+                             normal; -1 last: three only */
+  const double* displacement; /**< (x 3) of the vertices of an elastic body, or NULL */
+  const double* period;       /**< (2) edges of a cell that repeats along x and y, or NULL */
+  int planar;                 /**< 1 where all moves in the plane x, z */
+  const char* unit;           /**< of lengths, or NULL: m */
+  const char* mass_unit;      /**< of masses, or NULL: kg */
+};
+
+/** New. Adds a geometry to a file that has a problem of nc contacts. Returns 1, or 0 where numbers
+ *  contradict each other, and where the file has one that is not to be replaced. */
+int fclib_write_geometry(const struct fclib_geometry* geometry, const char* path);
+int fclib_write_geometry_with(const struct fclib_geometry* geometry, const char* path,
+                              const struct fclib_options* options);
 
 /* ---- many small problems --------------------------------------------------------------------- */
 

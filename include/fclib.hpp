@@ -17,6 +17,7 @@
 
 #include <fclib.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <exception>
@@ -345,6 +346,93 @@ inline void write_guesses(const std::string& path, std::span<const Solution> gue
     views.push_back(guess.view());
   }
   checked(fclib_write_guesses(detail::count(views.size()), views.data(), path.c_str()));
+}
+
+// ---- pictures
+
+/// Where the contacts of a problem are, and the bodies that touch there: what fclib_geometry says,
+/// as spans by rows. One that is empty is not given.
+struct Geometry {
+  // of each contact
+  std::span<const int> body{};        ///< (nc x 2) the normal points from the first to the second
+  std::span<const int> shape{};       ///< (nc x 2) or none: the first shape of each body
+  std::span<const int> feature{};     ///< (nc) or none
+  std::span<const double> point{};    ///< (nc x 3)
+  std::span<const double> normal{};   ///< (nc x 3)
+  std::span<const double> tangent{};  ///< (nc x 3)
+  std::span<const double> gap{};      ///< (nc) or none
+  // of each body
+  std::span<const std::string> name{};  ///< (nb) or none
+  std::span<const int> moves{};         ///< (nb) 1 or 0
+  std::span<const double> place{};      ///< (nb x 3)
+  std::span<const double> turn{};       ///< (nb x 4) or none
+  // of each shape
+  std::span<const int> shape_body{};      ///< (ns) or none: shape k is that of body k
+  std::span<const int> shape_kind{};      ///< (ns) FCLIB_SPHERE, ...
+  std::span<const double> shape_size{};   ///< (ns x 3)
+  std::span<const double> shape_place{};  ///< (ns x 3) or none
+  std::span<const double> shape_turn{};   ///< (ns x 4) or none
+  std::span<const int> shape_mesh{};      ///< (ns) or none
+  // of the meshes
+  std::span<const int> mesh_first{};       ///< ((nm + 1) x 2) or none
+  std::span<const double> vertex{};        ///< (x 3)
+  std::span<const int> face{};             ///< (x 4)
+  std::span<const double> displacement{};  ///< (x 3) or none
+  std::span<const double> period{};        ///< (2) or none
+  bool planar = false;
+  std::string unit{};       ///< of lengths, empty for m
+  std::string mass_unit{};  ///< of masses, empty for kg
+};
+
+/// Adds a geometry to a file that has a problem of as many contacts.
+inline void write_geometry(const std::string& path, const Geometry& geometry) {
+  const std::size_t nc = geometry.body.size() / 2;
+  const std::size_t nb = geometry.moves.size();
+  const std::size_t ns = geometry.shape_kind.size();
+  const auto array = [](const char* name, const auto& values, std::size_t expected) {
+    if (!values.empty()) detail::require_size(name, values.size(), expected);
+    return values.empty() ? nullptr : values.data();
+  };
+  std::vector<const char*> names;
+  for (const std::string& name : geometry.name) names.push_back(name.c_str());
+  fclib_geometry c{};
+  c.size = sizeof c;
+  c.nc = detail::count(nc);
+  c.body = array("body", geometry.body, 2 * nc);
+  c.shape = array("shape", geometry.shape, 2 * nc);
+  c.feature = array("feature", geometry.feature, nc);
+  c.point = array("point", geometry.point, 3 * nc);
+  c.normal = array("normal", geometry.normal, 3 * nc);
+  c.tangent = array("tangent", geometry.tangent, 3 * nc);
+  c.gap = array("gap", geometry.gap, nc);
+  c.nb = detail::count(nb);
+  c.name = array("name", names, nb);
+  c.moves = array("moves", geometry.moves, nb);
+  c.place = array("place", geometry.place, 3 * nb);
+  c.turn = array("turn", geometry.turn, 4 * nb);
+  c.ns = detail::count(ns);
+  c.shape_body = array("shape_body", geometry.shape_body, ns);
+  c.shape_kind = array("shape_kind", geometry.shape_kind, ns);
+  c.shape_size = array("shape_size", geometry.shape_size, 3 * ns);
+  c.shape_place = array("shape_place", geometry.shape_place, 3 * ns);
+  c.shape_turn = array("shape_turn", geometry.shape_turn, 4 * ns);
+  c.shape_mesh = array("shape_mesh", geometry.shape_mesh, ns);
+  if (const std::size_t size = geometry.mesh_first.size(); size > 0) {
+    if (size % 2 != 0) throw Error("mesh_first has an odd number of entries");
+    c.nm = detail::count(size / 2 - 1);
+    c.mesh_first = geometry.mesh_first.data();
+    const auto last = [&](std::size_t k) {
+      return static_cast<std::size_t>(std::max(geometry.mesh_first[size - k], 0));
+    };
+    c.vertex = array("vertex", geometry.vertex, 3 * last(2));
+    c.face = array("face", geometry.face, 4 * last(1));
+    c.displacement = array("displacement", geometry.displacement, 3 * last(2));
+  }
+  c.period = array("period", geometry.period, 2);
+  c.planar = geometry.planar ? 1 : 0;
+  c.unit = geometry.unit.empty() ? nullptr : geometry.unit.c_str();
+  c.mass_unit = geometry.mass_unit.empty() ? nullptr : geometry.mass_unit.c_str();
+  checked(fclib_write_geometry(&c, path.c_str()));
 }
 
 // ---- solving

@@ -68,14 +68,13 @@ C* read_c(const char* path) {
   });
 }
 
-/// What is given of a solution. What v and u lack follows from r and l, where the problem in the
-/// file says so; all else is zero, as 3.1 has it.
-Solution completed(const fclib_solution& c, const Problem& outline, const char* path) {
+/// What v and u of a solution lack follows from r and l, where the problem in the file says so;
+/// what else it lacks is zero if it is the caller's, as 3.1 has it.
+Solution completed(Solution solution, const Problem& outline, const char* path, bool with_zeros) {
   return std::visit(
       [&]<class P>(const P& sizes) {
-        Solution solution = solution_of(c, sizes, Parts::any);
         const auto lacks = [&](const Vector& values, Dim rows) {
-          return values.size() < sizes.size(rows);
+          return values.size() == 0 && sizes.size(rows) > 0;
         };
         if ((lacks(solution.u, Dim::m) || lacks(solution.v, Dim::n)) &&
             !lacks(solution.r, Dim::m) && !lacks(solution.l, Dim::p)) {
@@ -87,11 +86,19 @@ Solution completed(const fclib_solution& c, const Problem& outline, const char* 
         }
         for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::*) {
           Vector& values = solution.*field.member;
-          if (lacks(values, field.rows)) values = Vector::Zero(sizes.size(field.rows));
+          if (with_zeros && lacks(values, field.rows)) {
+            values = Vector::Zero(sizes.size(field.rows));
+          }
         });
-        return solution;
+        return std::move(solution);
       },
       outline);
+}
+
+Solution completed(const fclib_solution& c, const Problem& outline, const char* path) {
+  Solution given_parts =
+      std::visit([&](const auto& sizes) { return solution_of(c, sizes, Parts::any); }, outline);
+  return completed(std::move(given_parts), outline, path, true);
 }
 
 template <class C>
@@ -193,7 +200,8 @@ fclib_solution* fclib_read_solution(const char* path) {
     auto solution = read_solution(&given(path, "path"), &outline);
     if (!solution) throw Error(ErrorKind::file, "holds no solution", "/", path);
     Owned<fclib_solution> c(allocate<fclib_solution>(1));
-    to_c(*solution, outline, std::string(path) + ": /solution", *c);
+    to_c(completed(std::move(*solution), outline, path, false), outline,
+         std::string(path) + ": /solution", *c);
     return c.release();
   });
 }
@@ -210,8 +218,8 @@ fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses) {
     std::unique_ptr<fclib_solution, decltype(release)> array(
         allocate<fclib_solution>(guesses.size()), release);
     for (std::size_t k = 0; k < guesses.size(); ++k) {
-      to_c(guesses[k], outline, std::string(path) + ": /guesses/" + std::to_string(k + 1),
-           array.get()[k]);
+      to_c(completed(std::move(guesses[k]), outline, path, false), outline,
+           std::string(path) + ": /guesses/" + std::to_string(k + 1), array.get()[k]);
     }
     number = count;
     return array.release();

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "capi/errors.hpp"
+#include "linalg/places.hpp"
 
 namespace fclib::c {
 
@@ -166,6 +167,7 @@ CoreOf<C> problem_of(const C& c) {
       const bool compressed = a.storage == Storage::csc || a.storage == Storage::csr;
       if (!compressed || a.p.empty() || a.p.back() < 0) return;
       const auto entries = static_cast<std::size_t>(a.p.back());
+      require_counted(a.x, entries, place_of<P>(field) / "p");
       a.i.resize(std::min(a.i.size(), entries));
       a.x.resize(std::min(a.x.size(), entries));
     }

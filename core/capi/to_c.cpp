@@ -10,31 +10,7 @@ namespace fclib::c {
 
 namespace {
 
-template <class Numbers>
-auto malloc_array(const Numbers& values) {
-  using Number = std::remove_cvref_t<decltype(values[0])>;
-  const auto size = static_cast<std::size_t>(values.size());
-  MallocArray<Number> result(size);
-  if (size > 0) std::memcpy(result.data(), values.data(), size * sizeof(Number));
-  return result;
-}
-
-double* copy_vector(const Vector& values) { return malloc_array(values).release(); }
-
-RawMatrix raw_matrix(const Matrix& a) {
-  RawMatrix raw{.storage = a.storage,
-                .rows = a.rows,
-                .cols = a.cols,
-                .p = {},
-                .i = {},
-                .x = malloc_array(a.x),
-                .info = a.info};
-  if (a.storage != Storage::dense) {
-    raw.p = malloc_array(a.p);
-    raw.i = malloc_array(a.i);
-  }
-  return raw;
-}
+double* copy_vector(const Vector& values) { return malloc_copy(values).release(); }
 
 char* copy_text(const std::string& value) {
   if (value == absent_text || value == absent_group) return nullptr;
@@ -154,9 +130,9 @@ C* to_c(const CoreOf<C>& problem) {
     if constexpr (std::is_same_v<Type, Index>) {
       raw.members.push_back({field.name, value});
     } else if constexpr (std::is_same_v<Type, Matrix>) {
-      if (!optional || !value.empty()) raw.members.push_back({field.name, raw_matrix(value)});
+      if (!optional || !value.empty()) raw.members.push_back({field.name, raw_copy(value)});
     } else if constexpr (std::is_same_v<Type, Vector>) {
-      if (!optional || value.size() > 0) raw.members.push_back({field.name, malloc_array(value)});
+      if (!optional || value.size() > 0) raw.members.push_back({field.name, malloc_copy(value)});
     }
   });
   raw.info = problem.info;

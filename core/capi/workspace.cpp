@@ -7,6 +7,7 @@
 
 #include "capi/errors.hpp"
 #include "capi/status.hpp"
+#include "linalg/places.hpp"
 
 struct fclib_workspace {
   fclib::Workspace core;
@@ -41,6 +42,9 @@ MatrixView view_of(const fclib_matrix& c) {
                : view.p != nullptr ? view.p[view.storage == Storage::csc ? view.cols : view.rows]
                                    : 0;
     if (c.nz < 0 && view.nnz > c.nzmax) fail("problem->W->nzmax", "is less than the pointers say");
+    if (c.nz < 0 && view.nnz == 0 && c.nzmax > 1 && c.x != nullptr) {
+      require_counted({c.x, static_cast<std::size_t>(c.nzmax)}, 0, "problem->W->p");
+    }
     if (view.nnz > 0) view.i = need(c.i, "problem->W->i");
   }
   if (view.nnz > 0) view.x = need(c.x, "problem->W->x");

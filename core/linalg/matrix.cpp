@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
 
 #include "error.hpp"
 #include "linalg/places.hpp"
@@ -80,6 +81,43 @@ void validate(const Matrix& a, const std::string& where) {
       invalid(where + "/x[" + std::to_string(k) + "]", "the value is not a finite number");
     }
   }
+}
+
+void require_counted(std::span<const double> x, std::size_t counted, const std::string& counter) {
+  if (counted > 0 || x.size() <= 1) return;
+  const auto given = std::count_if(x.begin(), x.end(), [](double value) { return value != 0; });
+  if (given > 0) {
+    invalid(counter, "says that there is no entry, but x has " + std::to_string(x.size()) +
+                         ", of which " + std::to_string(given) +
+                         " are not 0: the pointers or the count are missing");
+  }
+}
+
+Matrix symmetric_of_triangle(const Matrix& a, const std::string& where) {
+  validate_places(a, where);
+  if (a.rows != a.cols) {
+    invalid(where, "is said to be a packed symmetric matrix, but has " + std::to_string(a.rows) +
+                       " rows and " + std::to_string(a.cols) + " columns");
+  }
+  Matrix whole{.storage = Storage::triplet, .rows = a.rows, .cols = a.cols, .info = a.info};
+  bool below = false;
+  bool above = false;
+  for_each_entry(a, [&](Index row, Index col, double value) {
+    if (value == 0 && a.storage == Storage::dense) return;
+    const auto put = [&](Index i, Index p) {
+      whole.i.push_back(i);
+      whole.p.push_back(p);
+      whole.x.push_back(value);
+    };
+    put(row, col);
+    if (row == col) return;
+    put(col, row);
+    if (value != 0) (row > col ? below : above) = true;
+  });
+  if (below && above) {
+    invalid(where, "is said to be one triangle of a symmetric matrix, but has entries in both");
+  }
+  return a.storage == Storage::triplet ? whole : converted(whole, a.storage);
 }
 
 bool is_canonical(const Matrix& a) {

@@ -61,6 +61,7 @@ MENU = {
         "command-line",
         "python",
         "compiled",
+        "matlab",
         "embedding",
         "recipes",
         "browser",

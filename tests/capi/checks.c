@@ -197,6 +197,22 @@ static void validation_and_merits(void) {
   CHECK(back && back->W->i[2] == 5);
   fclib_delete_local(back);
   free(back);
+
+  /* pointers that were never set, though there are entries; room for one entry is what CSparse
+   * gives a matrix of none */
+  int unset[] = {0, 0, 0, 0};
+  struct fclib_matrix pointless = identity;
+  pointless.p = unset;
+  a.W = &pointless;
+  for (int nz = -2; nz < 0; nz++) {
+    pointless.nz = nz;
+    pointless.nzmax = 3;
+    CHECK(!fclib_validate_local(&a));
+    SAYS("/fclib_local/W/p: says that there is no entry");
+    CHECK(isnan(fclib_merit_local(&a, MERIT_2, &s)));
+    pointless.nzmax = 1;
+    CHECK(fclib_validate_local(&a));
+  }
   a = local();
   wrong[1] = NAN;
   CHECK(!fclib_validate_local_solution(&a, &s));
@@ -204,6 +220,81 @@ static void validation_and_merits(void) {
   s.r = NULL;
   CHECK(!fclib_validate_local_solution(&a, &s) && isnan(fclib_merit_local(&a, MERIT_2, &s)));
   CHECK(isnan(fclib_merit_local(&a, (enum fclib_merit)5, &s)));
+}
+
+/* where bodies are: two balls on a plane and one on the other */
+static void geometry(void) {
+  struct fclib_local a = local();
+  CHECK(fclib_write_local(&a, path_of("geometry")));
+  int body[] = {0, 1}, moves[] = {0, 1}, kind[] = {FCLIB_PLANE, FCLIB_SPHERE};
+  double point[] = {0, 0, 0}, normal[] = {0, 0, 1}, tangent[] = {1, 0, 0};
+  double place[] = {0, 0, 0, 0, 0, 0.1}, size[] = {0, 0, 0, 0.1, 0, 0};
+  const char* names[] = {"ground", "ball"};
+  struct fclib_geometry g = {0};
+  CHECK(!fclib_write_geometry(&g, path_of("geometry")));
+  SAYS("geometry->size");
+  g.size = sizeof g;
+  CHECK(!fclib_write_geometry(&g, path_of("geometry")));
+  SAYS("/contacts: has 0 rows, expected nc = 1");
+  g.nc = 1;
+  CHECK(!fclib_write_geometry(&g, path_of("geometry")));
+  SAYS("/contacts/body: is NULL");
+  g.body = body;
+  g.point = point;
+  g.normal = normal;
+  g.tangent = tangent;
+  CHECK(!fclib_write_geometry(&g, path_of("geometry")));
+  SAYS("/contacts/body[0]: is 0, but there is none");
+  g.nb = g.ns = 2;
+  g.name = names;
+  g.moves = moves;
+  g.place = place;
+  g.shape_kind = kind;
+  g.shape_size = size;
+  CHECK(fclib_write_geometry(&g, path_of("geometry")));
+  CHECK(!fclib_write_geometry(&g, path_of("geometry")));
+  SAYS("is in the file already");
+
+  /* what contradicts itself, or the problem, is named, and not written */
+  struct fclib_options* again = fclib_options_create();
+  CHECK(fclib_options_set_text(again, "mode", "replace"));
+  CHECK(fclib_write_geometry_with(&g, path_of("geometry"), again));
+  body[1] = 2;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/contacts/body[1]: is 2, but must be 0 to 1");
+  body[1] = 1;
+  kind[1] = FCLIB_MESH;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/shape_mesh[1]: is -1, but the shape is a mesh");
+  int mesh[] = {-1, 0}, first[] = {0, 0, 4, 4},
+      face[] = {0, 2, 1, -1, 0, 1, 3, -1, 1, 2, 3, -1, 2, 0, 3, -1};
+  double vertex[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  g.nm = 1;
+  g.shape_mesh = mesh;
+  g.mesh_first = first;
+  g.vertex = vertex;
+  g.face = face;
+  CHECK(fclib_write_geometry_with(&g, path_of("geometry"), again));
+  face[5] = 4;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/face[5]: is 4, but the mesh has 4 vertices");
+  face[5] = -1;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/face[5]");
+  face[5] = 1;
+  first[2] = -1;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/mesh_first[2]");
+  first[2] = 4;
+  vertex[3] = NAN;
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/vertex[3]: the value is not a finite number");
+  names[0] = "two\nlines";
+  CHECK(!fclib_write_geometry_with(&g, path_of("geometry"), again));
+  SAYS("/bodies/name: name 0 has more than one line");
+  CHECK(!fclib_write_geometry(NULL, path_of("geometry")));
+  CHECK(!fclib_write_geometry(&g, NULL));
+  fclib_options_delete(again);
 }
 
 static void rolling(void) {
@@ -309,6 +400,7 @@ int main(int argc, char** argv) {
   modes();
   validation_and_merits();
   rolling();
+  geometry();
   solving();
   certificates();
   return 0;

@@ -120,6 +120,37 @@ void solving(C problem) {
   THROWS("mu", fclib::solve(problem));
 }
 
+void pictures(const std::string& path) {
+  Ball ball;
+  fclib::write(path, ball.local());
+  const std::array<int, 2> body{0, 1};
+  const std::array<int, 2> moves{0, 1};
+  const std::array<int, 2> kind{FCLIB_PLANE, FCLIB_SPHERE};
+  const std::array<double, 3> up{0, 0, 1};
+  const std::array<double, 3> along{1, 0, 0};
+  const std::array<double, 6> place{0, 0, 0, 0, 0, 0.1};
+  const std::array<double, 6> size{0, 0, 0, 0.1, 0, 0};
+  const std::vector<std::string> name{"ground", "ball"};
+  fclib::Geometry geometry{.body = body,
+                           .point = ball.none,
+                           .normal = up,
+                           .tangent = along,
+                           .name = name,
+                           .moves = moves,
+                           .place = place,
+                           .shape_kind = kind,
+                           .shape_size = size};
+  fclib::write_geometry(path, geometry);
+  THROWS("is in the file already", fclib::write_geometry(path, geometry));
+  geometry.place = up;
+  THROWS("place has 3 entries, expected 6", fclib::write_geometry(path, geometry));
+  geometry.place = {};
+  THROWS("/bodies/place: is NULL", fclib::write_geometry(path, geometry));
+  geometry.mesh_first = body;
+  geometry.mesh_first = geometry.mesh_first.first(1);
+  THROWS("odd", fclib::write_geometry(path, geometry));
+}
+
 void matrices() {
   const std::array<double, 3> x{};
   const std::array<int, 2> two{};
@@ -139,6 +170,7 @@ int main(int argc, char** argv) {
   solving(ball.local());
   solving(ball.global());
   matrices();
+  pictures(std::string(argv[1]) + "/pictures.hdf5");
   CHECK(!fclib::solvers().empty() && fclib::solvers()[0] == fclib_solver_name(0));
   return failures == 0 ? 0 : 1;
 }

@@ -239,6 +239,34 @@ def test_the_example_in_cpp_runs(cpp_example: Path, tmp_path: Path) -> None:
     check_ball(cpp_example, tmp_path)
 
 
+def test_the_bodies_of_the_example_are_drawn(programs: Path, tmp_path: Path) -> None:
+    program = compile_program(ROOT / "examples/cpp/stack.cpp", programs / "stack-cpp")
+    path = tmp_path / "stack.hdf5"
+    for _ in range(2):  # the file may be there already
+        done = subprocess.run([program, path], capture_output=True, text=True)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("converged")
+    problem, solution = fclib.read(path), fclib.read_solution(path)
+    assert fclib.left_out(path) == []
+    assert problem.contacts is not None
+    assert problem.bodies is not None
+    assert problem.bodies.names == ["table", "box", "ball"]
+    assert problem.contacts.feature.tolist() == [0, 1, 2, 3, 0]
+    assert problem.contacts.shape.tolist() == [[0, 1]] * 4 + [[1, 2]]
+    # what the contacts carry: the box and what the ball brings, in a step
+    assert solution is not None
+    force = solution.r.reshape(-1, 3)[:, 0]
+    assert force[4] == pytest.approx(2 * (1 + 9.81e-3))
+    assert force[:4].sum() == pytest.approx(force[4] + 9.81e-3)
+    for name in ("view", "bare"):
+        page = tmp_path / f"{name}.html"
+        fclib_view = [sys.executable, "-m", "fclib", "view", str(path), "--out", str(page)]
+        subprocess.run(fclib_view, check=True, capture_output=True)
+        assert ('"ball"' in page.read_text()) == (name == "view")
+        fclib.write(path, problem.replace(contacts=None, bodies=None), mode="replace")
+    valgrind(program, path)
+
+
 def test_the_example_in_fortran_runs(fortran_example: Path, tmp_path: Path) -> None:
     check_ball(fortran_example, tmp_path)
     known = fclib.read(tmp_path / "ball.hdf5").matrix_info
@@ -300,7 +328,7 @@ def test_the_fortran_module_is_the_header() -> None:
     module, header = source.read_text(), without_comments((HEADERS / "fclib.h").read_text())
 
     structs = re.findall(r"struct (?:FCLIB_APICOMPILE )?(\w+) \{(.*?)\};", header, re.DOTALL)
-    assert len(structs) == 11
+    assert len(structs) == 12
     for name, body in structs:
         members = [
             (in_fortran(member), member.split()[-1].strip("*"))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from fractions import Fraction
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fclib
 from fclib import analysis
@@ -190,3 +193,61 @@ def test_a_certificate_from_a_file(tmp_path: Path) -> None:
     done = subprocess.run([*command, "--certificate", str(wrong)], capture_output=True, text=True)
     assert done.returncode == 1
     assert "contact 0" in json.loads(done.stdout)["message"]
+
+
+# ---- files of other writers, and files whose data are missing
+
+
+@cases("never_written", "p_zeros")
+def test_missing_data_are_no_proof(path: Path) -> None:
+    words = {
+        "never_written": "/fclib_local/W/x: was declared and never written",
+        "p_zeros": "/fclib_local/W/p: says that there is no entry, but x has 36",
+    }[path.stem]
+    with pytest.raises(fclib.Error, match=re.escape(f"{path}: {words}")):
+        fclib.read(path)
+    for command in ("info", "check", "solve", "analyze"):
+        done = subprocess.run(
+            [sys.executable, "-m", "fclib", command, str(path)], capture_output=True, text=True
+        )
+        assert done.returncode == 1
+        assert done.stdout == ""
+        assert words in done.stderr
+
+
+@cases("symmetric_packed")
+def test_a_packed_triangle_is_the_whole(path: Path) -> None:
+    problem = fclib.read(path)
+    assert isinstance(problem, fclib.LocalProblem)
+    W = problem.W.toarray()
+    np.testing.assert_array_equal(W, W.T)
+    with h5py.File(path) as file:
+        group = file["fclib_local/W"]
+        p, i, x = (group[name][:] for name in ("p", "i", "x"))
+    lower = sp.csc_array((x, i, p), shape=(6, 6)).toarray()
+    np.testing.assert_array_equal(W, lower + lower.T - np.diag(np.diag(lower)))
+    result = fclib.solve(problem)
+    assert result.converged
+    assert judge(problem, result.solution).error <= 1e-8
+
+
+@cases("f8ints", "matlab_all", "col2d", "text_as_uint8", "vl_array")
+def test_what_other_programs_write_is_read(path: Path) -> None:
+    problem = fclib.read(path)
+    assert problem.nc == 2
+    result = fclib.solve(problem)
+    assert result.converged
+    assert judge(problem, result.solution).error <= 1e-8
+    title = {"text_as_uint8": "bytes as numbers"}.get(path.stem, "")
+    assert problem.info.title == title
+    assert len(fclib.left_out(path)) == (3 if path.stem == "vl_array" else 0)
+
+
+@cases("external_broken", "git_lfs_pointer")
+def test_what_a_file_is_that_holds_no_problem(path: Path) -> None:
+    words = {
+        "external_broken": "/fclib_local: is an external link to '/fclib_local' of the file",
+        "git_lfs_pointer": "is a pointer of Git LFS, not the file itself: run 'git lfs pull'",
+    }[path.stem]
+    with pytest.raises(fclib.FileError, match=re.escape(f"{path}: {words}")):
+        fclib.read(path)

@@ -9,6 +9,7 @@ is not run, with the reason that the page states.
 from __future__ import annotations
 
 import contextlib
+import os
 import re
 import shlex
 import shutil
@@ -45,7 +46,19 @@ OTHERS = [
     for b in blocks
     if b.language not in ("python", "sh", *WORDS) and b.runs
 ]
-LANGUAGES = {"python", "sh", "toml", "c", "cpp", "fortran", "cmake", "js", *WORDS}
+LANGUAGES = {
+    "python",
+    "sh",
+    "toml",
+    "c",
+    "cpp",
+    "fortran",
+    "cmake",
+    "js",
+    "octave",
+    "matlab",
+    *WORDS,
+}
 # what a page's Python uses and does not define, since it shows a part of a file
 BEFORE = {
     "docs/analysis.md": "import fclib\nproblem = fclib.read('problem.hdf5')",
@@ -277,6 +290,25 @@ def check_cmake(code: str, root: Path) -> None:
     assert target[1] in lists + config
 
 
+def run_octave(code: str, scratch: Path) -> None:
+    octave = shutil.which("octave-cli")
+    if octave is None:
+        pytest.skip("there is no Octave")
+    (scratch / "block.m").write_text(code)
+    fclib.write(scratch / "problem.hdf5", planted_local(1).problem)
+    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    done = subprocess.run(
+        [octave, "--no-init-file", "block.m"],
+        cwd=scratch,
+        env=os.environ | {"PATH": programs},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    line = done.stdout.splitlines()[-1]
+    assert line in ("6 contacts, 324 entries in W", "0 errors"), done.stdout
+
+
 @pytest.mark.parametrize("block", OTHERS, ids=str)
 def test_blocks_in_other_languages(block: Block, scratch: Path, root: Path) -> None:
     if block.language == "toml":
@@ -284,6 +316,9 @@ def test_blocks_in_other_languages(block: Block, scratch: Path, root: Path) -> N
         return
     if block.language == "cmake":
         check_cmake(block.code, root)
+        return
+    if block.language == "octave":
+        run_octave(block.code, scratch)
         return
     suffix = {"c": ".c", "cpp": ".cpp", "fortran": ".f90"}[block.language]
     source = scratch / f"block{suffix}"

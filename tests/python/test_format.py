@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fclib
+import odd_files
 from capi_library import compile_program
 from doc_blocks import blocks_of
 from helpers import STORAGES, dense, planted_global, planted_local, planted_rolling
@@ -240,6 +241,18 @@ int main(int argc, char** argv) {
 
 
 @pytest.mark.skipif(not PEER.is_file(), reason="libfclib-dev 3.1 is not installed")
+def test_odd_files(reader: Any, tmp_path: Path) -> None:
+    read = 0
+    for odd in odd_files.make(tmp_path):
+        try:
+            problem = fclib.read(odd.path)
+        except fclib.Error:
+            continue
+        read += 1
+        assert_same(reader(odd.path)[0][odd.kind], problem)
+    assert read > 90
+
+
 def test_what_libfclib_writes(reader: Any, tmp_path: Path) -> None:
     source, path = tmp_path / "write.c", tmp_path / "theirs.hdf5"
     source.write_text(WRITE)

@@ -26,10 +26,11 @@ Spoil = Callable[[h5py.File], None]
 
 
 def replace(name: str, value: object) -> Spoil:
-    """Put another value in place of a dataset or a group."""
+    """Put another value in place of a dataset or a group, or where there is none."""
 
     def spoil(file: h5py.File) -> None:
-        del file[name]
+        if name in file:
+            del file[name]
         file[name] = value
 
     return spoil
@@ -56,15 +57,6 @@ def resize(name: str, by: int) -> Spoil:
         values = file[name][()]
         del file[name]
         file[name] = values[:by] if by < 0 else np.append(values, [values[-1]] * by)
-
-    return spoil
-
-
-def reshape(name: str) -> Spoil:
-    def spoil(file: h5py.File) -> None:
-        values = file[name][()]
-        del file[name]
-        file[name] = values.reshape(1, -1)
 
     return spoil
 
@@ -160,6 +152,65 @@ def dense_of_wrong_size(file: h5py.File) -> None:
     file[f"{ROOT}/W/nz"][0] = -3
 
 
+def dense_of_two_dimensions(file: h5py.File) -> None:
+    """Rows or columns first? Nobody can tell."""
+    file[f"{ROOT}/W/nz"][0] = -3
+    replace(f"{ROOT}/W/x", np.eye(18))(file)
+
+
+def never_written(name: str, **layout: Any) -> Spoil:
+    """Declared as it was, and left so."""
+
+    def spoil(file: h5py.File) -> None:
+        shape, dtype = file[name].shape, file[name].dtype
+        del file[name]
+        file.create_dataset(name, shape=shape, dtype=dtype, **layout)
+
+    return spoil
+
+
+def half_written(name: str, **layout: Any) -> Spoil:
+    """The first chunks alone."""
+
+    def spoil(file: h5py.File) -> None:
+        values = file[name][()]
+        never_written(name, chunks=(4,), **layout)(file)
+        file[name][:4] = values[:4]
+
+    return spoil
+
+
+def no_counts(file: h5py.File) -> None:
+    file[f"{ROOT}/W/p"][:] = 0
+
+
+def no_triplets(file: h5py.File) -> None:
+    triplets(0, 0, 0)(file)
+    file[f"{ROOT}/R/nz"][0] = 0
+
+
+def packed(name: str, value: object) -> Spoil:
+    def spoil(file: h5py.File) -> None:
+        file[name].attrs["symmetric_packed"] = value
+
+    return spoil
+
+
+def spoil_contacts(file: h5py.File) -> None:
+    group = file.create_group("contacts")
+    group.attrs.create("layout", np.bytes_("FCLIB geometry 1"), dtype="S17")
+    group.create_dataset("gap", shape=(6,), dtype="<f8")
+
+
+def make_guesses(file: h5py.File) -> None:
+    file.create_group("guesses/mine")
+
+
+def room_with_numbers(file: h5py.File) -> None:
+    for name in ("i", "x"):
+        resize(f"{ROOT}/R/{name}", 2)(file)
+
+
 def rename(old: str, new: str) -> Spoil:
     def spoil(file: h5py.File) -> None:
         file.move(old, new)
@@ -193,19 +244,21 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
         for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q", "vectors/mu")
     },
     **{
-        f"real numbers in {name}": (replace(f"{ROOT}/{name}", [3.0]), f"{ROOT}/{name}")
+        f"no integers in {name}": (
+            replace(f"{ROOT}/{name}", [3.5]),
+            f"{ROOT}/{name}[0]: 3.5 is not",
+        )
         for name in ("spacedim", "W/n", "W/nz", "W/p", "W/i")
+    },
+    **{
+        f"{value} for an integer": (replace(f"{ROOT}/spacedim", [value]), f"{ROOT}/spacedim[0]")
+        for value in (np.nan, np.inf, 2.0**31, -(2.0**40))
     },
     "complex numbers": (replace(f"{ROOT}/vectors/q", np.ones(18) * 1j), f"{ROOT}/vectors/q"),
     "truth values": (replace(f"{ROOT}/vectors/q", np.ones(18, bool)), f"{ROOT}/vectors/q"),
     "nothing": (replace(f"{ROOT}/vectors/q", h5py.Empty("f8")), f"{ROOT}/vectors/q"),
-    "numbers in title": (replace(f"{ROOT}/info/title", [1, 2]), f"{ROOT}/info/title"),
-    "texts in title": (replace(f"{ROOT}/info/title", ["a", "b"]), f"{ROOT}/info/title"),
     # of the wrong shape
-    **{
-        f"two dimensions in {name}": (reshape(f"{ROOT}/{name}"), f"{ROOT}/{name}")
-        for name in ("W/x", "W/i", "vectors/q", "vectors/mu")
-    },
+    "dense of two dimensions": (dense_of_two_dimensions, f"{ROOT}/W/x: has more than one"),
     **{
         f"{name} {'short' if by < 0 else 'long'}": (resize(f"{ROOT}/{name}", by), f"{ROOT}/{names}")
         for name, by, names in (
@@ -319,10 +372,42 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
         declare(f"{ROOT}/W/x", "<f8", 2**60),
         f"{ROOT}/W/x: declares",
     ),
-    "a huge title": (
-        declare_text(f"{ROOT}/info/title"),
-        f"{ROOT}/info/title",
-    ),
+    # declared, and written in part or not at all
+    **{
+        f"{name} never written": (
+            never_written(f"{ROOT}/{name}"),
+            f"{ROOT}/{name}: was declared and never written",
+        )
+        for name in LOCAL_NAMES
+        if name not in ("W", "vectors")
+    },
+    **{
+        f"q never written, {word}": (
+            never_written(f"{ROOT}/vectors/q", **layout),
+            f"{ROOT}/vectors/q: was declared and never written",
+        )
+        for word, layout in {
+            "in chunks": {"chunks": (4,)},
+            "packed": {"chunks": (4,), "compression": "gzip"},
+            "with a fill value": {"fillvalue": 0.5},
+            "without end": {"maxshape": (None,)},
+        }.items()
+    },
+    **{
+        f"{name} half written{', packed' if layout else ''}": (
+            half_written(f"{ROOT}/{name}", **layout),
+            f"{ROOT}/{name}: was written in part",
+        )
+        for name in ("W/x", "W/p", "vectors/q", "vectors/mu")
+        for layout in ({}, {"compression": "gzip", "shuffle": True})
+    },
+    "all pointers 0": (no_counts, f"{ROOT}/W/p: says that there is no entry"),
+    "no triplets of two": (no_triplets, f"{ROOT}/R/nz: says that there is no entry"),
+    # a triangle of a symmetric matrix
+    "a triangle that is the whole": (packed(f"{ROOT}/W", 1), f"{ROOT}/W: is said to be one"),
+    "a triangle that is not square": (packed(f"{ROOT}/V", 1), f"{ROOT}/V: is said to be a packed"),
+    "a triangle in words": (packed(f"{ROOT}/W", "yes"), "symmetric_packed: is not a number"),
+    "two triangles": (packed(f"{ROOT}/W", 2), "symmetric_packed: is not a number"),
     # links
     "a dangling soft link": (
         replace(f"{ROOT}/vectors/q", h5py.SoftLink("/nowhere")),
@@ -348,11 +433,11 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
             replace(f"{ROOT}/{name}".rstrip("/"), [1.0]),
             f"{ROOT}/{name}".rstrip("/"),
         )
-        for name in ("", "W", "V", "vectors", "info")
+        for name in ("", "W", "V", "vectors")
     },
     **{
         f"a group in place of {name}": (make_group(f"{ROOT}/{name}"), f"{ROOT}/{name}")
-        for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q", "info/title")
+        for name in ("spacedim", "W/m", "W/nz", "W/p", "W/x", "vectors/q")
     },
     "a type in place of q": (
         replace(f"{ROOT}/vectors/q", np.dtype("f8")),
@@ -380,6 +465,41 @@ GLOBAL: dict[str, tuple[Spoil, str]] = {
 }
 
 CASES = LOCAL | GLOBAL
+
+# what a problem can do without, and the words about it
+OPTIONAL: dict[str, tuple[Spoil, str]] = {
+    "numbers in title": (replace(f"{ROOT}/info/title", [1, 2]), "info/title: does not hold text"),
+    "texts in title": (replace(f"{ROOT}/info/title", ["a", "b"]), "info/title: holds 2 texts"),
+    "title of many dimensions": (
+        replace(f"{ROOT}/info/title", np.zeros((2, 2), "u1")),
+        "info/title: does not hold text",
+    ),
+    "a huge title": (declare_text(f"{ROOT}/info/title"), "info/title: declares a text"),
+    "title never written": (
+        never_written(f"{ROOT}/info/title"),
+        "info/title: was declared and never written",
+    ),
+    "a group in place of title": (make_group(f"{ROOT}/info/title"), "info/title: is not a dataset"),
+    "a title elsewhere": (
+        replace(f"{ROOT}/info/title", h5py.ExternalLink("nothing.hdf5", "/title")),
+        "info/title: is an external link to '/title' of the file 'nothing.hdf5'",
+    ),
+    "a dataset in place of info": (replace(f"{ROOT}/info", [1.0]), f"{ROOT}/info: is not a group"),
+    "no such info": (
+        replace(f"{ROOT}/info", h5py.SoftLink("/nowhere")),
+        f"{ROOT}/info: is a link to '/nowhere'",
+    ),
+    "words for a rank": (replace(f"{ROOT}/W/rank", "full"), "W/rank: does not hold numbers"),
+    "several ranks": (replace(f"{ROOT}/W/rank", [1, 2]), "W/rank: has 2 entries"),
+    "numbers for a comment": (replace(f"{ROOT}/W/comment", [1.0]), "W/comment: does not hold text"),
+    "contacts of no table": (spoil_contacts, "/contacts/gap: was declared and never written"),
+    "no such solution": (
+        replace("solution", h5py.SoftLink("/nowhere")),
+        "/solution: is a link to '/nowhere'",
+    ),
+    "guesses of others": (make_guesses, "/guesses/number_of_guesses: the dataset is missing"),
+    "entries that nobody counts": (room_with_numbers, "R/x: has 6 entries, of which 4"),
+}
 
 
 @pytest.fixture(scope="module")
@@ -417,6 +537,28 @@ def test_a_spoilt_file_is_refused_and_the_dataset_named(corpus: Path, case: str)
     assert CASES[case][1] in message.removeprefix(str(path))
     assert "\n" not in message
     assert len(message) < len(str(path)) + 200
+
+
+@pytest.mark.parametrize("case", OPTIONAL)
+def test_what_is_optional_never_costs_the_problem(corpus: Path, tmp_path: Path, case: str) -> None:
+    path = path_of(tmp_path, case)
+    path.write_bytes((corpus / "good.hdf5").read_bytes())
+    with h5py.File(path, "a") as file:
+        OPTIONAL[case][0](file)
+    good, problem = fclib.read(corpus / "good.hdf5"), fclib.read(path)
+    assert fclib.digest(problem) == fclib.digest(good)
+    assert problem.info.title == ""
+    (line,) = fclib.left_out(path)
+    assert OPTIONAL[case][1] in line
+    run = helpers_cli.run("info", str(path))
+    assert run.returncode == 0, run.stderr
+    assert run.stderr == f"fclib: {path}: {line}: left out\n"
+    assert helpers_cli.run("solve", str(path)).returncode == 0
+
+
+def test_nothing_is_left_out_of_a_good_file(corpus: Path) -> None:
+    assert fclib.left_out(corpus / "good.hdf5") == []
+    assert fclib.left_out(corpus / "whole.hdf5") == []
 
 
 @pytest.mark.parametrize("command", [["info"], ["solve"], ["check"], ["solve", "--write"]])
@@ -669,8 +811,7 @@ SOLUTIONS: dict[str, tuple[Spoil, str]] = {
     "nan in r": (change("solution/r", 2, np.nan), "/solution/r[2]"),
     "inf in u": (change("solution/u", 0, np.inf), "/solution/u[0]"),
     "text in r": (replace("solution/r", "text"), "/solution/r"),
-    "two dimensions in r": (reshape("solution/r"), "/solution/r"),
-    "a huge r": (declare("solution/r", "<f8"), "/solution/r"),
+    "r never written": (declare("solution/r", "<f8"), "no solution"),
     "a dataset in place of the solution": (replace("solution", [1.0]), "/solution"),
     "a dangling link in place of l": (
         replace("solution/l", h5py.SoftLink("/nowhere")),
@@ -711,8 +852,5 @@ def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) 
     run = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=100, check=False
     )
-    if name == "solution":
-        assert run.stdout == "None\n"
-    else:
-        assert f"/{name}: the " in run.stderr
-        assert "is missing" in run.stderr
+    words = "is an external link to '/there' of the file 'pipe', which is not followed"
+    assert f"/{name}: {words}" in run.stderr

@@ -5,6 +5,8 @@ Each part is skipped where the other program is not installed.
 
 import itertools
 import json
+import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,6 +21,8 @@ import scipy.sparse as sp
 
 import browser_module
 import fclib
+import odd_files
+from capi_library import library_folder
 from fclib import scenes
 from helpers import dense, judge, planted_global, planted_local
 
@@ -167,7 +171,7 @@ Peer = Callable[..., str]
 
 
 @pytest.fixture(scope="module")
-def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
+def peer_program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A program that uses libfclib 3.1."""
     compiler = shutil.which("cc") or shutil.which("gcc")
     config = shutil.which("pkg-config")
@@ -185,10 +189,16 @@ def peer(tmp_path_factory: pytest.TempPathFactory) -> Peer:
     subprocess.run(
         [compiler, "-std=gnu11", "-o", program, source, *flags.stdout.split()], check=True
     )
+    return program
+
+
+@pytest.fixture(scope="module")
+def peer(peer_program: Path) -> Peer:
+    """Runs that program, which must succeed."""
 
     def run(*arguments: object) -> str:
         done = subprocess.run(
-            [program, *map(str, arguments)], capture_output=True, text=True, timeout=300
+            [peer_program, *map(str, arguments)], capture_output=True, text=True, timeout=300
         )
         assert done.returncode == 0, done.stdout[-500:] + done.stderr[-500:]
         return done.stdout
@@ -380,6 +390,123 @@ def test_we_read_what_libfclib_writes_without_contacts(peer: Peer, tmp_path: Pat
         problem = fclib.read(path)
         assert (problem.kind, problem.nc, problem.m) == (kind, 0, 0)
         assert fclib.solve(problem).converged
+
+
+# what 3.1 reads, and we refuse or read otherwise
+WRONG_IN_3_1 = {
+    "a vector longer": "it writes past an array",
+    "pointers longer": "it writes past an array",
+    "triplets not counted": "it writes past an array",
+    "two numbers for one": "it writes past a number",
+    "nzmax too small": "it writes past an array",
+    "a vector shorter": "it hands out numbers that are in no file",
+    "entries shorter": "it hands out numbers that are in no file",
+    "integers beyond 32 bits": "it clips them",
+    "no integers": "it cuts them",
+    "truth values": "it takes them for numbers",
+    "scale-offset": "HDF5 trusts what it unpacks, and a damaged file may end the process",
+    "a vector never written": "it takes fill values for data",
+    "pointers never written": "it takes fill values for data",
+    "values never written": "it takes fill values for data",
+    "values never written in chunks": "it takes fill values for data",
+    "values with a fill value": "it takes fill values for data",
+    "values half written": "it takes fill values for data",
+    "a triangle": "it takes a triangle for the whole matrix",
+    "nothing as a title": "it asks for no memory",
+}
+# files of which 3.1 hands out a title that is longer than it should be, or no text at all: it asks
+# for the memory of one element, and looks for no end
+ONLY_THE_PROBLEM = (
+    "texts of variable length",
+    "texts without NUL",
+    "an empty text",
+    "bytes",
+    "bytes in a row",
+    "several texts",
+    "several texts of any length",
+    "numbers as a title",
+    "nothing as a title",
+)
+# read as they are by the C libraries, which check no value; no problem
+INVALID = ("an index beyond", "a number that is none", "pointers all zero")
+
+
+def test_odd_files_are_read_as_libfclib_reads_them(peer_program: Path, tmp_path: Path) -> None:
+    ours = os.environ | {"LD_LIBRARY_PATH": str(library_folder())}
+    count, read, refused = 0, 0, set()
+    for odd in odd_files.make(tmp_path):
+        count += 1
+        done, mine = (
+            subprocess.run(
+                [peer_program, "show", odd.kind, odd.path],
+                capture_output=True,
+                env=environment,
+                timeout=60,
+            )
+            for environment in (dict(os.environ), ours)
+        )
+        # ours never ends its host: it returns NULL, and the program 1
+        assert mine.returncode in (0, 1), (odd, mine.stderr)
+        if mine.returncode:
+            assert odd.path.name.encode() in mine.stderr, odd
+        if done.returncode or odd.name in WRONG_IN_3_1:
+            if mine.returncode:
+                refused.add(odd.name)
+            continue
+        read += 1
+        assert mine.returncode == 0, (odd, mine.stderr)
+        if odd.name in INVALID:
+            assert mine.stdout == done.stdout
+            with pytest.raises(fclib.Error):
+                fclib.read(odd.path)
+            continue
+        again = json.loads(mine.stdout)
+        theirs = done.stdout
+        if odd.name in ONLY_THE_PROBLEM:
+            title = json.dumps(again["title"]).encode()
+            theirs = re.sub(
+                rb'"title": ".*", "solution"',
+                b'"title": ' + title + b', "solution"',
+                theirs,
+                flags=re.DOTALL,
+            )
+        seen = json.loads(theirs)
+        for matrix in (a for one in (seen, again) for a in one.values() if isinstance(a, dict)):
+            del matrix["nzmax"]  # ours is the length of x
+        assert again == seen, odd
+        assert_seen(fclib.read(odd.path), None, again)
+    assert count >= 120
+    assert read >= 80
+    # each of these is refused with a word, not read
+    assert refused <= {*WRONG_IN_3_1, *NOT_IN_3_1}, refused
+
+
+# what neither reads
+NOT_IN_3_1 = ("complex numbers", "no storage", "a dangling link", "a dangling external link")
+
+
+def test_titles_of_other_types_are_read_or_left_out(tmp_path: Path) -> None:
+    titles = {
+        "texts of variable length": "of any length",
+        "texts without NUL": "title",
+        "texts in a row": "title",
+        "an empty text": "",
+        "bytes": "bytes as numbers",
+        "bytes in a row": "bytes",
+    }
+    odd = {one.name: one.path for one in odd_files.make(tmp_path) if one.kind == "local"}
+    for name, title in titles.items():
+        assert fclib.read(odd[name]).info.title == title
+        assert fclib.left_out(odd[name]) == []
+    for name, words in {
+        "several texts": "holds 3 texts, expected one",
+        "numbers as a title": "does not hold text",
+        "nothing as a title": "holds 0 texts, expected one",
+    }.items():
+        assert fclib.read(odd[name]).info.title == ""
+        assert fclib.left_out(odd[name]) == [f"/fclib_local/info/title: {words}"]
+    (line,) = fclib.left_out(odd["a rank of the wrong type"])
+    assert line == "/fclib_local/W/rank: does not hold numbers"
 
 
 @pytest.fixture(scope="module")

@@ -160,16 +160,20 @@ def test_condensation_agrees_with_that_of_the_index(real_data: Path) -> None:
     assert pairs >= 5
 
 
-def test_stored_solutions_are_not_believed(real_data: Path) -> None:
-    judged = 0
+def test_stored_vectors_are_not_believed(real_data: Path) -> None:
+    unwritten = judged = 0
     for path in files(*KINDS):
-        solution = fclib.read_solution(path)
-        if solution is None:
-            continue
+        # their writer was given no reactions: HDF5 would read zeros
+        if "/solution/r: was declared and never written" in fclib.left_out(path):
+            unwritten += 1
+            assert fclib.read_solution(path) is None
+            assert "solution" not in fclib.contents(path)
         problem = fclib.read(path)
-        merit = fclib.merit(problem, solution)
-        judged += 1
-        assert abs(merit.error - judge(problem, solution).error) <= EXACT * max(1, merit.error)
+        for guess in fclib.read_guesses(path):
+            merit = fclib.merit(problem, guess)
+            judged += 1
+            assert abs(merit.error - judge(problem, guess).error) <= EXACT * max(1, merit.error)
+    assert unwritten > 0
     assert judged > 0
 
 

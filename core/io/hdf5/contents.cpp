@@ -12,7 +12,11 @@ std::vector<std::string> kinds_of(const Group& root) {
   return kinds;
 }
 
-namespace {
+bool has_solution(const Group& root) {
+  if (!root.has("solution")) return false;
+  const Handle group(H5Gopen2(root.id, "solution", H5P_DEFAULT), H5Gclose);
+  return !group.ok() || !is_unwritten({group.id(), root.child("solution")}, "r");
+}
 
 Index count_of(const Group& root, const Numbered& list) {
   if (!root.has(list.group)) return 0;
@@ -23,14 +27,26 @@ Index count_of(const Group& root, const Numbered& list) {
   return count;
 }
 
+namespace {
+
+/// What `read` returns, or this where it fails.
+template <class Value, class Read>
+Value value_or(Value otherwise, const Read& read) {
+  try {
+    return read();
+  } catch (const Error&) {
+    return otherwise;
+  }
+}
+
 }  // namespace
 
 Contents contents_of(const Group& root) {
   Contents contents;
   contents.kinds = kinds_of(root);
-  contents.solution = root.has("solution");
-  contents.guesses = count_of(root, guesses_list);
-  contents.solutions = count_of(root, solutions_list);
+  contents.solution = value_or(true, [&] { return has_solution(root); });
+  contents.guesses = value_or(0, [&] { return count_of(root, guesses_list); });
+  contents.solutions = value_or(0, [&] { return count_of(root, solutions_list); });
   return contents;
 }
 
@@ -52,7 +68,7 @@ P read_sizes(const Group& root) {
       group, [&]<class Member>(const Field<P, Member>& field, const Group& place) {
         const std::string name(field.name);
         if constexpr (std::is_same_v<Member, Vector>) {
-          if (field.member == &P::mu) contacts = open_numbers(place, name, false).size;
+          if (field.member == &P::mu) contacts = open_numbers(place, name).size;
         } else if constexpr (std::is_same_v<Member, Matrix>) {
           const Handle matrix = open_group(place, name);
           problem.*field.member = read_matrix_sizes<Matrix>({matrix.id(), place.child(name)});

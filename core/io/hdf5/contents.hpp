@@ -22,6 +22,13 @@ struct Numbered {
 constexpr Numbered guesses_list{"guesses", "number_of_guesses"};
 constexpr Numbered solutions_list{"solutions", "number_of_solutions"};
 
+/// Whether there is a solution: a group whose reactions were never written is none.
+bool has_solution(const Group& root);
+
+/// How many a list has; 0 where it is not there.
+Index count_of(const Group& root, const Numbered& list);
+
+/// A solution or a list that cannot be read does not keep its problem from being read.
 Contents contents_of(const Group& root);
 
 /// The kind of the problem that a solution of the file belongs to.

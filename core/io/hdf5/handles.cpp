@@ -4,12 +4,17 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
+#include <sstream>
 
 #include "io/hdf5/library.hpp"
+#include "number_text.hpp"
 
 namespace fclib::hdf5 {
 
@@ -32,15 +37,48 @@ std::mutex& library_mutex() {
   return instance;
 }
 
-/// Whether an external link may be followed: HDF5 would wait for ever at the end of a pipe.
-herr_t follow_to_files_alone(const char* from, const char*, const char* to, const char*, unsigned*,
-                             hid_t, void*) {
-  for (const fs::path& target : {fs::path(to), fs::path(from).parent_path() / to}) {
-    std::error_code error;
-    const auto status = fs::status(target, error);
-    if (fs::exists(status) && !fs::is_regular_file(status)) return -1;
+/// Where HDF5 looks for the file of an external link.
+std::array<fs::path, 2> places_of(const char* from, const char* to) {
+  return {fs::path(to), fs::path(from).parent_path() / to};
+}
+
+/// No external link is followed: a file from elsewhere could name any file of its reader's.
+herr_t follow_none(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
+  return -1;
+}
+
+/// What is wrong with a name that leads to no object.
+std::string words_of_link(hid_t group, const std::string& name) {
+  H5L_info_t link;
+  const bool known = H5Lget_info(group, name.c_str(), &link, H5P_DEFAULT) >= 0;
+  if (!known || link.type == H5L_TYPE_HARD) {
+    return "cannot be looked up by HDF5 (the file is damaged)";
   }
-  return 0;
+  std::string value(link.u.val_size + 1, '\0');
+  if (H5Lget_val(group, name.c_str(), value.data(), value.size(), H5P_DEFAULT) < 0) {
+    return "is a link that HDF5 cannot read";
+  }
+  if (link.type == H5L_TYPE_SOFT) {
+    return "is a link to " + quoted(value.c_str()) + ", which is not there";
+  }
+  const char* file = nullptr;
+  const char* object = nullptr;
+  if (link.type != H5L_TYPE_EXTERNAL ||
+      H5Lunpack_elink_val(value.data(), link.u.val_size, nullptr, &file, &object) < 0) {
+    return "is a link of a kind that is not followed";
+  }
+  std::string own(
+      static_cast<std::size_t>(std::max<ssize_t>(H5Fget_name(group, nullptr, 0), 0)) + 1, '\0');
+  H5Fget_name(group, own.data(), own.size());
+  bool there = false;
+  for (const fs::path& target : places_of(own.c_str(), file)) {
+    std::error_code error;
+    there = there || fs::exists(target, error);
+  }
+  const std::string words =
+      "is an external link to " + quoted(object) + " of the file " + quoted(file) + ", ";
+  return words + (there ? "which is not followed" : "which is not there") +
+         ": copy what it links to into this file";
 }
 
 Session* current = nullptr;  // under the lock
@@ -52,6 +90,54 @@ bool is_being_written(const std::string& path) {
   const bool locked = flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
   close(file);
   return locked;
+}
+
+/// The bytes of a file from a place on, as many as there are.
+std::string bytes_of(const std::string& path, std::size_t from, std::size_t count) {
+  std::ifstream file(path, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(from));
+  std::string bytes(count, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(count));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
+}
+
+/// Why an HDF5 file cannot be opened. A program that opens one to write it in a newer format says
+/// so in byte 11 of its superblock, and takes that back at the end.
+std::string what_is_wrong_with(const std::string& path) {
+  constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
+  constexpr std::size_t version = 8;
+  constexpr std::size_t flags = 11;
+  // HDF5 looks for its superblock at 0, 512, 1024, 2048, ...
+  for (std::size_t at = 0;; at = at == 0 ? 512 : 2 * at) {
+    const std::string block = bytes_of(path, at, flags + 1);
+    if (block.size() <= flags) break;
+    if (!block.starts_with(signature)) continue;
+    if (block[version] < 2 || block[flags] == 0) break;
+    return "was not closed by the program that wrote it. If that program has ended, run 'h5clear "
+           "-s " +
+           path + "'; what it had not yet written is missing";
+  }
+  return "cannot be opened by HDF5 (the file is damaged or cut short)";
+}
+
+/// What a file is that is no HDF5 file.
+std::string what_else_is(const std::string& path) {
+  constexpr std::size_t enough = 256;
+  const std::string start = bytes_of(path, 0, enough);
+  if (start.empty()) return "is not an HDF5 file: it is empty";
+  if (start.starts_with("version https://git-lfs.github.com/spec/")) {
+    return "is a pointer of Git LFS, not the file itself: run 'git lfs pull'";
+  }
+  // that of Siconos begins with the components of a contact, the contacts, and a storage
+  int numbers[3] = {};
+  std::istringstream text(start);
+  for (int& number : numbers) text >> number;
+  if (text && numbers[0] >= 2 && numbers[0] <= 5 && numbers[1] >= 0 && numbers[2] >= 0) {
+    return "is not an HDF5 file. If it is the text of Siconos (.dat), convert it: 'fclib convert " +
+           path + " NEW.hdf5'";
+  }
+  return "is not an HDF5 file";
 }
 
 }  // namespace
@@ -80,7 +166,7 @@ hid_t Session::link_access() {
   std::optional<Handle>& made = current->link_access_;
   if (!made) {
     made.emplace(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
-    H5Pset_elink_cb(made->id(), follow_to_files_alone, nullptr);
+    H5Pset_elink_cb(made->id(), follow_none, nullptr);
   }
   return made->id();
 }
@@ -91,10 +177,10 @@ std::string Group::child(std::string_view name) const {
 
 bool Group::has(const std::string& name) const {
   if (H5Oexists_by_name(id, name.c_str(), Session::link_access()) > 0) return true;
-  // what cannot be looked up is not what is not there
-  if (H5Lexists(id, name.c_str(), H5P_DEFAULT) < 0) {
-    fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
-  }
+  // what cannot be looked up is not what is not there, nor is a link to nothing
+  const htri_t found = H5Lexists(id, name.c_str(), H5P_DEFAULT);
+  if (found < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+  if (found > 0) fail(child(name), words_of_link(id, name));
   return false;
 }
 
@@ -117,9 +203,7 @@ Handle open_file(const std::string& path) {
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file.ok()) {
     if (is_being_written(path)) fail("", "another program has it open, and may write to it");
-    fail("", H5Fis_hdf5(path.c_str()) > 0
-                 ? "cannot be opened by HDF5 (the file is damaged or cut short)"
-                 : "is not an HDF5 file");
+    fail("", H5Fis_hdf5(path.c_str()) > 0 ? what_is_wrong_with(path) : what_else_is(path));
   }
   return file;
 }

@@ -70,6 +70,7 @@ struct Group {
   std::string path;
 
   [[nodiscard]] std::string child(std::string_view name) const;
+  /// Whether there is an object of this name. Fails where the name is a link to nothing.
   [[nodiscard]] bool has(const std::string& name) const;
 };
 

@@ -9,6 +9,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -68,6 +69,30 @@ struct RawMatrix {
   MallocArray<double> x;
   std::optional<MatrixInfo> info;
 };
+
+template <class Numbers>
+auto malloc_copy(const Numbers& values) {
+  using Number = std::remove_cvref_t<decltype(values[0])>;
+  MallocArray<Number> copy(static_cast<std::size_t>(values.size()));
+  std::copy(values.begin(), values.end(), copy.data());
+  return copy;
+}
+
+/// A matrix of the core's as one of a file.
+inline RawMatrix raw_copy(const Matrix& a) {
+  RawMatrix raw{.storage = a.storage,
+                .rows = a.rows,
+                .cols = a.cols,
+                .p = {},
+                .i = {},
+                .x = malloc_copy(a.x),
+                .info = a.info};
+  if (a.storage != Storage::dense) {
+    raw.p = malloc_copy(a.p);
+    raw.i = malloc_copy(a.i);
+  }
+  return raw;
+}
 
 /// A problem as a file has it: its arrays have the lengths that the matrices declare, nothing else
 /// is checked.

@@ -20,7 +20,12 @@ struct Contents {
 
 Contents read_contents(const std::string& path);
 
-/// The problem in the file, validated. `kind` chooses where there are several.
+/// What a file has beside its problems that cannot be read, such as a title of another type, and
+/// why. The reads below leave it out. Throws where a problem cannot be read.
+std::vector<std::string> read_left_out(const std::string& path);
+
+/// The problem in the file, validated. What it can do without is left out where it cannot be read.
+/// `kind` chooses where there are several.
 Problem read_problem(const std::string& path, std::string_view kind = {});
 
 /// The problem that the solution and the guesses of the file belong to, its sizes alone: matrices

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
+
+#include "number_text.hpp"
 
 namespace fclib::hdf5 {
 
@@ -62,6 +65,57 @@ void require_chunks(const Handle& properties, hid_t dataset, double entries, dou
   }
 }
 
+/// How many chunks a dataset needs for all its entries.
+double chunks_needed(const Handle& properties, const Handle& space) {
+  hsize_t chunk[H5S_MAX_RANK] = {};
+  hsize_t extent[H5S_MAX_RANK] = {};
+  const int rank = H5Pget_chunk(properties.id(), H5S_MAX_RANK, chunk);
+  if (rank < 1 || H5Sget_simple_extent_dims(space.id(), extent, nullptr) != rank) return 0;
+  double count = 1;
+  for (int k = 0; k < rank; ++k) {
+    count *= std::ceil(static_cast<double>(extent[k]) / static_cast<double>(chunk[k]));
+  }
+  return count;
+}
+
+/// Whether the file has no room for a dataset that has entries, and properties.
+bool is_unwritten(const Handle& dataset, const Handle& properties, std::size_t size) {
+  H5D_space_status_t status = H5D_SPACE_STATUS_ERROR;
+  return size > 0 && H5Pget_layout(properties.id()) != H5D_COMPACT &&
+         H5Dget_space_status(dataset.id(), &status) >= 0 &&
+         status == H5D_SPACE_STATUS_NOT_ALLOCATED;
+}
+
+/// Throws where entries were declared and never written: HDF5 would read its fill value for them.
+void require_written(const Handle& dataset, const Handle& properties, const Handle& space,
+                     std::size_t size, const std::string& path) {
+  if (size == 0 || !properties.ok()) return;
+  if (is_unwritten(dataset, properties, size)) {
+    fail(path, "was declared and never written: its data are missing");
+  }
+  const H5D_layout_t layout = H5Pget_layout(properties.id());
+#if H5_VERSION_GE(1, 10, 5)
+  hsize_t written = 0;
+  if (layout == H5D_CHUNKED && H5Dget_num_chunks(dataset.id(), space.id(), &written) >= 0 &&
+      static_cast<double>(written) < chunks_needed(properties, space)) {
+    fail(path, "was written in part: some of its data are missing");
+  }
+#endif
+}
+
+/// How many entries a dataset has.
+std::size_t size_of(const Handle& space, const std::string& path) {
+  const hssize_t points = H5Sget_simple_extent_npoints(space.id());
+  if (points < 0) fail(path, "has no size");
+  return static_cast<std::size_t>(points);
+}
+
+bool is_flat(const Handle& space) {
+  hsize_t extents[H5S_MAX_RANK] = {};
+  const int rank = H5Sget_simple_extent_dims(space.id(), extents, nullptr);
+  return std::count_if(extents, extents + std::max(rank, 0), [](hsize_t n) { return n != 1; }) <= 1;
+}
+
 /// Why HDF5 could not read a dataset.
 std::string reason_of(const Numbers& dataset) {
   const Handle properties(H5Dget_create_plist(dataset.id.id()), H5Pclose);
@@ -89,20 +143,16 @@ void read_as(const Numbers& dataset, hid_t memory, void* values) {
 
 }  // namespace
 
-Numbers open_numbers(const Group& group, const std::string& name, bool integers) {
+Numbers open_numbers(const Group& group, const std::string& name) {
   const std::string path = group.child(name);
   if (!group.has(name)) fail(path, "the dataset is missing");
   Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
   if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);
   const H5T_class_t kind = H5Tget_class(type.id());
-  if (integers && kind != H5T_INTEGER) fail(path, "does not hold integers");
   if (kind != H5T_INTEGER && kind != H5T_FLOAT) fail(path, "does not hold numbers");
   const Handle space(H5Dget_space(dataset.id()), H5Sclose);
-  const hssize_t points = H5Sget_simple_extent_npoints(space.id());
-  if (points < 0) fail(path, "has no size");
-  if (H5Sget_simple_extent_ndims(space.id()) > 1) fail(path, "has more than one dimension");
-  const auto size = static_cast<std::size_t>(points);
+  const std::size_t size = size_of(space, path);
   const auto entry_size = static_cast<double>(H5Tget_size(type.id()));
   const double bytes = static_cast<double>(size) * entry_size;
   const Handle properties = properties_of(dataset.id(), path);
@@ -111,13 +161,28 @@ Numbers open_numbers(const Group& group, const std::string& name, bool integers)
     fail(path, "declares " + std::to_string(size) + " entries, but the file does not hold them");
   }
   require_chunks(properties, dataset.id(), static_cast<double>(size), entry_size, path);
+  require_written(dataset, properties, space, size, path);
   if (size > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
     fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
   }
   const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
                                                  (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
-  return {std::move(dataset), path, size, narrow,
+  return {std::move(dataset),
+          path,
+          size,
+          kind == H5T_FLOAT,
+          narrow,
+          is_flat(space),
           properties.ok() ? packing_of(properties.id()) : Packing()};
+}
+
+bool is_unwritten(const Group& group, const std::string& name) {
+  if (!group.has(name)) return false;
+  const Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!dataset.ok()) return false;
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  const Handle properties = properties_of(dataset.id(), group.child(name));
+  return properties.ok() && is_unwritten(dataset, properties, size_of(space, group.child(name)));
 }
 
 void read_into(const Numbers& dataset, double* values) {
@@ -129,7 +194,21 @@ void read_into(const Numbers& dataset, std::int32_t* values) {
     read_as(dataset, H5T_NATIVE_INT32, values);
     return;
   }
-  // HDF5 would clip what does not fit
+  // HDF5 would clip what does not fit, and cut what is no integer
+  if (dataset.real) {
+    std::vector<double> wide(dataset.size);
+    read_into(dataset, wide.data());
+    for (std::size_t k = 0; k < wide.size(); ++k) {
+      using Limits = std::numeric_limits<std::int32_t>;
+      const bool fits = wide[k] >= Limits::min() && wide[k] <= Limits::max();
+      if (!fits || wide[k] != std::trunc(wide[k])) {
+        fail(dataset.path + "[" + std::to_string(k) + "]",
+             shortest(wide[k]) + " is not an integer of 32 bits");
+      }
+      values[k] = static_cast<std::int32_t>(wide[k]);
+    }
+    return;
+  }
   std::vector<std::int64_t> wide(dataset.size);
   read_as(dataset, H5T_NATIVE_INT64, wide.data());
   using Limits = std::numeric_limits<std::int32_t>;
@@ -144,16 +223,24 @@ void read_into(const Numbers& dataset, std::int32_t* values) {
 
 std::string read_text(const Group& group, const std::string& name) {
   const std::string path = group.child(name);
+  if (!group.has(name)) fail(path, "the dataset is missing");
   const Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
   if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
   const Handle type(H5Dget_type(dataset.id()), H5Tclose);
   const Handle space(H5Dget_space(dataset.id()), H5Sclose);
-  if (H5Tget_class(type.id()) != H5T_STRING) fail(path, "does not hold text");
-  if (H5Sget_simple_extent_npoints(space.id()) != 1) fail(path, "does not hold one text");
-  const std::size_t length = H5Tget_size(type.id());
+  const H5T_class_t kind = H5Tget_class(type.id());
+  const std::size_t points = size_of(space, path);
+  const bool as_bytes = kind == H5T_INTEGER && H5Tget_size(type.id()) == 1 && is_flat(space);
+  if (kind != H5T_STRING && !as_bytes) fail(path, "does not hold text");
+  if (points != 1 && !as_bytes) {
+    fail(path, "holds " + std::to_string(points) + " texts, expected one");
+  }
+  const std::size_t length = as_bytes ? points : H5Tget_size(type.id());
   const Handle properties = properties_of(dataset.id(), path);
-  require_chunks(properties, dataset.id(), 1, static_cast<double>(length), path);
+  const double entries = as_bytes ? static_cast<double>(points) : 1;
+  require_chunks(properties, dataset.id(), entries, static_cast<double>(length) / entries, path);
   if (H5Tis_variable_str(type.id()) > 0) {
+    require_written(dataset, properties, space, points, path);
     char* value = nullptr;
     if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, &value) < 0) {
       fail(path, "cannot be read");
@@ -166,6 +253,7 @@ std::string read_text(const Group& group, const std::string& name) {
     fail(path,
          "declares a text of " + std::to_string(length) + " bytes that the file does not hold");
   }
+  require_written(dataset, properties, space, points, path);
   std::string text(length, '\0');
   if (H5Dread(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()) < 0) {
     fail(path, "cannot be read");

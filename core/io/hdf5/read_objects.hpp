@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "io/hdf5/chunks.hpp"
@@ -12,16 +11,24 @@
 
 namespace fclib::hdf5 {
 
-/// An open dataset of numbers whose type and size have been looked at, and found believable.
+/// An open dataset of numbers whose type and size have been looked at, and found believable. More
+/// dimensions than one are read in the order of HDF5, the last one fastest, as by libfclib 3.1.
 struct Numbers {
   Handle id;
   std::string path;
   std::size_t size;
+  bool real;    ///< of floating point, though integers may be asked for: MATLAB writes so
   bool narrow;  ///< integers of 32 bits at most, with their sign
+  bool flat;    ///< at most one extent is not 1
   Packing packing;
 };
 
-Numbers open_numbers(const Group& group, const std::string& name, bool integers);
+/// Fails also where the numbers, or some of them, were never written.
+Numbers open_numbers(const Group& group, const std::string& name);
+
+/// Whether a dataset was declared and never written: so libfclib 3.1 stores a vector that it is not
+/// given.
+bool is_unwritten(const Group& group, const std::string& name);
 
 /// All the numbers of the dataset, into memory that has room for them.
 void read_into(const Numbers& dataset, double* values);
@@ -30,7 +37,7 @@ void read_into(const Numbers& dataset, std::int32_t* values);
 /// Values is any vector of doubles that is made with a size.
 template <class Values>
 Values read_doubles(const Group& group, const std::string& name) {
-  const Numbers dataset = open_numbers(group, name, false);
+  const Numbers dataset = open_numbers(group, name);
   Values values(static_cast<decltype(Values().size())>(dataset.size));
   read_into(dataset, values.data());
   return values;
@@ -39,7 +46,7 @@ Values read_doubles(const Group& group, const std::string& name) {
 /// Values is any vector of integers of 32 bits that is made with a size.
 template <class Values>
 Values read_indices(const Group& group, const std::string& name) {
-  const Numbers dataset = open_numbers(group, name, true);
+  const Numbers dataset = open_numbers(group, name);
   Values values(dataset.size);
   read_into(dataset, values.data());
   return values;
@@ -48,7 +55,7 @@ Values read_indices(const Group& group, const std::string& name) {
 /// A dataset of one number.
 template <class Number>
 Number read_number(const Group& group, const std::string& name) {
-  const Numbers dataset = open_numbers(group, name, std::is_integral_v<Number>);
+  const Numbers dataset = open_numbers(group, name);
   std::vector<Number> values(dataset.size);
   read_into(dataset, values.data());
   if (values.size() != 1) {
@@ -57,7 +64,7 @@ Number read_number(const Group& group, const std::string& name) {
   return values.front();
 }
 
-/// Text of fixed length, with or without its final NUL, or of variable length.
+/// Text of fixed length, with or without its final NUL, of variable length, or as its bytes.
 std::string read_text(const Group& group, const std::string& name);
 
 }  // namespace fclib::hdf5

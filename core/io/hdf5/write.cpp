@@ -261,6 +261,18 @@ void write_solution(const std::string& path, const Solution& solution,
   });
 }
 
+void write_geometry(const std::string& path, const Geometry& geometry,
+                    const WriteOptions& options) {
+  change_file(path, Start::existing, options.compression, [&](const Target& root) {
+    const Index contacts =
+        std::visit([](const auto& p) { return p.size(Dim::nc); }, outline_of(root));
+    const auto rows = std::get<std::vector<double>>(geometry.contacts.at("gap")).size();
+    detail::require_size(static_cast<Index>(rows), contacts, Dim::nc, "/contacts", "rows");
+    if (options.replace) remove_geometry(root);
+    write_geometry(root, geometry);
+  });
+}
+
 void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
                    const WriteOptions& options) {
   change_file(path, Start::existing, options.compression, [&](const Target& root) {
@@ -270,7 +282,7 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
         std::visit([&](const auto& p) { validate(guesses[k], p, guess_path(k + 1)); }, outline);
       }
     }
-    const Index there = options.append ? contents_of(root).guesses : 0;
+    const Index there = options.append ? count_of(root, guesses_list) : 0;
     if (there > 0) {
       const Handle group = open_group(root, "guesses");
       const Target target{{group.id(), root.child("guesses")}, root.style};

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "geometry.hpp"
 #include "io/hdf5/raw.hpp"
 #include "problem.hpp"
 
@@ -39,6 +40,9 @@ void write_solution(const std::string& path, const Solution& solution,
 /// those (WriteOptions::append).
 void write_guesses(const std::string& path, const std::vector<Solution>& guesses,
                    const WriteOptions& options = {.replace = true});
+
+/// Puts a geometry into a file that has a problem of as many contacts.
+void write_geometry(const std::string& path, const Geometry& geometry, const WriteOptions& options);
 
 /// Puts all solutions that are known of a problem into its file, in place of those it had, with the
 /// error of each. They stay where /solution is replaced, and go with the problem.

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "error.hpp"
-#include "number_text.hpp"
 
 namespace fclib::siconos {
 
@@ -14,14 +13,6 @@ namespace {
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
 }  // namespace
-
-/// What stands in the file, shortened and without what a terminal should not get.
-std::string quoted(std::string_view text) {
-  constexpr std::size_t longest = 24;
-  std::string result = "'";
-  for (const char c : text.substr(0, longest)) result += c >= ' ' && c <= '~' ? c : '?';
-  return result + (text.size() > longest ? "...'" : "'");
-}
 
 void Words::fail_at(Count line, const std::string& message) {
   throw Error(ErrorKind::file, message, "line " + std::to_string(line));

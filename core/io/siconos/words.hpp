@@ -5,12 +5,11 @@
 #include <string>
 #include <string_view>
 
+#include "number_text.hpp"
+
 namespace fclib::siconos {
 
 using Count = std::int64_t;
-
-/// What stands in the file, shortened and without what a terminal should not get.
-std::string quoted(std::string_view text);
 
 /// "W", "the first matrix": what is being read, for messages.
 using What = std::string_view;

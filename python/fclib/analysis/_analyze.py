@@ -234,7 +234,8 @@ class Analysis:
         sign = f"{name} is not known."
         if (w := self.spectra.get("W")) is not None:
             sign = f"{name} is {self.definiteness.word}, of rank {w.rank} of {self.problem.m}"
-            sign += "." if self.asymmetry["W"] <= SYMMETRIC else " and not symmetric."
+            skewness = self.asymmetry["W"]
+            sign += "." if skewness <= SYMMETRIC else f" and not symmetric, by {skewness:.2g}."
         text = [
             f"Existence: {self.existence.verdict}: {self.existence.reason}.",
             f"Self-stress: {self.self_stress.verdict}: {self.self_stress.reason}.",

@@ -12,6 +12,10 @@ import scipy.sparse as sp
 from scipy.linalg import cholesky, solve_triangular
 
 from fclib import _core, _solve
+from fclib._symmetry import SYMMETRIC as SYMMETRIC
+from fclib._symmetry import asymmetry as asymmetry
+from fclib._symmetry import columns as columns
+from fclib._symmetry import largest as largest
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
@@ -19,20 +23,6 @@ Global: TypeAlias = _core.GlobalProblem | _core.GlobalRollingProblem
 
 DENSE = 2000  # the side up to which a matrix is treated densely
 EPS = float(np.finfo(float).eps)
-SYMMETRIC = 1e-12  # max |A - A^T| / max |A| up to which a matrix counts as symmetric
-
-
-def columns(a: Any) -> Any:
-    """Any matrix as csc_array: duplicates added up, zeros left out."""
-    result = sp.csc_array(a, copy=True)
-    result.sum_duplicates()
-    result.eliminate_zeros()
-    return result
-
-
-def largest(a: Any) -> float:
-    """The largest |entry|."""
-    return float(abs(a).max()) if a.nnz else 0.0
 
 
 def norm(x: Any) -> float:
@@ -40,12 +30,6 @@ def norm(x: Any) -> float:
     with np.errstate(over="ignore"):
         found = float(np.hypot.reduce(np.asarray(x, dtype=float), initial=0.0))
     return min(found, float(np.finfo(float).max))
-
-
-def asymmetry(a: Any) -> float:
-    """Max |A - A^T| / max |A|, 0 for the zero matrix."""
-    size = largest(a)
-    return largest(columns(a - a.T)) / size if size else 0.0
 
 
 def balanced(a: Any, size: Array | None = None) -> Any:

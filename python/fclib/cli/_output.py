@@ -87,6 +87,11 @@ def fail(message: str) -> NoReturn:
     raise SystemExit(1)
 
 
+def warn(path: Path, message: str) -> None:
+    """One line on the standard error about a file; the command goes on."""
+    err.print(f"fclib: {path}: {message}", style="yellow", highlight=False)
+
+
 def interrupted(message: str = "interrupted") -> NoReturn:
     """End the process as Ctrl-C does: one line on the standard error and exit status 130."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one has nothing left to end

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 import fclib
-from fclib import bench
+from fclib import _symmetry, bench
 from fclib.cli._files import read_owner
 from fclib.cli._output import (
     Files,
@@ -21,6 +21,7 @@ from fclib.cli._output import (
     err,
     parse_options,
     usage_error,
+    warn,
 )
 
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
@@ -88,6 +89,8 @@ def command(
         try:
             trace = Trace(path.name) if verbose else None
             problem = fclib.read(path, kind) if kind else read_owner(path)
+            for line in _symmetry.not_symmetric(problem):
+                warn(path, line)
             run = bench.run(
                 str(path), problem, solver, tol, time_limit, options, trace, merit.value
             )

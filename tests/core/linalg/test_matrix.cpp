@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "error.hpp"
+#include "linalg/places.hpp"
 #include "random_data.hpp"
 
 namespace fclib {
@@ -69,6 +70,46 @@ TEST(Matrix, validation_names_the_entry) {
   } catch (const Error& error) {
     EXPECT_EQ(error.kind, ErrorKind::problem);
     EXPECT_EQ(error.where, "/fclib_local/W/i[2]");
+  }
+}
+
+TEST(Matrix, a_triangle_stands_for_both) {
+  testing::RandomData random(4);
+  const SparseColumns source = random.sparse(6, 6, 0.5);
+  for (const Storage storage : all_storages) {
+    for (const bool upper : {false, true}) {
+      const Eigen::MatrixXd full(source);
+      Eigen::MatrixXd half = full.triangularView<Eigen::Lower>();
+      if (upper) half.transposeInPlace();
+      const Matrix whole =
+          symmetric_of_triangle(converted(Matrix::from_eigen(half.sparseView()), storage), "W");
+      validate(whole, "W");
+      EXPECT_EQ(whole.storage, storage);
+      const Eigen::MatrixXd expected = full.selfadjointView<Eigen::Lower>();
+      EXPECT_EQ(dense_of(whole), expected);
+    }
+    const Matrix both = converted(Matrix::from_eigen(source), storage);
+    EXPECT_THROW(symmetric_of_triangle(both, "W"), Error);
+    EXPECT_THROW(
+        symmetric_of_triangle(converted(Matrix::from_eigen(random.sparse(3, 2, 1)), storage), "W"),
+        Error);
+  }
+}
+
+TEST(Matrix, values_that_nobody_counts) {
+  const std::vector<double> none(3);
+  const std::vector<double> one{1.0};
+  const std::vector<double> some{0.0, 2.0, 0.0};
+  require_counted(none, 0, "p");
+  require_counted(one, 0, "p");
+  require_counted(some, 1, "p");
+  try {
+    require_counted(some, 0, "/fclib_local/W/p");
+    FAIL() << "values without a count were accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind, ErrorKind::problem);
+    EXPECT_EQ(error.where, "/fclib_local/W/p");
+    EXPECT_NE(error.message.find("has 3, of which 1 are not 0"), std::string::npos);
   }
 }
 

@@ -245,7 +245,8 @@ def test_another_solver_changes_no_problem(installed: Path, tmp_path: Path, solv
     """Nor would another constant of `auto`: no problem sees a solver."""
     settings: Any = {"form": "global", "solver": solver}
     table = collections.build([plan(**settings)], tmp_path / "other", pictures=False)
-    assert set(table["solver"].to_pylist()) == {solver}
+    # others find the last digits
+    assert {name.split(", ")[0] for name in table["solver"].to_pylist()} == {solver}
     collections.build([plan(form="global")], tmp_path / "auto", pictures=False)
     made = digests(tmp_path / "other")
     assert len(made) == NUMBERS
@@ -320,7 +321,8 @@ def test_verify_says_by_how_much_a_problem_differs(
     installed: Path, tmp_path: Path, share: float, status: str, origin: str
 ) -> None:
     collections.build([plan(form="global")], tmp_path, pictures=False)
-    row = dict(collections.read_catalog(tmp_path).to_pylist()[5])
+    rows = collections.read_catalog(tmp_path).to_pylist()
+    row = rows[5]
     path = tmp_path / row["global_file"]
     problem, solution = read(path), fclib.read_solution(path)
     fclib.write(path, problem.replace(f=(1 + share) * problem.f), solution)
@@ -329,9 +331,8 @@ def test_verify_says_by_how_much_a_problem_differs(
         "global_sha256": collections.catalog.sha256(path),
         "error": 1.0,
     }
-    collections.catalog.write_catalog(tmp_path / collections.catalog.FILE, [row])
-    verdict, *lacking = collections.verify(tmp_path)  # the catalogue has this row alone
-    assert {one.status for one in lacking} == {"not listed"}
+    collections.catalog.write_catalog(tmp_path / collections.catalog.FILE, rows)
+    (verdict,) = (one for one in collections.verify(tmp_path) if one.id == row["id"])
     assert (verdict.status, verdict.origin) == (status, origin)
     if share:
         # to the digits that are left of it

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fclib import _core
+from fclib._verdicts import SOLVED
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Guess, Job, Record, Runner
@@ -46,7 +47,7 @@ class Progress:
     @property
     def solved(self) -> int:
         """Of those done now."""
-        return self.statuses["converged"]
+        return sum(self.statuses[name] for name in SOLVED)
 
     @property
     def rate(self) -> float:

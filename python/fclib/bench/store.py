@@ -29,7 +29,9 @@ import numpy.typing as npt
 
 from fclib import _core
 from fclib._solve import MERITS
+from fclib._verdicts import SOLVED
 from fclib.bench.job import KEPT, Job, ProblemFacts, Record
+from fclib.bench.table import Table
 
 # of the schema; 1 had neither certificates nor `merit`, which was "natural"; 2 had no faults, but
 # runs that were killed or unreadable, and does not say how a run was measured; 3 had no sequences
@@ -595,6 +597,14 @@ class Store:
         names = [column[0] for column in cursor.description]
         return [dict(zip(names, row, strict=True)) for row in cursor]
 
+    def table(self, more: Sequence[str] = ()) -> Table:
+        """All runs in columns."""
+        rows = self.results()
+        if "path" in more:
+            paths = dict(self.db.execute("SELECT hash, path FROM problems"))
+            rows = [row | {"path": paths[row["hash"]]} for row in rows]
+        return Table.of(rows)
+
     def history(self, run: int) -> list[tuple[int, float, float, str]]:
         """The reports of a run: iteration, error, time [s], stage."""
         query = "SELECT iteration, error, time, stage FROM history WHERE run = ? ORDER BY rowid"
@@ -646,7 +656,7 @@ class Store:
                     name=name,
                     planned=planned,
                     done=skipped + done,
-                    solved=counts.get("converged", 0),
+                    solved=sum(counts.get(name, 0) for name in SOLVED),
                     statuses=counts,
                     started=started,
                     seen=seen,

@@ -127,10 +127,11 @@ def test_headlines_are_those_of_the_profiles(site: Path, store: Path) -> None:
         assert set(head["solvers"]) == set(LABELS) - {"rare"}
         costs = profiles.costs([row for row in rows if row["solver"] != "rare"])
         assert head["instances"] == len(costs.instances)
-        curves = profiles.performance_profile(costs.values, np.array(head["taus"]))
+        weights = costs.weights("families")
+        curves = profiles.performance_profile(costs.values, np.array(head["taus"]), weights)
         order = [costs.solvers.index(name) for name in head["solvers"]]
         np.testing.assert_allclose(head["curves"], curves[order], atol=1e-5)
-        own = {row["solver"]: row for row in profiles.summary(costs)}
+        own = {row["solver"]: row for row in profiles.summary(costs, weigh="families")}
         for row in head["tables"][""]:
             for key, value in row.items():
                 assert value == (

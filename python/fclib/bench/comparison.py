@@ -22,7 +22,7 @@ import math
 import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
@@ -227,13 +227,25 @@ class Costs:
     solvers: tuple[str, ...]
     values: Array  # (instances, solvers), inf where it failed, nan where it has none
     metric: str
-    left_out: int = 0  # instances that some solver has not run, or does not take
+    # by tolerance the instances that some solver has not run, or does not take
+    left: Mapping[float, int] = field(default_factory=dict)
     spread: Array | None = None  # of the repeats, relative to the least; nan where there is one
     unsuitable: Mask | None = None  # where the solver does not take such problems
     copies: Array | None = None  # spread over renumbered copies; nan where there is one
     forms: Integers | None = None  # which form of the instance counts
-    of_other_forms: int = 0  # runs that do not count, because they are of the other form
+    # by tolerance the runs that do not count, because they are of the other form of a problem
+    other: Mapping[float, int] = field(default_factory=dict)
     both_forms: bool = False  # whether the two forms of a problem are two problems
+
+    @property
+    def left_out(self) -> int:
+        """Instances that are not in the common set."""
+        return sum(self.left.values())
+
+    @property
+    def of_other_forms(self) -> int:
+        """Runs that do not count, because they are of the other form of a problem."""
+        return sum(self.other.values())
 
     @property
     def solved(self) -> Mask:
@@ -295,8 +307,9 @@ class Costs:
         """Of some solvers, all by default, on the instances that all of these have run and take."""
         part = self.chosen(self.solvers if solvers is None else solvers)
         kept = np.flatnonzero(part.there.all(axis=1))
-        some = int(part.there.any(axis=1).sum())
-        return replace(part.of(kept), left_out=some - kept.size)
+        lost = part.there.any(axis=1) & ~part.there.all(axis=1)
+        left = Counter(part.instances[k].tol for k in np.flatnonzero(lost))
+        return replace(part.of(kept), left=dict(left))
 
     def own(self, solvers: Sequence[str] | None = None) -> Costs:
         """Of some solvers, each on the instances that it has run and takes."""
@@ -310,9 +323,8 @@ class Costs:
         The one with the fewest instances is left out first; two are kept.
         """
         count = self.there.sum(axis=0)
-        names = [
-            name for _, name in sorted(zip(-count, self.solvers, strict=True), key=lambda x: x[0])
-        ]
+        ranked = sorted(zip((-count).tolist(), self.solvers, strict=True))
+        names = [name for _, name in ranked]
         if len(names) and not count.any():
             return self.solvers
         names = [name for name in names if count[self.solvers.index(name)]]
@@ -323,9 +335,9 @@ class Costs:
     def _is_wide(self, names: Sequence[str]) -> bool:
         part = self.chosen(names)
         tols = np.array([one.tol for one in part.instances])
-        common, some = part.there.all(axis=1), part.there.any(axis=1)
         return all(
-            common[tols == tol].sum() >= COMMON * some[tols == tol].sum() for tol in np.unique(tols)
+            here.all(axis=1).sum() >= COMMON * here.any(axis=1).sum()
+            for here in (part.there[tols == tol] for tol in np.unique(tols))
         )
 
     def chosen(self, solvers: Sequence[str]) -> Costs:
@@ -364,7 +376,9 @@ class Costs:
 
     def at(self, tol: float) -> Costs:
         """Those at a tolerance."""
-        return self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
+        part = self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
+        left = {t: n for t, n in self.left.items() if t == tol}
+        return replace(part, left=left, other={t: n for t, n in self.other.items() if t == tol})
 
     @property
     def tolerances(self) -> list[float]:
@@ -424,7 +438,7 @@ def gather(
     runs = runs.where(~words_in(runs, "status").is_in(SURROUNDINGS))
     if not len(runs):
         none = np.zeros((0, len(names)))
-        return Costs((), tuple(names), none, metric, 0, none, none > 0, none, none.astype(np.int64))
+        return Costs((), tuple(names), none, metric)
     place, keys = keys_of(runs, both_forms)
     instances, form = described(runs, place, keys)
     order = sorted(
@@ -456,7 +470,8 @@ def gather(
     unsuitable = np.zeros(shape, bool)
     unsuitable.flat[cell[refused]] = True
     unsuitable &= np.isnan(values)
-    other = int((form[~refused] != forms.flat[cell[~refused]]).sum())
+    tols = numbers_in(runs, "tol")[~refused]
+    other = tols[form[~refused] != forms.flat[cell[~refused]]]
     return Costs(
         tuple(instances),
         tuple(names),
@@ -466,7 +481,7 @@ def gather(
         unsuitable=unsuitable,
         copies=copies,
         forms=forms,
-        of_other_forms=other,
+        other=dict(Counter(other.tolist())),
         both_forms=both_forms,
     )
 
@@ -631,6 +646,14 @@ def runs_of(rows: Iterable[Mapping[str, Any]], chosen: Costs) -> Table:
             which[k] = table[chosen.forms[k]]
         kept[kept] = which[instance[kept], solver[kept]] == hashes.codes[kept]
     return runs.where(kept)
+
+
+def odds(solved: int, of: int) -> tuple[float, float]:
+    """The ends of Wilson's 95 % interval of the chance to solve one more (Wilson 1927)."""
+    z, share = 1.96, solved / of
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * math.sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def names_of(instances: Sequence[Instance]) -> list[str]:

@@ -17,7 +17,7 @@ started from nothing (cold) and from the solution of a step before (warm) are ne
 - success at an accuracy: qpbenchmark (Caron et al.): the error that was reached decides, whatever
   the solver said.
 - intervals: the bootstrap draws problems, with all that was run on each (Efron & Tibshirani 1993);
-  where families weigh the same, from each family as many as it has.
+  if families weigh the same, it draws families, and problems in each.
 """
 
 from __future__ import annotations
@@ -108,6 +108,7 @@ def load(
     machine: str | None = None,
     merit: MeritKind | None = None,
     start: Start | None = "cold",
+    more: Sequence[str] = (),
 ) -> Table:
     """The runs of a store that a profile is of.
 
@@ -121,13 +122,14 @@ def load(
         merit: only runs whose tolerance bounds this.
         start: only runs that started from nothing, or, "warm", the steps of sequences but the first
             ones, which had no step before them; None for both, which no profile takes.
+        more: columns of long texts that are wanted too, as "message".
 
     Raises:
         StoreError: the file is no store.
         ProfileError: no run is left, or they are of several machines or merits.
     """
     with Store(store, create=False) as opened:
-        runs = read(opened)
+        runs = read(opened, more)
     if not len(runs):
         raise ProfileError(f"{store}: there are no runs")
     runs = runs.where(words_in(runs, "start").is_in(["cold"]) | (numbers_in(runs, "step", 0.0) > 0))
@@ -169,9 +171,9 @@ def load(
     return runs.where(np.argsort(rank[solver.codes], kind="stable"))
 
 
-def read(store: Store) -> Table:
+def read(store: Store, more: Sequence[str] = ()) -> Table:
     """All runs of a store; `same_as` says of a local form which global one it is of."""
-    runs = store.table(more=("path",))
+    runs = store.table(more=("path", *more))
     if not len(runs):
         return runs
     _, first = runs.numbers("hash")
@@ -310,14 +312,22 @@ def _problems(
 
 
 def _draws(groups: Sequence[Sequence[int]], count: int, seed: int) -> Iterator[Array]:
-    """(some, problems) how often each problem was drawn, so many times in all: the bootstrap."""
+    """(some, problems) how often each problem was drawn: the bootstrap, so many times in all.
+
+    Groups are drawn, and of each as many problems as it has.
+    """
     random = np.random.Generator(np.random.PCG64([seed, len(groups)]))
     size = sum(map(len, groups))
     for first in range(0, count, CHUNK):
         some = min(CHUNK, count - first)
         drawn = [np.array(own)[random.integers(0, len(own), (some, len(own)))] for own in groups]
         cells = np.concatenate(drawn, axis=1) + size * np.arange(some)[:, None]
-        yield np.bincount(cells.ravel(), minlength=some * size).reshape(some, size).astype(float)
+        counts = np.bincount(cells.ravel(), minlength=some * size).reshape(some, size)
+        shares = np.full(len(groups), 1 / len(groups))
+        often = random.multinomial(len(groups), shares, some)
+        for k, own in enumerate(groups):
+            counts[:, own] *= often[:, [k]]
+        yield counts.astype(float)
 
 
 # ---- means

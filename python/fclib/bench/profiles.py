@@ -41,11 +41,13 @@ from fclib import _core
 from fclib._solve import MeritKind
 from fclib.bench.job import ORDERLY, SURROUNDINGS
 from fclib.bench.store import Store
+from fclib.bench.table import Table, Words
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Start: TypeAlias = Literal["cold", "warm"]
 # of an instance: the problem's hash, tolerance, sequence and step
 Key: TypeAlias = tuple[str, float, str, int]
+INSTANCE = ("hash", "tol", "sequence", "step")
 # what a run may cost, and the least that is told from nothing
 METRICS: Mapping[str, tuple[str, float]] = {
     "cpu_s": ("CPU time [s]", 1e-6),
@@ -176,7 +178,7 @@ def load(
     machine: str | None = None,
     merit: MeritKind | None = None,
     start: Start | None = "cold",
-) -> list[dict[str, Any]]:
+) -> Table:
     """The rows of a store that a profile is of.
 
     Args:
@@ -195,11 +197,11 @@ def load(
         ProfileError: no run is left, or they are of several machines or merits.
     """
     with Store(store, create=False) as opened:
-        rows = opened.results()
-    if not rows:
+        rows = opened.table(more=("message",))
+    if not len(rows):
         raise ProfileError(f"{store}: there are no runs")
-    rows = [row for row in rows if row["start"] == "cold" or row["step"] > 0]
-    _name_machines(rows)
+    rows = rows.where((rows["start"] == "cold") | (rows["step"] > 0))
+    rows = rows.with_columns(node=_named_machines(rows))
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
         ("family", families),
@@ -211,41 +213,49 @@ def load(
     ]
     for column, values in wanted:
         if values:
-            known = sorted({str(row[column]) for row in rows})
-            rows = [row for row in rows if row[column] in values]
-            if not rows:
+            own = rows[column]
+            kept = own.is_in(values) if isinstance(own, Words) else np.isin(own, values)
+            if not kept.any():
+                there = own.present() if isinstance(own, Words) else np.unique(own).tolist()
                 raise ProfileError(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
-                    f" there is: {', '.join(known)}"
+                    f" there is: {', '.join(sorted(map(str, there)))}"
                 )
-    nodes = sorted({row["node"] or "?" for row in rows})
+            rows = rows.where(kept)
+    nodes = [node or "?" for node in rows["node"].present()]
     if len(nodes) > 1:
         raise ProfileError(
             f"{store}: times of several machines do not compare; choose one: {', '.join(nodes)}"
         )
-    if len({row["merit"] for row in rows}) > 1:
+    if len(rows["merit"].present()) > 1:
         raise ProfileError(
             f"{store}: the tolerance of some runs bounds both natural maps, of others that of the"
             " literature alone, which does not compare; choose one by merit: both, natural"
         )
     rows = one_limit(rows)
-    _name_solvers(rows)
+    # by the labels of the store, in the order that was asked for
     order = {name: k for k, name in enumerate(solvers)}
-    return sorted(rows, key=lambda row: order.get(row["solver"], len(order)))
+    rank = np.array([order.get(name, len(order)) for name in rows["solver"].values])
+    rows = rows.where(np.argsort(rank[rows["solver"].codes], kind="stable"))
+    return rows.with_columns(solver=_named_solvers(rows))
 
 
-def _name_machines(rows: Sequence[dict[str, Any]]) -> None:
-    """Give machines of one name different ones, where they have other processors."""
-    kinds: dict[str, set[tuple[Any, Any]]] = defaultdict(set)
-    for row in rows:
-        kinds[row["node"] or ""].add((row["cpu"], row["cores"]))
-    for row in rows:
-        if len(kinds[row["node"] or ""]) > 1:
-            row["node"] = f"{row['node']} ({row['cores']} x {row['cpu']})"
+def _named_machines(rows: Table) -> Words:
+    """The nodes of rows; machines of one name have different ones if their processors differ."""
+    numbers, first = rows.numbers("node", "cpu", "cores")
+    kinds = [rows.row(k) for k in first]
+    count = Counter(kind["node"] for kind in kinds)
+    names = Words.of(
+        f"{kind['node']} ({kind['cores']} x {kind['cpu']})"
+        if count[kind["node"]] > 1
+        else kind["node"]
+        for kind in kinds
+    )
+    return names[numbers]
 
 
-def _name_solvers(rows: Sequence[dict[str, Any]]) -> None:
-    """Give solvers of one label different ones, where they were not run in the same way."""
+def _named_solvers(rows: Table) -> Words:
+    """The labels of rows; solvers of one label have different ones if they ran differently."""
 
     def of(row: Mapping[str, Any]) -> dict[str, str]:
         options = json.loads(row["options"] or "{}")
@@ -256,32 +266,53 @@ def _name_solvers(rows: Sequence[dict[str, Any]]) -> None:
             "memory": f"{row['memory_limit']:g} MB" if row["memory_limit"] else "",
         }
 
+    numbers, first = rows.numbers("solver", "options", "version", "threads", "memory_limit")
+    kinds = [rows.row(k) for k in first]
     ways: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-    for row in rows:
+    for row in kinds:
         for name, value in of(row).items():
             ways[row["solver"]][name].add(value)
-    for row in rows:
+
+    def named(row: Mapping[str, Any]) -> str:
         own = ways[row["solver"]]
-        if differing := [value for name, value in of(row).items() if len(own[name]) > 1]:
-            row["solver"] = f"{row['solver']} ({', '.join(differing)})"
+        differing = [value for name, value in of(row).items() if len(own[name]) > 1]
+        return f"{row['solver']} ({', '.join(differing)})" if differing else str(row["solver"])
+
+    return Words.of(map(named, kinds))[numbers]
 
 
-def one_limit(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
+    """Runs in columns, which they may be already."""
+    if isinstance(rows, Table):
+        return rows
+    known = list(rows)
+    names = dict.fromkeys(name for row in known for name in (*row, *INSTANCE, "wall_limit"))
+    return Table.of([{name: row.get(name) for name in names} for row in known])
+
+
+def one_limit(rows: Table) -> Table:
     """Of each problem at a tolerance the runs under one limit: that of the most solvers.
 
     Of several such the largest: where a limit was raised, the runs before do not count.
     """
-    solvers: dict[Key, dict[tuple[float, float], set[str]]] = defaultdict(lambda: defaultdict(set))
-
-    def limit(row: Mapping[str, Any]) -> tuple[float, float]:
-        return row["time_limit"] or 0.0, row.get("wall_limit") or 0.0
-
-    for row in rows:
-        solvers[instance_of(row)][limit(row)].add(row["solver"])
-    chosen = {
-        key: max(own, key=lambda each: (len(own[each]), each)) for key, own in solvers.items()
-    }
-    return [row for row in rows if limit(row) == chosen[instance_of(row)]]
+    limits = rows.with_columns(
+        time_limit=np.nan_to_num(rows["time_limit"]), wall_limit=np.nan_to_num(rows["wall_limit"])
+    )
+    instance, _ = rows.numbers(*INSTANCE)
+    group, first = limits.with_columns(instance=instance).numbers(
+        "instance", "time_limit", "wall_limit"
+    )
+    if len(first) == instance.max(initial=-1) + 1:
+        return rows  # one limit everywhere
+    pairs = limits.with_columns(group=group).numbers("group", "solver")[1]
+    solvers = np.bincount(group[pairs], minlength=len(first))
+    own = limits.where(first)
+    # the best group of each instance comes last
+    order = np.lexsort((own["wall_limit"], own["time_limit"], solvers, instance[first]))
+    chosen = np.zeros(len(first), dtype=bool)
+    last = np.append(np.diff(instance[first][order]) > 0, True)
+    chosen[order[last]] = True
+    return rows.where(chosen[group])
 
 
 def instance_of(row: Mapping[str, Any]) -> Key:
@@ -329,7 +360,7 @@ def gather(
     numbers: dict[Key, int] = {}
     solvers: dict[str, int] = {}
     lines, columns, spent, refused = [], [], [], []
-    for row in one_limit([dict(row) for row in rows]):
+    for row in one_limit(table_of(rows)):
         column = solvers.setdefault(row["solver"], len(solvers))
         if row["status"] in SURROUNDINGS:
             continue

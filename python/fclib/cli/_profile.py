@@ -13,6 +13,7 @@ import numpy as np
 from fclib.bench import MeritKind, profiles
 from fclib.bench.campaign import published_means
 from fclib.bench.store import Store
+from fclib.bench.table import Table
 from fclib.cli._output import Report, Rows, err, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
@@ -48,10 +49,10 @@ def print_profile(
     rows = profiles.load(store, campaign=campaign, start=start, **chosen)
     costs = profiles.costs(rows, metric, count_unsuitable)
     published = published_means(store) if start == "cold" else {}
-    both: list[dict[str, Any]] = []
+    both = Table({})
     with Store(store, create=False) as opened:
-        if opened.results("start = 'warm'"):
-            same = {"machine": rows[0]["node"], "merit": rows[0]["merit"]}
+        if opened.has_sequences():
+            same = {"machine": rows["node"][0], "merit": rows["merit"][0]}
             both = profiles.load(store, start=None, **chosen | same)
         faults = [
             fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
@@ -85,13 +86,13 @@ def print_profile(
 def show(
     tables: dict[str, list[dict[str, Any]]],
     costs: profiles.Costs,
-    rows: Sequence[dict[str, Any]],
+    rows: Table,
     penalty: float,
     shift: float,
 ) -> None:
     """The tables, for people."""
     words = profiles.METRICS[costs.metric][0]
-    judged = profiles.JUDGED[rows[0]["merit"]]
+    judged = profiles.JUDGED[rows["merit"][0]]
     out.print(
         f"{words}: {profiles.caption(costs, rows)}; shifted geometric means, shift {shift:g},"
         f" failures as {penalty:g} x the limit; {judged}",
@@ -161,7 +162,7 @@ def show(
 def draw(
     tables: dict[str, list[dict[str, Any]]],
     costs: profiles.Costs,
-    rows: Sequence[dict[str, Any]],
+    rows: Table,
     store: Path,
     folder: Path,
     formats: Sequence[str],
@@ -175,7 +176,7 @@ def draw(
             write_csv(folder / f"{table.replace(' ', '-')}.csv", records)
     several = len(costs.tolerances) > 1
     for tol in costs.tolerances:
-        part, own = costs.at(tol), [row for row in rows if row["tol"] == tol]
+        part, own = costs.at(tol), rows.where(rows["tol"] == tol)
         words, ending = profiles.caption(part, own), f"-{tol:g}" if several else ""
         name = f"{costs.metric}{ending}"
         steps = curve_rows(part, profiles.ratios(part.values), "tau")
@@ -184,7 +185,7 @@ def draw(
         plots.performance(part, folder, formats, words, ending)
         for per_contact in (False, True):
             plots.data(part, folder, formats, per_contact=per_contact, caption=words, ending=ending)
-        longest = max((row["cpu_s"] or 0.0 for row in own), default=0.0)
+        longest = float(np.nan_to_num(own["cpu_s"]).max(initial=0.0))
         times = np.geomspace(1e-5, max(longest, 1e-4), 300)
         if curves := profiles.convergence(store, own, times):
             plots.convergence(curves, times, folder, formats, words, ending)

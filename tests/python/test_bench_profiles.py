@@ -204,6 +204,7 @@ def test_runtimes_to_targets_use_every_run(store: Path) -> None:
 def test_times_of_a_history_are_of_cpu(store: Path) -> None:
     with bench.Store(store) as opened:
         opened.db.execute("UPDATE history SET time = 10 * time")
+        opened.seal()
     rows = profiles.load(store, solvers=["A"])
     assert profiles.convergence(store, rows, np.array([4.5]))["A"].tolist() == [0.5e-6]
 
@@ -764,6 +765,7 @@ def test_names_that_matplotlib_would_read_otherwise(store: Path, tmp_path: Path)
     with bench.Store(store) as opened:
         for name, other in (("A", "_hidden"), ("B", "$x^$ cost"), ("C", r"C:\\x_{")):
             opened.db.execute("UPDATE solvers SET label = ? WHERE label = ?", (other, name))
+        opened.seal()
     done = run_cli(store, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     # in each of the formats
@@ -784,6 +786,7 @@ def test_figures_that_are_unsteady_or_of_a_busy_machine_are_marked(store: Path) 
         opened.db.execute("UPDATE machines SET cores = 2")
         opened.db.execute("UPDATE runs SET load = 1.5")
         opened.db.execute("UPDATE runs SET load = 2.5 WHERE id = 9")  # of C
+        opened.seal()
     shown = CliRunner().invoke(app, ["profile", str(store)])
     assert shown.exit_code == 0, shown.output
     lines = [line for line in shown.output.splitlines() if line.startswith(("A ", "B ", "C "))]
@@ -803,6 +806,7 @@ def test_machines_of_one_name_are_two(store: Path) -> None:
         opened.db.execute(
             "UPDATE runs SET machine = (SELECT id FROM machines WHERE hash = 'x') WHERE tol = 1e-7"
         )
+        opened.seal()
     with pytest.raises(profiles.ProfileError, match=r"here \(4 x B\), here \(None x None\)"):
         profiles.load(store)
     assert len(profiles.load(store, machine="here (4 x B)")) == 12
@@ -812,6 +816,7 @@ def test_what_was_not_run_in_the_same_way_is_no_repeat(store: Path) -> None:
     with bench.Store(store) as opened:
         opened.db.execute("UPDATE runs SET threads = 4 WHERE id <= 2")
         opened.db.execute("UPDATE runs SET memory_limit = 50 WHERE id > 10")
+        opened.seal()
     labels = {row["solver"] for row in profiles.load(store)}
     assert labels == {"A (1 threads)", "A (4 threads)", "B", "C (1000 MB)", "C (50 MB)"}
 

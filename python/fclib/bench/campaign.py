@@ -7,6 +7,7 @@ jobs of it.
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import random
 import re
@@ -543,6 +544,7 @@ def _solvers(
             family=info.family,
             origin=info.origin,
             label=str(entries.get("label", "")),
+            about=described(info),
         )
         if choice.title in choices:
             raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")
@@ -550,6 +552,33 @@ def _solvers(
     if not choices:
         raise CampaignError(f"solvers: none of them is here: {'; '.join(missing)}")
     return tuple(choices.values()), tuple(missing)
+
+
+def described(info: _core.SolverInfo) -> str:
+    """What a solver says of itself, in JSON: stores keep it, and ask no solver again.
+
+    An option is its name, type or choices, default, unit and meaning.
+    """
+    options = [
+        [
+            option.name,
+            " | ".join(option.choices) or option.type,
+            "see there" if option.type == "text" else str(option.default),
+            option.unit,
+            option.doc,
+        ]
+        for option in info.options
+    ]
+    return json.dumps(
+        {
+            "title": info.title,
+            "citation": info.citation,
+            "dimensions": list(info.dimensions),
+            "rolling": list(info.rolling_dimensions),
+            "options": options,
+        },
+        sort_keys=True,
+    )
 
 
 def parse_solver(text: str) -> dict[str, Any]:

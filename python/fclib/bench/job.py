@@ -88,6 +88,7 @@ class SolverChoice:
     family: str = ""
     origin: str = ""
     label: str = ""  # what tables call it
+    about: str = ""  # JSON, what the solver says of itself: `campaign.described`
 
     @property
     def title(self) -> str:

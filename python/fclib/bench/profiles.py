@@ -164,11 +164,12 @@ def load(
             f"{store}: the tolerance of some runs bounds both natural maps, of others that of the"
             " literature alone, which does not compare; choose one by merit: both, natural"
         )
-    runs = _name_solvers(one_limit(runs))
+    runs = one_limit(runs)
+    # by the labels of the store, in the order that was asked for
     order = {name: k for k, name in enumerate(solvers)}
     solver = words_in(runs, "solver")
-    rank = np.array([order.get(name, len(order)) for name in solver.values], int)
-    return runs.where(np.argsort(rank[solver.codes], kind="stable"))
+    rank = np.array([order.get(str(name), len(order)) for name in solver.values], int)
+    return _name_solvers(runs.where(np.argsort(rank[solver.codes], kind="stable")))
 
 
 def read(store: Store, more: Sequence[str] = ()) -> Table:

@@ -26,6 +26,7 @@ TEXTS = frozenset(
         *("key", "campaign", "problem", "family", "formulation", "title", "hash", "solver"),
         *("solver_name", "options", "version", "solver_family", "origin", "about", "merit"),
         *("status", "message", "start", "sequence", "stages", "measured", "node", "cpu", "machine"),
+        "path",
     )
 )
 Text: TypeAlias = str | None
@@ -127,8 +128,11 @@ class Table:
     def __len__(self) -> int:
         return self._length
 
-    def __getitem__(self, name: str) -> Any:
-        return self._columns[name]
+    def __getitem__(self, which: str | int | slice) -> Any:
+        """A column by its name, a row by its place, or a table of several rows."""
+        if isinstance(which, str):
+            return self._columns[which]
+        return self.where(which) if isinstance(which, slice) else self.row(which)
 
     def where(self, chosen: Chosen | Sequence[int]) -> Table:
         """The table of some rows: a mask, or their places in any order."""
@@ -164,17 +168,25 @@ class Table:
         rank[order] = np.arange(len(order))
         return rank[number.reshape(-1)], first[order]
 
+    def values(self, name: str) -> list[Any]:
+        """A column as Python has it: None where there is nothing, whole numbers as int."""
+        column = self._columns[name]
+        if isinstance(column, Words):
+            return column.tolist()
+        if name in WHOLE:
+            return [None if value != value else int(value) for value in column.tolist()]
+        return [None if value != value else value for value in column.tolist()]
+
     def row(self, k: int) -> dict[str, Any]:
         """A row as a dict: None where there is nothing, whole numbers as int."""
         return next(iter(self.where([k])))
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
-        columns = [_listed(name, column) for name, column in self._columns.items()]
-        for values in zip(*columns, strict=True):
+        for values in zip(*map(self.values, self._columns), strict=True):
             yield dict(zip(self._columns, values, strict=True))
 
 
-def numbers_of(name: str, values: Sequence[Any]) -> npt.NDArray[Any]:
+def numbers_of(name: str, values: Sequence[Any] | npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The column of numbers of this name; None is nan."""
     found = np.array(values, dtype=np.float64)
     if name == "solved":
@@ -187,12 +199,3 @@ def _objects(values: Iterable[Any]) -> npt.NDArray[np.object_]:
     found = np.empty(len(texts), dtype=object)
     found[:] = texts
     return found
-
-
-def _listed(name: str, column: Column) -> list[Any]:
-    """The values of a column as Python has them."""
-    if isinstance(column, Words):
-        return column.tolist()
-    if name in WHOLE:
-        return [None if value != value else int(value) for value in column.tolist()]
-    return [None if value != value else value for value in column.tolist()]

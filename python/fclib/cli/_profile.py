@@ -58,7 +58,7 @@ def print_profile(
     published = published_means(store) if start == "cold" else {}
     both: Table | None = None
     with Store(store, create=False) as opened:
-        warm = opened.db.execute("SELECT 1 FROM runs WHERE start = 'warm' LIMIT 1").fetchone()
+        warm = opened.has_sequences()
         faults = [
             fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
         ]

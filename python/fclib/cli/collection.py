@@ -430,7 +430,7 @@ def status(
             count = 0
             for path in stores:
                 with Store(path, create=False) as store:
-                    count += standing.add(store.results("start = 'cold'"), digests)
+                    count += standing.add(store.results(start="cold"), digests)
             err.print(f"{count} runs taken in", highlight=False)
         rows, basis = standing.standings(name)
     except KeyError as error:

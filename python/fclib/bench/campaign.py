@@ -214,7 +214,7 @@ class Campaign:
 
         Args:
             store: what it knows of files is not found out again.
-            tell: is called with what is left out, and why.
+            tell: is called with what is left out, and why, and with how far a set is built.
 
         Raises:
             fclib.Error: a problem cannot be found, made or read.
@@ -224,7 +224,7 @@ class Campaign:
         sequences: list[tuple[str, list[ProblemFacts], Group]] = []
         for group in self.groups:
             try:
-                paths = self._paths(group)
+                paths = self._paths(group, tell)
             except _core.FileError as error:
                 if not group.optional:
                     raise
@@ -295,8 +295,8 @@ class Campaign:
             chain.append(replace(self._job(facts, group, choice, tol, repeat), along=along))
         return chain
 
-    def _paths(self, group: Group) -> list[Path]:
-        paths = self._all_paths(group)
+    def _paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
+        paths = self._all_paths(group, tell)
         if group.sequence is None:
             return paths
         steps = group.sequence
@@ -308,13 +308,13 @@ class Campaign:
             raise _core.Error(f"a sequence needs two problems or more: {name} has {len(chosen)}")
         return chosen
 
-    def _all_paths(self, group: Group) -> list[Path]:
+    def _all_paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
         if group.set and group.sequence is not None:
             steps = group.sequence
             paths += made.stored(group.set, group.form, steps.start, steps.count, steps.stride)
         elif group.set:
-            paths += problems.of_set(group.set, group.form)
+            paths += problems.of_set(group.set, group.form, tell)
         if group.simulate is not None:
             paths += made.simulated(
                 family=group.simulate["family"],

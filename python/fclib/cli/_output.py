@@ -28,6 +28,7 @@ from rich.table import Table
 from rich.text import Text
 
 import fclib
+from fclib.bench import modules
 
 # text is printed as it is: no brackets of a unit, no path is taken for markup
 out = Console(markup=False, emoji=False)
@@ -59,6 +60,10 @@ GAP = 2  # between columns
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
 Tolerance = Annotated[float, typer.Option("--tol", help="Bound on the error.", min=0.0)]
+Modules = Annotated[
+    list[Path] | None,
+    typer.Option("--module", help="A file of Python with solvers of your own."),
+]
 Merit = Annotated[
     MeritKind,
     typer.Option(
@@ -105,6 +110,14 @@ def words_of(error: Exception) -> str:
 def usage_error(error: Exception) -> NoReturn:
     """End the command with the message and exit status 2."""
     raise typer.BadParameter(str(error)) from None
+
+
+def load_modules(paths: Sequence[Path] | None) -> None:
+    """Import files with solvers of the user's own; a usage error if that fails."""
+    try:
+        modules.load_modules([str(path.resolve()) for path in paths or ()])
+    except fclib.SolverError as error:
+        usage_error(error)
 
 
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:

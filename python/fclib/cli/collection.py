@@ -14,6 +14,7 @@ import typer
 
 import fclib
 from fclib import collections
+from fclib._verdicts import CLASSES
 from fclib.bench import Store
 from fclib.cli import choose
 from fclib.cli._build import (
@@ -51,7 +52,7 @@ app = typer.Typer(
 app.add_typer(choose.app, name="choose")
 
 
-Rating = Enum("Rating", {name: name for name in standing.CLASSES}, type=str)  # type: ignore[misc]
+Rating = Enum("Rating", {name: name for name in CLASSES}, type=str)  # type: ignore[misc]
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
 Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
@@ -459,7 +460,7 @@ def status(
     for row in rows:
         families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
     families["all"] = sum(families.values(), Counter())
-    columns = [*standing.CLASSES, *(["not run"] if families["all"]["not run"] else [])]
+    columns = [*CLASSES, *(["not run"] if families["all"]["not run"] else [])]
     out.print(
         Rows(
             [

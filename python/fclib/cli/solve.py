@@ -14,11 +14,13 @@ from fclib.cli._output import (
     Json,
     Merit,
     MeritKind,
+    Modules,
     Report,
     Rows,
     Tolerance,
     each_file,
     err,
+    load_modules,
     parse_options,
     usage_error,
 )
@@ -66,6 +68,7 @@ def command(
     option: Annotated[
         list[str] | None, typer.Option(help="An option of the solver, name=value, or name=@FILE.")
     ] = None,
+    module: Modules = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Show the iterations and the stages.")
     ] = False,
@@ -78,6 +81,7 @@ def command(
     if kind is not None and write:
         # the one solution of a file is that of its global problem
         raise typer.BadParameter("--write stores the solution of the main problem, not of a --kind")
+    load_modules(module)
     options = parse_options(option or [])
     try:
         fclib.find_solver(solver).check_options(options)

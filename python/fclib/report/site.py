@@ -28,7 +28,7 @@ from typing import Any
 
 from fclib import _core, _registry
 from fclib._solve import MERITS
-from fclib._verdicts import SOLVED, UNSUITABLE, is_solved, rating
+from fclib._verdicts import CLASSES, SOLVED, UNSUITABLE, is_solved, rating
 from fclib.bench import profiles
 from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
@@ -556,7 +556,7 @@ def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
     for name, (rows, basis) in known.items():
         counts: dict[str, dict[str, int]] = {}
         for row in rows:
-            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(standing.CLASSES, 0))
+            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(CLASSES, 0))
             if row.rating:
                 own[row.rating] += 1
         best = [(row.id, row.best) for row in rows if row.rating == "open"]

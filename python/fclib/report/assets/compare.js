@@ -64,6 +64,17 @@
   /* a solver with what it solves: "apgd 170 of 194" */
   Fclib.legend = (name, values) => { const { solved, of } = Fclib.counts(values); return `${name} ${solved} of ${of}`; };
 
+  /* what a profile is of: kind "performance", "data" or "contact" (cost over contacts; without any, no instance)
+     -> {instances, values: costs, shown: what is drawn, weights} */
+  Fclib.profile = (bench, costs, { solvers, keep, own, weigh, kind, families, contacts }) => {
+    const found = Fclib.compared(bench, costs, solvers, keep, own), sizes = found.instances.map((i) => contacts(bench.problems[i]));
+    const kept = found.instances.map((_, k) => k).filter((k) => kind !== "contact" || sizes[k]);
+    const instances = kept.map((k) => found.instances[k]), values = found.values.map((mine) => kept.map((k) => mine[k]));
+    const weights = Fclib.weights(values, instances.map((i) => families(bench.problems[i])), weigh);
+    const shown = kind === "performance" ? Fclib.ratios(values) : kind === "contact" ? values.map((mine) => mine.map((v, k) => v / sizes[kept[k]])) : values;
+    return { instances, values, shown, weights };
+  };
+
   /* exp(mean(log(t + s))) - s; a failure counts as its charge */
   Fclib.mean = (values, weights, charges, shift) => {
     let sum = 0;

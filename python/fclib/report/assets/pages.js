@@ -150,7 +150,7 @@
       select("measure", Object.entries(s.metrics), state.metric, change("metric")), select("tolerance", tolerances(), state.tol, change("tol")),
       select("family", families(), state.family, change("family")),
       select("set", [["common", "common: what all of them have run and take"], ["own", "own: what each has run and takes"]], state.set, change("set")),
-      select("weight", [["families", "each family the same"], ["instances", "each instance the same"]], state.weigh, change("weigh")),
+      select("weight", [["families", "all families alike"], ["instances", "all instances alike"]], state.weigh, change("weigh")),
       select("axis", [["log", "logarithmic"], ["linear", "linear"]], state.axis, change("axis"))),
     chips, h("div", { class: "tools" }, choose("those with enough runs", () => enough()), choose("all", () => labels.map((_, k) => k)), choose("none", () => [])),
     box, h("h2", {}, "How they ended"), statuses, h("h2", {}, "Two solvers, problem by problem"), pair);
@@ -161,30 +161,26 @@
       const keepProblem = state.family ? (k) => cat.read.family(k) === state.family : () => true;
       const order = [...chosen].sort((a, b) => a - b);
       enough = () => (state.family ? Fclib.widest(bench, costs, labels, keepProblem, s.common) : fair(state.tol));
-      const { instances, values } = Fclib.compared(bench, costs, order, keepProblem, state.set === "own");
-      drawProfile(order, instances, values, bench);
+      const found = Fclib.profile(bench, costs, { solvers: order, keep: keepProblem, own: state.set === "own", weigh: state.weigh, kind: state.kind, families: cat.read.family, contacts: cat.read.nc });
+      drawProfile(order, found, bench);
       drawStatuses(order, bench, keepProblem);
       drawPair(bench, costs, keepProblem);
     };
-    const drawProfile = (order, instances, values, bench) => {
+    const drawProfile = (order, { instances, values, shown, weights }, bench) => {
       if (!order.length || !instances.length) { box.replaceChildren(h("p", { class: "panel" }, order.length ? "There is no instance that all of these solvers have run and take." : "Choose some solvers.")); return; }
-      const performance = state.kind === "performance", contacts = instances.map((i) => cat.read.nc(bench.problems[i]));
-      const kept = state.kind === "contact" ? instances.map((_, k) => k).filter((k) => contacts[k]) : instances.map((_, k) => k);
-      const counted = values.map((own) => kept.map((k) => own[k])), family = kept.map((k) => cat.read.family(bench.problems[instances[k]]));
-      const weights = Fclib.weights(counted, family, state.weigh);
-      const shown = performance ? Fclib.ratios(counted) : state.kind === "contact" ? counted.map((own) => own.map((v, k) => v / contacts[kept[k]])) : counted;
+      const performance = state.kind === "performance";
       let low = Infinity, high = -Infinity;
       for (const own of shown) for (const v of own) if (Number.isFinite(v)) { if (v < low) low = v; if (v > high) high = v; }
       if (low === Infinity) { box.replaceChildren(h("p", { class: "panel" }, "None of these solvers solves any of these instances.")); return; }
       if (performance) { low = 1; high = Math.max(2, Math.min(1e4, high)); if (state.axis === "linear") high = Math.min(high, 20); }
       if (high <= low) high = low * 2;
-      const series = order.map((k, i) => ({ name: labels[k], legend: Fclib.legend(labels[k], counted[i]), style: k, ...Fclib.shares(shown[i], weights[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
+      const series = order.map((k, i) => ({ name: labels[k], legend: Fclib.legend(labels[k], values[i]), style: k, ...Fclib.shares(shown[i], weights[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
       const metric = s.metrics[state.metric];
       box.replaceChildren(Fclib.lines({
         name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, xlog: state.axis === "log",
         xrange: performance ? [1, state.axis === "log" ? high * 1.1 : high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
         xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
-        note: `${kept.length} instances of ${bench.problems.length}: ${state.set === "own" ? "for each solver those that it has run and takes" : "those that all chosen solvers have run and take"}; ${state.weigh === "families" ? "each family" : "each instance"} weighs the same; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
+        note: `${instances.length} instances of ${bench.problems.length}: ${state.set === "own" ? "for each solver those that it has run and takes" : "those that all chosen solvers have run and take"}; ${state.weigh === "families" ? "each family" : "each instance"} weighs the same; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
       }));
     };
     const drawStatuses = (order, bench, keepProblem) => {

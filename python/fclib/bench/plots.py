@@ -156,9 +156,7 @@ def data(
     name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "") + ending
     with figure(folder, name, formats, caption) as axes:
         for rank, k in enumerate(_order(shown, grid)):
-            axes.step(
-                bounds, curves[k], where="post", label=label(costs.solvers[k]), **stroke(rank)
-            )
+            axes.step(bounds, curves[k], where="post", label=label(shown.legend(k)), **stroke(rank))
         axes.set_xscale("log")
         axes.set_xlim(*ends)
         axes.set_ylim(0.0, 1.02)

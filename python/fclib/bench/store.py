@@ -666,65 +666,72 @@ class Store:
 
     def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
         """Store a run; False where there is one of its key."""
-        merits = record.merits or {}
+        return self.add_all([(job, record)], campaign) == 1
+
+    def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
+        """Store runs, all or none; how many there were not of their keys."""
         with self.transaction():
-            problem, solver = self._of(job)
-            facts = dict(record.machine or {})
-            text = json.dumps(facts, sort_keys=True)
-            machine = self._id(
-                "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
-            )
-            values = [
-                job.key,
-                campaign,
-                problem,
-                solver,
-                machine,
-                job.tol,
-                job.merit,
-                job.limits.time,
-                job.limits.wall,
-                job.limits.memory,
-                job.threads,
-                job.repeat,
-                record.status,
-                text_of(record.message),
-                int(record.solved),
-                record.iterations,
-                record.cpu_s,
-                record.said_cpu_s,
-                record.setup_s,
-                record.total_cpu_s,
-                record.wall_s,
-                record.memory,
-                *(merits.get(name) for name in MERITS),
-                record.stages,
-                record.measured,
-                int(record.warm),
-                int(record.pinned),
-                record.load,
-                record.frequency,
-                record.started,
-                job.start,
-                *((job.along.sequence, job.along.step) if job.along else (None, None)),
-                job.guess.step if job.guess and record.guessed else None,
-                job.along.after if job.along else None,
-            ]
-            marks = ", ".join("?" * len(RUN))
-            cursor = self.db.execute(
-                f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
-                " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
-                [*values, job.key],
-            )
-            if cursor.rowcount == 0:
-                return False
-            solution = record.solution
-            self._add_more(
-                cursor.lastrowid,
-                record.certificate,
-                [solution.get(name) for name in KEPT] if solution else None,
-                record.history or (),
-            )
+            return sum([self._add(job, record, campaign) for job, record in runs])
+
+    def _add(self, job: Job, record: Record, campaign: int | None) -> bool:
+        merits = record.merits or {}
+        problem, solver = self._of(job)
+        facts = dict(record.machine or {})
+        text = json.dumps(facts, sort_keys=True)
+        machine = self._id(
+            "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
+        )
+        values = [
+            job.key,
+            campaign,
+            problem,
+            solver,
+            machine,
+            job.tol,
+            job.merit,
+            job.limits.time,
+            job.limits.wall,
+            job.limits.memory,
+            job.threads,
+            job.repeat,
+            record.status,
+            text_of(record.message),
+            int(record.solved),
+            record.iterations,
+            record.cpu_s,
+            record.said_cpu_s,
+            record.setup_s,
+            record.total_cpu_s,
+            record.wall_s,
+            record.memory,
+            *(merits.get(name) for name in MERITS),
+            record.stages,
+            record.measured,
+            int(record.warm),
+            int(record.pinned),
+            record.load,
+            record.frequency,
+            record.started,
+            job.start,
+            *((job.along.sequence, job.along.step) if job.along else (None, None)),
+            job.guess.step if job.guess and record.guessed else None,
+            job.along.after if job.along else None,
+        ]
+        marks = ", ".join("?" * len(RUN))
+        cursor = self.db.execute(
+            f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
+            " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
+            [*values, job.key],
+        )
+        if cursor.rowcount == 0:
+            return False
+        solution = record.solution
+        self._add_more(
+            cursor.lastrowid,
+            record.certificate,
+            [solution.get(name) for name in KEPT] if solution else None,
+            record.history or (),
+        )
         return True
 
     def _add_more(

@@ -32,15 +32,9 @@ std::mutex& library_mutex() {
   return instance;
 }
 
-/// Whether an external link may be followed: HDF5 would wait for ever at the end of a pipe.
-herr_t follow_to_files_alone(const char* from, const char*, const char* to, const char*, unsigned*,
-                             hid_t, void*) {
-  for (const fs::path& target : {fs::path(to), fs::path(from).parent_path() / to}) {
-    std::error_code error;
-    const auto status = fs::status(target, error);
-    if (fs::exists(status) && !fs::is_regular_file(status)) return -1;
-  }
-  return 0;
+/// No external link is followed: a file from elsewhere could name any file of its reader's.
+herr_t follow_none(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
+  return -1;
 }
 
 Session* current = nullptr;  // under the lock
@@ -80,7 +74,7 @@ hid_t Session::link_access() {
   std::optional<Handle>& made = current->link_access_;
   if (!made) {
     made.emplace(H5Pcreate(H5P_LINK_ACCESS), H5Pclose);
-    H5Pset_elink_cb(made->id(), follow_to_files_alone, nullptr);
+    H5Pset_elink_cb(made->id(), follow_none, nullptr);
   }
   return made->id();
 }
@@ -92,8 +86,12 @@ std::string Group::child(std::string_view name) const {
 bool Group::has(const std::string& name) const {
   if (H5Oexists_by_name(id, name.c_str(), Session::link_access()) > 0) return true;
   // what cannot be looked up is not what is not there
-  if (H5Lexists(id, name.c_str(), H5P_DEFAULT) < 0) {
-    fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+  const htri_t linked = H5Lexists(id, name.c_str(), H5P_DEFAULT);
+  if (linked < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
+  H5L_info_t link;
+  if (linked > 0 && H5Lget_info(id, name.c_str(), &link, H5P_DEFAULT) >= 0 &&
+      link.type == H5L_TYPE_EXTERNAL) {
+    fail(child(name), "is a link into another file, and is not followed: copy what it links to");
   }
   return false;
 }

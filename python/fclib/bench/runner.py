@@ -195,6 +195,7 @@ def run_campaign(
     Path(store).parent.mkdir(parents=True, exist_ok=True)
     new = not Path(store).exists()
     with Store(store) as opened:
+        opened.mend()
         try:
             plan = campaign.plan(opened, tell)
         except (_core.Error, ImportError):

@@ -95,7 +95,7 @@ def _one_line(word: str) -> str:
     return " ".join(word.split())
 
 
-def explained(path: Path, error: sqlite3.Error) -> StoreError:
+def explained(path: Path, error: Exception) -> StoreError:
     """What an error of SQLite means for a store, and what to do."""
     word = _one_line(str(error))
     if "readonly" in word:
@@ -138,7 +138,8 @@ class _Cursor(sqlite3.Cursor):
     def _explained(self, call: Callable[..., Any], *arguments: Any) -> Any:
         try:
             return call(*arguments)
-        except sqlite3.DatabaseError as error:
+        # SQLite's own message may quote what is no text
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             path = getattr(self.connection, "path", None)
             if path is None or isinstance(error, sqlite3.ProgrammingError):
                 raise
@@ -177,7 +178,7 @@ def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
                 last, step = number, 1
                 yield tuple(row)
             return
-        except sqlite3.DatabaseError:
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
             last, step = last + step, 2 * step
 
 
@@ -362,7 +363,7 @@ class Store:
                     made._seal(table, "")
             if "runs" not in there:
                 raise StoreError(f"{path}: is no store that this fclib knows")
-        except (sqlite3.DatabaseError, StoreError) as error:
+        except (sqlite3.DatabaseError, StoreError, UnicodeDecodeError) as error:
             made.close()
             raise StoreError(f"{path}: {_one_line(str(error))}") from None
         finally:
@@ -526,39 +527,38 @@ class Store:
             self._seal("campaigns", "id = ?", campaign)
 
     def mend(self) -> int:
-        """Remove what was damaged, so that its runs are run again; how many rows.
+        """Remove damaged rows, which a warning names, and what refers to them; how many runs.
 
-        With a row go those that refer to it.
+        They are run again by the campaign that goes on.
         """
         gone: dict[str, list[int]] = {}
         kept: dict[str, set[int]] = {}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DamageWarning)
-            for table, own in layouts().items():
-                right: set[int] = set()
-                at = {name: own.numbers.index(f) for name, f in refers(own.numbers)}
-                for rows, numbers in self._right(table):
-                    good = np.ones(len(rows), dtype=bool)
-                    for other, column in at.items():
-                        good &= [x != x or x in kept[other] for x in numbers[:, column].tolist()]
-                    right.update(row[0] for row, fine in zip(rows, good, strict=True) if fine)
-                kept[table] = right
-                (count,) = self.db.execute(f"SELECT COUNT(*) FROM {table} NOT INDEXED").fetchone()
-                if count != len(right):
-                    every = self.db.execute(f"SELECT rowid FROM {table} NOT INDEXED")
-                    gone[table] = [row for (row,) in every if row not in right]
+        for table, own in layouts().items():
+            at = {name: own.numbers.index(by) for name, by in refers(own.numbers)}
+            kept[table] = set()
+            for rows, numbers in self._right(table):
+                good = np.ones(len(rows), dtype=bool)
+                for other, column in at.items():
+                    good &= [x != x or x in kept[other] for x in numbers[:, column].tolist()]
+                kept[table].update(row[0] for row, fine in zip(rows, good, strict=True) if fine)
+            (count,) = self.db.execute(f"SELECT COUNT(*) FROM {table} NOT INDEXED").fetchone()
+            if count != len(kept[table]):
+                every = self.db.execute(f"SELECT rowid FROM {table} NOT INDEXED").fetchall()
+                gone[table] = [row for (row,) in every if row not in kept[table]]
         if not gone:
             return 0
         with self.transaction():
+            # indexes have what rows were before they were damaged
+            self.db.execute("REINDEX")
             for table, places in gone.items():
                 rows = [(place,) for place in places]
                 self.db.executemany(f"DELETE FROM {table} WHERE rowid = ?", rows)
-                which = f"{_rows_of(places)} of {table}"
-                self._warn(which, len(places), "damaged, or refer to what is, and removed")
-            # an index still has what a damaged row was before
-            self.db.execute("REINDEX")
         self._ids.clear()
-        return sum(map(len, gone.values()))
+        runs = gone.get("runs", [])
+        if runs:
+            what = "damaged, or of damaged rows, and removed: a campaign runs them again"
+            self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
+        return len(runs)
 
     def keys(self) -> set[str]:
         """The keys of all runs."""
@@ -667,65 +667,72 @@ class Store:
 
     def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
         """Store a run; False where there is one of its key."""
-        merits = record.merits or {}
+        return self.add_all([(job, record)], campaign) == 1
+
+    def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
+        """Store runs, all or none; how many there were not of their keys."""
         with self.transaction():
-            problem, solver = self._of(job)
-            facts = dict(record.machine or {})
-            text = json.dumps(facts, sort_keys=True)
-            machine = self._id(
-                "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
-            )
-            values = [
-                job.key,
-                campaign,
-                problem,
-                solver,
-                machine,
-                job.tol,
-                job.merit,
-                job.limits.time,
-                job.limits.wall,
-                job.limits.memory,
-                job.threads,
-                job.repeat,
-                record.status,
-                text_of(record.message),
-                int(record.solved),
-                record.iterations,
-                record.cpu_s,
-                record.said_cpu_s,
-                record.setup_s,
-                record.total_cpu_s,
-                record.wall_s,
-                record.memory,
-                *(merits.get(name) for name in MERITS),
-                record.stages,
-                record.measured,
-                int(record.warm),
-                int(record.pinned),
-                record.load,
-                record.frequency,
-                record.started,
-                job.start,
-                *((job.along.sequence, job.along.step) if job.along else (None, None)),
-                job.guess.step if job.guess and record.guessed else None,
-                job.along.after if job.along else None,
-            ]
-            marks = ", ".join("?" * len(RUN))
-            cursor = self.db.execute(
-                f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
-                " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
-                [*values, job.key],
-            )
-            if cursor.rowcount == 0:
-                return False
-            solution = record.solution
-            self._add_more(
-                cursor.lastrowid,
-                record.certificate,
-                [solution.get(name) for name in KEPT] if solution else None,
-                record.history or (),
-            )
+            return sum([self._add(job, record, campaign) for job, record in runs])
+
+    def _add(self, job: Job, record: Record, campaign: int | None) -> bool:
+        merits = record.merits or {}
+        problem, solver = self._of(job)
+        facts = dict(record.machine or {})
+        text = json.dumps(facts, sort_keys=True)
+        machine = self._id(
+            "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
+        )
+        values = [
+            job.key,
+            campaign,
+            problem,
+            solver,
+            machine,
+            job.tol,
+            job.merit,
+            job.limits.time,
+            job.limits.wall,
+            job.limits.memory,
+            job.threads,
+            job.repeat,
+            record.status,
+            text_of(record.message),
+            int(record.solved),
+            record.iterations,
+            record.cpu_s,
+            record.said_cpu_s,
+            record.setup_s,
+            record.total_cpu_s,
+            record.wall_s,
+            record.memory,
+            *(merits.get(name) for name in MERITS),
+            record.stages,
+            record.measured,
+            int(record.warm),
+            int(record.pinned),
+            record.load,
+            record.frequency,
+            record.started,
+            job.start,
+            *((job.along.sequence, job.along.step) if job.along else (None, None)),
+            job.guess.step if job.guess and record.guessed else None,
+            job.along.after if job.along else None,
+        ]
+        marks = ", ".join("?" * len(RUN))
+        cursor = self.db.execute(
+            f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
+            " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
+            [*values, job.key],
+        )
+        if cursor.rowcount == 0:
+            return False
+        solution = record.solution
+        self._add_more(
+            cursor.lastrowid,
+            record.certificate,
+            [solution.get(name) for name in KEPT] if solution else None,
+            record.history or (),
+        )
         return True
 
     def _add_more(

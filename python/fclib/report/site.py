@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import json
 import math
 import shutil
 import tempfile
@@ -30,6 +31,7 @@ from fclib import _core, _registry
 from fclib._solve import MERITS
 from fclib._verdicts import CLASSES, SOLVED, UNSUITABLE, is_solved, rating
 from fclib.bench import profiles
+from fclib.bench.campaign import described
 from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.collections import families, read_catalog, sets, standing
@@ -365,7 +367,7 @@ class _Writer:
         if self.campaigns is not None:
             site |= self._runs(self.campaigns)
         else:
-            site["solvers"] = [_solver(info.name, info.name, {}) for info in _registry.solvers()]
+            site["solvers"] = [_own(info) for info in _registry.solvers()]
         views, steps = self._views()
         site["families"] = self._families(steps)
         site["views"] = views
@@ -432,8 +434,11 @@ class _Writer:
             solved = sum(is_solved(run["status"]) for run in runs)
             self.problems.rows[place] |= {"runs": len(runs), "solved": solved}
         self.progress("problems", len(by_place), len(by_place))
-        _, places = campaigns.rows.numbers("solver")
-        first = {row["solver"]: row for row in campaigns.rows.where(places)}
+        # of a solver that was run before stores knew what it is, and after, the later
+        _, places = campaigns.rows.numbers("solver", "about")
+        kinds = list(campaigns.rows.where(places))
+        first = {row["solver"]: row for row in kinds if row["about"]}
+        first = {row["solver"]: row for row in kinds} | first
         return {
             "overview": campaigns.overview(),
             "tolerances": campaigns.tolerances,
@@ -442,10 +447,7 @@ class _Writer:
             "work": rounded(
                 profiles.work_precision(campaigns.rows, campaigns.costs, weigh=WEIGH), DIGITS
             ),
-            "solvers": [
-                _solver(label, first[label]["solver_name"], first[label])
-                for label in campaigns.solvers
-            ],
+            "solvers": [_solver(label, first[label]) for label in campaigns.solvers],
         }
 
     def _put_bench(self, t: int, bench: Bench) -> None:
@@ -608,35 +610,32 @@ def _family(family: Any) -> dict[str, Any]:
     }
 
 
-def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of a solver: here, or where it was run."""
+def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of a solver, by what it said where it was run: no name is looked up here."""
+    about = json.loads(row["about"] or "{}")
+    name, title = row["solver_name"], about.get("title", "")
     found: dict[str, Any] = {"label": label, "name": name}
-    if row:
-        found |= {key: row[key] for key in ("options", "version", "origin")}
-        found["family"] = row["solver_family"]
-    version = f"{found.get('origin') or 'fclib'} {found.get('version') or _core.version}"
-    found["bibtex"] = citing.implementation(name, "", version)
-    try:
-        info = _registry.find_solver(name)
-    except _core.Error:
-        return found  # of another machine, or a program of the user's
-    found["bibtex"] = citing.implementation(name, info.title, version)
-    found["papers"] = citing.papers_of(info.citation)
-    return found | {
-        "title": info.title,
-        "citation": info.citation,
-        "family": info.family,
-        "origin": info.origin,
-        "dimensions": list(info.dimensions),
-        "rolling": list(info.rolling_dimensions),
-        "known": [
-            [
-                option.name,
-                " | ".join(option.choices) or option.type,
-                "see there" if option.type == "text" else str(option.default),
-                option.unit,
-                option.doc,
-            ]
-            for option in info.options
-        ],
-    }
+    found |= {key: row[key] for key in ("options", "version", "origin")}
+    found["family"] = row["solver_family"]
+    version = f"{found['origin'] or 'fclib'} {found['version'] or _core.version}"
+    found["bibtex"] = citing.implementation(name, title, version)
+    if not about:
+        return found  # of a store that was made before solvers said it
+    found["papers"] = citing.papers_of(about["citation"])
+    found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
+    return found | {"known": about["options"]}
+
+
+def _own(info: _core.SolverInfo) -> dict[str, Any]:
+    """What a solver that is here says of itself, as if it had been run."""
+    return _solver(
+        info.name,
+        {
+            "solver_name": info.name,
+            "solver_family": info.family,
+            "origin": info.origin,
+            "version": "",
+            "options": "{}",
+            "about": described(info),
+        },
+    )

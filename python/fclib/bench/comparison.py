@@ -99,6 +99,11 @@ def numbers_in(runs: Table, name: str, missing: float = math.nan) -> Array:
     )
 
 
+def kept(runs: Table, mask: Mask) -> Table:
+    """Some of the runs; without a copy if that is all of them."""
+    return runs if mask.all() else runs.where(mask)
+
+
 def in_order(words: Words) -> list[Any]:
     """The texts that occur, in the order in which they come first."""
     _, first = np.unique(words.codes, return_index=True)
@@ -213,7 +218,7 @@ def one_limit(rows: Iterable[Mapping[str, Any]], both_forms: bool = False) -> Ta
     order = np.lexsort((pairs % len(kinds), count, pairs // len(kinds)))
     chosen = np.zeros(len(keys), np.int64)
     chosen[pairs[order] // len(kinds)] = pairs[order]  # of each instance the last one stays
-    return runs.where(pair == chosen[place])
+    return kept(runs, pair == chosen[place])
 
 
 # ---- costs
@@ -435,7 +440,7 @@ def gather(
     solver = words_in(runs, "solver")
     numbers = {name: k for k, name in enumerate(names)}
     column_of = np.array([numbers.get(name, -1) for name in solver.values], np.int64)
-    runs = runs.where(~words_in(runs, "status").is_in(SURROUNDINGS))
+    runs = kept(runs, ~words_in(runs, "status").is_in(SURROUNDINGS))
     if not len(runs):
         none = np.zeros((0, len(names)))
         return Costs((), tuple(names), none, metric)
@@ -631,12 +636,12 @@ def compared(every: Costs, solvers: Sequence[str] | None = None, own_set: bool =
 def runs_of(rows: Iterable[Mapping[str, Any]], chosen: Costs) -> Table:
     """The runs that costs are of: of these solvers, on these instances, in the form that counts."""
     runs = one_limit(rows, chosen.both_forms)
-    runs = runs.where(~words_in(runs, "status").is_in((*SURROUNDINGS, UNSUITABLE)))
+    fits = ~words_in(runs, "status").is_in((*SURROUNDINGS, UNSUITABLE))
     if not len(runs) or not chosen.instances:
         return runs.where(np.zeros(len(runs), bool))
     instance, solver = chosen.cells_of(runs)
-    kept = (instance >= 0) & (solver >= 0)
-    kept[kept] = chosen.there[instance[kept], solver[kept]]
+    fits &= (instance >= 0) & (solver >= 0)
+    fits[fits] = chosen.there[instance[fits], solver[fits]]
     if chosen.forms is not None:
         hashes = words_in(runs, "hash")
         codes = {value: k for k, value in enumerate(hashes.values)}
@@ -644,8 +649,8 @@ def runs_of(rows: Iterable[Mapping[str, Any]], chosen: Costs) -> Table:
         for k, one in enumerate(chosen.instances):
             table = np.array([codes.get(form, -1) for form in one.forms], np.int64)
             which[k] = table[chosen.forms[k]]
-        kept[kept] = which[instance[kept], solver[kept]] == hashes.codes[kept]
-    return runs.where(kept)
+        fits[fits] = which[instance[fits], solver[fits]] == hashes.codes[fits]
+    return kept(runs, fits)
 
 
 def odds(solved: int, of: int) -> tuple[float, float]:

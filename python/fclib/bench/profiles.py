@@ -36,7 +36,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib._solve import MeritKind
-from fclib._verdicts import UNSUITABLE
+from fclib._verdicts import UNSUITABLE, is_solved
 from fclib.bench.comparison import (
     METRICS,
     TIMES,
@@ -49,6 +49,7 @@ from fclib.bench.comparison import (
     costs,
     gather,
     in_order,
+    kept,
     least,
     names_of,
     numbers_in,
@@ -88,6 +89,14 @@ SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is mar
 MARK, LOADED = "~", "^"  # of such a figure, and of one with runs under load
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 VIRTUAL_BEST = "virtual best"
+# columns of a store that no table, figure or page is of: a third of the memory
+UNREAD = frozenset(
+    (
+        *("natural", "scaled_natural", "dynamics", "bilateral", "kinematics", "cone", "dual_cone"),
+        *("complementarity", "open", "stick", "slide", "said_cpu_s", "setup_s", "measured"),
+        *("warm", "pinned", "machine", "frequency_mhz", "solved"),
+    )
+)
 JUDGED = {
     "both": "the tolerance bounds both natural maps",
     "natural": "the tolerance bounds the natural map of the literature alone",
@@ -132,7 +141,8 @@ def load(
         runs = read(opened, more)
     if not len(runs):
         raise ProfileError(f"{store}: there are no runs")
-    runs = runs.where(words_in(runs, "start").is_in(["cold"]) | (numbers_in(runs, "step", 0.0) > 0))
+    later = numbers_in(runs, "step", 0.0) > 0
+    runs = kept(runs, words_in(runs, "start").is_in(["cold"]) | later)
     runs = _name_machines(runs)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
@@ -153,7 +163,7 @@ def load(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
                     f" there is: {', '.join(sorted(map(str, there)))}"
                 )
-            runs = runs.where(fits)
+            runs = kept(runs, fits)
     nodes = sorted({name or "?" for name in words_in(runs, "node").present()})
     if len(nodes) > 1:
         raise ProfileError(
@@ -169,12 +179,15 @@ def load(
     order = {name: k for k, name in enumerate(solvers)}
     solver = words_in(runs, "solver")
     rank = np.array([order.get(str(name), len(order)) for name in solver.values], int)
-    return _name_solvers(runs.where(np.argsort(rank[solver.codes], kind="stable")))
+    if order:
+        runs = runs.where(np.argsort(rank[solver.codes], kind="stable"))
+    return _name_solvers(runs)
 
 
 def read(store: Store, more: Sequence[str] = ()) -> Table:
     """All runs of a store; `same_as` says of a local form which global one it is of."""
     runs = store.table(more=("path", *more))
+    runs = Table({name: runs[name] for name in runs.names if name not in UNREAD})
     if not len(runs):
         return runs
     _, first = runs.numbers("hash")
@@ -718,6 +731,11 @@ def along(
         names = ("hash", "solver", "tol", "merit", "repeat", "time_limit", "wall_limit")
         return tuple(row[name] for name in names)
 
+    # of what was run cold alone nothing is said here
+    every = table_of(rows)
+    hashes, warm = words_in(every, "hash"), words_in(every, "start").is_in(["warm"])
+    every = kept(every, hashes.is_in(in_order(words_in(every.where(warm), "hash"))))
+    rows = list(every)
     cold = {same(row): row for row in rows if row["start"] == "cold"}
     chains: dict[tuple[str, float, str], list[tuple[Any, Any]]] = defaultdict(list)
     for row in sorted(rows, key=lambda row: (row["step"] or 0, row["repeat"])):
@@ -732,7 +750,7 @@ def along(
         for (sequence, tol, solver), pairs in sorted(chains.items()):
             spent = np.array([[_spent(row) for row in pair] for pair in pairs]).sum(axis=0)
             counts = np.array([[row["iterations"] or 0 for row in pair] for pair in pairs])
-            solved = np.array([[row["solved"] for row in pair] for pair in pairs])
+            solved = np.array([[is_solved(row["status"]) for row in pair] for pair in pairs])
             apart = [
                 gap
                 for one, other in pairs

@@ -713,6 +713,56 @@ def test_sets_of_the_collection_are_named() -> None:
         campaign(problems=["set:nowhere"]).plan()
 
 
+def test_a_set_that_is_built_in_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    from fclib.collections import library
+
+    folders = library.Collection("tiny").folders
+    there, built = set(folders[:3]), []
+
+    def build(name: str, folder: Path, progress: Any = None) -> None:
+        for done in range(5 if progress else 0):
+            progress(name, done, 5)
+        built.append(name)
+
+    monkeypatch.setattr(library, "is_there", lambda name, folder: name in there)
+    monkeypatch.setattr(library, "ensure", build)
+    said: list[str] = []
+    campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
+    # those that were asked for and are not there, and no others
+    assert built[: len(folders) - 3] == folders[3:]
+    assert said[0].startswith(f"set tiny: 3 of {len(folders)} families are in ")
+    assert "fclib collection build tiny --out " in said[0]
+    # a word for each family at once, and not one for each problem
+    assert said[1:-1] == [
+        f"family {k} of {len(folders) - 3}: {name}, 0 of 5 problems"
+        for k, name in enumerate(folders[3:], start=1)
+    ]
+    there.update(folders)
+    said.clear()
+    campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
+    assert said == []
+
+
+def test_files_of_a_set_that_is_not_built_name_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path))
+    wanted = {
+        "standard/*/*-global.hdf5": "standard",
+        "rt444/Chain/*.hdf5": "rt444/Chain",
+        "standard": "standard",
+    }
+    for pattern, name in wanted.items():
+        with pytest.raises(fclib.FileError) as told:
+            problems.files_of([f"${{FCLIB_COLLECTION}}/{pattern}"], Path("/"))
+        assert str(told.value).endswith(f"fclib collection build {name} --out {tmp_path}")
+    for pattern in (f"{tmp_path}/mine/*.hdf5", "/nowhere/standard/*.hdf5"):
+        with pytest.raises(fclib.FileError) as told:
+            problems.files_of([pattern], Path("/"))
+        assert "collection build" not in str(told.value)
+
+
 # ---- what is asked for
 
 

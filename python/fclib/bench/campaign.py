@@ -350,8 +350,12 @@ def published_means(store: str | Path) -> dict[tuple[str, float], float]:
     found = {}
     with Store(store, create=False) as opened:
         for text in opened.texts():
-            campaign = toml().loads(text)
-            for group in campaign.get("problems", ()):
+            try:
+                campaign = toml().loads(text)
+            except ValueError:
+                continue  # of another version, or edited
+            groups = campaign.get("problems", ())
+            for group in groups if isinstance(groups, list) else ():
                 if not isinstance(group, Mapping) or "published_mean" not in group:
                     continue
                 tolerances = group.get("tolerances", campaign.get("tolerances", []))

@@ -24,7 +24,6 @@ started from nothing (cold) and from the solution of a step before (warm) are ne
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections import Counter, defaultdict
@@ -41,7 +40,7 @@ from fclib import _core
 from fclib._solve import MeritKind
 from fclib.bench.job import ORDERLY, SURROUNDINGS
 from fclib.bench.store import Store
-from fclib.bench.table import Table, Words
+from fclib.bench.table import Table, Words, object_in
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Start: TypeAlias = Literal["cold", "warm"]
@@ -258,7 +257,7 @@ def _named_solvers(rows: Table) -> Words:
     """The labels of rows; solvers of one label have different ones if they ran differently."""
 
     def of(row: Mapping[str, Any]) -> dict[str, str]:
-        options = json.loads(row["options"] or "{}")
+        options = object_in(row["options"])
         return {
             "version": row["version"] or "?",
             "options": " ".join(f"{k}={v}" for k, v in options.items()) or "no options",

@@ -435,7 +435,7 @@ class Store:
                     if value == NOTHING:
                         found[name] = None
                     else:
-                        found[name] = value if name in blobs else value.decode()
+                        found[name] = value if name in blobs else value.decode(errors="replace")
                 yield found
 
     def _seal(self, table: str, condition: str, *values: Any) -> None:
@@ -890,7 +890,7 @@ class Store:
         done: dict[float, Counter[str]] = {}
         for rows, numbers in self._right("runs"):
             for number, row in zip(numbers[:, campaign].tolist(), rows, strict=True):
-                done.setdefault(number, Counter())[row[status].decode()] += 1
+                done.setdefault(number, Counter())[row[status].decode(errors="replace")] += 1
         found = []
         for row in reversed(list(self._read("campaigns"))):
             counts = done.get(float(row["id"]), Counter())
@@ -1028,7 +1028,7 @@ class _Places(dict[bytes, int]):
 
 def _text(value: bytes) -> str | None:
     """Of a text as `Layout.query` selects it."""
-    return None if value == NOTHING else value.decode()
+    return None if value == NOTHING else value.decode(errors="replace")
 
 
 def _marks(names: Sequence[str]) -> str:

@@ -671,9 +671,14 @@ class Store:
     def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
         """Store runs, all or none; how many there were not of their keys."""
         with self.transaction():
-            return sum([self._add(job, record, campaign) for job, record in runs])
+            added = [self._add(job, record, campaign) for job, record in runs]
+            new = [run for run in added if run is not None]
+            if new:  # the last ones: nobody else writes meanwhile
+                self._seal("runs", "id >= ?", new[0])
+        return len(new)
 
-    def _add(self, job: Job, record: Record, campaign: int | None) -> bool:
+    def _add(self, job: Job, record: Record, campaign: int | None) -> int | None:
+        """The number of a run that is stored, without its checksum; None where it is there."""
         merits = record.merits or {}
         problem, solver = self._of(job)
         facts = dict(record.machine or {})
@@ -724,15 +729,16 @@ class Store:
             [*values, job.key],
         )
         if cursor.rowcount == 0:
-            return False
+            return None
+        run: int = cursor.lastrowid
         solution = record.solution
         self._add_more(
-            cursor.lastrowid,
+            run,
             record.certificate,
             [solution.get(name) for name in KEPT] if solution else None,
             record.history or (),
         )
-        return True
+        return run
 
     def _add_more(
         self,
@@ -741,8 +747,7 @@ class Store:
         vectors: Sequence[bytes | None] | None,
         history: Sequence[Sequence[Any]],
     ) -> None:
-        """Seal a run, and store what of it lies in other tables."""
-        self._seal("runs", "id = ?", run)
+        """Store what of a run lies in other tables."""
         if certificate:
             query = "INSERT INTO certificates (run, certificate) VALUES (?, ?)"
             self.db.execute(query, (run, certificate))
@@ -966,7 +971,7 @@ class Store:
             known = self.db.execute(same, (row["key"], row["started"])).fetchone()
             if not known and adapt(row):
                 self._insert_fault([row[name] for name in FAULT])
-        added, lost = 0, []
+        added, first, lost = 0, 0, []
         insert = f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({_marks(RUN)})"
         for row in other._read("runs"):
             number = row["id"]
@@ -978,6 +983,7 @@ class Store:
             )
             if cursor.rowcount:
                 added += 1
+                first = first or cursor.lastrowid
                 vectors = next(other._read("solutions", "run = ?", (number,)), None)
                 self._add_more(
                     cursor.lastrowid,
@@ -985,6 +991,8 @@ class Store:
                     [vectors[name] for name in KEPT] if vectors else None,
                     other.history(number),
                 )
+        if first:
+            self._seal("runs", "id >= ?", first)
         if lost:
             other._warn(f"{_rows_of(lost)} of runs", len(lost), "of damaged rows, and left out")
         return added

@@ -559,17 +559,21 @@ class Store:
             self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
         return len(runs)
 
+    def mended(self) -> Table:
+        """All runs with their keys, after what was damaged is removed."""
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", DamageWarning)
+            runs = self.table(more=("key",))
+        if said:
+            self.mend()
+            runs = self.table(more=("key",))
+        return runs
+
     def keys(self) -> set[str]:
         """The keys of all runs."""
         return set(self.table(more=("key",))["key"].values)
 
-    def spent(self, keys: Sequence[str]) -> float:
-        """[s] that the runs of some keys have taken, of CPU, or of waiting where that ended it."""
-        runs = self.table(more=("key",))
-        cost = np.where(runs["status"] == "wall_limit", runs["wall_s"], runs["total_cpu_s"])
-        return float(np.nansum(cost[runs["key"].is_in(keys)]))
-
-    def forget(self, keys: Sequence[str], statuses: Sequence[str]) -> int:
+    def forget(self, keys: Iterable[str], statuses: Sequence[str]) -> int:
         """Remove the runs of some keys that ended in one of the statuses; how many.
 
         With a run of a sequence go those of the steps after it, which follow from it.

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any, TypeAlias, overload
 
@@ -72,7 +73,7 @@ class Words:
 
     def is_in(self, texts: Iterable[Any]) -> npt.NDArray[np.bool_]:
         """Which rows have one of these texts."""
-        wanted = set(texts)
+        wanted = texts if isinstance(texts, (AbstractSet, Mapping)) else set(texts)
         found = np.array([value in wanted for value in self.values], dtype=bool)
         return np.asarray(found[self.codes]) if len(found) else np.zeros(len(self), bool)
 

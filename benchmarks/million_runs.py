@@ -32,7 +32,7 @@ from fclib.bench.job import Job, Record
 FCLIB = shutil.which("fclib", path=Path(sys.executable).parent) or "fclib"
 SOLVERS = ("auto", "nsgs", "apgd", "admm", "ppa-nsn", "nsn-ac", "nsip", "homotopy")
 TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8)
-PROBLEMS = 2500
+PROBLEMS = 3125
 AT_ONCE = 10_000  # runs of one transaction
 CAMPAIGN = """
 name = "million"

@@ -152,13 +152,13 @@ def test_a_damaged_row_is_named_and_left_out(table: str, whole: Path, tmp_path: 
     assert ".py" not in done.stderr
 
 
-@pytest.mark.parametrize("table", [*OF_RUNS, "history", "files"])
+@pytest.mark.parametrize("table", [*OF_RUNS, "files"])
 def test_what_was_damaged_is_run_again(table: str, whole: Path, tmp_path: Path) -> None:
     path = tmp_path / "one.sqlite"
     path.write_bytes(whole.read_bytes())
     with bench.Store(path) as store:
         right = content(store)
-        name = {"runs": "error", "machines": "cpu", "history": "time", "files": "problem"}
+        name = {"runs": "error", "machines": "cpu", "files": "problem"}
         store.db.execute(f"UPDATE {table} SET {name.get(table, 'name')} = 2.5 WHERE rowid = 1")
     with pytest.warns(DamageWarning, match=f"of {table} is damaged"):
         progress = bench.run_campaign(campaign(), path)

@@ -146,7 +146,7 @@ def test_extremes_are_ordered_and_true(site: Path, store: Path) -> None:
     ids = column(site, "id")
     for t, tol in enumerate(known["tolerances"]):
         with Store(store, create=False) as opened:
-            rows = [r for r in opened.results(tol=tol) if r["solver"] != "rare"]
+            rows = [row for row in opened.results(tol=tol) if row["solver"] != "rare"]
         for label, lists in known["headlines"][t]["extremes"].items():
             for kind in ("best", "worst"):
                 for place, own, best, which in lists[kind]:
@@ -177,7 +177,7 @@ def test_the_catalogue_knows_all_problems_and_their_best_solver(
     assert ids[-1] == "Alone/alone"
     assert column(site, "nc")[:-1] == [row["nc"] for row in catalogue]
     with Store(store, create=False) as opened:
-        rows = [r for r in opened.results() if r["solved"]]
+        rows = opened.results(solved=True)
     assert sum(x or 0 for x in column(site, "solved")) == len(rows)
     for k, best in enumerate(column(site, "best_solver")):
         name = ids[k].rpartition("/")[2]

@@ -207,7 +207,15 @@ class Campaign:
     def plan(
         self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
     ) -> list[Job]:
-        """The jobs, in the order in which they are to be done: repeat by repeat, each shuffled.
+        """The jobs, in the order in which they are to be done, as `plan_by_key` has them."""
+        return list(self.plan_by_key(store, tell).values())
+
+    def plan_by_key(
+        self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
+    ) -> dict[str, Job]:
+        """The jobs by their keys, in the order in which they are to be done.
+
+        They go repeat by repeat, each shuffled.
 
         Where there is a budget, problem after problem, so that what it suffices for is spread
         evenly over the groups and families, and all solvers have run what was begun.
@@ -261,7 +269,7 @@ class Campaign:
                 ours = spread(ours)
             for job in ours:
                 jobs.setdefault(job.key, job)  # one problem under two names is run once
-        return list(jobs.values())
+        return jobs
 
     def _job(
         self, facts: ProblemFacts, group: Group, choice: SolverChoice, tol: float, repeat: int
@@ -350,8 +358,12 @@ def published_means(store: str | Path) -> dict[tuple[str, float], float]:
     found = {}
     with Store(store, create=False) as opened:
         for text in opened.texts():
-            campaign = toml().loads(text)
-            for group in campaign.get("problems", ()):
+            try:
+                campaign = toml().loads(text)
+            except ValueError:
+                continue  # of another version, or edited
+            groups = campaign.get("problems", ())
+            for group in groups if isinstance(groups, list) else ():
                 if not isinstance(group, Mapping) or "published_mean" not in group:
                     continue
                 tolerances = group.get("tolerances", campaign.get("tolerances", []))

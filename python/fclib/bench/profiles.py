@@ -22,7 +22,6 @@ started from nothing (cold) and from the solution of a step before (warm) are ne
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections import Counter, defaultdict
@@ -62,7 +61,7 @@ from fclib.bench.comparison import (
 )
 from fclib.bench.job import ORDERLY
 from fclib.bench.store import Store
-from fclib.bench.table import Table, Words
+from fclib.bench.table import Table, Words, object_in
 
 __all__ = [
     "METRICS",
@@ -218,7 +217,7 @@ def _name_solvers(runs: Table) -> Table:
     """Give solvers of one label different ones, where they were not run in the same way."""
 
     def of(row: Mapping[str, Any]) -> dict[str, str]:
-        options = json.loads(row["options"] or "{}")
+        options = object_in(row["options"])
         return {
             "version": row["version"] or "?",
             "options": " ".join(f"{k}={v}" for k, v in options.items()) or "no options",

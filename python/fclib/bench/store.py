@@ -436,7 +436,7 @@ class Store:
                     if value == NOTHING:
                         found[name] = None
                     else:
-                        found[name] = value if name in blobs else value.decode()
+                        found[name] = value if name in blobs else value.decode(errors="replace")
                 yield found
 
     def _seal(self, table: str, condition: str, *values: Any) -> None:
@@ -560,17 +560,21 @@ class Store:
             self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
         return len(runs)
 
+    def mended(self) -> Table:
+        """All runs with their keys, after what was damaged is removed."""
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", DamageWarning)
+            runs = self.table(more=("key",))
+        if said:
+            self.mend()
+            runs = self.table(more=("key",))
+        return runs
+
     def keys(self) -> set[str]:
         """The keys of all runs."""
         return set(self.table(more=("key",))["key"].values)
 
-    def spent(self, keys: Sequence[str]) -> float:
-        """[s] that the runs of some keys have taken, of CPU, or of waiting where that ended it."""
-        runs = self.table(more=("key",))
-        cost = np.where(runs["status"] == "wall_limit", runs["wall_s"], runs["total_cpu_s"])
-        return float(np.nansum(cost[runs["key"].is_in(keys)]))
-
-    def forget(self, keys: Sequence[str], statuses: Sequence[str]) -> int:
+    def forget(self, keys: Iterable[str], statuses: Sequence[str]) -> int:
         """Remove the runs of some keys that ended in one of the statuses; how many.
 
         With a run of a sequence go those of the steps after it, which follow from it.
@@ -672,9 +676,14 @@ class Store:
     def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
         """Store runs, all or none; how many there were not of their keys."""
         with self.transaction():
-            return sum([self._add(job, record, campaign) for job, record in runs])
+            added = [self._add(job, record, campaign) for job, record in runs]
+            new = [run for run in added if run is not None]
+            if new:  # the last ones: nobody else writes meanwhile
+                self._seal("runs", "id >= ?", new[0])
+        return len(new)
 
-    def _add(self, job: Job, record: Record, campaign: int | None) -> bool:
+    def _add(self, job: Job, record: Record, campaign: int | None) -> int | None:
+        """The number of a run that is stored, without its checksum; None where it is there."""
         merits = record.merits or {}
         problem, solver = self._of(job)
         facts = dict(record.machine or {})
@@ -725,15 +734,16 @@ class Store:
             [*values, job.key],
         )
         if cursor.rowcount == 0:
-            return False
+            return None
+        run: int = cursor.lastrowid
         solution = record.solution
         self._add_more(
-            cursor.lastrowid,
+            run,
             record.certificate,
             [solution.get(name) for name in KEPT] if solution else None,
             record.history or (),
         )
-        return True
+        return run
 
     def _add_more(
         self,
@@ -742,8 +752,7 @@ class Store:
         vectors: Sequence[bytes | None] | None,
         history: Sequence[Sequence[Any]],
     ) -> None:
-        """Seal a run, and store what of it lies in other tables."""
-        self._seal("runs", "id = ?", run)
+        """Store what of a run lies in other tables."""
         if certificate:
             query = "INSERT INTO certificates (run, certificate) VALUES (?, ?)"
             self.db.execute(query, (run, certificate))
@@ -891,7 +900,7 @@ class Store:
         done: dict[float, Counter[str]] = {}
         for rows, numbers in self._right("runs"):
             for number, row in zip(numbers[:, campaign].tolist(), rows, strict=True):
-                done.setdefault(number, Counter())[row[status].decode()] += 1
+                done.setdefault(number, Counter())[row[status].decode(errors="replace")] += 1
         found = []
         for row in reversed(list(self._read("campaigns"))):
             counts = done.get(float(row["id"]), Counter())
@@ -967,7 +976,7 @@ class Store:
             known = self.db.execute(same, (row["key"], row["started"])).fetchone()
             if not known and adapt(row):
                 self._insert_fault([row[name] for name in FAULT])
-        added, lost = 0, []
+        added, first, lost = 0, 0, []
         insert = f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({_marks(RUN)})"
         for row in other._read("runs"):
             number = row["id"]
@@ -979,6 +988,7 @@ class Store:
             )
             if cursor.rowcount:
                 added += 1
+                first = first or cursor.lastrowid
                 vectors = next(other._read("solutions", "run = ?", (number,)), None)
                 self._add_more(
                     cursor.lastrowid,
@@ -986,6 +996,8 @@ class Store:
                     [vectors[name] for name in KEPT] if vectors else None,
                     other.history(number),
                 )
+        if first:
+            self._seal("runs", "id >= ?", first)
         if lost:
             other._warn(f"{_rows_of(lost)} of runs", len(lost), "of damaged rows, and left out")
         return added
@@ -1029,7 +1041,7 @@ class _Places(dict[bytes, int]):
 
 def _text(value: bytes) -> str | None:
     """Of a text as `Layout.query` selects it."""
-    return None if value == NOTHING else value.decode()
+    return None if value == NOTHING else value.decode(errors="replace")
 
 
 def _marks(names: Sequence[str]) -> str:

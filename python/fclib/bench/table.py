@@ -6,7 +6,9 @@ A column of numbers is a float64 array, nan where there is nothing; `solved` is 
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any, TypeAlias, overload
 
@@ -71,7 +73,7 @@ class Words:
 
     def is_in(self, texts: Iterable[Any]) -> npt.NDArray[np.bool_]:
         """Which rows have one of these texts."""
-        wanted = set(texts)
+        wanted = texts if isinstance(texts, (AbstractSet, Mapping)) else set(texts)
         found = np.array([value in wanted for value in self.values], dtype=bool)
         return np.asarray(found[self.codes]) if len(found) else np.zeros(len(self), bool)
 
@@ -192,6 +194,15 @@ def numbers_of(name: str, values: Sequence[Any] | npt.NDArray[Any]) -> npt.NDArr
     if name == "solved":
         return found > 0  # also of nan: False
     return found.astype(np.int64) if name == "run" else found
+
+
+def object_in(text: str | None) -> dict[str, Any]:
+    """The object that a column has in JSON; an empty one where somebody has edited it."""
+    try:
+        found = json.loads(text or "{}")
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _objects(values: Iterable[Any]) -> npt.NDArray[np.object_]:

@@ -36,9 +36,7 @@ def plain(text: str) -> str:
     """A text without what steers a terminal: files, stores and solvers are strangers' words."""
     if text.isprintable():
         return text
-    return "".join(
-        one if one.isprintable() or one in "\n\t" else " " if one.isspace() else "?" for one in text
-    )
+    return "".join(one if one.isprintable() or one in "\n\t" else " " for one in text)
 
 
 class _Plain(Console):

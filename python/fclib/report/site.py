@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import json
 import math
 import shutil
 import tempfile
@@ -34,6 +33,7 @@ from fclib.bench import profiles
 from fclib.bench.campaign import described
 from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
+from fclib.bench.table import object_in
 from fclib.collections import families, read_catalog, sets, standing
 from fclib.collections.known import kind_of
 from fclib.report import browser, citing, drawn, taking
@@ -113,6 +113,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("thumb", "picture", "whether there is a small picture of it"),
     ("collection", "set", "the set of families"),
 )
+# what solvers say of themselves: `fclib.bench.campaign.described`
+ABOUT = {"title": str, "citation": str, "dimensions": list, "rolling": list, "options": list}
 # of a catalogue, and of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
 HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
@@ -612,7 +614,9 @@ def _family(family: Any) -> dict[str, Any]:
 
 def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     """What is known of a solver, by what it said where it was run: no name is looked up here."""
-    about = json.loads(row["about"] or "{}")
+    about = object_in(row["about"])
+    if not all(isinstance(about.get(key), kind) for key, kind in ABOUT.items()):
+        about = {}  # of a store that was made before solvers said it, or was edited
     name, title = row["solver_name"], about.get("title", "")
     found: dict[str, Any] = {"label": label, "name": name}
     found |= {key: row[key] for key in ("options", "version", "origin")}
@@ -620,7 +624,7 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     version = f"{found['origin'] or 'fclib'} {found['version'] or _core.version}"
     found["bibtex"] = citing.implementation(name, title, version)
     if not about:
-        return found  # of a store that was made before solvers said it
+        return found
     found["papers"] = citing.papers_of(about["citation"])
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
     return found | {"known": about["options"]}

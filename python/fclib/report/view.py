@@ -272,5 +272,6 @@ def write_view(
     }.items():
         page = page.replace(mark, text)
     part = path.with_name(f".{path.name}.part")
-    part.write_text(page, encoding="utf-8")
+    # the name of a file may be no text
+    part.write_text(page, encoding="utf-8", errors="replace")
     part.replace(path)

@@ -14,6 +14,7 @@ from collections import Counter
 
 import _results
 
+from fclib._verdicts import CLASSES
 from fclib.collections import standing
 
 SETS = ("machines", "robots", "impacts", "existence", "dynamics", "simulators", "rr9118")
@@ -42,7 +43,7 @@ def main() -> None:
                 "family": family,
                 "problems": len(own),
                 "CPU a run [s]": f"{worst.limit:g}" if worst else "",
-                **{name: counts[name] for name in (*standing.CLASSES, "not run")},
+                **{name: counts[name] for name in (*CLASSES, "not run")},
                 "the hardest is solved by": f"{worst.solved} of {worst.voters}" if worst else "",
             }
         )

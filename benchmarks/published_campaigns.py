@@ -22,9 +22,10 @@ import _results
 import numpy as np
 
 from fclib import bench
-from fclib.bench import campaign, profiles
+from fclib.bench import campaign, comparison, profiles
 
 STORES = _results.ROOT / "build" / "campaigns"
+WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
 
 
 def main() -> None:
@@ -55,59 +56,75 @@ def main() -> None:
 
 
 def write_solved(name: str, store: Path) -> None:
-    """How many problems of each family each solver solves, and which ones not all of them do."""
-    every = profiles.load(store)
-    rows = [row for row in every if row["status"] != "unsuitable"]
-    solvers = sorted({row["solver_name"] for row in rows})
+    """How many problems of each family each solver solves, and which ones not all of them do.
+
+    Each solver has its own set here: the problems that it has run and takes.
+    """
+    rows = profiles.load(store)
+    whole = comparison.compared(profiles.gather(rows), own_set=True)
+    titles = comparison.names_of(whole.instances)
+    order = sorted(range(len(whole.solvers)), key=lambda k: whole.solvers[k])
     table = []
-    for family in sorted({row["family"] for row in rows}):
-        own = [row for row in rows if row["family"] == family]
-        sizes = [row["nc"] for row in own]
+    for family in sorted({one.family for one in whole.instances}):
+        places = [k for k, one in enumerate(whole.instances) if one.family == family]
+        part = whole.of(places)
+        sizes = [one.nc for one in part.instances]
         ends = dict.fromkeys((min(sizes), max(sizes)))
         cells: dict[str, Any] = {"family": family, "contacts": " to ".join(map(str, ends))}
-        for solver in solvers:
-            runs = [row for row in own if row["solver_name"] == solver]
-            solved = sum(row["solved"] for row in runs)
-            cells[solver] = f"{solved} of {len(runs)}" if runs else "takes none"
-        missed: dict[str, list[str]] = {}
-        for row in own:
-            if not row["solved"]:
-                missed.setdefault(str(row["problem"]), []).append(row["solver_name"])
-        cells["not solved"] = "; ".join(
-            f"{problem}: {', '.join(sorted(names))}" for problem, names in sorted(missed.items())
-        )
+        counts = part.counts()
+        for k in order:
+            solved, of = counts[k]
+            cells[short(whole.solvers[k])] = f"{solved} of {of}" if of else "takes none"
+        missed = []
+        for place, own in zip(places, part.values, strict=True):
+            names = [short(whole.solvers[k]) for k in order if np.isinf(own[k])]
+            if names:
+                missed.append(f"{titles[place]}: {', '.join(names)}")
+        cells["not solved"] = "; ".join(sorted(missed))
         table.append(cells)
-    note = profiles.caption(profiles.costs(every), every) + "."
+    note = profiles.caption(whole, rows, "instances", own_set=True) + "."
     title = f"Campaign {name}: who solves what"
     _results.store(f"campaign-{name}-solved", table, title=title, note=note)
 
 
+def short(solver: str) -> str:
+    """The label of a solver, without its version."""
+    return solver.partition(" (")[0]
+
+
 def write(name: str, store: Path) -> None:
-    """The tables of a store."""
+    """The tables of a store: on the common set, where each family weighs the same."""
     rows = profiles.load(store)
-    whole = profiles.costs(rows)
+    every = profiles.gather(rows)
+    whole = comparison.compared(every)
     with bench.Store(store, create=False) as opened:
         (first, *_) = opened.status()
         spent = opened.spent(list(opened.keys()))
     note = (
-        f"{profiles.caption(whole, rows)}. {first.done} of the campaign's {first.planned} runs, in"
-        f" {spent / 60:.0f} min of runs; {len(whole.instances)} instances were run by all solvers,"
-        f" {whole.left_out} that were not are left out."
+        f"{profiles.caption(whole, rows, WEIGH)}. {first.done} of the campaign's {first.planned}"
+        f" runs, in {spent / 60:.0f} min of runs."
     )
+    for row in profiles.left_out(every, whole):
+        note += (
+            f" Not compared: {short(row['solver'])}, which solves {row['solved']} of the"
+            f" {row['of']} that it has run to {_results.power(row['tol'])}."
+        )
     if busy := sum(profiles.loaded(rows).values()):
         note += f" {busy} of {len(rows)} runs were begun under a load above the number of cores."
     solvers: list[dict[str, Any]] = []
     for tol in whole.tolerances:
         costs = whole.at(tol)
-        within = profiles.performance_profile(costs.values, np.array([2.0, 10.0]))
+        bounds = np.array([2.0, 10.0])
+        within = profiles.performance_profile(costs.values, bounds, costs.weights(WEIGH))
         shares = dict(zip(costs.solvers, within.tolist(), strict=True))
-        for row in profiles.summary(costs):
+        for row in profiles.summary(costs, weigh=WEIGH):
             two, ten = shares.get(row["solver"], (1.0, 1.0))
             solvers.append(
                 {
                     "tolerance": _results.power(tol),
-                    "solver": row["solver"].partition(" (")[0],
+                    "solver": short(row["solver"]),
                     "solved": f"{row['solved']} of {row['of']}",
+                    "share": f"{100 * row['share']:.0f} %",
                     "fastest": row["fastest"],
                     "mean [s]": row["mean"],
                     "to best": row["to best"],
@@ -125,7 +142,7 @@ def write(name: str, store: Path) -> None:
             "mean of the fastest [s]": row["mean of fastest"],
             **({"published [s]": row["published"] or ""} if "published" in row else {}),
             "unsolved": row["unsolved"],
-            "most often the fastest": row["most often fastest"].partition(" (")[0],
+            "most often the fastest": short(row["most often fastest"]),
         }
         for row in profiles.families(whole, campaign.published_means(store))
     ]

@@ -3,10 +3,9 @@
     .venv/bin/python benchmarks/standard_table.py [--results]
 
 Nothing is run: the runs are those of campaigns/standard.toml, which `fclib collection status
-standard --add STORE` has taken in (collection/fclib_collection/results/runs.csv). A run counts as
-solved where it reached 1e-8 by both merits, or proved that there is no solution, within the limit.
-A mean is the shifted geometric mean of the CPU times (shift 1 ms); a failure is charged as ten
-times the limit.
+standard --add STORE` has taken in (collection/fclib_collection/results/runs.csv). They are compared
+as `fclib profile` compares those of a store (`fclib.bench.comparison`): on the problems that all of
+the solvers take, where each family weighs the same.
 """
 
 from __future__ import annotations
@@ -20,15 +19,11 @@ import numpy as np
 
 import fclib
 from fclib import scenes
-from fclib.bench import profiles
+from fclib._verdicts import UNSUITABLE
+from fclib.bench import comparison, profiles
 from fclib.collections import standing
 
-
-def mean(runs: list[standing.Run]) -> float:
-    """The shifted geometric mean of the times [ms]."""
-    times = np.array([[run.cpu if run.solved and run.cpu else np.inf] for run in runs])
-    charges = np.array([run.limit or 0.0 for run in runs])
-    return 1e3 * float(profiles.shifted_geometric_mean(times, charges)[0])
+WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
 
 
 def votes() -> dict[tuple[str, str], standing.Run]:
@@ -46,11 +41,51 @@ def votes() -> dict[tuple[str, str], standing.Run]:
             found[row.id, run.solver] = run
     tried = Counter(solver for _, solver in found)
     most = max(tried.values())
-    return {
-        (name, solver): run
-        for (name, solver), run in found.items()
-        if tried[solver] == most and run.status != "unsuitable"
-    }
+    return {key: run for key, run in found.items() if tried[key[1]] == most}
+
+
+def rows_of(runs: dict[tuple[str, str], standing.Run]) -> list[dict[str, Any]]:
+    """The runs as a store has them."""
+    return [
+        {
+            "solver": solver,
+            "hash": run.digest,
+            "problem": name,
+            "family": name.split("/")[1],
+            "nc": None,
+            "tol": standing.TOLERANCE,
+            "time_limit": run.limit,
+            "status": run.status,
+            "cpu_s": run.cpu,
+        }
+        for (name, solver), run in runs.items()
+    ]
+
+
+def solver_rows(costs: profiles.Costs, taken: Counter[str]) -> list[dict[str, Any]]:
+    """A row a solver, the one that solves the largest share first."""
+    quotients = profiles.ratios(costs.values)
+    weights = costs.weights(WEIGH)
+    within = profiles.share_within(quotients, np.array([2.0, 10.0]), weights)
+    found = []
+    for row in profiles.summary(costs, weigh=WEIGH)[1:]:
+        k = costs.solvers.index(row["solver"])
+        alone = costs.solved[:, k] & (costs.solved.sum(axis=1) == 1)
+        found.append(
+            {
+                "solver": row["solver"],
+                "family": fclib.find_solver(row["solver"]).family,
+                "takes": taken[row["solver"]],
+                "solved": f"{row['solved']} of {row['of']}",
+                "share": f"{100 * row['share']:.0f} %",
+                "alone": int(alone.sum()),
+                "fastest": row["fastest"],
+                "within 2x of the fastest": f"{100 * within[k, 0]:.0f} %",
+                "within 10x": f"{100 * within[k, 1]:.0f} %",
+                "mean [ms]": 1e3 * row["mean"],
+            }
+        )
+    return found
 
 
 def main() -> None:
@@ -62,68 +97,39 @@ def main() -> None:
     arguments = parser.parse_args()
 
     runs = votes()
-    own: dict[str, list[standing.Run]] = defaultdict(list)
-    best: dict[str, float] = {}
-    for (name, solver), run in runs.items():
-        own[solver].append(run)
-        if run.solved and run.cpu is not None:
-            best[name] = min(run.cpu, best.get(name, np.inf))
-    by_solver = {
-        solver: {name: runs[name, solver] for name, s in runs if s == solver} for solver in own
-    }
+    every = profiles.gather(rows_of(runs))
+    costs = every.shared()
+    taken = Counter(solver for (_, solver), run in runs.items() if run.status != UNSUITABLE)
+    solvers = solver_rows(costs, taken)
 
-    solvers: list[dict[str, Any]] = []
-    for solver, mine in by_solver.items():
-        solved = {name: run for name, run in mine.items() if run.solved}
-        ratios = np.array([(run.cpu or 0.0) / best[name] for name, run in solved.items()])
-        solvers.append(
-            {
-                "solver": solver,
-                "family": fclib.find_solver(solver).family,
-                "takes": len(mine),
-                "solved": len(solved),
-                "alone": sum(
-                    not any(runs[n, s].solved for n, s in runs if n == name and s != solver)
-                    for name in solved
-                ),
-                "fastest": int((ratios <= 1).sum()),
-                "within 2x of the fastest": f"{100 * (ratios <= 2).sum() / len(mine):.0f} %",
-                "within 10x": f"{100 * (ratios <= 10).sum() / len(mine):.0f} %",
-                "mean [ms]": mean([*mine.values()]),
-            }
-        )
-    solvers.sort(key=lambda row: (-row["solved"] / row["takes"], row["mean [ms]"]))
-
-    kinds: dict[str, dict[str, dict[str, standing.Run]]] = defaultdict(lambda: defaultdict(dict))
+    kinds: dict[str, list[int]] = defaultdict(list)
     families = scenes.families() | scenes.assemblies()
-    for (name, solver), run in runs.items():
-        kinds[families[name.split("/")[1]].collection][solver][name] = run
+    for k, one in enumerate(every.instances):
+        kinds[families[one.family].collection].append(k)
     table: list[dict[str, Any]] = []
-    for kind, found in kinds.items():
-        row: dict[str, Any] = {"kind": kind, "problems": max(map(len, found.values()))}
-        ranked = sorted(
-            (s for s in found if s != "auto"),
-            key=lambda s: (-sum(r.solved for r in found[s].values()), mean([*found[s].values()])),
-        )
+    for kind, places in kinds.items():
+        # of a kind that only some take, these
+        part = comparison.compared(every.of(places))
+        rows = {row["solver"]: row for row in profiles.summary(part, weigh=WEIGH)[1:]}
+        ranked = [name for name in rows if name != "auto"]
+        row = {"kind": kind, "problems": len(part.instances), "solvers": len(rows)}
         for title, solver in (("auto", "auto"), ("next", ranked[0]), ("then", ranked[1])):
-            mine_ = found[solver]
-            count = sum(run.solved for run in mine_.values())
             if title != "auto":
                 row[title] = solver
-            row[f"{title}: solved"] = count
-            row[f"{title}: mean [ms]"] = mean([*mine_.values()])
-        row["others: fewest solved"] = min(
-            sum(r.solved for r in found[s].values()) / len(found[s]) for s in ranked
-        )
-        row["others: fewest solved"] = f"{100 * row['others: fewest solved']:.0f} %"
+            row[f"{title}: solved"] = rows[solver]["solved"]
+            row[f"{title}: mean [ms]"] = 1e3 * rows[solver]["mean"]
+        fewest = min(rows[name]["share"] for name in ranked)
+        row["others: fewest solved"] = f"{100 * fewest:.0f} %"
         table.append(row)
     table.sort(key=lambda row: -row["problems"])
 
-    some = next(iter(runs.values()))
+    limits = sorted({one.limit for one in every.instances})
     dates = sorted({run.date for run in runs.values()})
     note = (
-        f"{len({name for name, _ in runs})} problems, to 1e-8 by both merits, {some.limit:g} s of"
-        f" CPU a run, means with failures as ten times that; the runs are of"
+        f"{len(every.instances)} problems to 1e-8 by both merits, or proved to have no solution;"
+        f" {' or '.join(f'{limit:g}' for limit in limits)} s of CPU a run; of these"
+        f" {len(costs.instances)} that all {len(costs.solvers)} solvers take; each family weighs"
+        " the same in shares and means, failures count as ten times the limit; the runs are of"
         f" {' to '.join(dict.fromkeys((dates[0], dates[-1])))}."
     )
     if arguments.results:

@@ -174,11 +174,13 @@ def test_what_is_interrupted_is_not_said_to_run(tmp_path: Path) -> None:
     ]
     assert shown["state"] == "interrupted"
     # of one that was killed its process tells, and not how long it has been silent
-    with sqlite3.connect(path) as db:
-        db.execute("UPDATE campaigns SET ended = NULL, seen = 0, pid = ?", (os.getpid(),))
+    with bench.Store(path) as store:
+        store.db.execute("UPDATE campaigns SET ended = NULL, seen = 0, pid = ?", (os.getpid(),))
+        store.seal()
     assert '"running"' in run_cli("--status", path, "--json").stdout
-    with sqlite3.connect(path) as db:
-        db.execute("UPDATE campaigns SET seen = 1e12, pid = 4194305")
+    with bench.Store(path) as store:
+        store.db.execute("UPDATE campaigns SET seen = 1e12, pid = 4194305")
+        store.seal()
     assert '"interrupted"' in run_cli("--status", path, "--json").stdout
 
 
@@ -322,10 +324,9 @@ def elsewhere(source: Path, target: Path, node: str) -> None:
     """A copy of a store, as another machine would have made it."""
     with bench.Store(source) as store:
         store.db.execute("VACUUM INTO ?", (str(target),))
-    database = sqlite3.connect(target)
-    with database:
-        database.execute("UPDATE machines SET node = ?1, hash = ?1", (node,))
-    database.close()
+    with bench.Store(target) as store:
+        store.db.execute("UPDATE machines SET node = ?1, hash = ?1", (node,))
+        store.seal()
 
 
 def test_what_cannot_begin_leaves_no_store(small: Path, tmp_path: Path) -> None:
@@ -427,63 +428,47 @@ def test_what_is_no_store_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "absent.sqlite").exists()
 
 
-ADDED_LAST = ("start", "sequence", "step", "guess")
-ADDED = ("said_cpu_s", "measured", "warm", "pinned", *ADDED_LAST)
-
-
-def made_older(path: Path, version: int) -> None:
-    """Make of a store what an earlier fclib made; before version 3, one of its runs was killed."""
+def made_older(path: Path) -> None:
+    """Make of a store what fclib 1.0 made."""
     database = sqlite3.connect(path)
     (view,) = database.execute("SELECT sql FROM sqlite_master WHERE name = 'results'").fetchone()
-    gone = ADDED if version < 3 else ADDED_LAST
-    statements = ["DROP VIEW results", "DROP TABLE solutions"]
-    statements += [f"ALTER TABLE runs DROP COLUMN {name}" for name in (*gone, "after")]
-    if version < 3:
-        statements += ["DROP TABLE faults"]
-        statements += ["UPDATE runs SET status = 'killed', solved = 0 WHERE id = 1"]
-    for name in gone:
-        view = view.replace(f"runs.{name}, ", "").replace(f"runs.{name},\n", "")
-    if version == 1:
-        statements += ["DROP TABLE certificates", "ALTER TABLE runs DROP COLUMN merit"]
-        view = view.replace("runs.merit, ", "")
-    for statement in (*statements, view, f"PRAGMA user_version = {version}"):
-        database.execute(statement)
+    database.execute("DROP VIEW results")
+    for (table,) in database.execute(
+        "SELECT name FROM sqlite_master WHERE type = 'table'"
+    ).fetchall():
+        database.execute(f"ALTER TABLE {table} DROP COLUMN checksum")
+    database.execute("ALTER TABLE solvers DROP COLUMN about")
+    database.execute(view.replace(", solvers.about", ""))
+    database.execute("PRAGMA user_version = 4")
     database.commit()
     database.close()
 
 
-@pytest.mark.parametrize("version", [1, 2, 3])
 @pytest.mark.parametrize("writable", [True, False])
-def test_a_store_of_an_earlier_version_is_brought_up_to_date(
-    version: int, writable: bool, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_a_store_of_the_earlier_version_is_brought_up_to_date(
+    writable: bool, small: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     old = tmp_path / "old.sqlite"
-    shutil.copy(small, old)
-    with bench.Store(old) as store:
-        first, *rows = store.results()
-        rows = rows if version < 3 else [first, *rows]
-        columns = [name for name in store.columns() if name not in (*ADDED, "merit")]
-    made_older(old, version)
+    with bench.Store(small) as store:
+        store.db.execute("VACUUM INTO ?", (str(old),))
+        rows = [row | {"about": None} for row in store.results()]
+    made_older(old)
     before = old.read_bytes()
     if not writable:
         monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
     for _ in range(2):
         with bench.Store(old, create=False) as store:
-            again = store.results()
-            assert [{name: row[name] for name in columns} for row in again] == [
-                {name: row[name] for name in columns} for row in rows
-            ]
-            merits = {"natural"} if version == 1 else {"both"}
-            assert {row["merit"] for row in again} == merits
-            assert {row["start"] for row in again} == {"cold"}
-            assert store.certificate(again[0]["run"]) is None
-            if version == 3:
-                continue
-            assert {row["measured"] for row in again} == {None}
-            # what was killed counts as not run
-            (fault,) = store.faults()
-            assert (fault["status"], fault["problem"]) == ("killed", first["problem"])
+            assert store.results() == rows
+            assert store.history(rows[0]["run"])
     assert (old.read_bytes() == before) != writable
+    if writable:
+        # what was run is not run again, and what solvers say of themselves is added
+        again = bench.run_campaign(campaign(history=True), old)
+        assert (again.skipped, again.solved) == (18, 0)
+        more = bench.run_campaign(campaign(history=True, repeats=2), old)
+        assert more.solved == 18
+        with bench.Store(old) as store:
+            assert all(json.loads(row["about"])["title"] for row in store.results())
 
 
 def test_a_store_in_a_folder_that_cannot_be_written(
@@ -494,7 +479,7 @@ def test_a_store_in_a_folder_that_cannot_be_written(
     monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
     with bench.Store(tmp_path / "one.sqlite", create=False) as store:
         assert len(store.results()) == 18
-        with pytest.raises(sqlite3.OperationalError, match="readonly"):
+        with pytest.raises(bench.StoreError, match=r"one\.sqlite: cannot be written: copy it"):
             store.begin("x", "", 0, 0, "")
     assert sorted(tmp_path.iterdir()) == files
 
@@ -726,6 +711,56 @@ def test_sets_of_the_collection_are_named() -> None:
     assert {Path(job.problem.path).is_absolute() for job in plan} == {True}
     with pytest.raises(fclib.Error, match=r"set nowhere: .*tiny"):
         campaign(problems=["set:nowhere"]).plan()
+
+
+def test_a_set_that_is_built_in_part_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("pyarrow")
+    from fclib.collections import library
+
+    folders = library.Collection("tiny").folders
+    there, built = set(folders[:3]), []
+
+    def build(name: str, folder: Path, progress: Any = None) -> None:
+        for done in range(5 if progress else 0):
+            progress(name, done, 5)
+        built.append(name)
+
+    monkeypatch.setattr(library, "is_there", lambda name, folder: name in there)
+    monkeypatch.setattr(library, "ensure", build)
+    said: list[str] = []
+    campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
+    # those that were asked for and are not there, and no others
+    assert built[: len(folders) - 3] == folders[3:]
+    assert said[0].startswith(f"set tiny: 3 of {len(folders)} families are in ")
+    assert "fclib collection build tiny --out " in said[0]
+    # a word for each family at once, and not one for each problem
+    assert said[1:-1] == [
+        f"family {k} of {len(folders) - 3}: {name}, 0 of 5 problems"
+        for k, name in enumerate(folders[3:], start=1)
+    ]
+    there.update(folders)
+    said.clear()
+    campaign(problems=["set:tiny"], solvers=["auto"], tolerances=[1e-4]).plan(tell=said.append)
+    assert said == []
+
+
+def test_files_of_a_set_that_is_not_built_name_the_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FCLIB_COLLECTION", str(tmp_path))
+    wanted = {
+        "standard/*/*-global.hdf5": "standard",
+        "rt444/Chain/*.hdf5": "rt444/Chain",
+        "standard": "standard",
+    }
+    for pattern, name in wanted.items():
+        with pytest.raises(fclib.FileError) as told:
+            problems.files_of([f"${{FCLIB_COLLECTION}}/{pattern}"], Path("/"))
+        assert str(told.value).endswith(f"fclib collection build {name} --out {tmp_path}")
+    for pattern in (f"{tmp_path}/mine/*.hdf5", "/nowhere/standard/*.hdf5"):
+        with pytest.raises(fclib.FileError) as told:
+            problems.files_of([pattern], Path("/"))
+        assert "collection build" not in str(told.value)
 
 
 # ---- what is asked for

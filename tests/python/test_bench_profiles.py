@@ -177,7 +177,8 @@ def test_repeats_count_by_the_quickest_and_keep_their_spread(store: Path) -> Non
 def test_work_precision_and_convergence_by_hand(store: Path) -> None:
     fill(store, {name: [2 * t if t else None for t in own] for name, own in TIMES.items()}, 1e-9)
     rows = profiles.load(store)
-    points = [p for p in profiles.work_precision(rows, penalty=1, shift=1.0) if p["solver"] == "A"]
+    points = profiles.work_precision(rows, profiles.costs(rows), penalty=1, shift=1.0)
+    points = [p for p in points if p["solver"] == "A"]
     assert [(p["tol"], p["solved"], p["of"]) for p in points] == [(1e-6, 3, 4), (1e-9, 3, 4)]
     assert points[0]["mean"] == pytest.approx((2 * 3 * 5 * 101) ** 0.25 - 1)
     assert points[1]["mean"] == pytest.approx((3 * 5 * 9 * 101) ** 0.25 - 1)
@@ -203,6 +204,7 @@ def test_runtimes_to_targets_use_every_run(store: Path) -> None:
 def test_times_of_a_history_are_of_cpu(store: Path) -> None:
     with bench.Store(store) as opened:
         opened.db.execute("UPDATE history SET time = 10 * time")
+        opened.seal()
     rows = profiles.load(store, solvers=["A"])
     assert profiles.convergence(store, rows, np.array([4.5]))["A"].tolist() == [0.5e-6]
 
@@ -309,7 +311,7 @@ def test_some_solvers_share_the_instances_that_all_of_them_have_run() -> None:
     assert some.values.tolist() == [[4, 3]]
     assert some.left_out == 1
     with pytest.raises(
-        profiles.ProfileError, match=r"^there is no problem that all of these solvers have run$"
+        profiles.ProfileError, match=r"^there is no problem that all of these solvers have run and"
     ):
         profiles.costs(rows)
 
@@ -345,7 +347,11 @@ def test_a_failure_is_charged_the_limit_or_the_largest_cost() -> None:
 
 def test_a_failure_costs_nothing_less_than_everything() -> None:
     # a run that stopped at its limit has a time, and one without a time is not solved by its status
-    rows = [row("A", 0, 5.0, solved=0), row("A", 1, None, solved=1), row("A", 2, 5.0)]
+    rows = [
+        row("A", 0, 5.0, status="inaccurate"),
+        row("A", 1, None, status="converged"),
+        row("A", 2, 5.0),
+    ]
     assert profiles.costs(rows).values.tolist() == [[math.inf], [math.inf], [5]]
 
 
@@ -358,13 +364,17 @@ def test_what_was_not_run_is_no_instance() -> None:
         assert profiles.gather(rows[:1]).values.shape == (0, 1)
 
 
-def test_what_a_solver_does_not_take_is_left_out_for_it() -> None:
+def test_what_a_solver_does_not_take_is_in_no_common_set() -> None:
     rows = [
         *(row("A", 0, 1.0), row("B", 0, 2.0)),
         *(row("A", 1, 3.0), row("B", 1, None, status="unsuitable")),
         *(row(name, 2, None, status="unsuitable") for name in "AB"),
     ]
-    costs = profiles.costs(rows)
+    common = profiles.costs(rows)
+    assert (common.values.tolist(), common.left_out) == ([[1, 2]], 1)
+    assert [common.legend(k) for k in range(2)] == ["A 1 of 1", "B 1 of 1"]
+    # or each of them has its own set
+    costs = profiles.costs(rows, own_set=True)
     np.testing.assert_array_equal(costs.values, [[1, 2], [3, math.nan]])
     assert costs.unsuitable is not None
     assert costs.unsuitable.tolist() == [[False, False], [False, True]]
@@ -374,6 +384,7 @@ def test_what_a_solver_does_not_take_is_left_out_for_it() -> None:
     best, a, b = profiles.summary(costs, shift=1.0)
     assert (best["of"], a["of"], b["of"], b["unsuitable"]) == (2, 2, 1, 1)
     assert (b["mean"], b["to best"]) == (pytest.approx(2), pytest.approx(2))
+    assert [costs.legend(k) for k in range(2)] == ["A 2 of 2", "B 1 of 1"]
     (pair,) = profiles.pairs(costs)
     assert (pair.both, pair.only_first, pair.only_second) == (1, 0, 0)
     (family,) = profiles.families(costs)
@@ -411,13 +422,13 @@ def test_the_wall_clock_is_charged_its_own_limit() -> None:
 
 
 def test_the_bootstrap_draws_problems() -> None:
-    # one problem at twenty tolerances is no more than one problem
-    rows = [row(s, 0, t * k, tol=10.0**-k) for s, t in (("A", 1), ("B", 2)) for k in range(1, 21)]
+    # one problem at twenty steps of a sequence is no more than one problem
+    rows = [row(s, 0, t * k, step=k) for s, t in (("A", 1), ("B", 2)) for k in range(1, 21)]
     rows += [row("A", 1, 4.0), row("B", 1, 1.0)]
     (pair,) = profiles.pairs(profiles.costs(rows))
     assert [pair.low, pair.high] == pytest.approx([0.5, 4])
     costs = profiles.costs([row("A", 0, 1.0), row("A", 1, None)])
-    low, high = profiles.bands(costs, lambda own: profiles.share_within(own, np.array([1.0])))
+    low, high = profiles.bands(costs, costs.values, np.array([1.0]))
     assert (low.tolist(), high.tolist()) == ([[0]], [[1]])
 
 
@@ -428,7 +439,7 @@ def test_success_is_by_the_error_that_was_reached() -> None:
         row("A", 2, None, error=1e-9),  # killed at its limit
         row("A", 3, None, status="unsuitable", error=None),
     ]
-    (found,) = profiles.accuracies(rows, 1e-6)
+    (found,) = profiles.accuracies(rows, profiles.costs(rows))
     assert (found["runs"], found["error <= 0.01"], found["error <= 1e-06"]) == (3, 2 / 3, 1 / 3)
 
 
@@ -436,7 +447,7 @@ def test_the_influence_of_the_shift_is_shown() -> None:
     rows = [*(row("A", k, 1e-3) for k in range(2)), row("B", 0, 1e-5), row("B", 1, 2e-3)]
     a, b = profiles.shifts(profiles.costs(rows), shift=1e-3)
     assert {a["solver"], b["solver"]} == {"A", "B"}
-    assert list(a) == ["solver", "shift 0.0001", "shift 0.001", "shift 0.01"]
+    assert list(a) == ["tol", "solver", "shift 0.0001", "shift 0.001", "shift 0.01"]
 
 
 def test_instances_are_in_order_of_family_problem_and_growing_accuracy() -> None:
@@ -501,9 +512,11 @@ def test_the_columns_of_the_summary() -> None:
     best = (2 * 8 * 101) ** (1 / 3) - 1
     slow = (4 * 16 * 101) ** (1 / 3) - 1
     assert found[0] == {
+        "tol": 1e-6,
         "solver": "virtual best",
         "solved": 2,
         "of": 3,
+        "share": pytest.approx(2 / 3),
         "unsuitable": 0,
         "fastest": 2,
         "mean": pytest.approx(best),
@@ -511,11 +524,14 @@ def test_the_columns_of_the_summary() -> None:
         "median ratio": 1,
         "worst ratio": 1,
         "spread": None,
+        "copies": None,
     }
     assert found[2] == {
+        "tol": 1e-6,
         "solver": "slow",
         "solved": 2,
         "of": 3,
+        "share": pytest.approx(2 / 3),
         "unsuitable": 0,
         "fastest": 0,
         "mean": pytest.approx(slow),
@@ -523,6 +539,7 @@ def test_the_columns_of_the_summary() -> None:
         "median ratio": pytest.approx((3 + 15 / 7) / 2),
         "worst ratio": 3,
         "spread": None,
+        "copies": None,
     }
     assert (found[4]["median ratio"], found[4]["worst ratio"]) == (None, None)
     assert [line["fastest"] for line in found] == [2, 2, 0, 1, 0]
@@ -583,11 +600,11 @@ def test_failures_are_counted_by_status() -> None:
     ]
     found = profiles.failures(rows)
     assert found == [
-        {"solver": "A", "cpu_limit": 3, "converged": 1, "crashed": 0},
-        {"solver": "B", "cpu_limit": 0, "converged": 1, "crashed": 1},
+        {"tol": 1e-6, "solver": "A", "cpu_limit": 3, "converged": 1, "crashed": 0},
+        {"tol": 1e-6, "solver": "B", "cpu_limit": 0, "converged": 1, "crashed": 1},
     ]
     # the most frequent status first
-    assert list(found[0]) == ["solver", "cpu_limit", "converged", "crashed"]
+    assert list(found[0]) == ["tol", "solver", "cpu_limit", "converged", "crashed"]
 
 
 def test_work_and_precision_of_each_solver_where_they_compare() -> None:
@@ -598,7 +615,8 @@ def test_work_and_precision_of_each_solver_where_they_compare() -> None:
         # no problem that both have run
         *(row("A", 0, 1.0, tol=1e-3), row("B", 1, 1.0, tol=1e-3)),
     ]
-    found = profiles.work_precision(rows, "iterations", penalty=2, shift=1.0)
+    costs = profiles.costs(rows, "iterations")
+    found = profiles.work_precision(rows, costs, penalty=2, shift=1.0)
     assert [(line["solver"], line["tol"]) for line in found] == [
         *(("A", 1e-6), ("B", 1e-6)),
         *(("A", 1e-9), ("B", 1e-9)),
@@ -714,10 +732,10 @@ def test_convergence_counts_what_was_reached_at_the_time_itself(store: Path) -> 
     # A's runs have arrived at 1, 2 and 4 s; its run that failed has no history
     times = np.array([-1.0, 0.0, 1.0, 2.0, 4.0])
     rows = profiles.load(store, solvers=["A"])
-    curves = profiles.convergence(store, rows[::-1], times)
+    curves = profiles.convergence(store, rows.where(slice(None, None, -1)), times)
     assert curves["A"].tolist() == [math.inf, 1, 1, 1, 0.5e-6]
     assert curves["A"].dtype == float
-    assert profiles.convergence(store, rows[3:], times) == {}
+    assert profiles.convergence(store, rows.where(slice(3, None)), times) == {}
 
 
 # ---- the command
@@ -747,6 +765,7 @@ def test_names_that_matplotlib_would_read_otherwise(store: Path, tmp_path: Path)
     with bench.Store(store) as opened:
         for name, other in (("A", "_hidden"), ("B", "$x^$ cost"), ("C", r"C:\\x_{")):
             opened.db.execute("UPDATE solvers SET label = ? WHERE label = ?", (other, name))
+        opened.seal()
     done = run_cli(store, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     # in each of the formats
@@ -767,6 +786,7 @@ def test_figures_that_are_unsteady_or_of_a_busy_machine_are_marked(store: Path) 
         opened.db.execute("UPDATE machines SET cores = 2")
         opened.db.execute("UPDATE runs SET load = 1.5")
         opened.db.execute("UPDATE runs SET load = 2.5 WHERE id = 9")  # of C
+        opened.seal()
     shown = CliRunner().invoke(app, ["profile", str(store)])
     assert shown.exit_code == 0, shown.output
     lines = [line for line in shown.output.splitlines() if line.startswith(("A ", "B ", "C "))]
@@ -786,6 +806,7 @@ def test_machines_of_one_name_are_two(store: Path) -> None:
         opened.db.execute(
             "UPDATE runs SET machine = (SELECT id FROM machines WHERE hash = 'x') WHERE tol = 1e-7"
         )
+        opened.seal()
     with pytest.raises(profiles.ProfileError, match=r"here \(4 x B\), here \(None x None\)"):
         profiles.load(store)
     assert len(profiles.load(store, machine="here (4 x B)")) == 12
@@ -795,6 +816,7 @@ def test_what_was_not_run_in_the_same_way_is_no_repeat(store: Path) -> None:
     with bench.Store(store) as opened:
         opened.db.execute("UPDATE runs SET threads = 4 WHERE id <= 2")
         opened.db.execute("UPDATE runs SET memory_limit = 50 WHERE id > 10")
+        opened.seal()
     labels = {row["solver"] for row in profiles.load(store)}
     assert labels == {"A (1 threads)", "A (4 threads)", "B", "C (1000 MB)", "C (50 MB)"}
 

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -597,3 +599,47 @@ def test_contacts_are_shown_with_the_names_of_their_bodies(tmp_path: Path) -> No
     assert {"first", "second", "world", "ball"} <= set(shown.split())
     (record,) = records(run("check", "--contacts", "--json", file))
     assert (record["contacts"][0]["first"], record["contacts"][0]["second"]) == ("world", "ball")
+
+
+# ---- solvers of one's own, campaigns
+
+
+OWN = """
+import fclib
+
+@fclib.solver("my-nothing", family="splitting")
+def solve(problem, r, monitor):
+    \"\"\"Returns the starting point.\"\"\"
+"""
+
+
+def test_solvers_of_ones_own_are_taken_from_a_file(tmp_path: Path) -> None:
+    (tmp_path / "my_nothing_file.py").write_text(OWN)
+    problem = fclib.LocalProblem(W=np.eye(3), q=-np.ones(3), mu=np.full(1, 0.5))
+    fclib.write(tmp_path / "one.hdf5", problem)
+    file, module = tmp_path / "one.hdf5", tmp_path / "my_nothing_file.py"
+    arguments = ["solve", file, "--solver", "my-nothing", "--module", module, "--json"]
+    solved = run(*arguments)
+    assert json.loads(solved.stdout)["solver"] == "my-nothing"
+    shown = run("solvers", "my-nothing", "--module", module)
+    assert "Returns the starting point." in shown.stdout
+    for command in (["solve", file], ["solvers"]):
+        absent = run(*command, "--module", tmp_path / "absent.py")
+        assert absent.returncode == 2
+        assert "absent.py" in absent.stderr
+
+
+def test_the_help_of_campaigns_shows_their_options() -> None:
+    shown = run("bench", "--help").stdout
+    for word in ("merge", "export", "--problems", "--solver", "--time-limit", "--module"):
+        assert word in shown
+
+
+def test_a_pipe_is_told_how_far_a_build_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    from fclib.cli import _progress
+
+    monkeypatch.setattr(_progress, "PAUSE", 0.0)
+    with redirect_stderr(StringIO()) as told, _progress.many_bars() as show:
+        show("set/Family", 1, 3)
+        show("set/Family", 2, 3)
+    assert told.getvalue() == "set/Family: 1 of 3\nset/Family: 2 of 3\n"

@@ -8,12 +8,10 @@ is not run, with the reason that the page states.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import re
 import shlex
 import shutil
-import sqlite3
 import subprocess
 import sys
 import types
@@ -104,9 +102,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
     collection = make_collection(folder / "collection")
     # of one tolerance: each has pictures of its own
     quick = make_store(folder / "quick.sqlite", collection, files=4, tolerances=(1e-8,))
-    with contextlib.closing(sqlite3.connect(quick)) as store:
-        store.execute("UPDATE machines SET node = 'node7'")
-        store.commit()
+    with bench.Store(quick) as store:
+        store.db.execute("UPDATE machines SET node = 'node7'")
+        store.seal()
     for name in ("one", "two", "a", "b"):
         shutil.copy(quick, folder / f"{name}.sqlite")
     return folder

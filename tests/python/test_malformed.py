@@ -854,3 +854,41 @@ def test_an_external_link_to_a_pipe_is_not_waited_at(tmp_path: Path, name: str) 
     )
     words = "is an external link to '/there' of the file 'pipe', which is not followed"
     assert f"/{name}: {words}" in run.stderr
+
+
+LINKED = (ROOT, f"{ROOT}/W", f"{ROOT}/W/x", f"{ROOT}/vectors/q", f"{ROOT}/info", "solution")
+
+
+@pytest.mark.parametrize("soft", [False, True])
+@pytest.mark.parametrize("name", [*LINKED, "contacts", f"{ROOT}/info/title", "guesses"])
+def test_no_link_into_another_file_is_followed(tmp_path: Path, name: str, soft: bool) -> None:
+    """A file from elsewhere names a file of its reader's, and `convert` would copy it."""
+    theirs, path = tmp_path / "theirs.hdf5", tmp_path / "problem.hdf5"
+    pairs, points = np.zeros((1, 2), np.int32), np.zeros((1, 3))
+    contacts = fclib.Contacts(
+        **dict.fromkeys(("body", "shape"), pairs),
+        **dict.fromkeys(("point", "normal", "tangent"), points),
+        feature=np.zeros(1, np.int32),
+        gap=np.zeros(1),
+    )
+    problem = fclib.LocalProblem(W=np.eye(3), q=[-1, 0, 0.0], mu=[0.12345], contacts=contacts)
+    for file in (theirs, path):
+        problem = problem.replace(info=fclib.ProblemInfo(title=file.stem))
+        fclib.write(file, problem, fclib.solve(problem).solution)
+        fclib.write_guesses(file, [fclib.solve(problem).solution], mode="add")
+    with h5py.File(path, "a") as file:
+        del file[name]
+        file["away" if soft else name] = h5py.ExternalLink(theirs, f"/{name}")
+        if soft:
+            file[name] = h5py.SoftLink("/away")
+    copy = tmp_path / "copy.hdf5"
+    done = helpers_cli.run("convert", path, copy)
+    assert "Traceback" not in done.stderr
+    if done.returncode == 0:
+        # what was linked is left out
+        with h5py.File(copy) as file:
+            assert name not in file or f"{ROOT}/info" in name
+        assert fclib.read(copy).info.title != "theirs"
+    else:
+        assert "problem.hdf5" in done.stderr
+        assert soft or f"/{name}: is an external link to" in done.stderr

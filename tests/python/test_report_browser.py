@@ -266,7 +266,7 @@ def test_profiles_are_those_of_the_bench(go: Opener, store: Path, site: Path) ->
         bounds = numbers[:, 0]
         inside = np.sqrt(bounds[:-1] * bounds[1:])
         wide = bounds[1:] > bounds[:-1] * (1 + 1e-4)
-        expected = profiles.share_within(values, inside[wide])
+        expected = profiles.share_within(values, inside[wide], shown.weights("families"))
         order = [costs.solvers.index(name) for name in chosen]
         np.testing.assert_allclose(numbers[:-1, 1:][wide].T, expected[order], atol=1e-9)
 

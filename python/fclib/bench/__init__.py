@@ -23,8 +23,12 @@ warm_up.py      its first call of a solver, which is not measured
 meter.py        what the kernel says a run took: a control group, or the processes
 processes.py    processes as Linux shows them
 machine.py      what a record says of its machine; cores for one run alone
+layout.py       how a store lies in SQLite: tables, columns, a checksum for each row
+table.py        runs in columns
 store.py        one SQLite file, one row a run
-profiles.py     what the runs of a store say. Knows rows alone
+table.py        runs in columns
+comparison.py   what an instance is, which of them are compared, and their costs
+profiles.py     what the runs of a store say. Knows runs alone
 plots.py        profiles as pictures
 single.py       one run by hand, in this process
 """

@@ -7,6 +7,7 @@ jobs of it.
 from __future__ import annotations
 
 import importlib
+import json
 import math
 import random
 import re
@@ -206,14 +207,22 @@ class Campaign:
     def plan(
         self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
     ) -> list[Job]:
-        """The jobs, in the order in which they are to be done: repeat by repeat, each shuffled.
+        """The jobs, in the order in which they are to be done, as `plan_by_key` has them."""
+        return list(self.plan_by_key(store, tell).values())
+
+    def plan_by_key(
+        self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
+    ) -> dict[str, Job]:
+        """The jobs by their keys, in the order in which they are to be done.
+
+        They go repeat by repeat, each shuffled.
 
         Where there is a budget, problem after problem, so that what it suffices for is spread
         evenly over the groups and families, and all solvers have run what was begun.
 
         Args:
             store: what it knows of files is not found out again.
-            tell: is called with what is left out, and why.
+            tell: is called with what is left out, and why, and with how far a set is built.
 
         Raises:
             fclib.Error: a problem cannot be found, made or read.
@@ -223,7 +232,7 @@ class Campaign:
         sequences: list[tuple[str, list[ProblemFacts], Group]] = []
         for group in self.groups:
             try:
-                paths = self._paths(group)
+                paths = self._paths(group, tell)
             except _core.FileError as error:
                 if not group.optional:
                     raise
@@ -260,7 +269,7 @@ class Campaign:
                 ours = spread(ours)
             for job in ours:
                 jobs.setdefault(job.key, job)  # one problem under two names is run once
-        return list(jobs.values())
+        return jobs
 
     def _job(
         self, facts: ProblemFacts, group: Group, choice: SolverChoice, tol: float, repeat: int
@@ -294,8 +303,8 @@ class Campaign:
             chain.append(replace(self._job(facts, group, choice, tol, repeat), along=along))
         return chain
 
-    def _paths(self, group: Group) -> list[Path]:
-        paths = self._all_paths(group)
+    def _paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
+        paths = self._all_paths(group, tell)
         if group.sequence is None:
             return paths
         steps = group.sequence
@@ -307,13 +316,13 @@ class Campaign:
             raise _core.Error(f"a sequence needs two problems or more: {name} has {len(chosen)}")
         return chosen
 
-    def _all_paths(self, group: Group) -> list[Path]:
+    def _all_paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
         paths = problems.files_of(group.files, self.base) if group.files else []
         if group.set and group.sequence is not None:
             steps = group.sequence
             paths += made.stored(group.set, group.form, steps.start, steps.count, steps.stride)
         elif group.set:
-            paths += problems.of_set(group.set, group.form)
+            paths += problems.of_set(group.set, group.form, tell)
         if group.simulate is not None:
             paths += made.simulated(
                 family=group.simulate["family"],
@@ -349,8 +358,12 @@ def published_means(store: str | Path) -> dict[tuple[str, float], float]:
     found = {}
     with Store(store, create=False) as opened:
         for text in opened.texts():
-            campaign = toml().loads(text)
-            for group in campaign.get("problems", ()):
+            try:
+                campaign = toml().loads(text)
+            except ValueError:
+                continue  # of another version, or edited
+            groups = campaign.get("problems", ())
+            for group in groups if isinstance(groups, list) else ():
                 if not isinstance(group, Mapping) or "published_mean" not in group:
                     continue
                 tolerances = group.get("tolerances", campaign.get("tolerances", []))
@@ -543,6 +556,7 @@ def _solvers(
             family=info.family,
             origin=info.origin,
             label=str(entries.get("label", "")),
+            about=described(info),
         )
         if choice.title in choices:
             raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")
@@ -550,6 +564,33 @@ def _solvers(
     if not choices:
         raise CampaignError(f"solvers: none of them is here: {'; '.join(missing)}")
     return tuple(choices.values()), tuple(missing)
+
+
+def described(info: _core.SolverInfo) -> str:
+    """What a solver says of itself, in JSON: stores keep it, and ask no solver again.
+
+    An option is its name, type or choices, default, unit and meaning.
+    """
+    options = [
+        [
+            option.name,
+            " | ".join(option.choices) or option.type,
+            "see there" if option.type == "text" else str(option.default),
+            option.unit,
+            option.doc,
+        ]
+        for option in info.options
+    ]
+    return json.dumps(
+        {
+            "title": info.title,
+            "citation": info.citation,
+            "dimensions": list(info.dimensions),
+            "rolling": list(info.rolling_dimensions),
+            "options": options,
+        },
+        sort_keys=True,
+    )
 
 
 def parse_solver(text: str) -> dict[str, Any]:

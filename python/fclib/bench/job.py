@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from fclib._solve import MeritKind
+from fclib._verdicts import is_solved
 
 # how a run may end; the first group is said by the solver and confirmed by the merit
 STATUSES: Mapping[str, str] = MappingProxyType(
@@ -87,6 +88,7 @@ class SolverChoice:
     family: str = ""
     origin: str = ""
     label: str = ""  # what tables call it
+    about: str = ""  # JSON, what the solver says of itself: `campaign.described`
 
     @property
     def title(self) -> str:
@@ -219,8 +221,8 @@ class Record:
 
     @property
     def solved(self) -> bool:
-        """Whether the error, recomputed, met the tolerance within the limits."""
-        return self.status == "converged"
+        """Whether the error, recomputed, met the tolerance within the limits, or a proof holds."""
+        return is_solved(self.status)
 
     @property
     def ran(self) -> bool:

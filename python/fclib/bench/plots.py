@@ -6,12 +6,13 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from fclib.bench import profiles
-from fclib.bench.profiles import METRICS, Array, Costs
+from fclib.bench.comparison import METRICS, Array, Costs, Weigh
 
 # told apart by those who see few colours, too: Okabe & Ito (2008), then other strokes
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -39,6 +40,7 @@ STYLE: Any = {
 }
 SIZE = (5.6, 3.2)  # [inch]
 ENDS = 1e4  # the largest ratio that is shown
+SHARES = {"instances": "instances", "families": "instances, by family,"}
 
 
 def stroke(number: int) -> dict[str, Any]:
@@ -51,6 +53,13 @@ def label(text: str) -> str:
     """A name as Matplotlib shows it: it takes $ for mathematics, and hides what begins with _."""
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
+
+
+def wrapped(caption: str, width: int = 110) -> str:
+    """A caption in lines that break between its parts, but inside of a very long one."""
+    parts = [part.replace(" ", "\0") for part in caption.split("; ")]
+    whole = "; ".join(part if len(part) < width else part.replace("\0", " ") for part in parts)
+    return "\n".join(textwrap.wrap(whole, width)).replace("\0", " ")
 
 
 @contextmanager
@@ -69,7 +78,7 @@ def figure(folder: Path, name: str, formats: Sequence[str], caption: str = "") -
         try:
             yield axes
             if caption:
-                drawn.supxlabel(label("\n".join(textwrap.wrap(caption, 110))), fontsize=5.5)
+                drawn.supxlabel(label(wrapped(caption)), fontsize=5.5)
             folder.mkdir(parents=True, exist_ok=True)
             for kind in formats:
                 part = folder / f".{name}.part.{kind}"
@@ -92,7 +101,12 @@ def _order(costs: Costs, heights: Array) -> list[int]:
 
 
 def performance(
-    costs: Costs, folder: Path, formats: Sequence[str], caption: str = "", ending: str = ""
+    costs: Costs,
+    folder: Path,
+    formats: Sequence[str],
+    caption: str = "",
+    ending: str = "",
+    weigh: Weigh = "instances",
 ) -> None:
     """Dolan & More's profiles, the ratio on a logarithmic axis, with their 95 % bands."""
     quotients = profiles.ratios(costs.values)
@@ -100,12 +114,13 @@ def performance(
     end = min(ENDS, 1.3 * float(finite.max(initial=2.0)))
     taus = np.unique(np.concatenate([[1.0, end], finite[finite <= end]]))
     spaced = np.geomspace(1, end, 200)
-    curves = profiles.performance_profile(costs.values, taus)
-    grid = profiles.performance_profile(costs.values, spaced)
-    low, high = profiles.bands(costs, lambda own: profiles.performance_profile(own, spaced))
+    weights = costs.weights(weigh)
+    curves = profiles.share_within(quotients, taus, weights)
+    grid = profiles.share_within(quotients, spaced, weights)
+    low, high = profiles.bands(costs, quotients, spaced, weigh)
     with figure(folder, f"performance-{costs.metric}{ending}", formats, caption) as axes:
         for rank, k in enumerate(_order(costs, grid)):
-            name, style = label(costs.solvers[k]), stroke(rank)
+            name, style = label(costs.legend(k)), stroke(rank)
             axes.step(taus, curves[k], where="post", label=name, **style)
             axes.fill_between(
                 spaced, low[k], high[k], step="post", alpha=0.1, color=style["color"], linewidth=0
@@ -114,7 +129,7 @@ def performance(
         axes.set_xlim(1.0, end)
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel(rf"$\tau$: {METRICS[costs.metric][0].split(' [')[0]} over that of the best")
-        axes.set_ylabel(r"share of problems solved within $\tau$")
+        axes.set_ylabel(rf"share of {SHARES[weigh]} solved within $\tau$")
         _legend(axes)
 
 
@@ -126,6 +141,7 @@ def data(
     per_contact: bool,
     caption: str = "",
     ending: str = "",
+    weigh: Weigh = "instances",
 ) -> None:
     """The share solved within a cost, or within a cost per contact."""
     shown = costs.per_contact() if per_contact else costs
@@ -134,19 +150,18 @@ def data(
         return
     ends = 0.8 * float(finite.min()), 1.2 * float(finite.max())
     bounds = np.unique(np.concatenate([ends, finite]))
-    curves = profiles.share_within(shown.values, bounds)
-    grid = profiles.share_within(shown.values, np.geomspace(*ends, 200))
+    weights = shown.weights(weigh)
+    curves = profiles.share_within(shown.values, bounds, weights)
+    grid = profiles.share_within(shown.values, np.geomspace(*ends, 200), weights)
     name = f"data-{costs.metric}" + ("-per-contact" if per_contact else "") + ending
     with figure(folder, name, formats, caption) as axes:
         for rank, k in enumerate(_order(shown, grid)):
-            axes.step(
-                bounds, curves[k], where="post", label=label(costs.solvers[k]), **stroke(rank)
-            )
+            axes.step(bounds, curves[k], where="post", label=label(shown.legend(k)), **stroke(rank))
         axes.set_xscale("log")
         axes.set_xlim(*ends)
         axes.set_ylim(0.0, 1.02)
         axes.set_xlabel(METRICS[costs.metric][0] + (" per contact" if per_contact else ""))
-        axes.set_ylabel("share of problems solved")
+        axes.set_ylabel(f"share of {SHARES[weigh]} solved")
         _legend(axes)
 
 
@@ -167,7 +182,9 @@ def work_precision(
             marker = MARKERS[rank % len(MARKERS)]
             x, y = [p["mean"] for p in own], [p["tol"] for p in own]
             fills = [style["color"] if p["solved"] == p["of"] else "white" for p in own]
-            axes.plot(x, y, **style, label=label(solver), marker=marker, markersize=4)
+            counts = ", ".join(dict.fromkeys(f"{p['solved']} of {p['of']}" for p in own))
+            name = label(f"{solver} {counts}")
+            axes.plot(x, y, **style, label=name, marker=marker, markersize=4)
             axes.scatter(
                 x,
                 y,
@@ -195,13 +212,15 @@ def convergence(
     formats: Sequence[str],
     caption: str = "",
     ending: str = "",
+    legend: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """The least error that was reached, over time; at one tolerance."""
     ends = {solver: float(curve[-1]) for solver, curve in curves.items()}
     with figure(folder, f"convergence{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: ends[s])):
             curve = np.where(np.isfinite(curves[solver]), curves[solver], np.nan)
-            axes.step(times, curve, where="post", label=label(solver), **stroke(rank))
+            name = label(legend.get(solver, solver))
+            axes.step(times, curve, where="post", label=name, **stroke(rank))
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlabel("CPU time [s]")
@@ -215,6 +234,7 @@ def runtimes(
     formats: Sequence[str],
     caption: str = "",
     ending: str = "",
+    legend: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
     """The share of pairs of a run and an error that were reached within a time."""
     finite = np.concatenate([own[np.isfinite(own) & (own > 0)] for own in times.values()])
@@ -226,7 +246,8 @@ def runtimes(
     with figure(folder, f"runtimes{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: -curves[s].mean())):
             style = stroke(rank)
-            axes.step(bounds, curves[solver], where="post", label=label(solver), **style)
+            name = label(legend.get(solver, solver))
+            axes.step(bounds, curves[solver], where="post", label=name, **style)
         axes.set_xscale("log")
         axes.set_xlim(*ends)
         axes.set_ylim(0.0, 1.02)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fclib import _core, _digest
 from fclib.bench.job import ProblemFacts
 
 SUFFIXES = (".hdf5", ".h5")
+PATIENCE = 10.0  # [s] between two words on how far a build is
 
 
 def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
@@ -33,17 +35,37 @@ def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
         else:
             matches = [p for p in _glob(path) if p.is_file()]
         if not matches:
-            raise _core.FileError(f"{path}: there is no such file, and none in such a folder")
+            raise _core.FileError(
+                f"{path}: there is no such file, and none in such a folder{_how_to_have(path)}"
+            )
         found |= dict.fromkeys(sorted(match.resolve() for match in matches))
     return list(found)
 
 
-def of_set(name: str, form: str | None = None) -> list[Path]:
+def _how_to_have(path: Path) -> str:
+    """The command that builds what is looked for in the folder of the collection; "" elsewhere."""
+    from fclib.collections import library, sets
+
+    try:
+        name, *parts = path.relative_to(library.default_folder()).parts
+    except ValueError:
+        return ""
+    if name not in sets():
+        return ""
+    family = f"/{parts[0]}" if parts and not any(c in parts[0] for c in "*?[") else ""
+    folder = f" --out {library.default_folder()}"
+    return f"; it is built by: fclib collection build {name}{family}{folder}"
+
+
+def of_set(
+    name: str, form: str | None = None, tell: Callable[[str], None] = lambda _: None
+) -> list[Path]:
     """The files of a set of the collection, or of a family of it; built or fetched where needed.
 
     Args:
         name: as ``fclib collection list`` has it.
         form: "global" or "local"; by default the global one of a problem that has both.
+        tell: is told what is built, and how far that is.
 
     Raises:
         fclib.Error: there is no such set, or it cannot be had.
@@ -53,10 +75,35 @@ def of_set(name: str, form: str | None = None) -> list[Path]:
 
     try:
         found = library.Collection(name)
+        absent = [own for own in found.folders if not library.is_there(own, found.folder)]
+        if absent:
+            there = len(found.folders) - len(absent)
+            tell(
+                f"set {name}: {there} of {len(found.folders)} families are in {found.folder}; the"
+                f" others are built now, once: {', '.join(own.split('/')[-1] for own in absent)}."
+                f" On several cores: fclib collection build {name} --out {found.folder}"
+            )
+        for k, own in enumerate(absent):
+            library.ensure(own, found.folder, _now_and_then(f"{k + 1} of {len(absent)}", tell))
+        if absent:
+            tell(f"set {name}: built")
         return [found.path(k, form).resolve() for k in range(len(found))]
     except (KeyError, OSError) as error:
         word = error.args[0] if isinstance(error, KeyError) else error
         raise _core.Error(f"set {name}: {word}") from None
+
+
+def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
+    """Says how far the build of a family is: at its beginning, and every `PATIENCE` seconds."""
+    said = -PATIENCE
+
+    def show(name: str, done: int, total: int) -> None:
+        nonlocal said
+        if time.monotonic() - said >= PATIENCE:
+            said = time.monotonic()
+            tell(f"family {which}: {name}, {done} of {total} problems")
+
+    return show
 
 
 def check_names(path: str, kind: str) -> None:

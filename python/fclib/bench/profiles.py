@@ -1,9 +1,6 @@
-"""What the runs of a store say: profiles, means, ratios. Knows rows and numbers, no problem.
+"""What the runs of a store say: profiles, means, ratios. Knows runs and numbers, no problem.
 
-An instance is a problem at a tolerance, under one limit. The cost of a solver on an instance is
-infinite where it failed, and the least of its repeats, where at least half of them solved it; their
-spread is kept. Where the solver does not take such problems there is no cost, and the instance does
-not count for it. What was not run for a cause from outside is not there. Runs that
+What an instance is, what solved means and which instances count is in `comparison.py`. Runs that
 started from nothing (cold) and from the solution of a step before (warm) are never in one profile;
 `along` puts them beside each other. Sources:
 
@@ -19,17 +16,17 @@ started from nothing (cold) and from the solution of a step before (warm) are ne
   histories of all runs, also of those that failed.
 - success at an accuracy: qpbenchmark (Caron et al.): the error that was reached decides, whatever
   the solver said.
-- intervals: the bootstrap draws problems, with all that was run on each (Efron & Tibshirani 1993).
+- intervals: the bootstrap draws problems, with all that was run on each (Efron & Tibshirani 1993);
+  if families weigh the same, it draws families, and problems in each.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
@@ -37,133 +34,76 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
 from fclib._solve import MeritKind
-from fclib.bench.job import ORDERLY, SURROUNDINGS
+from fclib._verdicts import UNSUITABLE, is_solved
+from fclib.bench.comparison import (
+    METRICS,
+    TIMES,
+    WEIGH,
+    Array,
+    Costs,
+    Instance,
+    ProfileError,
+    Weigh,
+    costs,
+    gather,
+    in_order,
+    kept,
+    least,
+    names_of,
+    numbers_in,
+    one_limit,
+    pair_forms,
+    runs_of,
+    solved_in,
+    table_of,
+    words_in,
+)
+from fclib.bench.job import ORDERLY
 from fclib.bench.store import Store
+from fclib.bench.table import Table, Words, object_in
 
-Array: TypeAlias = npt.NDArray[np.float64]
+__all__ = [
+    "METRICS",
+    "TIMES",
+    "WEIGH",
+    "Costs",
+    "Instance",
+    "ProfileError",
+    "Weigh",
+    "costs",
+    "gather",
+    "least",
+    "names_of",
+]
+
 Start: TypeAlias = Literal["cold", "warm"]
-# of an instance: the problem's hash, tolerance, sequence and step
-Key: TypeAlias = tuple[str, float, str, int]
-# what a run may cost, and the least that is told from nothing
-METRICS: Mapping[str, tuple[str, float]] = {
-    "cpu_s": ("CPU time [s]", 1e-6),
-    "total_cpu_s": ("CPU time of the whole run [s]", 1e-6),
-    "wall_s": ("wall clock [s]", 1e-6),
-    "iterations": ("iterations", 1.0),
-    "memory_mb": ("memory [MB]", 1.0),
-}
-TIMES = ("cpu_s", "total_cpu_s", "wall_s")
 PENALTY = 10.0  # times the limit, for a failure in a mean
 SHIFT = 1e-3  # [s]
 RESAMPLES = 2000
 BANDS = 400  # the same for the bands of curves
+CHUNK = 100  # of them at once: 40 MB where there are 50,000 problems
 LAST = 3  # drift is that of the last third of a sequence
 SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is marked
 MARK, LOADED = "~", "^"  # of such a figure, and of one with runs under load
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 VIRTUAL_BEST = "virtual best"
-
-
-class ProfileError(_core.Error, ValueError):
-    """There is nothing to be compared."""
-
-
-@dataclass(frozen=True)
-class Instance:
-    """A problem at a tolerance."""
-
-    hash: str
-    problem: str
-    family: str
-    nc: int
-    tol: float
-    limit: float  # [s] of CPU
-    wall_limit: float = math.inf  # [s]
-
-
-@dataclass(frozen=True)
-class Costs:
-    """The cost of each solver on each instance that all of them have run."""
-
-    instances: tuple[Instance, ...]
-    solvers: tuple[str, ...]
-    values: Array  # (instances, solvers), inf where it failed, nan where it has none
-    metric: str
-    left_out: int = 0  # instances that some solver has not run
-    spread: Array | None = None  # of the repeats, relative to the least; nan where there is one
-    unsuitable: npt.NDArray[np.bool_] | None = None  # where the solver does not take such problems
-
-    @property
-    def solved(self) -> npt.NDArray[np.bool_]:
-        """(instances, solvers)."""
-        return np.isfinite(self.values)
-
-    @property
-    def best(self) -> Array:
-        """(instances) of the virtual best solver; inf where none solves it."""
-        return least(self.values)
-
-    @property
-    def charges(self) -> Array:
-        """(instances) what a failure is charged before the penalty.
-
-        For a time it is the limit of the run; for another metric the largest cost of a solver that
-        solves the instance, or any instance where none does.
-        """
-        if self.metric == "wall_s":
-            limits = [(one.wall_limit, one.limit) for one in self.instances]
-            return np.array([wall if math.isfinite(wall) else cpu for wall, cpu in limits])
-        if self.metric in TIMES:
-            return np.array([instance.limit for instance in self.instances])
-        finite = np.where(self.solved, self.values, -np.inf)
-        overall = float(finite.max(initial=1.0))
-        largest = finite.max(axis=1, initial=-np.inf)
-        return np.asarray(np.where(self.solved.any(axis=1), largest, overall))
-
-    def per_contact(self) -> Costs:
-        """The costs over the number of contacts; instances without any are left out."""
-        contacts = np.array([instance.nc for instance in self.instances])
-        there = contacts > 0
-        part = self.of(np.flatnonzero(there))
-        return replace(part, values=part.values / contacts[there, None])
-
-    def shared(self, solvers: Sequence[str] | None = None) -> Costs:
-        """Of some solvers, all by default, on the instances that all of these have run."""
-        names = self.solvers if solvers is None else tuple(solvers)
-        columns = [self.solvers.index(name) for name in names]
-        part = replace(
-            self,
-            solvers=names,
-            values=self.values[:, columns],
-            spread=None if self.spread is None else self.spread[:, columns],
-            unsuitable=None if self.unsuitable is None else self.unsuitable[:, columns],
-        )
-        has = ~np.isnan(part.values)
-        ran = has if part.unsuitable is None else has | part.unsuitable
-        kept = np.flatnonzero(ran.all(axis=1) & has.any(axis=1))
-        return replace(part.of(kept), left_out=int(has.any(axis=1).sum()) - kept.size)
-
-    def of(self, chosen: Iterable[int]) -> Costs:
-        """Some of the instances."""
-        numbers = list(chosen)
-        return replace(
-            self,
-            instances=tuple(self.instances[k] for k in numbers),
-            values=self.values[numbers],
-            spread=None if self.spread is None else self.spread[numbers],
-            unsuitable=None if self.unsuitable is None else self.unsuitable[numbers],
-        )
-
-    def at(self, tol: float) -> Costs:
-        """Those at a tolerance."""
-        return self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
-
-    @property
-    def tolerances(self) -> list[float]:
-        """The largest first."""
-        return sorted({instance.tol for instance in self.instances}, reverse=True)
+# columns of a store that no table, figure or page is of: a third of the memory
+UNREAD = frozenset(
+    (
+        *("natural", "scaled_natural", "dynamics", "bilateral", "kinematics", "cone", "dual_cone"),
+        *("complementarity", "open", "stick", "slide", "said_cpu_s", "setup_s", "measured"),
+        *("warm", "pinned", "machine", "frequency_mhz", "solved"),
+    )
+)
+JUDGED = {
+    "both": "the tolerance bounds both natural maps",
+    "natural": "the tolerance bounds the natural map of the literature alone",
+}
+WEIGHED = {
+    "families": "each family weighs the same",
+    "instances": "each instance weighs the same",
+}
 
 
 def load(
@@ -176,8 +116,9 @@ def load(
     machine: str | None = None,
     merit: MeritKind | None = None,
     start: Start | None = "cold",
-) -> list[dict[str, Any]]:
-    """The rows of a store that a profile is of.
+    more: Sequence[str] = (),
+) -> Table:
+    """The runs of a store that a profile is of.
 
     Args:
         store: the file.
@@ -189,17 +130,19 @@ def load(
         merit: only runs whose tolerance bounds this.
         start: only runs that started from nothing, or, "warm", the steps of sequences but the first
             ones, which had no step before them; None for both, which no profile takes.
+        more: columns of long texts that are wanted too, as "message".
 
     Raises:
         StoreError: the file is no store.
         ProfileError: no run is left, or they are of several machines or merits.
     """
     with Store(store, create=False) as opened:
-        rows = opened.results()
-    if not rows:
+        runs = read(opened, more)
+    if not len(runs):
         raise ProfileError(f"{store}: there are no runs")
-    rows = [row for row in rows if row["start"] == "cold" or row["step"] > 0]
-    _name_machines(rows)
+    later = numbers_in(runs, "step", 0.0) > 0
+    runs = kept(runs, words_in(runs, "start").is_in(["cold"]) | later)
+    runs = _name_machines(runs)
     wanted: list[tuple[str, Sequence[Any]]] = [
         ("campaign", [campaign] if campaign else ()),
         ("family", families),
@@ -211,44 +154,70 @@ def load(
     ]
     for column, values in wanted:
         if values:
-            known = sorted({str(row[column]) for row in rows})
-            rows = [row for row in rows if row[column] in values]
-            if not rows:
+            own = runs[column]
+            fits = own.is_in(values) if isinstance(own, Words) else np.isin(own, values)
+            if not fits.any():
+                there = own.present() if isinstance(own, Words) else np.unique(own).tolist()
                 raise ProfileError(
                     f"{store}: no run with {column} {', '.join(map(str, values))};"
-                    f" there is: {', '.join(known)}"
+                    f" there is: {', '.join(sorted(map(str, there)))}"
                 )
-    nodes = sorted({row["node"] or "?" for row in rows})
+            runs = kept(runs, fits)
+    nodes = sorted({name or "?" for name in words_in(runs, "node").present()})
     if len(nodes) > 1:
         raise ProfileError(
             f"{store}: times of several machines do not compare; choose one: {', '.join(nodes)}"
         )
-    if len({row["merit"] for row in rows}) > 1:
+    if len(words_in(runs, "merit").present()) > 1:
         raise ProfileError(
             f"{store}: the tolerance of some runs bounds both natural maps, of others that of the"
             " literature alone, which does not compare; choose one by merit: both, natural"
         )
-    rows = one_limit(rows)
-    _name_solvers(rows)
+    runs = one_limit(runs)
+    # by the labels of the store, in the order that was asked for
     order = {name: k for k, name in enumerate(solvers)}
-    return sorted(rows, key=lambda row: order.get(row["solver"], len(order)))
+    solver = words_in(runs, "solver")
+    rank = np.array([order.get(str(name), len(order)) for name in solver.values], int)
+    if order:
+        runs = runs.where(np.argsort(rank[solver.codes], kind="stable"))
+    return _name_solvers(runs)
 
 
-def _name_machines(rows: Sequence[dict[str, Any]]) -> None:
+def read(store: Store, more: Sequence[str] = ()) -> Table:
+    """All runs of a store; `same_as` says of a local form which global one it is of."""
+    runs = store.table(more=("path", *more))
+    runs = Table({name: runs[name] for name in runs.names if name not in UNREAD})
+    if not len(runs):
+        return runs
+    _, first = runs.numbers("hash")
+    pairs = pair_forms(iter(runs.where(first)))
+    said = words_in(runs, "same_as")
+    own = words_in(runs, "hash").map(lambda digest: pairs.get(str(digest)))
+    if not pairs or any(said.values):
+        return runs  # the campaign has said which are the same
+    return runs.with_columns(same_as=own)
+
+
+def _name_machines(runs: Table) -> Table:
     """Give machines of one name different ones, where they have other processors."""
-    kinds: dict[str, set[tuple[Any, Any]]] = defaultdict(set)
-    for row in rows:
-        kinds[row["node"] or ""].add((row["cpu"], row["cores"]))
-    for row in rows:
-        if len(kinds[row["node"] or ""]) > 1:
-            row["node"] = f"{row['node']} ({row['cores']} x {row['cpu']})"
+    number, first = runs.numbers("node", "cpu", "cores")
+    kinds = list(runs.where(first))
+    several = Counter(kind["node"] or "" for kind in kinds)
+    names = [
+        f"{kind['node']} ({kind['cores']} x {kind['cpu']})"
+        if several[kind["node"] or ""] > 1
+        else kind["node"]
+        for kind in kinds
+    ]
+    own = Words.of(names)
+    return runs.with_columns(node=Words(own.values, own.codes[number]))
 
 
-def _name_solvers(rows: Sequence[dict[str, Any]]) -> None:
+def _name_solvers(runs: Table) -> Table:
     """Give solvers of one label different ones, where they were not run in the same way."""
 
     def of(row: Mapping[str, Any]) -> dict[str, str]:
-        options = json.loads(row["options"] or "{}")
+        options = object_in(row["options"])
         return {
             "version": row["version"] or "?",
             "options": " ".join(f"{k}={v}" for k, v in options.items()) or "no options",
@@ -256,140 +225,22 @@ def _name_solvers(rows: Sequence[dict[str, Any]]) -> None:
             "memory": f"{row['memory_limit']:g} MB" if row["memory_limit"] else "",
         }
 
+    number, first = runs.numbers("solver", "version", "options", "threads", "memory_limit")
+    kinds = list(runs.where(first))
     ways: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-    for row in rows:
+    for row in kinds:
         for name, value in of(row).items():
             ways[row["solver"]][name].add(value)
-    for row in rows:
+    names = []
+    for row in kinds:
         own = ways[row["solver"]]
-        if differing := [value for name, value in of(row).items() if len(own[name]) > 1]:
-            row["solver"] = f"{row['solver']} ({', '.join(differing)})"
-
-
-def one_limit(rows: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Of each problem at a tolerance the runs under one limit: that of the most solvers.
-
-    Of several such the largest: where a limit was raised, the runs before do not count.
-    """
-    solvers: dict[Key, dict[tuple[float, float], set[str]]] = defaultdict(lambda: defaultdict(set))
-
-    def limit(row: Mapping[str, Any]) -> tuple[float, float]:
-        return row["time_limit"] or 0.0, row.get("wall_limit") or 0.0
-
-    for row in rows:
-        solvers[instance_of(row)][limit(row)].add(row["solver"])
-    chosen = {
-        key: max(own, key=lambda each: (len(own[each]), each)) for key, own in solvers.items()
-    }
-    return [row for row in rows if limit(row) == chosen[instance_of(row)]]
-
-
-def instance_of(row: Mapping[str, Any]) -> Key:
-    """What rows of one instance share; at rest, several steps of a sequence are one problem."""
-    return row["hash"], row["tol"], row.get("sequence") or "", row.get("step") or 0
-
-
-JUDGED = {
-    "both": "the tolerance bounds both natural maps",
-    "natural": "the tolerance bounds the natural map of the literature alone",
-}
-
-
-def costs(
-    rows: Sequence[Mapping[str, Any]], metric: str = "cpu_s", count_unsuitable: bool = False
-) -> Costs:
-    """The costs of the solvers of some rows, on what all of them have run or do not take.
-
-    Args:
-        rows: as `load` gives them.
-        metric: one of `METRICS`.
-        count_unsuitable: whether a problem that a solver does not take is a failure of it.
-
-    Raises:
-        ProfileError: the metric is unknown, or no instance was run by all solvers.
-    """
-    found = gather(rows, metric, count_unsuitable).shared()
-    if not found.instances:
-        raise ProfileError("there is no problem that all of these solvers have run")
-    return found
-
-
-def gather(
-    rows: Iterable[Mapping[str, Any]], metric: str = "cpu_s", count_unsuitable: bool = False
-) -> Costs:
-    """As `costs`, of all instances that one of the solvers has run; nan where another has not.
-
-    Raises:
-        ProfileError: the metric is unknown.
-    """
-    if metric not in METRICS:
-        raise ProfileError(f"there is no metric {metric}; there is: {', '.join(METRICS)}")
-    floor = METRICS[metric][1]
-    instances: dict[Key, Instance] = {}
-    numbers: dict[Key, int] = {}
-    solvers: dict[str, int] = {}
-    lines, columns, spent, refused = [], [], [], []
-    for row in one_limit([dict(row) for row in rows]):
-        column = solvers.setdefault(row["solver"], len(solvers))
-        if row["status"] in SURROUNDINGS:
-            continue
-        key = instance_of(row)
-        if key not in instances:
-            numbers[key] = len(instances)
-            instances[key] = Instance(
-                hash=row["hash"],
-                problem=row["problem"],
-                family=row["family"],
-                nc=row["nc"],
-                tol=row["tol"],
-                limit=row["time_limit"],
-                wall_limit=row.get("wall_limit") or math.inf,
-            )
-        if row["status"] == "unsuitable" and not count_unsuitable:
-            refused.append((numbers[key], column))
-            continue
-        value = row[metric]
-        lines.append(numbers[key])
-        columns.append(column)
-        good = row["solved"] and value is not None
-        spent.append(max(float(value), floor) if good else math.inf)
-    shape = len(instances), len(solvers)
-    found, spread = np.full(shape, np.nan), np.full(shape, np.nan)
-    unsuitable = np.zeros(shape, dtype=bool)
-    if spent:
-        # the repeats of a run beside each other, the quickest first
-        values, cells = np.array(spent), np.array(lines) * len(solvers) + np.array(columns)
-        order = np.lexsort((values, cells))
-        cells, first, count = np.unique(cells[order], return_index=True, return_counts=True)
-        solved = np.add.reduceat(np.isfinite(values[order]), first)
-        quickest = values[order[first]]
-        found.flat[cells] = np.where(2 * solved >= count, quickest, np.inf)
-        slowest = values[order[first + np.maximum(solved, 1) - 1]]
-        with np.errstate(invalid="ignore"):
-            own = np.where((solved > 1) & np.isfinite(quickest), slowest / quickest - 1, np.nan)
-        spread.flat[cells] = own
-    for place in refused:
-        unsuitable[place] = bool(np.isnan(found[place]))
-    ordered = sorted(
-        instances, key=lambda k: (instances[k].family, instances[k].problem, -k[1], k[2:])
-    )
-    rank = [numbers[key] for key in ordered]
-    return Costs(
-        tuple(instances[key] for key in ordered),
-        tuple(solvers),
-        found[rank],
-        metric,
-        spread=spread[rank],
-        unsuitable=unsuitable[rank],
-    )
+        differing = [value for name, value in of(row).items() if len(own[name]) > 1]
+        names.append(f"{row['solver']} ({', '.join(differing)})" if differing else row["solver"])
+    found = Words.of(names)
+    return runs.with_columns(solver=Words(found.values, found.codes[number]))
 
 
 # ---- profiles
-
-
-def least(values: Array) -> Array:
-    """(instances) the least cost of each; inf where no solver has one."""
-    return np.asarray(np.where(np.isnan(values), np.inf, values).min(axis=1, initial=np.inf))
 
 
 def ratios(values: Array) -> Array:
@@ -400,68 +251,127 @@ def ratios(values: Array) -> Array:
     return np.asarray(np.where(np.isnan(values), np.nan, found))
 
 
-def share_within(values: Array, bounds: Array) -> Array:
+def share_within(values: Array, bounds: Array, weights: Array | None = None) -> Array:
     """The share of instances whose value is at most each bound (solvers, bounds).
 
-    Of a solver those instances count for which it has a value.
+    Args:
+        values: (instances, solvers); of a solver those instances count for which it has a value.
+        bounds: in growing order.
+        weights: (instances, solvers), as `Costs.weights` has them; by default all the same.
     """
-    count = np.maximum(1, (~np.isnan(values)).sum(axis=0))[:, None]
-    found = [np.searchsorted(np.sort(column), bounds, side="right") for column in values.T]
-    return np.asarray(np.array(found).reshape(values.shape[1], len(bounds)) / count)
+    if weights is None:
+        count = np.maximum(1, (~np.isnan(values)).sum(axis=0))[:, None]
+        found = [np.searchsorted(np.sort(column), bounds, side="right") for column in values.T]
+        return np.asarray(np.array(found).reshape(values.shape[1], len(bounds)) / count)
+    shares = np.zeros((values.shape[1], len(bounds)))
+    for k, (own, weight) in enumerate(zip(values.T, weights.T, strict=True)):
+        order = np.argsort(own, kind="stable")
+        sums = np.append(0.0, np.cumsum(weight[order]))
+        shares[k] = sums[np.searchsorted(own[order], bounds, side="right")]
+    return shares
 
 
-def performance_profile(values: Array, taus: Array) -> Array:
+def performance_profile(values: Array, taus: Array, weights: Array | None = None) -> Array:
     """rho_s(tau) (solvers, taus) of costs (instances, solvers), by Dolan & More (2002)."""
-    return share_within(ratios(values), taus)
+    return share_within(ratios(values), taus, weights)
 
 
-def bands(costs: Costs, curve: Any, seed: int = 0) -> tuple[Array, Array]:
-    """The ends of 95 % intervals of curves (solvers, bounds), by drawing problems `BANDS` times.
+def bands(
+    costs: Costs, values: Array, bounds: Array, weigh: Weigh = "instances", seed: int = 0
+) -> tuple[Array, Array]:
+    """The ends of 95 % intervals of `share_within`, by drawing problems `BANDS` times.
 
     Args:
-        costs: what the curves are of.
-        curve: makes them of values (instances, solvers).
+        costs: what the values are of.
+        values: (instances, solvers) of the curves: costs or ratios.
+        bounds: (k) in growing order.
+        weigh: what weighs the same.
         seed: of the bootstrap.
     """
-    own = _by_problem([instance.hash for instance in costs.instances])
-    random = np.random.Generator(np.random.PCG64([seed, len(own)]))
-    drawn = []
-    for _ in range(BANDS):
-        chosen = np.concatenate([own[k] for k in random.integers(0, len(own), len(own))])
-        drawn.append(curve(costs.values[chosen]))
-    low, high = np.quantile(np.array(drawn), [0.025, 0.975], axis=0)
-    return np.asarray(low), np.asarray(high)
+    problems, groups = _problems(costs, np.arange(len(costs.instances)), weigh)
+    drawn = np.concatenate(list(_draws(groups, BANDS, seed)))
+    weights = costs.weights(weigh)
+    low, high = np.zeros((2, len(costs.solvers), len(bounds)))
+    for k, own in enumerate(values.T):
+        # of each problem the weight of its instances up to each bound, then of what was drawn
+        there = ~np.isnan(own)
+        step = np.searchsorted(bounds, own[there], side="left")
+        sums = np.zeros((drawn.shape[1], len(bounds) + 1))
+        np.add.at(sums, (problems[there], step), weights[there, k])
+        counted = drawn @ sums
+        total = np.maximum(counted.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        shares = np.cumsum(counted[:, :-1], axis=1) / total
+        low[k], high[k] = np.quantile(shares, [0.025, 0.975], axis=0)
+    return low, high
 
 
-def _by_problem(hashes: Sequence[str]) -> list[npt.NDArray[np.int64]]:
-    """The places of each problem."""
-    found: dict[str, list[int]] = defaultdict(list)
-    for k, digest in enumerate(hashes):
-        found[digest].append(k)
-    return [np.array(own) for own in found.values()]
+def _problems(
+    costs: Costs, places: npt.NDArray[np.int64], weigh: Weigh
+) -> tuple[npt.NDArray[np.int64], list[list[int]]]:
+    """For each of some instances the number of its problem; and the problems, drawn group by group.
+
+    A group is a family where these weigh the same, else it is all.
+    """
+    known: dict[str, int] = {}
+    groups: dict[str, list[int]] = defaultdict(list)
+    numbers = np.zeros(len(places), np.int64)
+    for k, place in enumerate(places.tolist()):
+        one = costs.instances[place]
+        if one.hash not in known:
+            known[one.hash] = len(known)
+            groups[one.family if weigh == "families" else ""].append(known[one.hash])
+        numbers[k] = known[one.hash]
+    return numbers, list(groups.values())
+
+
+def _draws(groups: Sequence[Sequence[int]], count: int, seed: int) -> Iterator[Array]:
+    """(some, problems) how often each problem was drawn: the bootstrap, so many times in all.
+
+    Groups are drawn, and of each as many problems as it has.
+    """
+    random = np.random.Generator(np.random.PCG64([seed, len(groups)]))
+    size = sum(map(len, groups))
+    for first in range(0, count, CHUNK):
+        some = min(CHUNK, count - first)
+        drawn = [np.array(own)[random.integers(0, len(own), (some, len(own)))] for own in groups]
+        cells = np.concatenate(drawn, axis=1) + size * np.arange(some)[:, None]
+        counts = np.bincount(cells.ravel(), minlength=some * size).reshape(some, size)
+        shares = np.full(len(groups), 1 / len(groups))
+        often = random.multinomial(len(groups), shares, some)
+        for k, own in enumerate(groups):
+            counts[:, own] *= often[:, [k]]
+        yield counts.astype(float)
 
 
 # ---- means
 
 
 def shifted_geometric_mean(
-    values: Array, charges: Array, penalty: float = PENALTY, shift: float = SHIFT
+    values: Array,
+    charges: Array,
+    penalty: float = PENALTY,
+    shift: float = SHIFT,
+    weights: Array | None = None,
 ) -> Array:
     """(solvers) of costs (instances, solvers); a failure counts as penalty times its charge.
 
-    Of a solver those instances count for which it has a cost; nan where there is none.
+    Of a solver those instances count for which it has a cost; nan where there is none. All weigh
+    the same without `weights` (instances, solvers), as `Costs.weights` has them.
     """
     whole = np.where(np.isinf(values), penalty * charges[:, None], values)
     there = ~np.isnan(values)
-    logs = np.where(there, np.log1p(np.where(there, whole, 0.0) / shift), 0.0).sum(axis=0)
-    with np.errstate(invalid="ignore"):
-        return np.asarray(np.expm1(logs / there.sum(axis=0)) * shift)
+    if weights is None:
+        weights = there / np.maximum(1, there.sum(axis=0))
+    logs = np.where(there, np.log1p(np.where(there, whole, 0.0) / shift), 0.0)
+    means = np.expm1((weights * logs).sum(axis=0)) * shift
+    return np.asarray(np.where(there.any(axis=0), means, np.nan))
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two solvers on the instances that both solve."""
+    """Two solvers on the instances that both solve, at a tolerance."""
 
+    tol: float
     first: str
     second: str
     both: int
@@ -472,13 +382,16 @@ class Pair:
     high: float
 
 
-def pairs(costs: Costs, against: str | None = None, seed: int = 0) -> list[Pair]:
-    """Each two of the solvers, or each of the others and one.
+def pairs(
+    costs: Costs, against: str | None = None, seed: int = 0, weigh: Weigh = "instances"
+) -> list[Pair]:
+    """Each two of the solvers at each tolerance, or each of the others and one.
 
     Args:
         costs: of all.
         against: the one, as the second of each pair.
         seed: of the bootstrap, which draws the problems `RESAMPLES` times.
+        weigh: what weighs the same.
     """
     names = costs.solvers
     chosen = [
@@ -487,60 +400,114 @@ def pairs(costs: Costs, against: str | None = None, seed: int = 0) -> list[Pair]
         for b in range(len(names))
         if (a < b if against is None else names[a] != against == names[b])
     ]
+    parts = [costs.at(tol) for tol in costs.tolerances]
+    return [pair for part in parts for pair in _pairs(part, chosen, seed, weigh)]
+
+
+def _pairs(costs: Costs, chosen: Sequence[tuple[int, int]], seed: int, weigh: Weigh) -> list[Pair]:
+    """At one tolerance. All pairs share the draws, so that many problems take little time."""
+    (tol,) = costs.tolerances
+    some = np.flatnonzero(costs.solved.any(axis=1))
+    if not len(some):
+        some = np.arange(len(costs.instances))
+    numbers, groups = _problems(costs, some, weigh)
+    size = sum(map(len, groups))
+    # of each problem what its instances weigh for a pair, and their logarithms by these weights
+    sums, sizes = np.zeros((2, size, len(chosen)))
+    ratios = np.full(len(chosen), math.nan)
+    for k, (a, b) in enumerate(chosen):
+        both = costs.solved[:, a] & costs.solved[:, b]
+        part = Costs(costs.instances, ("",), np.where(both, 1.0, np.nan)[:, None], costs.metric)
+        weights = part.weights(weigh)[:, 0]
+        own = np.zeros(len(both))
+        own[both] = weights[both] * np.log(costs.values[both, a] / costs.values[both, b])
+        sums[:, k] = np.bincount(numbers, own[some], size)
+        sizes[:, k] = np.bincount(numbers, weights[some], size)
+        if both.any():
+            ratios[k] = math.exp(own.sum())
+    means = []
+    for drawn in _draws(groups, RESAMPLES, seed):
+        total = drawn @ sizes
+        # a draw without any of their problems says nothing
+        with np.errstate(invalid="ignore", divide="ignore"):
+            means.append(np.where(total > 0, (drawn @ sums) / total, np.nan))
+    ends = np.full((2, len(chosen)), math.nan)
+    known = np.flatnonzero(~np.isnan(ratios))
+    if len(known):
+        ends[:, known] = np.nanquantile(np.concatenate(means)[:, known], [0.025, 0.975], axis=0)
     found = []
-    for a, b in chosen:
-        good_a, good_b = costs.solved[:, a], costs.solved[:, b]
-        both = good_a & good_b
-        logs = np.log(costs.values[both, a] / costs.values[both, b])
-        ratio = low = high = math.nan
-        if logs.size:
-            random = np.random.Generator(np.random.PCG64([seed, a, b]))
-            own = _by_problem([costs.instances[k].hash for k in np.flatnonzero(both)])
-            sums = np.array([logs[part].sum() for part in own])
-            sizes = np.array([len(part) for part in own])
-            drawn = random.integers(0, len(own), (RESAMPLES, len(own)))
-            ratio = float(np.exp(logs.mean()))
-            means = sums[drawn].sum(axis=1) / sizes[drawn].sum(axis=1)
-            low, high = np.exp(np.quantile(means, [0.025, 0.975])).tolist()
-        failed_a, failed_b = np.isinf(costs.values[:, a]), np.isinf(costs.values[:, b])
-        only_a, only_b = int((good_a & failed_b).sum()), int((good_b & failed_a).sum())
-        found.append(Pair(names[a], names[b], int(both.sum()), only_a, only_b, ratio, low, high))
+    for k, (a, b) in enumerate(chosen):
+        good, failed = costs.solved[:, [a, b]], np.isinf(costs.values[:, [a, b]])
+        counts = (
+            int((good[:, 0] & good[:, 1]).sum()),
+            int((good[:, 0] & failed[:, 1]).sum()),
+            int((good[:, 1] & failed[:, 0]).sum()),
+        )
+        low, high = np.exp(ends[:, k]).tolist()
+        names = costs.solvers[a], costs.solvers[b]
+        found.append(Pair(tol, *names, *counts, float(ratios[k]), low, high))
     return found
 
 
 # ---- tables
 
 
-def summary(costs: Costs, penalty: float = PENALTY, shift: float = SHIFT) -> list[dict[str, Any]]:
-    """A row a solver, the virtual best first, then by what they solve and their means."""
+def summary(
+    costs: Costs,
+    penalty: float = PENALTY,
+    shift: float = SHIFT,
+    weigh: Weigh = "instances",
+) -> list[dict[str, Any]]:
+    """A row a tolerance and solver: the virtual best, then by what they solve and their means.
+
+    Args:
+        costs: of all tolerances; no figure is of several of them.
+        penalty: what a failure is charged, times the limit.
+        shift: of the geometric mean.
+        weigh: what weighs the same in the share that is solved, and in the mean.
+    """
+    parts = [costs.at(tol) for tol in costs.tolerances]
+    return [row for part in parts for row in _summary(part, penalty, shift, weigh)]
+
+
+def _summary(costs: Costs, penalty: float, shift: float, weigh: Weigh) -> list[dict[str, Any]]:
+    (tol,) = costs.tolerances
     best = costs.best
-    values = np.column_stack([best, costs.values])
-    means = shifted_geometric_mean(values, costs.charges, penalty, shift)
+    whole = Costs(
+        costs.instances,
+        (VIRTUAL_BEST, *costs.solvers),
+        np.column_stack([best, costs.values]),
+        costs.metric,
+    )
+    values, weights = whole.values, whole.weights(weigh)
+    means = shifted_geometric_mean(values, costs.charges, penalty, shift, weights)
+    # of the best, on the instances of each solver
+    beside = np.where(whole.there, best[:, None], np.nan)
+    least_means = shifted_geometric_mean(beside, costs.charges, penalty, shift, weights)
     quotients = ratios(values)
+    shares = (weights * whole.solved).sum(axis=0)
     rows: list[dict[str, Any]] = []
-    for k, name in enumerate((VIRTUAL_BEST, *costs.solvers)):
-        there = ~np.isnan(values[:, k])
-        solved = np.isfinite(values[:, k])
+    for k, name in enumerate(whole.solvers):
+        solved = whole.solved[:, k]
         own = quotients[solved, k]
-        # of the best on the same instances
-        (least_mean,) = shifted_geometric_mean(
-            best[there, None], costs.charges[there], penalty, shift
-        )
         rows.append(
             {
+                "tol": tol,
                 "solver": name,
                 "solved": int(solved.sum()),
-                "of": int(there.sum()),
+                "of": int(whole.there[:, k].sum()),
+                "share": float(shares[k]),
                 "unsuitable": _count(costs.unsuitable, k - 1),
                 "fastest": int((own == 1).sum()) if k else int(solved.sum()),
                 "mean": float(means[k]),
-                "to best": float(means[k] / least_mean) if least_mean > 0 else math.nan,
+                "to best": float(means[k] / least_means[k]) if least_means[k] > 0 else math.nan,
                 "median ratio": float(np.median(own)) if own.size else None,
                 "worst ratio": float(own.max()) if own.size else None,
                 "spread": _median(costs.spread, k - 1),
+                "copies": _median(costs.copies, k - 1),
             }
         )
-    return [rows[0], *sorted(rows[1:], key=lambda row: (-row["solved"], row["mean"]))]
+    return [rows[0], *sorted(rows[1:], key=lambda row: (-row["share"], row["mean"]))]
 
 
 def _count(marks: npt.NDArray[np.bool_] | None, k: int) -> int:
@@ -548,63 +515,115 @@ def _count(marks: npt.NDArray[np.bool_] | None, k: int) -> int:
 
 
 def _median(spread: Array | None, k: int) -> float | None:
-    """The median spread of the repeats of a solver, where there are any."""
+    """The median spread of the repeats or the copies of a solver, where there are any."""
     if spread is None or k < 0:
         return None
     own = spread[np.isfinite(spread[:, k]), k]
     return float(np.median(own)) if own.size else None
 
 
-def shifts(costs: Costs, penalty: float = PENALTY, shift: float = SHIFT) -> list[dict[str, Any]]:
-    """A row a solver: its mean over that of the virtual best, for other shifts too."""
+def left_out(every: Costs, chosen: Costs) -> list[dict[str, Any]]:
+    """A row a tolerance and solver that is not compared: what it solves of what it has run."""
+    rows = []
+    for tol in every.tolerances:
+        part = every.at(tol)
+        there = {one.key for one in chosen.at(tol).instances}
+        in_common = np.array([one.key in there for one in part.instances], bool)
+        for k, name in enumerate(part.solvers):
+            solved, of = part.counts()[k]
+            if name not in chosen.solvers and of:
+                common = int((part.there[:, k] & in_common).sum())
+                refused = _count(part.unsuitable, k)
+                rows.append(
+                    {
+                        "tol": tol,
+                        "solver": name,
+                        "solved": solved,
+                        "of": of,
+                        "unsuitable": refused,
+                        "in the common set": common,
+                    }
+                )
+    return rows
+
+
+def shifts(
+    costs: Costs, penalty: float = PENALTY, shift: float = SHIFT, weigh: Weigh = "instances"
+) -> list[dict[str, Any]]:
+    """A row a tolerance and solver: its mean over the virtual best's, for other shifts too."""
     tables = {
-        f"shift {s:g}": {row["solver"]: row["to best"] for row in summary(costs, penalty, s)}
+        f"shift {s:g}": {
+            (row["tol"], row["solver"]): row["to best"] for row in summary(costs, penalty, s, weigh)
+        }
         for s in (shift / 10, shift, 10 * shift)
     }
-    order = [row["solver"] for row in summary(costs, penalty, shift)[1:]]
+    order = [(row["tol"], row["solver"]) for row in summary(costs, penalty, shift, weigh)]
     return [
-        {"solver": name, **{title: own[name] for title, own in tables.items()}} for name in order
+        {"tol": tol, "solver": name, **{title: own[tol, name] for title, own in tables.items()}}
+        for tol, name in order
+        if name != VIRTUAL_BEST
     ]
 
 
-def accuracies(rows: Sequence[Mapping[str, Any]], tol: float) -> list[dict[str, Any]]:
-    """A row a solver: the share of its runs at a tolerance that reached an error, within limits.
+def accuracies(
+    rows: Iterable[Mapping[str, Any]], costs: Costs, weigh: Weigh = "instances"
+) -> list[dict[str, Any]]:
+    """A row a tolerance and solver: the share of instances on which a run reached an error in time.
 
-    The recomputed error decides, whatever the solver said.
+    The recomputed error decides, whatever the solver said; of repeats each counts a part.
+
+    Args:
+        rows: the runs that the costs are of, or more.
+        costs: which instances count, and for whom.
+        weigh: what weighs the same.
     """
-    found = []
-    for solver in dict.fromkeys(row["solver"] for row in rows):
-        own = [
-            row
-            for row in rows
-            if row["solver"] == solver and row["tol"] == tol and row["status"] != "unsuitable"
-        ]
-        if not own:
-            continue
-        entry: dict[str, Any] = {"solver": solver, "tol": tol, "runs": len(own)}
-        for bound in ACCURACIES:
-            reached = [
-                row["error"] is not None
-                and row["error"] <= bound
-                and row["status"] in (*ORDERLY, "inaccurate")
-                and (row["cpu_s"] or 0.0) <= row["time_limit"]
-                for row in own
-            ]
-            entry[f"error <= {bound:g}"] = sum(reached) / len(own)
-        found.append(entry)
+    runs = runs_of(rows, costs)
+    place, column = costs.cells_of(runs)
+    weights = costs.weights(weigh)
+    tols = np.array([one.tol for one in costs.instances])
+    # each solver's weights at one tolerance have the sum 1
+    for tol in np.unique(tols):
+        part = costs.at(float(tol))
+        weights[tols == tol] = part.weights(weigh)
+    cell = place * len(costs.solvers) + column
+    count = np.bincount(cell, minlength=costs.values.size)
+    own = weights[place, column] / count[cell]
+    error = numbers_in(runs, "error")
+    fit = words_in(runs, "status").is_in((*ORDERLY, "inaccurate"))
+    fit &= numbers_in(runs, "cpu_s", 0.0) <= numbers_in(runs, "time_limit")
+    found: list[dict[str, Any]] = []
+    for tol in costs.tolerances:
+        for k, solver in enumerate(costs.solvers):
+            mine = (column == k) & (tols[place] == tol)
+            if not mine.any():
+                continue
+            entry: dict[str, Any] = {"solver": solver, "tol": tol, "runs": int(mine.sum())}
+            for bound in ACCURACIES:
+                with np.errstate(invalid="ignore"):
+                    reached = mine & fit & (error <= bound)
+                entry[f"error <= {bound:g}"] = float(own[reached].sum())
+            found.append(entry)
     return found
 
 
-def failures(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """A row a solver: how many of its runs ended in which status."""
-    counts: dict[str, Counter[str]] = defaultdict(Counter)
-    for row in rows:
-        counts[row["solver"]][row["status"]] += 1
-    statuses = [name for name, _ in Counter(row["status"] for row in rows).most_common()]
-    return [
-        {"solver": solver, **{status: own[status] for status in statuses}}
-        for solver, own in counts.items()
-    ]
+def failures(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """A row a tolerance and solver: how many of all its runs ended in which status."""
+    runs = table_of(rows)
+    tols = numbers_in(runs, "tol")
+    solver, status = words_in(runs, "solver"), words_in(runs, "status")
+    statuses = np.bincount(status.codes, minlength=len(status.values)).tolist()
+    first = {name: k for k, name in enumerate(in_order(status))}
+    codes = {name: k for k, name in enumerate(status.values)}
+    order = sorted(first, key=lambda name: (-statuses[codes[name]], first[name]))
+    found = []
+    for tol in sorted({*tols.tolist()}, reverse=True):
+        for name in in_order(solver):
+            mine = (solver == name) & (tols == tol)
+            if mine.any():
+                count = np.bincount(status.codes[mine], minlength=len(status.values)).tolist()
+                own = {status: count[codes[status]] for status in order}
+                found.append({"tol": tol, "solver": name, **own})
+    return found
 
 
 def families(
@@ -644,38 +663,47 @@ def families(
 
 
 def work_precision(
-    rows: Sequence[Mapping[str, Any]],
-    metric: str = "cpu_s",
+    rows: Iterable[Mapping[str, Any]],
+    costs: Costs,
     penalty: float = PENALTY,
     shift: float = SHIFT,
-    count_unsuitable: bool = False,
+    weigh: Weigh = "instances",
 ) -> list[dict[str, Any]]:
-    """A row a solver and tolerance: what the accuracy costs, over problems that all have run.
+    """A row a solver and tolerance: what the accuracy costs.
 
     `error` is the geometric mean of the recomputed errors of the runs that were solved.
+
+    Args:
+        rows: the runs that the costs are of, or more.
+        costs: of all tolerances.
+        penalty: what a failure is charged, times the limit.
+        shift: of the geometric mean.
+        weigh: what weighs the same.
     """
+    runs = runs_of(rows, costs)
+    solver, tols = words_in(runs, "solver"), numbers_in(runs, "tol")
+    with np.errstate(invalid="ignore"):
+        logs = np.log(np.maximum(numbers_in(runs, "error"), 1e-17))
+    good = solved_in(runs) & np.isfinite(logs)
     found = []
-    for tol in sorted({row["tol"] for row in rows}, reverse=True):
-        own = [row for row in rows if row["tol"] == tol]
-        try:
-            part = costs(own, metric, count_unsuitable)
-        except ProfileError:
-            continue
-        means = shifted_geometric_mean(part.values, part.charges, penalty, shift)
-        for k, solver in enumerate(part.solvers):
-            errors = [
-                max(row["error"], 1e-17) for row in own if row["solver"] == solver and row["solved"]
-            ]
-            found.append(
-                {
-                    "solver": solver,
-                    "tol": tol,
-                    "mean": float(means[k]),
-                    "error": float(np.exp(np.log(errors).mean())) if errors else None,
-                    "solved": int(part.solved[:, k].sum()),
-                    "of": int((~np.isnan(part.values[:, k])).sum()),
-                }
-            )
+    for tol in costs.tolerances:
+        part = costs.at(tol)
+        weights = part.weights(weigh)
+        means = shifted_geometric_mean(part.values, part.charges, penalty, shift, weights)
+        for k, name in enumerate(part.solvers):
+            errors = logs[good & (tols == tol) & (solver == name)]
+            solved, of = part.counts()[k]
+            if of:
+                found.append(
+                    {
+                        "solver": name,
+                        "tol": tol,
+                        "mean": float(means[k]),
+                        "error": float(np.exp(errors.mean())) if errors.size else None,
+                        "solved": solved,
+                        "of": of,
+                    }
+                )
     return found
 
 
@@ -683,7 +711,7 @@ def work_precision(
 
 
 def along(
-    store: str | Path, rows: Sequence[Mapping[str, Any]], campaign: str | None = None
+    store: str | Path, rows: Iterable[Mapping[str, Any]], campaign: str | None = None
 ) -> list[dict[str, Any]]:
     """A row a sequence, tolerance and solver: its warm runs against its cold ones.
 
@@ -702,6 +730,11 @@ def along(
         names = ("hash", "solver", "tol", "merit", "repeat", "time_limit", "wall_limit")
         return tuple(row[name] for name in names)
 
+    # of what was run cold alone nothing is said here
+    every = table_of(rows)
+    hashes, warm = words_in(every, "hash"), words_in(every, "start").is_in(["warm"])
+    every = kept(every, hashes.is_in(in_order(words_in(every.where(warm), "hash"))))
+    rows = list(every)
     cold = {same(row): row for row in rows if row["start"] == "cold"}
     chains: dict[tuple[str, float, str], list[tuple[Any, Any]]] = defaultdict(list)
     for row in sorted(rows, key=lambda row: (row["step"] or 0, row["repeat"])):
@@ -716,7 +749,7 @@ def along(
         for (sequence, tol, solver), pairs in sorted(chains.items()):
             spent = np.array([[_spent(row) for row in pair] for pair in pairs]).sum(axis=0)
             counts = np.array([[row["iterations"] or 0 for row in pair] for pair in pairs])
-            solved = np.array([[row["solved"] for row in pair] for pair in pairs])
+            solved = np.array([[is_solved(row["status"]) for row in pair] for pair in pairs])
             apart = [
                 gap
                 for one, other in pairs
@@ -759,33 +792,44 @@ def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float | None
 
 
 def curves(
-    store: str | Path, rows: Sequence[Mapping[str, Any]]
+    store: str | Path, rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, list[tuple[Array, Array]]]:
     """For each run of each solver the times [s] and the least errors until then.
 
     The times are of CPU: those of the history, which are of the wall clock, in proportion. A run
     that left no history, as one that was killed, has reached nothing. Empty where no run has one.
     """
+    runs = table_of(rows)
+    runs = runs.where(~words_in(runs, "status").is_in((UNSUITABLE,)))
+    names = words_in(runs, "solver").tolist()
+    numbers, spent = (
+        numbers_in(runs, "run").astype(int).tolist(),
+        numbers_in(runs, "cpu_s").tolist(),
+    )
     found: dict[str, list[tuple[Array, Array]]] = defaultdict(list)
     some = False
     with Store(store, create=False) as opened:
-        for row in rows:
-            if row["status"] == "unsuitable":
-                continue
-            history = opened.history(row["run"])
-            times = np.array([time for _, _, time, _ in history], dtype=float)
-            errors = np.array([error for _, error, _, _ in history], dtype=float)
-            if times.size:
-                some = True
-                if row["cpu_s"] is not None and times[-1] > 0:
-                    times *= row["cpu_s"] / times[-1]
-                errors = np.minimum.accumulate(errors)
-            found[row["solver"]].append((times, errors))
+        for solver, run, cpu_s in zip(names, numbers, spent, strict=True):
+            history = opened.history(run)
+            times, errors = least_errors(history, None if math.isnan(cpu_s) else cpu_s)
+            some = some or bool(times.size)
+            found[str(solver)].append((times, errors))
     return dict(found) if some else {}
 
 
+def least_errors(
+    history: Sequence[tuple[int, float, float, str]], cpu_s: float | None
+) -> tuple[Array, Array]:
+    """The times [s] of CPU of the reports of a run, and the least error until each of them."""
+    times = np.array([time for _, _, time, _ in history], dtype=float)
+    errors = np.array([error for _, error, _, _ in history], dtype=float)
+    if times.size and cpu_s is not None and times[-1] > 0:
+        times *= cpu_s / times[-1]
+    return times, np.minimum.accumulate(errors)
+
+
 def convergence(
-    store: str | Path, rows: Sequence[Mapping[str, Any]], times: Array
+    store: str | Path, rows: Iterable[Mapping[str, Any]], times: Array
 ) -> dict[str, Array]:
     """The least error reached by a time, its median over all runs, by solver.
 
@@ -801,7 +845,8 @@ def convergence(
     Raises:
         ProfileError: the runs are at several tolerances: they end at different errors.
     """
-    if len({row["tol"] for row in rows}) > 1:
+    rows = table_of(rows)
+    if len(np.unique(numbers_in(rows, "tol"))) > 1:
         raise ProfileError("convergence is of runs at one tolerance")
     found = {}
     for solver, own in curves(store, rows).items():
@@ -820,7 +865,7 @@ def targets(tol: float) -> Array:
     return np.array([*(10.0**k for k in range(-1, last, -1)), tol])
 
 
-def runtimes(store: str | Path, rows: Sequence[Mapping[str, Any]], tol: float) -> dict[str, Array]:
+def runtimes(store: str | Path, rows: Iterable[Mapping[str, Any]], tol: float) -> dict[str, Array]:
     """For each solver the times [s] of CPU to the `targets` of all its runs; inf where not reached.
 
     Args:
@@ -830,7 +875,8 @@ def runtimes(store: str | Path, rows: Sequence[Mapping[str, Any]], tol: float) -
     """
     wanted = targets(tol)
     found = {}
-    for solver, own in curves(store, [row for row in rows if row["tol"] == tol]).items():
+    runs = table_of(rows)
+    for solver, own in curves(store, runs.where(numbers_in(runs, "tol") == tol)).items():
         times = np.full((len(own), len(wanted)), np.inf)
         for k, (moments, errors) in enumerate(own):
             # the errors fall: the first that is small enough
@@ -844,42 +890,63 @@ def runtimes(store: str | Path, rows: Sequence[Mapping[str, Any]], tol: float) -
 # ---- what a figure says of itself
 
 
-def caption(costs: Costs, rows: Sequence[Mapping[str, Any]]) -> str:
-    """Instances, tolerances, limits, failures, machine, date and version, in one line."""
+def caption(
+    costs: Costs,
+    rows: Iterable[Mapping[str, Any]],
+    weigh: Weigh = "instances",
+    own_set: bool = False,
+) -> str:
+    """Instances, which of them, tolerances, limits, machine, date and version, in one line."""
 
     def span(values: Iterable[float]) -> str:
         known = sorted(set(values))
         return f"{known[0]:g}" if len(known) == 1 else f"{known[0]:g} to {known[-1]:g}"
 
-    first = rows[0]
+    def said(name: str) -> str:
+        return str(next((word for word in in_order(words_in(runs, name)) if word), "?"))
+
+    runs = table_of(rows)
     failed = int(np.isinf(costs.values).sum())
-    count = int((~np.isnan(costs.values)).sum())
-    started = [row["started"] for row in rows if row.get("started")]
-    days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in started})
+    count = int(costs.there.sum())
+    started = numbers_in(runs, "started", 0.0)
+    some = started[started > 0]
+    ends = (float(some.min()), float(some.max())) if some.size else ()
+    days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in ends})
     # of the core; modules and programs have digests of their own
-    versions = sorted({str(row.get("version") or "").partition("-")[0] for row in rows
-                       if row.get("origin") == "fclib"})  # fmt: skip
+    own = runs.where(words_in(runs, "origin") == "fclib")
+    versions = sorted(
+        {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
+    )
+    families = len({one.family for one in costs.instances})
     words = [
-        f"{len(costs.instances)} instances",
+        f"{len(costs.instances)} instances of"
+        f" {families} {'family' if families == 1 else 'families'}",
+        "for each solver those that it has run and takes"
+        if own_set
+        else f"which all {len(costs.solvers)} solvers have run and take"
+        if len(costs.solvers) > 1
+        else "which it has run and takes",
+        WEIGHED[weigh],
         f"tolerance {', '.join(f'{tol:g}' for tol in costs.tolerances)}",
         f"limit {span(one.limit for one in costs.instances)} s of CPU",
         f"{failed} of {count} runs failed",
     ]
-    if any(row.get("start") == "warm" for row in rows):
+    if words_in(runs, "start").is_in(["warm"]).any():
         words.insert(1, "warm: each step from a solution of one before it")
-    if refused := int(costs.unsuitable.sum()) if costs.unsuitable is not None else 0:
-        words.append(f"{refused} left out as unsuitable")
-    words += [f"{first.get('cpu') or '?'} ({first.get('node') or '?'})"]
+    if costs.left_out:
+        words.append(f"{costs.left_out} instances left out, which not all have run or take")
+    if costs.of_other_forms:
+        words.append(f"{costs.of_other_forms} runs of the other form of a problem left out")
+    words += [f"{said('cpu')} ({said('node')})"]
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []
     return "; ".join(words)
 
 
-def loaded(rows: Sequence[Mapping[str, Any]]) -> dict[str, int]:
+def loaded(rows: Iterable[Mapping[str, Any]]) -> dict[str, int]:
     """How many runs of each solver were begun while the load was above the number of cores."""
-    found = Counter(
-        row["solver"]
-        for row in rows
-        if row.get("load") and row.get("cores") and row["load"] > row["cores"]
-    )
-    return dict(found)
+    runs = table_of(rows)
+    load, cores = numbers_in(runs, "load", 0.0), numbers_in(runs, "cores", 0.0)
+    solver = words_in(runs.where((load > cores) & (cores > 0)), "solver")
+    counts = np.bincount(solver.codes, minlength=len(solver.values)).tolist()
+    return {name: n for name, n in zip(solver.values, counts, strict=True) if n}

@@ -5,17 +5,21 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter, defaultdict, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fclib import _core
+from fclib._verdicts import SOLVED
 from fclib.bench import machine, pool, processes
 from fclib.bench.campaign import Campaign
 from fclib.bench.job import Guess, Job, Record, Runner
 from fclib.bench.store import Store
+from fclib.bench.table import Table
 
 BEAT = 2.0  # [s] between two signs of life in the store
 RETRIES = 2  # of a run that something from outside has spoilt
@@ -46,7 +50,7 @@ class Progress:
     @property
     def solved(self) -> int:
         """Of those done now."""
-        return self.statuses["converged"]
+        return sum(self.statuses[name] for name in SOLVED)
 
     @property
     def rate(self) -> float:
@@ -144,6 +148,13 @@ def cost(record: Record) -> float:
     return (record.wall_s if waited else record.total_cpu_s) or 0.0
 
 
+def spent(runs: Table, keys: Collection[str]) -> float:
+    """[s] of a budget that the runs of some keys have taken."""
+    waited = runs["status"] == "wall_limit"
+    costs = np.where(waited, runs["wall_s"], runs["total_cpu_s"])
+    return float(np.nansum(costs[runs["key"].is_in(keys)]))
+
+
 def with_guess(job: Job, by_key: Mapping[str, Job], store: Store) -> Job:
     """A run of a sequence with the last solution that the solver found before; others as they are.
 
@@ -194,25 +205,26 @@ def run_campaign(
     Path(store).parent.mkdir(parents=True, exist_ok=True)
     new = not Path(store).exists()
     with Store(store) as opened:
+        runs = opened.mended()
         try:
-            plan = campaign.plan(opened, tell)
+            plan = campaign.plan_by_key(opened, tell)
         except (_core.Error, ImportError):
             if new:
                 opened.discard()
             raise
-        if retry:
-            opened.forget([job.key for job in plan], retry)
-        there = opened.keys()
-        left = [job for job in plan if job.key not in there]
+        if retry and opened.forget(plan, retry):
+            runs = opened.mended()
+        there = set(runs["key"].values)
+        left = [job for key, job in plan.items() if key not in there]
         progress = Progress(planned=len(plan), skipped=len(plan) - len(left))
-        progress.spent = opened.spent([job.key for job in plan])
+        progress.spent = spent(runs, plan)
         node = machine.facts()["node"]
         number = opened.begin(campaign.name, campaign.text, len(plan), progress.skipped, node)
         show(progress)
         if runner is None:
             warn_of_load(jobs * campaign.threads, tell)
 
-        by_key = {job.key: job for job in plan if job.along}
+        by_key = {key: job for key, job in plan.items() if job.along}
 
         def begin(job: Job) -> Job | None:
             """A job, unless another campaign has done it meanwhile, or it cannot be paid for."""

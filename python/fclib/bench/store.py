@@ -2,23 +2,28 @@
 
 Tables: runs, and what they refer to by number: problems, solvers, machines, campaigns; history has
 the reports of runs for which they were asked; faults has what kept runs from being done, and is no
-solver's. The view `results` has all of a run in one row. The
-columns and their units are in docs/bench.md, and `SCHEMA` below is what that says.
+solver's. The view `results` has all of a run in one row. The columns and their units are in
+docs/bench.md, and `layout.SCHEMA` is what that says.
 
 A run is identified by its key (`fclib.bench.job.Job.key`). `Store.add` inserts it in one statement
 unless there is one of that key: a run is stored once, whatever is interrupted and however many
 campaigns write. The file is in WAL mode, which needs a local file system.
+
+Each row has a checksum (`layout.py`). A row that was damaged is left out by all that reads a store,
+and a `DamageWarning` names it; so is a run that refers to such a row. What has a name in a store is
+text: no name is looked up anywhere, least of all run.
 """
 
 from __future__ import annotations
 
 import csv
-import dataclasses
 import json
 import os
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Sequence
+import warnings
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,132 +34,44 @@ import numpy.typing as npt
 
 from fclib import _core
 from fclib._solve import MERITS
+from fclib._verdicts import SOLVED
+from fclib.bench import layout
 from fclib.bench.job import KEPT, Job, ProblemFacts, Record
+from fclib.bench.layout import (
+    CAMPAIGN,
+    FAULT,
+    HISTORY,
+    MACHINE,
+    NOTHING,
+    OF_A_RUN,
+    PROBLEM,
+    RELEASED,
+    RUN,
+    SOLVER,
+    STATEMENTS,
+    VERSION,
+    layouts,
+)
+from fclib.bench.table import TEXTS, Column, Table, Words, numbers_of
 
-# of the schema; 1 had neither certificates nor `merit`, which was "natural"; 2 had no faults, but
-# runs that were killed or unreadable, and does not say how a run was measured; 3 had no sequences
-VERSION = 4
-APPLICATION = 0x46434C42  # "FCLB"
 PATIENCE = 60.0  # [s] to wait for another writer
-
-SCHEMA = """
-CREATE TABLE campaigns (
-    id INTEGER PRIMARY KEY, name TEXT, text TEXT, planned INTEGER, skipped INTEGER, pid INTEGER,
-    node TEXT, started REAL, seen REAL, ended REAL
-);
-CREATE TABLE problems (
-    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, name TEXT, family TEXT, path TEXT, kind TEXT,
-    formulation TEXT, spacedim INTEGER, n INTEGER, p INTEGER, nc INTEGER, nnz INTEGER, title TEXT
-);
-CREATE TABLE solvers (
-    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, label TEXT, name TEXT, options TEXT,
-    version TEXT, family TEXT, origin TEXT
-);
-CREATE TABLE machines (
-    id INTEGER PRIMARY KEY, hash TEXT NOT NULL UNIQUE, node TEXT, cpu TEXT, cores INTEGER,
-    memory_gb REAL, facts TEXT
-);
-CREATE TABLE runs (
-    id INTEGER PRIMARY KEY, key TEXT NOT NULL,
-    campaign INTEGER REFERENCES campaigns, problem INTEGER NOT NULL REFERENCES problems,
-    solver INTEGER NOT NULL REFERENCES solvers, machine INTEGER NOT NULL REFERENCES machines,
-    tol REAL, time_limit REAL, wall_limit REAL, memory_limit REAL, threads INTEGER, repeat INTEGER,
-    merit TEXT NOT NULL DEFAULT 'natural',
-    status TEXT NOT NULL, message TEXT, solved INTEGER NOT NULL, iterations INTEGER,
-    cpu_s REAL, said_cpu_s REAL, setup_s REAL, total_cpu_s REAL, wall_s REAL, memory_mb REAL,
-    {merits}, stages TEXT, measured TEXT, warm INTEGER, pinned INTEGER,
-    load REAL, frequency_mhz REAL, started REAL,
-    start TEXT NOT NULL DEFAULT 'cold', sequence TEXT, step INTEGER, guess INTEGER, after TEXT,
-    UNIQUE (key, machine)
-);
-CREATE TABLE faults (
-    id INTEGER PRIMARY KEY, key TEXT NOT NULL, campaign INTEGER REFERENCES campaigns,
-    problem INTEGER NOT NULL REFERENCES problems, solver INTEGER NOT NULL REFERENCES solvers,
-    tol REAL, status TEXT NOT NULL, message TEXT, started REAL
-);
-CREATE INDEX runs_by_campaign ON runs (campaign);
-CREATE TABLE history (
-    run INTEGER NOT NULL REFERENCES runs, iteration INTEGER, error REAL, time REAL, stage TEXT
-);
-CREATE INDEX history_by_run ON history (run);
-CREATE TABLE certificates (
-    run INTEGER PRIMARY KEY REFERENCES runs, certificate TEXT NOT NULL
-);
-CREATE TABLE solutions (
-    run INTEGER PRIMARY KEY REFERENCES runs, u BLOB, r BLOB, l BLOB
-);
-CREATE TABLE files (
-    path TEXT PRIMARY KEY, size INTEGER, modified INTEGER, problem INTEGER REFERENCES problems
-);
-CREATE VIEW results AS SELECT
-    runs.id AS run, runs.key, campaigns.name AS campaign,
-    problems.name AS problem, problems.family, problems.formulation, problems.spacedim, problems.n,
-    problems.p, problems.nc, problems.nnz, problems.title, problems.hash,
-    solvers.label AS solver, solvers.name AS solver_name, solvers.options, solvers.version,
-    solvers.family AS solver_family, solvers.origin,
-    runs.tol, runs.merit, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads,
-    runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s,
-    runs.said_cpu_s, runs.setup_s, runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits},
-    runs.start, runs.sequence, runs.step, runs.guess,
-    runs.stages, runs.measured, runs.warm, runs.pinned, machines.node, machines.cpu,
-    machines.cores, machines.hash AS machine, runs.load, runs.frequency_mhz, runs.started
-FROM runs
-JOIN problems ON problems.id = runs.problem
-JOIN solvers ON solvers.id = runs.solver
-JOIN machines ON machines.id = runs.machine
-LEFT JOIN campaigns ON campaigns.id = runs.campaign;
-""".format(
-    merits=", ".join(f"{name} REAL" for name in MERITS),
-    run_merits=", ".join(f"runs.{name}" for name in MERITS),
-)
-STATEMENTS = SCHEMA.split(";\n")
-
-
-def _statement(start: str) -> str:
-    return next(one for one in STATEMENTS if one.strip().startswith(start))
-
-
-# what a store of each version lacks against the next one
-ADDED = {
-    1: (
-        "ALTER TABLE runs ADD COLUMN merit TEXT NOT NULL DEFAULT 'natural'",
-        _statement("CREATE TABLE certificates"),
-    ),
-    2: (
-        *(
-            f"ALTER TABLE runs ADD COLUMN {column}"
-            for column in ("said_cpu_s REAL", "measured TEXT", "warm INTEGER", "pinned INTEGER")
-        ),
-        _statement("CREATE TABLE faults"),
-        "INSERT INTO faults (key, campaign, problem, solver, tol, status, message, started)"
-        " SELECT key, campaign, problem, solver, tol, status, message, started FROM runs"
-        " WHERE status IN ('killed', 'unreadable')",
-        "DELETE FROM runs WHERE status IN ('killed', 'unreadable')",
-    ),
-    3: (
-        "ALTER TABLE runs ADD COLUMN start TEXT NOT NULL DEFAULT 'cold'",
-        *(
-            f"ALTER TABLE runs ADD COLUMN {column}"
-            for column in ("sequence TEXT", "step INTEGER", "guess INTEGER", "after TEXT")
-        ),
-        _statement("CREATE TABLE solutions"),
-        "DROP VIEW IF EXISTS results",
-        _statement("CREATE VIEW results"),
-    ),
+BATCH = 20_000  # rows that are read at once: some 20 MB
+NAMED = 5  # damaged rows of a table that a warning names one by one
+# columns of texts that differ from run to run, and the path of a problem, which is of its machine
+LONG = ("key", "message", "stages")
+MORE = (*LONG, "path")
+# what a run refers to: table, and for each column of `results` the one that it is there
+REFERRED: dict[str, dict[str, str]] = {
+    "problem": {"problem": "name"}
+    | {name: name for name in ("family", "formulation", "spacedim", "n", "p", "nc", "nnz")}
+    | {"title": "title", "hash": "hash", "path": "path"},
+    "solver": {"solver": "label", "solver_name": "name", "options": "options"}
+    | {"version": "version", "solver_family": "family", "origin": "origin", "about": "about"},
+    "machine": {"node": "node", "cpu": "cpu", "cores": "cores", "machine": "hash"},
+    "campaign": {"campaign": "name"},
 }
-PROBLEM = tuple(field.name for field in dataclasses.fields(ProblemFacts))
-SOLVER = ("hash", "label", "name", "options", "version", "family", "origin")
-MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
-RUN = (
-    *("key", "campaign", "problem", "solver", "machine"),
-    *("tol", "merit", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
-    *("status", "message", "solved", "iterations"),
-    *("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
-    *(*MERITS, "stages", "measured", "warm", "pinned", "load", "frequency_mhz", "started"),
-    *("start", "sequence", "step", "guess", "after"),
-)
-OF_A_RUN = ("history", "certificates", "solutions")  # tables with more of a run
-FAULT = ("key", "campaign", "problem", "solver", "tol", "status", "message", "started")
+MENDING = "fclib bench merge NEW.sqlite saves what can be read"
+NUMBER = {"run": "id"}  # what columns of `results` are in `runs`, where their names differ
 
 
 def text_of(text: str) -> str:
@@ -170,8 +87,85 @@ class DamagedError(StoreError):
     """A store was damaged."""
 
 
+class DamageWarning(UserWarning):
+    """Rows of a store were damaged, and are left out."""
+
+
 def _one_line(word: str) -> str:
     return " ".join(word.split())
+
+
+def explained(path: Path, error: Exception) -> StoreError:
+    """What an error of SQLite means for a store, and what to do."""
+    word = _one_line(str(error))
+    if "readonly" in word:
+        todo = "cannot be written: copy it into a folder of your own"
+    elif "locked" in word or "busy" in word:
+        todo = f"another program has kept it for {PATIENCE:.0f} s: try again when that has ended"
+    elif "full" in word or "disk I/O" in word:
+        todo = (
+            "cannot be written further: the disk is full, or a limit on sizes of files is reached."
+            " What was stored before stays; free some space, and give the same command again"
+        )
+    elif "unable to open" in word:
+        todo = "cannot be opened: are there rights to its folder, and space in it?"
+    else:
+        return DamagedError(f"{path}: is damaged, or no store: {word}")
+    return StoreError(f"{path}: {todo} (SQLite: {word})")
+
+
+class _Cursor(sqlite3.Cursor):
+    """A cursor whose errors are those of stores."""
+
+    def execute(self, *arguments: Any) -> Any:
+        return self._explained(super().execute, *arguments)
+
+    def executemany(self, *arguments: Any) -> Any:
+        return self._explained(super().executemany, *arguments)
+
+    def fetchone(self) -> Any:
+        return self._explained(super().fetchone)
+
+    def fetchmany(self, size: int = 1) -> Any:  # type: ignore[override]
+        return self._explained(super().fetchmany, size)
+
+    def fetchall(self) -> Any:
+        return self._explained(super().fetchall)
+
+    def __next__(self) -> Any:
+        return self._explained(super().__next__)
+
+    def _explained(self, call: Callable[..., Any], *arguments: Any) -> Any:
+        try:
+            return call(*arguments)
+        # SQLite's own message may quote what is no text
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            path = getattr(self.connection, "path", None)
+            if path is None or isinstance(error, sqlite3.ProgrammingError):
+                raise
+            raise explained(path, error) from None
+
+
+class _Connection(sqlite3.Connection):
+    """A connection whose errors are those of stores, once it has a path."""
+
+    path: Path
+
+    def cursor(self, factory: Any = _Cursor) -> Any:
+        return super().cursor(factory)
+
+    def execute(self, *arguments: Any) -> Any:
+        return self.cursor().execute(*arguments)
+
+    def executemany(self, *arguments: Any) -> Any:
+        return self.cursor().executemany(*arguments)
+
+
+def _rows_of(places: Sequence[int]) -> str:
+    """Rows by their numbers, in words."""
+    words = ", ".join(map(str, places[:NAMED]))
+    more = f" and {len(places) - NAMED} more" if len(places) > NAMED else ""
+    return f"row{'s' if len(places) > 1 else ''} {words}{more}"
 
 
 def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
@@ -184,7 +178,7 @@ def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
                 last, step = number, 1
                 yield tuple(row)
             return
-        except sqlite3.DatabaseError:
+        except (sqlite3.DatabaseError, UnicodeDecodeError):
             last, step = last + step, 2 * step
 
 
@@ -226,7 +220,7 @@ class Store:
             raise StoreError(f"{self.path}: is a folder, and no store")
         if not self.path.parent.is_dir():
             raise StoreError(f"{self.path}: there is no folder {self.path.parent}")
-        self._ids: dict[tuple[str, str], int] = {}
+        self._ids: dict[str, dict[str, int]] = {}
         self.read_only = self.path.exists() and not (
             os.access(self.path, os.W_OK) and os.access(self.path.parent, os.W_OK)
         )
@@ -241,19 +235,25 @@ class Store:
                 timeout=PATIENCE,
                 isolation_level=None,
                 uri=self.read_only,
+                factory=_Connection,
             )
-            self._prepare()
+            self.db.path = self.path
         except sqlite3.OperationalError as error:
-            raise StoreError(f"{self.path}: {error}") from None
-        except sqlite3.DatabaseError as error:
-            raise self._damaged(str(error)) from None
+            raise explained(self.path, error) from None
+        try:
+            self._prepare()
+        except DamagedError as error:
+            self.db.close()
+            raise DamagedError(f"{error}; {self._saved()}") from None
+        except BaseException:
+            self.db.close()
+            raise
 
     def _prepare(self) -> None:
         db = self.db
         version = db.execute("PRAGMA user_version").fetchone()[0]
         empty = not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone()
-        if not empty and version not in (*ADDED, VERSION):
-            db.close()
+        if not empty and version not in (RELEASED, VERSION):
             if version == 0:
                 raise StoreError(f"{self.path}: is a database, but no store of fclib bench")
             raise StoreError(
@@ -263,9 +263,19 @@ class Store:
         if not empty:
             (word,) = db.execute("PRAGMA quick_check(1)").fetchone()
             if word != "ok":
-                raise self._damaged(word)
+                raise DamagedError(f"{self.path}: is damaged: {_one_line(word)}")
         if self.read_only:
-            self._prepare_copy(empty, version)
+            if empty:
+                raise StoreError(f"{self.path}: is empty, and cannot be written")
+            if version == RELEASED:
+                # brought up to date in memory
+                copy = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
+                copy.path = self.path
+                db.backup(copy)
+                db.close()
+                self.db = copy
+                self._upgrade()
+            self._check_tables()
             return
         db.execute("PRAGMA journal_mode = WAL")
         db.execute("PRAGMA synchronous = NORMAL")
@@ -275,39 +285,44 @@ class Store:
                 if not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
                     for statement in STATEMENTS:
                         db.execute(statement)
-                    db.execute(f"PRAGMA application_id = {APPLICATION}")
+                    db.execute(f"PRAGMA application_id = {layout.APPLICATION}")
                     db.execute(f"PRAGMA user_version = {VERSION}")
-        elif version < VERSION:
+        elif version == RELEASED:
             self._upgrade()
+        self._check_tables()
 
-    def _prepare_copy(self, empty: bool, version: int) -> None:
-        """Of a file that cannot be written an older one is brought up to date in memory."""
-        if empty:
-            raise StoreError(f"{self.path}: is empty, and cannot be written")
-        if version < VERSION:
-            copy = sqlite3.connect(":memory:", isolation_level=None)
-            self.db.backup(copy)
-            self.db.close()
-            self.db = copy
-            self._upgrade()
+    def _check_tables(self) -> None:
+        """DamagedError where the file's tables are not those of this version."""
+        for table, own in layouts().items():
+            if layout.declared_in(self.db, table) != own.declared:
+                raise DamagedError(f"{self.path}: is damaged: the columns of {table} are others")
 
     def _upgrade(self) -> None:
         with self.transaction():
             # another may have brought it up to date meanwhile
-            version = self.db.execute("PRAGMA user_version").fetchone()[0]
-            for known in range(version, VERSION):
-                for statement in ADDED[known]:
-                    self.db.execute(statement)
+            if self.db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
+                return
+            for table, own in layouts().items():
+                there = {name for name, _ in layout.declared_in(self.db, table)}
+                if not there or "checksum" in there:
+                    raise DamagedError(f"{self.path}: is damaged: it has no version")
+                for name, kind in own.declared:
+                    if name not in there:
+                        self.db.execute(f"ALTER TABLE {table} ADD COLUMN {name} {kind}")
+            self.db.execute("DROP VIEW IF EXISTS results")
+            self.db.execute(layout.VIEW)
+            self.seal()
             self.db.execute(f"PRAGMA user_version = {VERSION}")
 
-    def _damaged(self, word: str) -> DamagedError:
+    def _saved(self) -> str:
+        """What can be done for a store that is damaged."""
         try:
-            with Store.recover(self.path) as saved:
-                runs = len(saved.keys())
-            what = f"{runs} of its runs can be read: fclib bench merge NEW.sqlite {self.path}"
-        except (StoreError, sqlite3.DatabaseError):
-            what = "nothing of it can be read"
-        return DamagedError(f"{self.path}: is damaged, or no store: {_one_line(word)}; {what}")
+            with warnings.catch_warnings(), Store.recover(self.path) as saved:
+                warnings.simplefilter("ignore", DamageWarning)
+                runs = len(saved.table())
+        except StoreError:
+            return "nothing of it can be read"
+        return f"{runs} of its runs can be read: fclib bench merge NEW.sqlite {self.path}"
 
     @classmethod
     def recover(cls, path: str | Path) -> Store:
@@ -318,29 +333,124 @@ class Store:
         """
         made = cls.__new__(cls)
         made.path, made.read_only, made._ids = Path(path), True, {}
-        made.db = sqlite3.connect(":memory:", isolation_level=None)
+        made.db = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
         source = sqlite3.connect(f"{made.path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
+        # what is no text any more is read, and has another checksum then
+        source.text_factory = lambda data: data.decode(errors="replace")
         try:
-            version = source.execute("PRAGMA user_version").fetchone()[0]
-            parts = source.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
-            if version not in (*ADDED, VERSION):
-                raise StoreError(f"{path}: is no store that this fclib knows")
-            tables = [(name, sql) for kind, name, sql in parts if kind == "table" and sql]
-            for name, sql in tables:
-                made.db.execute(sql)
-                for row in _rows(source, name):
+            names = "SELECT name FROM sqlite_master WHERE type = 'table'"
+            there = {name for (name,) in source.execute(names)}
+            # an own schema: that of the file may be damaged too
+            for statement in STATEMENTS:
+                made.db.execute(statement)
+            made.db.execute(f"PRAGMA user_version = {VERSION}")
+            for table, own in layouts().items():
+                if table not in there:
+                    continue
+                columns = [name for name, _ in layout.declared_in(source, table)]
+                # of the released version, which had no checksums
+                bare = len(columns) < len(own.declared) and "checksum" not in columns
+                names = ", ".join(
+                    [name for name, _ in own.declared if name not in ("about", "checksum")]
+                    if bare
+                    else [name for name, _ in own.declared]
+                )
+                for row in _rows(source, table):
                     marks = ", ".join("?" * len(row))
-                    made.db.execute(f"INSERT OR IGNORE INTO {name} VALUES ({marks})", row)
-            made.db.execute(next(sql for kind, _, sql in parts if kind == "view"))
-            made.db.execute(f"PRAGMA user_version = {version}")
-            if version < VERSION:
-                made._upgrade()
-        except (sqlite3.DatabaseError, StopIteration) as error:
+                    query = f"INSERT OR IGNORE INTO {table} ({names}) VALUES ({marks})"
+                    made.db.execute(query, row)
+                if bare:
+                    made._seal(table, "")
+            if "runs" not in there:
+                raise StoreError(f"{path}: is no store that this fclib knows")
+        except (sqlite3.DatabaseError, StoreError, UnicodeDecodeError) as error:
             made.close()
             raise StoreError(f"{path}: {_one_line(str(error))}") from None
         finally:
             source.close()
+        made.db.path = made.path
         return made
+
+    # ---- rows and their checksums
+
+    def _batches(
+        self, table: str, condition: str = "", values: Sequence[Any] = ()
+    ) -> Iterator[list[tuple[Any, ...]]]:
+        """The rows of a table as the file has them, as `Layout.query` selects them."""
+        cursor = self.db.cursor()
+        rows: list[tuple[Any, ...]] = []
+        first = True
+        while first or rows:
+            # bytes, since a damaged text may be none; for the time of this call alone
+            self.db.text_factory = bytes
+            try:
+                if first:
+                    cursor.execute(layouts()[table].query(condition), values)
+                    first = False
+                rows = cursor.fetchmany(BATCH)
+            finally:
+                self.db.text_factory = str
+            if rows:
+                yield rows
+
+    def _right(
+        self, table: str, condition: str = "", values: Sequence[Any] = ()
+    ) -> Iterator[tuple[list[tuple[Any, ...]], npt.NDArray[np.float64]]]:
+        """The rows of a table that are as they were written, with their numbers.
+
+        A warning names the others.
+        """
+        wrong: list[int] = []
+        last = -(1 << 63)
+        for rows in self._batches(table, condition, values):
+            good, numbers = layout.right(layouts()[table], rows)
+            places = np.array([row[0] for row in rows], dtype=np.int64)
+            # in a damaged tree a row may come twice
+            good &= places > np.maximum.accumulate(np.concatenate([[last], places[:-1]]))
+            last = max(last, int(places.max()))
+            if not good.all():
+                wrong += places[~good].tolist()
+                rows = [row for row, fine in zip(rows, good, strict=True) if fine]
+                numbers = numbers[good]
+            yield rows, numbers
+        if wrong:
+            self._warn(f"{_rows_of(wrong)} of {table}", len(wrong), "damaged, and left out")
+
+    def _warn(self, which: str, count: int, what: str) -> None:
+        verb = "is" if count == 1 else "are"
+        warnings.warn(f"{self.path}: {which} {verb} {what}", DamageWarning, stacklevel=4)
+
+    def _read(
+        self, table: str, condition: str = "", values: Sequence[Any] = ()
+    ) -> Iterator[dict[str, Any]]:
+        """The right rows of a table as dicts, with `rowid`."""
+        own = layouts()[table]
+        whole = [kind == "INTEGER" for name in own.numbers for n, kind in own.declared if n == name]
+        blobs = {name for name, kind in own.declared if kind == "BLOB"}
+        for rows, _ in self._right(table, condition, values):
+            for row in rows:
+                found: dict[str, Any] = {"rowid": row[0]}
+                for name, value, is_whole in zip(own.numbers, row[1:], whole, strict=False):
+                    found[name] = value if value is None or not is_whole else int(value)
+                for name, value in zip(own.texts, row[1 + len(whole) : -1], strict=True):
+                    if value == NOTHING:
+                        found[name] = None
+                    else:
+                        found[name] = value if name in blobs else value.decode(errors="replace")
+                yield found
+
+    def _seal(self, table: str, condition: str, *values: Any) -> None:
+        """Write the checksums of rows."""
+        own = layouts()[table]
+        update = f"UPDATE {table} SET checksum = ? WHERE rowid = ?"
+        for rows in self._batches(table, condition, values):
+            found = layout.checksums(own, rows, layout.numbers_of(own, rows))
+            self.db.executemany(update, [(c, row[0]) for c, row in zip(found, rows, strict=True)])
+
+    def seal(self) -> None:
+        """Write the checksums of all rows anew, as they are: of rows that were written by hand."""
+        for table in layouts():
+            self._seal(table, "")
 
     def __enter__(self) -> Store:
         return self
@@ -365,71 +475,119 @@ class Store:
         self.db.execute("BEGIN IMMEDIATE")
         try:
             yield
+            self.db.execute("COMMIT")
         except BaseException:
-            self.db.execute("ROLLBACK")
             self._ids.clear()
+            if self.db.in_transaction:  # a full disk has ended it
+                self.db.execute("ROLLBACK")
             raise
-        self.db.execute("COMMIT")
 
     def _id(self, table: str, names: Sequence[str], values: Sequence[Any]) -> int:
         """The number of a row of a table whose first column is its hash; it is made if needed."""
-        key = table, values[0]
-        if key not in self._ids:
+        if table not in self._ids:
+            self._ids[table] = {row["hash"]: row["id"] for row in self._read(table)}
+        known, digest = self._ids[table], values[0]
+        if digest not in known:
             marks = ", ".join("?" * len(names))
-            self.db.execute(
+            cursor = self.db.execute(
                 f"INSERT INTO {table} ({', '.join(names)}) VALUES ({marks}) ON CONFLICT DO NOTHING",
-                values,
+                [text_of(value) if isinstance(value, str) else value for value in values],
             )
-            query = f"SELECT id FROM {table} WHERE hash = ?"
-            self._ids[key] = int(self.db.execute(query, (values[0],)).fetchone()[0])
-        return self._ids[key]
+            if cursor.rowcount:
+                known[digest] = cursor.lastrowid
+                self._seal(table, "id = ?", known[digest])
+            else:
+                # another campaign has written it meanwhile
+                known |= {row["hash"]: row["id"] for row in self._read(table)}
+                if digest not in known:
+                    raise DamagedError(f"{self.path}: is damaged: a row of {table}; {MENDING}")
+        return known[digest]
 
     def begin(self, name: str, text: str, planned: int, skipped: int, node: str) -> int:
         """Note that a campaign starts; `skipped` of its `planned` runs are there. Its number."""
         now = time.time()
-        cursor = self.db.execute(
-            "INSERT INTO campaigns (name, text, planned, skipped, pid, node, started, seen)"
-            " VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-            (name, text, planned, skipped, os.getpid(), node, now, now),
-        )
-        assert cursor.lastrowid is not None
-        return cursor.lastrowid
+        with self.transaction():
+            cursor = self.db.execute(
+                "INSERT INTO campaigns (name, text, planned, skipped, pid, node, started, seen)"
+                " VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                (text_of(name), text_of(text), planned, skipped, os.getpid(), node, now, now),
+            )
+            number: int = cursor.lastrowid
+            self._seal("campaigns", "id = ?", number)
+        return number
 
     def alive(self, campaign: int, ended: bool = False) -> None:
         """Note that a campaign is at work, or has ended."""
         now = time.time()
-        self.db.execute(
-            "UPDATE campaigns SET seen = ?, ended = ? WHERE id = ?",
-            (now, now if ended else None, campaign),
-        )
+        with self.transaction():
+            self.db.execute(
+                "UPDATE campaigns SET seen = ?, ended = ? WHERE id = ?",
+                (now, now if ended else None, campaign),
+            )
+            self._seal("campaigns", "id = ?", campaign)
+
+    def mend(self) -> int:
+        """Remove damaged rows, which a warning names, and what refers to them; how many runs.
+
+        They are run again by the campaign that goes on.
+        """
+        gone: dict[str, list[int]] = {}
+        kept: dict[str, set[int]] = {}
+        for table, own in layouts().items():
+            at = {name: own.numbers.index(by) for name, by in refers(own.numbers)}
+            kept[table] = set()
+            for rows, numbers in self._right(table):
+                good = np.ones(len(rows), dtype=bool)
+                for other, column in at.items():
+                    good &= [x != x or x in kept[other] for x in numbers[:, column].tolist()]
+                kept[table].update(row[0] for row, fine in zip(rows, good, strict=True) if fine)
+            (count,) = self.db.execute(f"SELECT COUNT(*) FROM {table} NOT INDEXED").fetchone()
+            if count != len(kept[table]):
+                every = self.db.execute(f"SELECT rowid FROM {table} NOT INDEXED").fetchall()
+                gone[table] = [row for (row,) in every if row not in kept[table]]
+        if not gone:
+            return 0
+        with self.transaction():
+            # indexes have what rows were before they were damaged
+            self.db.execute("REINDEX")
+            for table, places in gone.items():
+                rows = [(place,) for place in places]
+                self.db.executemany(f"DELETE FROM {table} WHERE rowid = ?", rows)
+        self._ids.clear()
+        runs = gone.get("runs", [])
+        if runs:
+            what = "damaged, or of damaged rows, and removed: a campaign runs them again"
+            self._warn(f"{_rows_of(runs)} of runs", len(runs), what)
+        return len(runs)
+
+    def mended(self) -> Table:
+        """All runs with their keys, after what was damaged is removed."""
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always", DamageWarning)
+            runs = self.table(more=("key",))
+        if said:
+            self.mend()
+            runs = self.table(more=("key",))
+        return runs
 
     def keys(self) -> set[str]:
         """The keys of all runs."""
-        return {key for (key,) in self.db.execute("SELECT key FROM runs")}
+        return set(self.table(more=("key",))["key"].values)
 
-    def spent(self, keys: Sequence[str]) -> float:
-        """[s] that the runs of some keys have taken, of CPU, or of waiting where that ended it."""
-        cost = "CASE status WHEN 'wall_limit' THEN wall_s ELSE total_cpu_s END"
-        query = f"SELECT key, COALESCE({cost}, 0) FROM runs"
-        wanted = set(keys)
-        return float(sum(cost for key, cost in self.db.execute(query) if key in wanted))
-
-    def forget(self, keys: Sequence[str], statuses: Sequence[str]) -> int:
+    def forget(self, keys: Iterable[str], statuses: Sequence[str]) -> int:
         """Remove the runs of some keys that ended in one of the statuses; how many.
 
         With a run of a sequence go those of the steps after it, which follow from it.
         """
-        marks = ", ".join("?" * len(statuses))
-        query = f"SELECT id, key FROM runs WHERE status IN ({marks})"
-        wanted = set(keys)
-        found = [row for row in self.db.execute(query, list(statuses)) if row[1] in wanted]
+        wanted, ended = set(keys), set(statuses)
+        every = [(row["id"], row["key"], row["status"], row["after"]) for row in self._read("runs")]
+        found = [(run, key) for run, key, status, _ in every if key in wanted and status in ended]
         runs: dict[int, None] = {}
+        while found:
+            runs |= dict.fromkeys(run for run, _ in found)
+            gone = {key for _, key in found}
+            found = [(run, key) for run, key, _, after in every if after and after in gone]
         with self.transaction():
-            later = list(self.db.execute("SELECT id, key, after FROM runs WHERE after != ''"))
-            while found:
-                runs |= dict.fromkeys(run for run, _ in found)
-                gone = {key for _, key in found}
-                found = [(run, key) for run, key, after in later if after in gone]
             rows = [(run,) for run in runs]
             for table in OF_A_RUN:
                 self.db.executemany(f"DELETE FROM {table} WHERE run = ?", rows)
@@ -440,25 +598,29 @@ class Store:
         """Whether there is a run of a key."""
         return self.db.execute("SELECT 1 FROM runs WHERE key = ?", (key,)).fetchone() is not None
 
+    def has_sequences(self) -> bool:
+        """Whether there are runs along sequences."""
+        query = "SELECT 1 FROM runs WHERE start <> 'cold' LIMIT 1"
+        return self.db.execute(query).fetchone() is not None
+
     def _of(self, job: Job) -> tuple[int, int]:
         """The numbers of the problem and of the solver of a job."""
         choice = job.solver
         options = json.dumps(dict(choice.options), sort_keys=True)
         values = (choice.title, choice.name, options, choice.version)
-        return (
-            self._id("problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM]),
-            self._id(
-                "solvers",
-                SOLVER,
-                ["\n".join(values), *values, choice.family, choice.origin],
-            ),
-        )
+        problem = self._id("problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM])
+        facts = ("\n".join(values), *values, choice.family, choice.origin, choice.about)
+        solver = self._id("solvers", SOLVER, facts)
+        if choice.about:  # which a store of an earlier version does not know
+            query = "UPDATE solvers SET about = ? WHERE id = ? AND about IS NULL"
+            if self.db.execute(query, (choice.about, solver)).rowcount:
+                self._seal("solvers", "id = ?", solver)
+        return problem, solver
 
     def fault(self, job: Job, record: Record, campaign: int | None = None) -> None:
         """Note what has kept a run from being done, as often as it was tried."""
         with self.transaction():
-            self.db.execute(
-                f"INSERT INTO faults ({', '.join(FAULT)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            self._insert_fault(
                 (
                     job.key,
                     campaign,
@@ -467,193 +629,294 @@ class Store:
                     record.status,
                     text_of(record.message),
                     record.started,
-                ),
+                )
             )
+
+    def _insert_fault(self, values: Sequence[Any]) -> None:
+        query = f"INSERT INTO faults ({', '.join(FAULT)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+        self._seal("faults", "id = ?", self.db.execute(query, values).lastrowid)
 
     def faults(self) -> list[dict[str, Any]]:
         """What was not run, for a cause from outside, and has not been run since."""
-        query = (
-            "SELECT solvers.label AS solver, problems.name AS problem, problems.family,"
-            " problems.hash, campaigns.name AS campaign, faults.tol, faults.status, faults.message,"
-            " MAX(faults.started) AS started FROM faults"
-            " JOIN problems ON problems.id = faults.problem"
-            " JOIN solvers ON solvers.id = faults.solver"
-            " LEFT JOIN campaigns ON campaigns.id = faults.campaign"
-            " WHERE faults.key NOT IN (SELECT key FROM runs) GROUP BY faults.key"
-        )
-        cursor = self.db.execute(query)
-        names = [column[0] for column in cursor.description]
-        return [dict(zip(names, row, strict=True)) for row in cursor]
+        last: dict[str, dict[str, Any]] = {}
+        for row in self._read("faults"):
+            if row["key"] not in last or (row["started"] or 0) > (last[row["key"]]["started"] or 0):
+                last[row["key"]] = row
+        last = {key: row for key, row in last.items() if not self.has(key)}
+        if not last:
+            return []
+        known = {column: self._by_number(column) for column in ("problem", "solver", "campaign")}
+        found = []
+        for row in last.values():
+            problem = known["problem"].get(row["problem"])
+            solver = known["solver"].get(row["solver"])
+            campaign = known["campaign"].get(row["campaign"], {"name": None})
+            if problem is None or solver is None:
+                continue  # of a damaged row, which was named
+            found.append(
+                {
+                    "solver": solver["label"],
+                    "problem": problem["name"],
+                    "family": problem["family"],
+                    "hash": problem["hash"],
+                    "campaign": campaign["name"],
+                    **{name: row[name] for name in ("tol", "status", "message", "started")},
+                }
+            )
+        return found
+
+    def _by_number(self, column: str) -> dict[int, dict[str, Any]]:
+        """The right rows of what runs refer to by a column."""
+        return {row["id"]: row for row in self._read(f"{column}s")}
 
     def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
         """Store a run; False where there is one of its key."""
-        merits = record.merits or {}
+        return self.add_all([(job, record)], campaign) == 1
+
+    def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
+        """Store runs, all or none; how many there were not of their keys."""
         with self.transaction():
-            problem, solver = self._of(job)
-            facts = dict(record.machine or {})
-            text = json.dumps(facts, sort_keys=True)
-            machine = self._id(
-                "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
-            )
-            values = [
-                job.key,
-                campaign,
-                problem,
-                solver,
-                machine,
-                job.tol,
-                job.merit,
-                job.limits.time,
-                job.limits.wall,
-                job.limits.memory,
-                job.threads,
-                job.repeat,
-                record.status,
-                text_of(record.message),
-                int(record.solved),
-                record.iterations,
-                record.cpu_s,
-                record.said_cpu_s,
-                record.setup_s,
-                record.total_cpu_s,
-                record.wall_s,
-                record.memory,
-                *(merits.get(name) for name in MERITS),
-                record.stages,
-                record.measured,
-                int(record.warm),
-                int(record.pinned),
-                record.load,
-                record.frequency,
-                record.started,
-                job.start,
-                *((job.along.sequence, job.along.step) if job.along else (None, None)),
-                job.guess.step if job.guess and record.guessed else None,
-                job.along.after if job.along else None,
-            ]
-            marks = ", ".join("?" * len(RUN))
-            cursor = self.db.execute(
-                f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
-                " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
-                [*values, job.key],
-            )
-            if cursor.rowcount == 0:
-                return False
-            run = cursor.lastrowid
-            if record.certificate:
-                self.db.execute("INSERT INTO certificates VALUES (?, ?)", (run, record.certificate))
-            if record.solution:
-                vectors = [record.solution.get(name) for name in KEPT]
-                self.db.execute("INSERT INTO solutions VALUES (?, ?, ?, ?)", (run, *vectors))
-            if record.history:
-                self.db.executemany(
-                    "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
-                    [(run, *report) for report in record.history],
-                )
-        return True
+            added = [self._add(job, record, campaign) for job, record in runs]
+            new = [run for run in added if run is not None]
+            if new:  # the last ones: nobody else writes meanwhile
+                self._seal("runs", "id >= ?", new[0])
+        return len(new)
+
+    def _add(self, job: Job, record: Record, campaign: int | None) -> int | None:
+        """The number of a run that is stored, without its checksum; None where it is there."""
+        merits = record.merits or {}
+        problem, solver = self._of(job)
+        facts = dict(record.machine or {})
+        text = json.dumps(facts, sort_keys=True)
+        machine = self._id(
+            "machines", MACHINE, [text, *(facts.get(name) for name in MACHINE[1:-1]), text]
+        )
+        values = [
+            job.key,
+            campaign,
+            problem,
+            solver,
+            machine,
+            job.tol,
+            job.merit,
+            job.limits.time,
+            job.limits.wall,
+            job.limits.memory,
+            job.threads,
+            job.repeat,
+            record.status,
+            text_of(record.message),
+            int(record.solved),
+            record.iterations,
+            record.cpu_s,
+            record.said_cpu_s,
+            record.setup_s,
+            record.total_cpu_s,
+            record.wall_s,
+            record.memory,
+            *(merits.get(name) for name in MERITS),
+            record.stages,
+            record.measured,
+            int(record.warm),
+            int(record.pinned),
+            record.load,
+            record.frequency,
+            record.started,
+            job.start,
+            *((job.along.sequence, job.along.step) if job.along else (None, None)),
+            job.guess.step if job.guess and record.guessed else None,
+            job.along.after if job.along else None,
+        ]
+        marks = ", ".join("?" * len(RUN))
+        cursor = self.db.execute(
+            f"INSERT INTO runs ({', '.join(RUN)}) SELECT {marks}"
+            " WHERE NOT EXISTS (SELECT 1 FROM runs WHERE key = ?)",
+            [*values, job.key],
+        )
+        if cursor.rowcount == 0:
+            return None
+        run: int = cursor.lastrowid
+        solution = record.solution
+        self._add_more(
+            run,
+            record.certificate,
+            [solution.get(name) for name in KEPT] if solution else None,
+            record.history or (),
+        )
+        return run
+
+    def _add_more(
+        self,
+        run: int,
+        certificate: str | None,
+        vectors: Sequence[bytes | None] | None,
+        history: Sequence[Sequence[Any]],
+    ) -> None:
+        """Store what of a run lies in other tables."""
+        if certificate:
+            query = "INSERT INTO certificates (run, certificate) VALUES (?, ?)"
+            self.db.execute(query, (run, certificate))
+            self._seal("certificates", "run = ?", run)
+        if vectors:
+            query = "INSERT INTO solutions (run, u, r, l) VALUES (?, ?, ?, ?)"
+            self.db.execute(query, (run, *vectors))
+            self._seal("solutions", "run = ?", run)
+        if history:
+            query = f"INSERT INTO history (run, {', '.join(HISTORY)}) VALUES (?, ?, ?, ?, ?)"
+            self.db.executemany(query, [(run, *report) for report in history])
+            self._seal("history", "run = ?", run)
 
     # ---- what is known of files, so that a campaign need not read them again
 
     def known(self, path: Path) -> ProblemFacts | None:
         """The problem of a file that has not changed since it was noted."""
         info = path.stat()
-        row = self.db.execute(
-            f"SELECT {', '.join('problems.' + name for name in PROBLEM)} FROM files"
-            " JOIN problems ON problems.id = files.problem"
-            " WHERE files.path = ? AND size = ? AND modified = ?",
-            (str(path), info.st_size, info.st_mtime_ns),
-        ).fetchone()
-        if row is None:
-            return None
-        return ProblemFacts(**dict(zip(PROBLEM, row, strict=True)) | {"path": str(path)})
+        same = "path = ? AND size = ? AND modified = ?"
+        noted = (text_of(str(path)), info.st_size, info.st_mtime_ns)
+        for row in self._read("files", same, noted):
+            for facts in self._read("problems", "id = ?", (row["problem"],)):
+                return ProblemFacts(**{name: facts[name] for name in PROBLEM} | {"path": str(path)})
+        return None
 
     def note(self, path: Path, facts: ProblemFacts) -> None:
         """Note what a file holds."""
+        if text_of(str(path)) != str(path):
+            return  # SQLite does not know such names
         info = path.stat()
         with self.transaction():
             problem = self._id("problems", PROBLEM, [getattr(facts, name) for name in PROBLEM])
             self.db.execute(
-                "INSERT OR REPLACE INTO files VALUES (?, ?, ?, ?)",
+                "INSERT OR REPLACE INTO files (path, size, modified, problem) VALUES (?, ?, ?, ?)",
                 (str(path), info.st_size, info.st_mtime_ns, problem),
             )
+            self._seal("files", "path = ?", str(path))
 
     # ---- what others read
 
+    def table(self, more: Sequence[str] = ()) -> Table:
+        """All runs, in the order in which they were stored, in the columns of `results`.
+
+        Args:
+            more: which of the columns of `MORE` are read too.
+        """
+        own = layouts()["runs"]
+        known = {column: list(self._by_number(column).values()) for column in REFERRED}
+        wanted = [name for name in (*layout.columns(), "path") if name not in MORE or name in more]
+        referred = {name for columns in REFERRED.values() for name in columns}
+        mine = [name for name in wanted if name not in referred]
+        numbers = {n: own.numbers.index(NUMBER.get(n, n)) for n in mine if n not in TEXTS}
+        texts = {n: own.texts.index(n) + 1 + len(own.numbers) for n in mine if n in TEXTS}
+        found: dict[str, list[Any]] = {name: [np.empty(0)] for name in (*numbers, *REFERRED)}
+        words: dict[str, _Places] = {name: _Places() for name in texts}
+        codes: dict[str, list[npt.NDArray[np.int64]]] = {n: [np.empty(0, np.int64)] for n in texts}
+        for rows, values in self._right("runs"):
+            for name, place in numbers.items():
+                found[name].append(values[:, place].copy())
+            for name in REFERRED:
+                found[name].append(values[:, own.numbers.index(name)].copy())
+            for name, place in texts.items():
+                numbered = map(words[name].__getitem__, [row[place] for row in rows])
+                codes[name].append(np.fromiter(numbered, np.int64, len(rows)))
+        columns: dict[str, Column] = {
+            name: numbers_of(name, np.concatenate(found.pop(name))) for name in numbers
+        }
+        for name in texts:
+            columns[name] = Words.of(_text(value) for value in words.pop(name))[
+                np.concatenate(codes.pop(name))
+            ]
+        there = np.ones(len(columns["run"]), dtype=bool)
+        for column, names in REFERRED.items():
+            places, exists = _places(np.concatenate(found.pop(column)), known[column])
+            there &= exists
+            for name, other in names.items():
+                if name not in wanted:
+                    continue
+                given = [row[other] for row in known[column]] + [None]  # the last: NULL
+                if name in TEXTS:
+                    columns[name] = Words.of(given)[places]
+                else:
+                    columns[name] = numbers_of(name, given)[places]
+        table = Table({name: columns[name] for name in wanted})
+        if there.all():
+            return table
+        lost = table["run"][~there].tolist()
+        self._warn(f"{_rows_of(lost)} of runs", len(lost), "of damaged rows, and left out")
+        return table.where(there)
+
     def columns(self) -> list[str]:
         """The columns of `results`."""
-        return [row[1] for row in self.db.execute("PRAGMA table_info(results)")]
+        return list(layout.columns())
 
-    def results(self, where: str = "", values: Sequence[Any] = ()) -> list[dict[str, Any]]:
+    def results(self, **wanted: Any) -> list[dict[str, Any]]:
         """All runs, a row each, in the order in which they were stored.
 
         Args:
-            where: a condition of SQL on the columns of `results`, with a ? for each of the values.
-            values: in their order.
+            wanted: only runs that have these values in these columns.
         """
-        condition = f" WHERE {where}" if where else ""
-        cursor = self.db.execute(f"SELECT * FROM results{condition} ORDER BY run", values)
-        names = [column[0] for column in cursor.description]
-        return [dict(zip(names, row, strict=True)) for row in cursor]
+        table = self.table(more=LONG)
+        for name, value in wanted.items():
+            table = table.where(table[name] == value)
+        return list(table)
 
     def history(self, run: int) -> list[tuple[int, float, float, str]]:
         """The reports of a run: iteration, error, time [s], stage."""
-        query = "SELECT iteration, error, time, stage FROM history WHERE run = ? ORDER BY rowid"
-        return list(self.db.execute(query, (run,)))
+        return [
+            tuple(row[name] for name in HISTORY)
+            for row in self._read("history", "run = ?", (run,))
+            if row["run"] == run  # an index may be damaged
+        ]
 
     def certificate(self, run: int) -> str | None:
         """The proof that a run gave that there is no solution, in JSON."""
-        query = "SELECT certificate FROM certificates WHERE run = ?"
-        row = self.db.execute(query, (run,)).fetchone()
-        return None if row is None else str(row[0])
+        for row in self._read("certificates", "run = ?", (run,)):
+            return str(row["certificate"])
+        return None
 
     def solution(self, run: int) -> dict[str, npt.NDArray[np.float64]]:
         """The vectors u, r and l that a run of a sequence found; empty where it solved nothing."""
-        row = self.db.execute("SELECT u, r, l FROM solutions WHERE run = ?", (run,)).fetchone()
-        pairs = zip(KEPT, row or (), strict=bool(row))
-        return {name: np.frombuffer(value) for name, value in pairs if value is not None}
+        for row in self._read("solutions", "run = ?", (run,)):
+            return {name: np.frombuffer(row[name]) for name in KEPT if row[name] is not None}
+        return {}
 
     def solution_of(self, key: str) -> tuple[bytes, bytes | None] | None:
         """The reactions and multipliers that the run of a key found; None where it found none."""
-        query = (
-            "SELECT r, l FROM solutions JOIN runs ON runs.id = solutions.run"
-            " WHERE runs.key = ? ORDER BY runs.id LIMIT 1"
-        )
-        found: tuple[bytes, bytes | None] | None = self.db.execute(query, (key,)).fetchone()
-        return found
+        for run in self._read("runs", "key = ?", (key,)):
+            if run["key"] != key:
+                continue  # an index may be damaged
+            for row in self._read("solutions", "run = ?", (run["id"],)):
+                return row["r"], row["l"]
+        return None
 
     def texts(self) -> list[str]:
         """The campaigns that have written here, as their files have them."""
-        query = "SELECT DISTINCT text FROM campaigns WHERE text IS NOT NULL"
-        return [text for (text,) in self.db.execute(query)]
+        found = [row["text"] for row in self._read("campaigns")]
+        return list(dict.fromkeys(text for text in found if text is not None))
 
     def status(self) -> list[Status]:
         """The campaigns that have written here, the last one first."""
+        own = layouts()["runs"]
+        campaign = own.numbers.index("campaign")
+        status = own.texts.index("status") + 1 + len(own.numbers)
+        done: dict[float, Counter[str]] = {}
+        for rows, numbers in self._right("runs"):
+            for number, row in zip(numbers[:, campaign].tolist(), rows, strict=True):
+                done.setdefault(number, Counter())[row[status].decode(errors="replace")] += 1
         found = []
-        rows = self.db.execute(
-            "SELECT id, name, planned, skipped, started, seen, ended, node, pid FROM campaigns"
-            " ORDER BY id DESC"
-        ).fetchall()
-        for number, name, planned, skipped, started, seen, ended, node, pid in rows:
-            counts = dict(
-                self.db.execute(
-                    "SELECT status, COUNT(*) FROM runs WHERE campaign = ? GROUP BY status",
-                    (number,),
-                )
-            )
-            done = sum(counts.values())
+        for row in reversed(list(self._read("campaigns"))):
+            counts = done.get(float(row["id"]), Counter())
             found.append(
                 Status(
-                    name=name,
-                    planned=planned,
-                    done=skipped + done,
-                    solved=counts.get("converged", 0),
-                    statuses=counts,
-                    started=started,
-                    seen=seen,
-                    ended=ended,
-                    node=node,
-                    pid=pid,
-                    done_before=skipped,
+                    name=row["name"],
+                    planned=row["planned"],
+                    done=row["skipped"] + counts.total(),
+                    solved=sum(counts[name] for name in SOLVED),
+                    statuses=dict(counts),
+                    started=row["started"],
+                    seen=row["seen"],
+                    ended=row["ended"],
+                    node=row["node"],
+                    pid=row["pid"],
+                    done_before=row["skipped"],
                 )
             )
         return found
@@ -670,6 +933,7 @@ class Store:
             StoreError: one of them is no store.
         """
         added = 0
+        self.mend()
         for path in others:
             if Path(path).resolve() == self.path.resolve():
                 raise StoreError(f"{path}: is the store that the others are to be merged into")
@@ -682,60 +946,60 @@ class Store:
         return added
 
     def _take(self, other: Store) -> int:
-        numbers: dict[str, dict[int, int]] = {}
-        for table, names in (("problems", PROBLEM), ("solvers", SOLVER), ("machines", MACHINE)):
-            rows = other.db.execute(f"SELECT id, {', '.join(names)} FROM {table}")
-            numbers[table] = {row[0]: self._id(table, names, row[1:]) for row in rows}
-        campaigns: dict[int | None, int | None] = {None: None}
-        columns = "name, text, planned, skipped, pid, node, started, seen, ended"
-        for number, *row in other.db.execute(f"SELECT id, {columns} FROM campaigns"):
+        numbers: dict[str, dict[Any, Any]] = {}
+        kinds = (("problem", PROBLEM), ("solver", SOLVER), ("machine", MACHINE))
+        for column, names in kinds:
+            numbers[column] = {
+                number: self._id(f"{column}s", names, [row[name] for name in names])
+                for number, row in other._by_number(column).items()
+            }
+        numbers["campaign"] = {None: None}
+        for number, row in other._by_number("campaign").items():
             same = "SELECT id FROM campaigns WHERE name IS ? AND node IS ? AND started IS ?"
-            found = self.db.execute(same, (row[0], row[5], row[6])).fetchone()
-            campaigns[number] = (
-                found[0]
-                if found
-                else self.db.execute(
-                    f"INSERT INTO campaigns ({columns}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", row
-                ).lastrowid
-            )
+            found = self.db.execute(same, (row["name"], row["node"], row["started"])).fetchone()
+            if found is None:
+                query = f"INSERT INTO campaigns ({', '.join(CAMPAIGN)}) VALUES ({_marks(CAMPAIGN)})"
+                new = self.db.execute(query, [row[name] for name in CAMPAIGN]).lastrowid
+                self._seal("campaigns", "id = ?", new)
+            numbers["campaign"][number] = found[0] if found else new
 
-        def refer(row: dict[str, Any], columns: Sequence[str]) -> bool:
-            row["campaign"] = campaigns.get(row["campaign"])
-            for column in columns:
-                row[column] = numbers[f"{column}s"].get(row[column])
-            return all(row[column] is not None for column in columns)
+        def adapt(row: dict[str, Any]) -> bool:
+            """Give a row the numbers that are used here; False where it is of a damaged row."""
+            columns = [column for column in numbers if column in row]
+            good = all(row[column] in numbers[column] for column in columns)
+            if good:
+                row |= {column: numbers[column][row[column]] for column in columns}
+            return good
 
-        for values in other.db.execute(f"SELECT {', '.join(FAULT)} FROM faults"):
-            fault = dict(zip(FAULT, values, strict=True))
+        for row in other._read("faults"):
             same = "SELECT 1 FROM faults WHERE key = ? AND started IS ?"
-            known = self.db.execute(same, (fault["key"], fault["started"])).fetchone()
-            if not known and refer(fault, ("problem", "solver")):
-                self.db.execute(
-                    f"INSERT INTO faults ({', '.join(FAULT)}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                    list(fault.values()),
-                )
-        added = 0
-        marks = ", ".join("?" * len(RUN))
-        for number, *values in other.db.execute(f"SELECT id, {', '.join(RUN)} FROM runs"):
-            run = dict(zip(RUN, values, strict=True))
-            if not refer(run, ("problem", "solver", "machine")):
-                continue  # of a damaged one
+            known = self.db.execute(same, (row["key"], row["started"])).fetchone()
+            if not known and adapt(row):
+                self._insert_fault([row[name] for name in FAULT])
+        added, first, lost = 0, 0, []
+        insert = f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({_marks(RUN)})"
+        for row in other._read("runs"):
+            number = row["id"]
+            if not adapt(row):
+                lost.append(number)
+                continue
             cursor = self.db.execute(
-                f"INSERT INTO runs ({', '.join(RUN)}) VALUES ({marks}) ON CONFLICT DO NOTHING",
-                list(run.values()),
+                f"{insert} ON CONFLICT DO NOTHING", [row[name] for name in RUN]
             )
             if cursor.rowcount:
                 added += 1
-                new = cursor.lastrowid
-                if certificate := other.certificate(number):
-                    self.db.execute("INSERT INTO certificates VALUES (?, ?)", (new, certificate))
-                query = "SELECT u, r, l FROM solutions WHERE run = ?"
-                if vectors := other.db.execute(query, (number,)).fetchone():
-                    self.db.execute("INSERT INTO solutions VALUES (?, ?, ?, ?)", (new, *vectors))
-                self.db.executemany(
-                    "INSERT INTO history VALUES (?, ?, ?, ?, ?)",
-                    [(new, *report) for report in other.history(number)],
+                first = first or cursor.lastrowid
+                vectors = next(other._read("solutions", "run = ?", (number,)), None)
+                self._add_more(
+                    cursor.lastrowid,
+                    other.certificate(number),
+                    [vectors[name] for name in KEPT] if vectors else None,
+                    other.history(number),
                 )
+        if first:
+            self._seal("runs", "id >= ?", first)
+        if lost:
+            other._warn(f"{_rows_of(lost)} of runs", len(lost), "of damaged rows, and left out")
         return added
 
     def export(self, path: str | Path) -> int:
@@ -746,23 +1010,58 @@ class Store:
             ImportError: Parquet needs pyarrow.
         """
         path = Path(path)
-        rows, columns = self.results(), self.columns()
+        if path.suffix not in (".csv", ".parquet"):
+            raise StoreError(f"{path}: a store is exported to .csv or .parquet")
+        table = self.table(more=LONG)
         part = path.with_name(f".{path.name}.part")
         try:
             if path.suffix == ".csv":
-                with part.open("w", newline="") as file:
-                    writer = csv.DictWriter(file, columns)
-                    writer.writeheader()
-                    writer.writerows(rows)
-            elif path.suffix == ".parquet":
+                with part.open("w", newline="", encoding="utf-8") as file:
+                    writer = csv.writer(file)
+                    writer.writerow(table.names)
+                    writer.writerows(zip(*map(table.values, table.names), strict=True))
+            else:
                 import pyarrow as pa
                 import pyarrow.parquet as pq
 
-                table = pa.table({name: [row[name] for row in rows] for name in columns})
-                pq.write_table(table, part)
-            else:
-                raise StoreError(f"{path}: a store is exported to .csv or .parquet")
+                pq.write_table(pa.table({name: table.values(name) for name in table.names}), part)
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
-        return len(rows)
+        return len(table)
+
+
+class _Places(dict[bytes, int]):
+    """Numbers things as they first come."""
+
+    def __missing__(self, key: bytes) -> int:
+        self[key] = number = len(self)
+        return number
+
+
+def _text(value: bytes) -> str | None:
+    """Of a text as `Layout.query` selects it."""
+    return None if value == NOTHING else value.decode(errors="replace")
+
+
+def _marks(names: Sequence[str]) -> str:
+    return ", ".join("?" * len(names))
+
+
+def _places(
+    numbers: npt.NDArray[np.float64], known: Sequence[dict[str, Any]]
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
+    """The places of numbers among rows, the last one for nan; and whether there is such a row."""
+    ids = np.array([row["id"] for row in known], dtype=np.float64)
+    order = np.argsort(ids)
+    at = np.searchsorted(ids[order], numbers)
+    nothing = np.isnan(numbers)
+    places = np.append(order, len(ids))[np.where(nothing, len(ids), np.minimum(at, len(ids)))]
+    return places, nothing | (np.append(ids, np.nan)[places] == numbers)
+
+
+def refers(numbers: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """The tables that rows with these columns refer to, and the columns by which they do."""
+    for column in (*REFERRED, "run"):
+        if column in numbers:
+            yield f"{column}s", column

@@ -326,7 +326,7 @@ class Supervisor:
             record.status, record.message = "lost", one_line(error)
         if vectors:
             self.judge(order, record, vectors)
-        if order["keep"] and record.solved:
+        if order["keep"] and record.status == "converged":
             known = {name: vectors[name] for name in KEPT if name in vectors}
             record.solution = {name: value.tobytes() for name, value in known.items()}
         if record.status in ORDERLY and self.clean(order):
@@ -420,10 +420,10 @@ class Supervisor:
         record.merits = {name: float(getattr(merit, name)) for name in MERITS}
         if record.status == "infeasible":
             prove(problem, record, *proof)
-        if record.status != "converged":
+        if not record.solved:
             return
         limits = order["limits"]
-        if not merit.error_by(order["merit"]) <= order["tol"]:
+        if record.status == "converged" and not merit.error_by(order["merit"]) <= order["tol"]:
             record.status = "inaccurate"
         elif (record.cpu_s or 0.0) > limits["time"] or (record.wall_s or 0.0) > limits["wall"]:
             record.status, record.message = "time_limit", "solved, but too late"

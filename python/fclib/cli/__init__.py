@@ -18,6 +18,7 @@ _profile.py    the profile of `profile` and `demo`
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -25,7 +26,7 @@ import typer
 from typer.core import TyperGroup
 
 import fclib
-from fclib.cli._output import fail, interrupted, print_version, words_of
+from fclib.cli._output import fail, interrupted, print_version, warn, words_of
 
 COMMANDS = (
     "info",
@@ -88,10 +89,12 @@ class Commands(TyperGroup):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command."""
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            interrupted()
+        with warnings.catch_warnings():
+            warnings.showwarning = warn
+            try:
+                return super().invoke(ctx)
+            except KeyboardInterrupt:
+                interrupted()
 
     def get_params(self, ctx: Any) -> list[Any]:
         """The options, those of completion hidden."""

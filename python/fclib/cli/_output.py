@@ -14,7 +14,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.cells import cell_len
-from rich.console import Console, ConsoleOptions
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -24,17 +24,38 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
 import fclib
+from fclib.bench import modules
+
+
+def plain(text: str) -> str:
+    """A text without what steers a terminal: files, stores and solvers are strangers' words."""
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() or one in "\n\t" else " " for one in text)
+
+
+class _Plain(Console):
+    """A console on which no text steers the terminal. Colours are the console's own."""
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """The parts of what is printed."""
+        for part in super().render(renderable, options):
+            yield part if part.control else part._replace(text=plain(part.text))
+
 
 # text is printed as it is: no brackets of a unit, no path is taken for markup
-out = Console(markup=False, emoji=False)
+out = _Plain(markup=False, emoji=False)
 if not out.is_terminal:
     # nothing is folded on its way into a file or a pipe
-    out = Console(width=240, markup=False, emoji=False)
-err = Console(stderr=True, soft_wrap=True, markup=False, emoji=False)
+    out = _Plain(width=240, markup=False, emoji=False)
+err = _Plain(stderr=True, soft_wrap=True, markup=False, emoji=False)
 
 
 class MeritKind(str, Enum):
@@ -59,6 +80,10 @@ GAP = 2  # between columns
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
 Json = Annotated[bool, typer.Option("--json", help="One JSON object a line.")]
 Tolerance = Annotated[float, typer.Option("--tol", help="Bound on the error.", min=0.0)]
+Modules = Annotated[
+    list[Path] | None,
+    typer.Option("--module", help="A file of Python with solvers of your own."),
+]
 Merit = Annotated[
     MeritKind,
     typer.Option(
@@ -87,7 +112,7 @@ def fail(message: str) -> NoReturn:
     raise SystemExit(1)
 
 
-def warn(path: Path, message: str) -> None:
+def warn_of(path: Path, message: str) -> None:
     """One line on the standard error about a file; the command goes on."""
     err.print(f"fclib: {path}: {message}", style="yellow", highlight=False)
 
@@ -100,6 +125,11 @@ def interrupted(message: str = "interrupted") -> NoReturn:
     raise SystemExit(130)
 
 
+def warn(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Say a warning in one line on the standard error, without where in the code it is from."""
+    err.print(f"fclib: {message}", style="yellow", highlight=False)
+
+
 def words_of(error: Exception) -> str:
     """Of an error of the system the file and the reason, without its number."""
     if isinstance(error, OSError) and error.strerror:
@@ -109,7 +139,15 @@ def words_of(error: Exception) -> str:
 
 def usage_error(error: Exception) -> NoReturn:
     """End the command with the message and exit status 2."""
-    raise typer.BadParameter(str(error)) from None
+    raise typer.BadParameter(plain(str(error))) from None
+
+
+def load_modules(paths: Sequence[Path] | None) -> None:
+    """Import files with solvers of the user's own; a usage error if that fails."""
+    try:
+        modules.load_modules([str(path.resolve()) for path in paths or ()])
+    except fclib.SolverError as error:
+        usage_error(error)
 
 
 def parse_options(pairs: Sequence[str]) -> dict[str, str]:
@@ -168,8 +206,7 @@ def format_value(value: object) -> str:
         return "; ".join(parts) or "-"
     if isinstance(value, float):
         return f"{value:.1e}" if value and not 1e-2 <= abs(value) < 1e4 else f"{value:.4g}"
-    # what a stranger's file says must not steer the terminal
-    return "".join(one if one.isprintable() or one == "\n" else " " for one in str(value))
+    return plain(str(value))
 
 
 def format_known(values: dict[str, object]) -> str:

@@ -10,12 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from fclib.bench import MeritKind, profiles
+from fclib.bench import MeritKind, comparison, profiles
 from fclib.bench.campaign import published_means
 from fclib.bench.store import Store
+from fclib.bench.table import Table
 from fclib.cli._output import Report, Rows, err, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
+# columns of the summary that are shown only if one of them says something
+RARE = ("unsuitable", "spread", "copies")
 
 
 def print_profile(
@@ -33,11 +36,14 @@ def print_profile(
     penalty: float = profiles.PENALTY,
     shift: float = profiles.SHIFT,
     count_unsuitable: bool = False,
+    own_set: bool = False,
+    both_forms: bool = False,
+    weigh: profiles.Weigh = "families",
     formats: Sequence[str] = ("pdf", "svg", "png"),
     as_json: bool = False,
     quiet: bool = False,
 ) -> None:
-    """Print the tables of a store, and draw its pictures where a folder is given."""
+    """Print the tables of a store, and draw its pictures if a folder is given."""
     chosen: dict[str, Any] = {
         "families": family,
         "solvers": solver,
@@ -46,125 +52,197 @@ def print_profile(
         "merit": merit,
     }
     rows = profiles.load(store, campaign=campaign, start=start, **chosen)
-    costs = profiles.costs(rows, metric, count_unsuitable)
+    every = profiles.gather(rows, metric, count_unsuitable, both_forms)
+    costs = comparison.compared(every, solver or None, own_set)
+    compared = comparison.runs_of(rows, costs)
     published = published_means(store) if start == "cold" else {}
-    both: list[dict[str, Any]] = []
+    both: Table | None = None
     with Store(store, create=False) as opened:
-        if opened.results("start = 'warm'"):
-            same = {"machine": rows[0]["node"], "merit": rows[0]["merit"]}
-            both = profiles.load(store, start=None, **chosen | same)
+        warm = opened.has_sequences()
         faults = [
             fault for fault in opened.faults() if not campaign or fault["campaign"] == campaign
         ]
+    if warm:
+        same = {"machine": rows.row(0)["node"], "merit": rows.row(0)["merit"]}
+        both = profiles.load(store, start=None, **chosen | same)
     tables: dict[str, list[dict[str, Any]]] = {
-        "summary": profiles.summary(costs, penalty, shift),
-        "profile": shares_within(costs),
+        "summary": profiles.summary(costs, penalty, shift, weigh),
+        "left out": profiles.left_out(every, costs),
+        "profile": shares_within(costs, weigh),
         "statuses": profiles.failures(rows),
         "families": profiles.families(costs, published),
-        "pairs": [dataclasses.asdict(pair) for pair in profiles.pairs(costs)],
-        "shifts": profiles.shifts(costs, penalty, shift) if metric in profiles.TIMES else [],
-        "accuracies": [
-            entry for each in costs.tolerances for entry in profiles.accuracies(rows, each)
-        ],
-        "work-precision": profiles.work_precision(rows, metric, penalty, shift, count_unsuitable),
-        "along": profiles.along(store, both, campaign),
+        "pairs": [dataclasses.asdict(pair) for pair in profiles.pairs(costs, weigh=weigh)],
+        "shifts": (
+            profiles.shifts(costs, penalty, shift, weigh) if metric in profiles.TIMES else []
+        ),
+        "accuracies": profiles.accuracies(compared, costs, weigh),
+        "work-precision": profiles.work_precision(compared, costs, penalty, shift, weigh),
+        "along": [] if both is None else profiles.along(store, both, campaign),
         "not run": profiles.failures(faults),
     }
+    said = Said(rows, compared, penalty, shift, weigh, own_set)
     if not quiet and as_json:
         report = Report(True)
         for table, records in tables.items():
             for record in records:
                 report.add({"table": table, **record})
     elif not quiet:
-        show(tables, costs, rows, penalty, shift)
+        show(tables, costs, said)
     if folder is not None:
-        draw(tables, costs, rows, store, folder, formats)
+        draw(tables, costs, store, folder, formats, said)
         err.print(f"Pictures and tables: {folder}", highlight=False)
 
 
-def show(
-    tables: dict[str, list[dict[str, Any]]],
-    costs: profiles.Costs,
-    rows: Sequence[dict[str, Any]],
-    penalty: float,
-    shift: float,
-) -> None:
-    """The tables, for people."""
+@dataclasses.dataclass(frozen=True)
+class Said:
+    """What tables and pictures say of the runs that they are of."""
+
+    rows: Table  # all that were asked for
+    compared: Table  # those that count
+    penalty: float
+    shift: float
+    weigh: profiles.Weigh
+    own_set: bool
+
+    def caption(self, costs: profiles.Costs) -> str:
+        """Of costs at one tolerance or at several."""
+        tols = comparison.numbers_in(self.rows, "tol")
+        own = self.rows.where(np.isin(tols, costs.tolerances))
+        return profiles.caption(costs, own, self.weigh, self.own_set)
+
+
+def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: Said) -> None:
+    """The tables, for people: those of each tolerance together."""
     words = profiles.METRICS[costs.metric][0]
-    judged = profiles.JUDGED[rows[0]["merit"]]
-    out.print(
-        f"{words}: {profiles.caption(costs, rows)}; shifted geometric means, shift {shift:g},"
-        f" failures as {penalty:g} x the limit; {judged}",
-        highlight=False,
-    )
-    if costs.left_out:
-        out.print(f"{costs.left_out} left out, which not all solvers have run", highlight=False)
-    busy = profiles.loaded(rows)
-    marked, unsteady = [], False
-    for row in tables["summary"]:
-        wide = row["spread"] is not None and row["spread"] > profiles.SPREAD
-        unsteady = unsteady or wide
-        of = f"{row['mean']:.3g}"
-        marks = (profiles.MARK if wide else "") + (
-            profiles.LOADED if busy.get(row["solver"]) else ""
-        )
-        marked.append(row | {"mean": f"{of} {marks}".rstrip()})
-    if all(row["spread"] is None for row in marked):
-        marked = [{name: row[name] for name in row if name != "spread"} for row in marked]
-    if not any(row["unsuitable"] for row in marked):
-        marked = [{name: row[name] for name in row if name != "unsuitable"} for row in marked]
+    judged = profiles.JUDGED[said.rows.row(0)["merit"]]
+    busy = profiles.loaded(said.rows)
     titles = {
-        "summary": None,
-        "profile": "Performance profile: solved within a multiple of the best",
-        "statuses": "How the runs ended",
-        "not run": "Not run, for causes outside of the solvers",
-        "along": "Along sequences: from a solution of a step before (warm), or from nothing (cold)",
+        "profile": "Performance profile: the share solved within a multiple of the best",
         "shifts": "Means over that of the best, by the shift of the mean",
         "families": "The fastest solver of each problem, by family",
     }
-    for name, title in titles.items():
-        shown_rows = marked if name == "summary" else tables[name]
-        if shown_rows:
-            out.print()
-            out.print(Rows(shown_rows, title))
-        if name == "summary" and unsteady:
+    for tol in costs.tolerances:
+        part = costs.at(tol)
+        here = f"Tolerance {tol:g}"
+        out.print(
+            f"{here}. {words}: {said.caption(part)}; shifted geometric means, shift"
+            f" {said.shift:g}, failures as {said.penalty:g} x the limit; {judged}",
+            highlight=False,
+        )
+        out.print()
+        own = [row for row in tables["summary"] if row["tol"] == tol]
+        out.print(Rows(shown_summary(own, busy), here))
+        if any(is_unsteady(row) for row in own):
             out.print(
                 f"{profiles.MARK}: repeats differ by more than {100 * profiles.SPREAD:.0f} %"
                 " in the median",
                 highlight=False,
             )
-        if name == "summary" and busy:
+        if busy:
             out.print(
-                f"{profiles.LOADED}: {sum(busy.values())} of {len(rows)} runs were begun while the"
-                " load was above the number of cores: their times may be longer than on a quiet"
-                " machine",
+                f"{profiles.LOADED}: {sum(busy.values())} of {len(said.rows)} runs were begun"
+                " while the load was above the number of cores: their times may be longer than on"
+                " a quiet machine",
                 highlight=False,
             )
-    best = tables["summary"][1]["solver"]
-    shown = [pair for pair in profiles.pairs(costs, against=best) if pair.both]
-    if shown:
+        for name, title in titles.items():
+            if found := at(tables[name], tol):
+                out.print()
+                out.print(Rows(found, f"{title}; {here.lower()}"))
+        show_pairs(tables["pairs"], own[1]["solver"], tol)
         out.print()
-        records = [
+    show_left_out(tables["left out"], costs)
+    titles = {
+        "statuses": "How all the runs ended",
+        "along": "Along sequences: from a solution of a step before (warm), or from nothing (cold)",
+        "not run": "Not run, for causes outside of the solvers",
+    }
+    for name, title in titles.items():
+        if tables[name]:
+            out.print(Rows(tables[name], title))
+            out.print()
+
+
+def at(rows: Sequence[dict[str, Any]], tol: float) -> list[dict[str, Any]]:
+    """The rows at a tolerance, without it."""
+    return [
+        {name: value for name, value in row.items() if name != "tol"}
+        for row in rows
+        if row["tol"] == tol
+    ]
+
+
+def is_unsteady(row: dict[str, Any]) -> bool:
+    """Whether the repeats of a solver differ by much."""
+    return row["spread"] is not None and row["spread"] > profiles.SPREAD
+
+
+def shown_summary(rows: Sequence[dict[str, Any]], busy: dict[str, int]) -> list[dict[str, Any]]:
+    """The summary at one tolerance, with marks; columns that say nothing are left out."""
+    silent = {name for name in RARE if not any(row[name] for row in rows)}
+    found = []
+    for row in rows:
+        marks = (profiles.MARK if is_unsteady(row) else "") + (
+            profiles.LOADED if busy.get(row["solver"]) else ""
+        )
+        own = row | {
+            "share": f"{100 * row['share']:.1f} %",
+            "mean": f"{row['mean']:.3g} {marks}".rstrip(),
+        }
+        found.append({name: own[name] for name in own if name not in silent and name != "tol"})
+    return found
+
+
+def show_pairs(pairs: Sequence[dict[str, Any]], best: str, tol: float) -> None:
+    """Each solver beside the best one, at a tolerance."""
+    records = []
+    for pair in pairs:
+        if pair["tol"] != tol or best not in (pair["first"], pair["second"]) or not pair["both"]:
+            continue
+        turned = pair["first"] == best
+        other = pair["second" if turned else "first"]
+        ratio, low, high = pair["ratio"], pair["low"], pair["high"]
+        ratio, low, high = (1 / ratio, 1 / high, 1 / low) if turned else (ratio, low, high)
+        only, theirs = pair["only_first"], pair["only_second"]
+        only, theirs = (theirs, only) if turned else (only, theirs)
+        records.append(
             {
-                "solver": pair.first,
-                "ratio": pair.ratio,
-                "95 % interval": f"{pair.low:.3g} to {pair.high:.3g}",
-                "both solve": pair.both,
-                "only it": pair.only_first,
-                f"only {best}": pair.only_second,
+                "solver": other,
+                "ratio": ratio,
+                "95 % interval": f"{low:.3g} to {high:.3g}",
+                "both solve": pair["both"],
+                "only it": only,
+                f"only {best}": theirs,
             }
-            for pair in shown
-        ]
-        out.print(Rows(records, f"Geometric means of ratios to {best}, where both solve"))
+        )
+    if records:
+        out.print()
+        title = f"Geometric means of ratios to {best}, where both solve; tolerance {tol:g}"
+        out.print(Rows(records, title))
+
+
+def show_left_out(rows: Sequence[dict[str, Any]], costs: profiles.Costs) -> None:
+    """The solvers that are not compared, and how to compare them."""
+    if not rows:
+        return
+    title = (
+        f"Not compared: the common set would lose more than {100 * comparison.COMMON:.0f} % of"
+        " the instances"
+    )
+    out.print(Rows(rows, title))
+    names = [*costs.solvers, *dict.fromkeys(row["solver"] for row in rows)]
+    words = " ".join(f'--solver "{name}"' if " " in name else f"--solver {name}" for name in names)
+    out.print(f"All on their common set: {words}; each on its own set: --own-set", highlight=False)
+    out.print()
 
 
 def draw(
     tables: dict[str, list[dict[str, Any]]],
     costs: profiles.Costs,
-    rows: Sequence[dict[str, Any]],
     store: Path,
     folder: Path,
     formats: Sequence[str],
+    said: Said,
 ) -> None:
     """Pictures and CSV files into a folder."""
     from fclib.bench import plots
@@ -174,24 +252,35 @@ def draw(
         if table != "profile":
             write_csv(folder / f"{table.replace(' ', '-')}.csv", records)
     several = len(costs.tolerances) > 1
+    tols = comparison.numbers_in(said.compared, "tol")
     for tol in costs.tolerances:
-        part, own = costs.at(tol), [row for row in rows if row["tol"] == tol]
-        words, ending = profiles.caption(part, own), f"-{tol:g}" if several else ""
+        part, own = costs.at(tol), said.compared.where(tols == tol)
+        words, ending = said.caption(part), f"-{tol:g}" if several else ""
         name = f"{costs.metric}{ending}"
-        steps = curve_rows(part, profiles.ratios(part.values), "tau")
+        steps = curve_rows(part, profiles.ratios(part.values), "tau", said.weigh)
         write_csv(folder / f"performance-{name}.csv", steps)
-        write_csv(folder / f"data-{name}.csv", curve_rows(part, part.values, costs.metric))
-        plots.performance(part, folder, formats, words, ending)
+        steps = curve_rows(part, part.values, costs.metric, said.weigh)
+        write_csv(folder / f"data-{name}.csv", steps)
+        plots.performance(part, folder, formats, words, ending, weigh=said.weigh)
         for per_contact in (False, True):
-            plots.data(part, folder, formats, per_contact=per_contact, caption=words, ending=ending)
-        longest = max((row["cpu_s"] or 0.0 for row in own), default=0.0)
+            plots.data(
+                part,
+                folder,
+                formats,
+                per_contact=per_contact,
+                caption=words,
+                ending=ending,
+                weigh=said.weigh,
+            )
+        longest = float(np.nanmax(comparison.numbers_in(own, "cpu_s"), initial=0.0))
         times = np.geomspace(1e-5, max(longest, 1e-4), 300)
+        legend = dict(zip(part.solvers, map(part.legend, range(len(part.solvers))), strict=True))
         if curves := profiles.convergence(store, own, times):
-            plots.convergence(curves, times, folder, formats, words, ending)
+            plots.convergence(curves, times, folder, formats, words, ending, legend)
             reached = profiles.runtimes(store, own, tol)
-            plots.runtimes(reached, folder, formats, words, ending)
+            plots.runtimes(reached, folder, formats, words, ending, legend)
     if several:
-        words = profiles.caption(costs, rows)
+        words = said.caption(costs)
         plots.work_precision(tables["work-precision"], costs.metric, folder, formats, words)
 
 
@@ -207,23 +296,34 @@ def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     part.replace(path)
 
 
-def curve_rows(costs: profiles.Costs, values: profiles.Array, name: str) -> list[dict[str, Any]]:
+def curve_rows(
+    costs: profiles.Costs, values: comparison.Array, name: str, weigh: profiles.Weigh
+) -> list[dict[str, Any]]:
     """The steps of curves as a table: the bound, then a column a solver."""
     finite = np.unique(values[np.isfinite(values)])
-    shares = profiles.share_within(values, finite)
+    shares = profiles.share_within(values, finite, costs.weights(weigh))
     return [
         {name: float(bound), **dict(zip(costs.solvers, shares[:, k].tolist(), strict=True))}
         for k, bound in enumerate(finite)
     ]
 
 
-def shares_within(costs: profiles.Costs) -> list[dict[str, Any]]:
-    """The performance profile at a few ratios, in percent."""
-    shares = profiles.performance_profile(costs.values, np.array([*TAUS, np.finfo(float).max]))
+def shares_within(costs: profiles.Costs, weigh: profiles.Weigh) -> list[dict[str, Any]]:
+    """The performance profile at a few ratios, in percent, at each tolerance."""
+    found = []
     names = [f"<= {tau:g}x" for tau in TAUS] + ["solved"]
-    rows = [
-        {"solver": solver, **{n: f"{100 * s:.0f} %" for n, s in zip(names, own, strict=True)}}
-        for solver, own in zip(costs.solvers, shares.tolist(), strict=True)
-    ]
-    means = dict(zip(costs.solvers, shares.mean(axis=1), strict=True))
-    return sorted(rows, key=lambda row: -means[row["solver"]])
+    for tol in costs.tolerances:
+        part = costs.at(tol)
+        taus = np.array([*TAUS, np.finfo(float).max])
+        shares = profiles.performance_profile(part.values, taus, part.weights(weigh))
+        rows = [
+            {
+                "tol": tol,
+                "solver": solver,
+                **{n: f"{100 * s:.0f} %" for n, s in zip(names, own, strict=True)},
+            }
+            for solver, own in zip(part.solvers, shares.tolist(), strict=True)
+        ]
+        means = dict(zip(part.solvers, shares.mean(axis=1), strict=True))
+        found += sorted(rows, key=lambda row, means=means: -means[row["solver"]])  # type: ignore[misc]
+    return found

@@ -19,10 +19,12 @@ from rich.progress import (
 from fclib import bench
 from fclib.cli._output import err
 
+PAUSE = 10.0  # [s] between two lines where there is no terminal
+
 
 @contextmanager
 def many_bars() -> Iterator[Callable[[str, int, int], None]]:
-    """A bar for each family on the standard error, where that is a terminal."""
+    """A bar for each family on a terminal, else a line every ten seconds on the standard error."""
     columns = (
         TextColumn("{task.description}", markup=False),
         BarColumn(),
@@ -31,8 +33,13 @@ def many_bars() -> Iterator[Callable[[str, int, int], None]]:
     )
     with Progress(*columns, console=err, disable=not err.is_terminal) as bars:
         tasks: dict[str, Any] = {}
+        said = time.monotonic()
 
         def show(name: str, done: int, total: int) -> None:
+            nonlocal said
+            if not err.is_terminal and time.monotonic() - said > PAUSE:
+                said = time.monotonic()
+                err.print(f"{name}: {done} of {total}", highlight=False)
             if name not in tasks:
                 tasks[name] = bars.add_task(name, total=total)
             bars.update(tasks[name], completed=done, total=total)
@@ -62,7 +69,7 @@ def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
             if left is not None:
                 words += f", {progress.rate:.1f}/s, {duration(left)} left"
             bar.update(task, total=progress.planned, completed=progress.done, words=words)
-            if not quiet and not err.is_terminal and time.monotonic() - said > 10:
+            if not quiet and not err.is_terminal and time.monotonic() - said > PAUSE:
                 said = time.monotonic()
                 err.print(f"{name}: {progress.done} of {progress.planned}, {words}")
 

@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 
 import fclib
 from fclib import bench
+from fclib._verdicts import is_solved
 from fclib.bench import machine
 from fclib.bench.campaign import SET, parse_solver
 from fclib.bench.runner import RETRIES
@@ -43,6 +44,12 @@ class WithDefault(TyperGroup):
         if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
             args = ["run", *args]
         return super().parse_args(ctx, args)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """The commands, and below them the options of `run`, which need not be named."""
+        super().format_help(ctx, formatter)
+        run = self.commands["run"]
+        run.format_help(run.context_class(run, info_name="run", parent=ctx), formatter)
 
 
 app = typer.Typer(
@@ -199,7 +206,7 @@ def run(
         "planned": progress.planned,
         "there before": progress.skipped,
         "solved": progress.solved,
-        **{name: count for name, count in progress.statuses.most_common() if name != "converged"},
+        **{name: n for name, n in progress.statuses.most_common() if name != "converged"},
     }
     if progress.not_run:
         record["not run"] = progress.not_run.total()
@@ -247,7 +254,7 @@ def describe(status: Status) -> dict[str, Any]:
         "state": state,
         "runs": f"{status.done} of {status.planned}",
         "solved": status.solved,
-        "others": {name: n for name, n in status.statuses.items() if name != "converged"},
+        "others": {name: n for name, n in status.statuses.items() if not is_solved(name)},
         "rate": round(status.rate, 2),
         "left": duration(left) if left is not None else "-",
         "started": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(status.started)),

@@ -70,7 +70,7 @@ def choose_hard(
     try:
         for path in stores:
             with Store(path, create=False) as store:
-                runs += store.results("start = 'cold'")
+                runs += store.results(start="cold")
         chosen = choose.hard(runs, folder, tol=tol, share=share, per_family=per_family)
     except (fclib.Error, collections.CatalogError, ImportError, ValueError) as error:
         fail(str(error))

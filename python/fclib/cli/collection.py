@@ -15,6 +15,7 @@ import typer
 import fclib
 from fclib import collections
 from fclib._judge import TOLERANCE
+from fclib._verdicts import CLASSES
 from fclib.bench import Store
 from fclib.cli import choose
 from fclib.cli._build import (
@@ -55,7 +56,7 @@ app.add_typer(choose.app, name="choose")
 
 MOST_COPIES = 10  # that are named; the catalogue has all
 
-Rating = Enum("Rating", {name: name for name in standing.CLASSES}, type=str)  # type: ignore[misc]
+Rating = Enum("Rating", {name: name for name in CLASSES}, type=str)  # type: ignore[misc]
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
 Folder = Annotated[Path, typer.Argument(help="Folder of a collection.")]
 Jobs = Annotated[int | None, typer.Option(help="Processes; by default one a core.", min=1)]
@@ -466,7 +467,7 @@ def status(
             count = 0
             for path in stores:
                 with Store(path, create=False) as store:
-                    count += standing.add(store.results("start = 'cold'"), digests)
+                    count += standing.add(store.results(start="cold"), digests)
             err.print(f"{count} runs taken in", highlight=False)
         rows, basis = standing.standings(name)
     except KeyError as error:
@@ -495,7 +496,7 @@ def status(
     for row in rows:
         families.setdefault(row.id.split("/")[1], Counter())[row.rating or "not run"] += 1
     families["all"] = sum(families.values(), Counter())
-    columns = [*standing.CLASSES, *(["not run"] if families["all"]["not run"] else [])]
+    columns = [*CLASSES, *(["not run"] if families["all"]["not run"] else [])]
     out.print(
         Rows(
             [

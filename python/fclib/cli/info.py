@@ -8,7 +8,7 @@ from typing import Any
 import fclib
 from fclib import _symmetry
 from fclib.cli._files import Contents, contents_of
-from fclib.cli._output import Files, Json, Report, each_file, warn
+from fclib.cli._output import Files, Json, Report, each_file, warn_of
 
 MATRICES = ("M", "H", "G", "W", "V", "R")
 MATRIX_INFO = ("comment", "conditioning", "determinant", "rank")
@@ -65,11 +65,11 @@ def command(files: Files, as_json: Json = False) -> None:
             problems = [fclib.read(path, kind) for kind in contents.kinds or (None,)]
             left_out = fclib.left_out(path)
             for line in left_out:
-                warn(path, f"{line}: left out")
+                warn_of(path, f"{line}: left out")
             for problem in problems:
                 report.add(describe(path, problem, contents) | {"left_out": left_out})
                 for line in _symmetry.not_symmetric(problem):
-                    warn(path, line)
+                    warn_of(path, line)
         except fclib.Error as error:
             report.error(path, error)
     if not any(record["matrix_info"] for record in report.records):

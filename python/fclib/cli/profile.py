@@ -23,6 +23,20 @@ class Start(str, Enum):
     warm = "warm"
 
 
+class Weigh(str, Enum):
+    """What weighs the same in shares and means: each family, or each instance."""
+
+    families = "families"
+    instances = "instances"
+
+
+class Forms(str, Enum):
+    """Of a problem with a global and a local form the one that a solver takes, or both."""
+
+    one = "one"
+    both = "both"
+
+
 def command(
     store: Annotated[Path, typer.Argument(help="A store of `fclib bench`.")],
     metric: Annotated[Metric, typer.Option(help="What is compared.")] = CPU_TIME,
@@ -50,6 +64,20 @@ def command(
             "--count-unsuitable", help="Count a problem that a solver does not take as a failure."
         ),
     ] = False,
+    own_set: Annotated[
+        bool,
+        typer.Option(
+            "--own-set",
+            help="Count each solver on the instances that it has run and takes, instead of on those"
+            " that all have.",
+        ),
+    ] = False,
+    weigh: Annotated[
+        Weigh, typer.Option(help="What weighs the same in shares and means.")
+    ] = Weigh.families,
+    forms: Annotated[
+        Forms, typer.Option(help="Of a problem in two forms: one counts, or both.")
+    ] = Forms.one,
     out_dir: Annotated[
         Path | None, typer.Option("--out", help="Folder for pictures and CSV.")
     ] = None,
@@ -77,6 +105,9 @@ def command(
             penalty=penalty,
             shift=shift,
             count_unsuitable=count_unsuitable,
+            own_set=own_set,
+            both_forms=forms is Forms.both,
+            weigh=weigh.value,
             formats=formats.split(","),
             as_json=as_json,
         )

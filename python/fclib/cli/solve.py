@@ -14,14 +14,16 @@ from fclib.cli._output import (
     Json,
     Merit,
     MeritKind,
+    Modules,
     Report,
     Rows,
     Tolerance,
     each_file,
     err,
+    load_modules,
     parse_options,
     usage_error,
-    warn,
+    warn_of,
 )
 
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
@@ -67,6 +69,7 @@ def command(
     option: Annotated[
         list[str] | None, typer.Option(help="An option of the solver, name=value, or name=@FILE.")
     ] = None,
+    module: Modules = None,
     verbose: Annotated[
         bool, typer.Option("--verbose", "-v", help="Show the iterations and the stages.")
     ] = False,
@@ -79,6 +82,7 @@ def command(
     if kind is not None and write:
         # the one solution of a file is that of its global problem
         raise typer.BadParameter("--write stores the solution of the main problem, not of a --kind")
+    load_modules(module)
     options = parse_options(option or [])
     try:
         fclib.find_solver(solver).check_options(options)
@@ -90,7 +94,7 @@ def command(
             trace = Trace(path.name) if verbose else None
             problem = fclib.read(path, kind) if kind else read_owner(path)
             for line in _symmetry.not_symmetric(problem):
-                warn(path, line)
+                warn_of(path, line)
             run = bench.run(
                 str(path), problem, solver, tol, time_limit, options, trace, merit.value
             )

@@ -12,7 +12,7 @@ from rich.text import Text
 
 import fclib
 from fclib import external
-from fclib.cli._output import Json, Report, Rows, out, usage_error
+from fclib.cli._output import Json, Modules, Report, Rows, load_modules, out, usage_error
 
 DEFAULT = inspect.signature(fclib.solve).parameters["solver"].default
 
@@ -127,9 +127,11 @@ def command(
     chain: Annotated[
         bool, typer.Option("--chain", help="Show what a stage of auto's option chain may say.")
     ] = False,
+    module: Modules = None,
     as_json: Json = False,
 ) -> None:
     """List the solvers, or show some of them with their options."""
+    load_modules(module)
     report = Report(as_json)
     if chain:
         show_chain(report)

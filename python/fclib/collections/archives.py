@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import shutil
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,9 @@ REGISTRY = "registry.txt"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives
 TIMEOUT = 30.0  # longest silence of a server [s]
 TRIES = 3  # connections, for what broke off
+# times the size of an archive that its files may have: `publish` stores them as they are, and HDF5
+# has compressed them; what is made to fill a disk has a thousand times its size
+UNPACKED = 20
 
 
 class FetchError(OSError):
@@ -137,8 +141,11 @@ def get(
     fetcher = pooch.create(path=archives, base_url=base, registry=None)
     try:
         fetcher.load_registry(archives / REGISTRY)
-    except OSError as error:
+    except (OSError, ValueError) as error:
         raise FetchError(f"{base}{REGISTRY}: is no registry: {error}") from error
+    for name in fetcher.registry:
+        if Path(name).name != name:
+            raise FetchError(f"{base}{REGISTRY}: {name!r} is no name of a file")
 
     published = {folder_of(name): name for name in fetcher.registry if name.endswith(".zip")}
     wanted = list(dict.fromkeys(own for name in names for own in wanted_of(name, [*published])))
@@ -158,7 +165,7 @@ def get(
             path = fetcher.fetch(archive, downloader=fetch)
         except ValueError as error:
             raise FetchError(f"{base}{archive}: is not what the registry says: {error}") from error
-        unpack(Path(path), folder)
+        unpack(Path(path), folder, own)
     catalog.gather(folder)
     return wanted
 
@@ -230,13 +237,49 @@ def download(url: str, target: Path, progress: Callable[[int, int], None] | None
     raise FetchError(f"{url}: cannot be fetched: {reason}")
 
 
-def unpack(archive: Path, folder: Path) -> None:
-    """Unpack a family; its part of the catalogue comes last, since it says that all is there."""
-    with zipfile.ZipFile(archive) as zipped:
-        for entry in sorted(zipped.infolist(), key=lambda e: e.filename.endswith(catalog.FILE)):
-            target = (folder / entry.filename).resolve()
-            if not target.is_relative_to(folder.resolve()):
-                raise FetchError(f"{archive}: {entry.filename!r} leads out of the folder")
-            target.parent.mkdir(parents=True, exist_ok=True)
-            content = zipped.read(entry)
-            catalog.replace_file(target, lambda path, content=content: path.write_bytes(content))
+def unpack(archive: Path, folder: Path, family: str) -> None:
+    """Unpack SET/FAMILY; its part of the catalogue comes last, since it says that all is there.
+
+    Raises:
+        FetchError: the file is no archive of this family; nothing of it is unpacked then, or it was
+            damaged.
+    """
+    try:
+        with zipfile.ZipFile(archive) as zipped:
+            entries = [entry for entry in zipped.infolist() if not entry.is_dir()]
+            _check(archive, entries, folder, family)
+            for entry in sorted(entries, key=lambda e: e.filename.endswith(catalog.FILE)):
+                target = folder / entry.filename
+                target.parent.mkdir(parents=True, exist_ok=True)
+                content = zipped.read(entry)
+
+                def write(path: Path, entry: Any = entry, content: bytes = content) -> None:
+                    path.write_bytes(content)
+                    if entry.filename == f"{family}/{catalog.FILE}":
+                        catalog.read_catalog(path)  # what is none takes no place
+
+                catalog.replace_file(target, write)
+    except catalog.CatalogError as error:
+        raise FetchError(f"{archive}: {family}/{catalog.FILE} is no catalogue: {error}") from None
+    # what zipfile raises of an archive that is damaged, encrypted, or packed in another way
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        raise FetchError(f"{archive}: is no archive that can be unpacked: {error}") from None
+
+
+def _check(archive: Path, entries: Sequence[zipfile.ZipInfo], folder: Path, family: str) -> None:
+    """FetchError where an archive has what does not belong to a family, or is far too much."""
+    for entry in entries:
+        target = (folder / entry.filename).resolve()
+        inside = target.is_relative_to((folder / family).resolve())
+        if not (inside and entry.filename.startswith(f"{family}/")):
+            raise FetchError(f"{archive}: {entry.filename!r} leads out of the folder {family}")
+    if f"{family}/{catalog.FILE}" not in {entry.filename for entry in entries}:
+        raise FetchError(
+            f"{archive}: has no {family}/{catalog.FILE}, and is no archive of that family"
+        )
+    size, whole = archive.stat().st_size, sum(entry.file_size for entry in entries)
+    if whole > UNPACKED * size:
+        raise FetchError(
+            f"{archive}: has {size} bytes, and its files would have {whole}, more than {UNPACKED}"
+            " times as many: nothing of it is unpacked"
+        )

@@ -14,6 +14,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from fclib import _core
+
 FILE = "catalog.parquet"
 PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution
 # of a family while it is built: where to go on, and in it the rows that are there already
@@ -72,6 +74,9 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
 # of the files' paths and SHA-256
 FILES = ("global_file", "global_sha256", "local_file", "local_sha256")
 
+# columns that become parts of paths
+FOLDERS = ("collection", "family", "global_file", "local_file")
+
 # further columns, of which a build fills what is cheap, or what it was asked to analyze: all;
 # docs/analysis.md has their meaning
 ANALYSIS: tuple[str, ...] = (
@@ -93,7 +98,7 @@ ANALYSIS: tuple[str, ...] = (
 )
 
 
-class CatalogError(Exception):
+class CatalogError(_core.Error):
     """A catalogue that is not there, or is not one."""
 
 
@@ -148,6 +153,16 @@ def read_catalog(path: str | Path) -> Any:
     for name in ("id", "digest", *FILES):
         if name not in table.column_names:
             raise CatalogError(f"{file}: is no catalogue, it has no column {name!r}")
+    for name, kind, _ in COLUMNS:
+        wanted = pa.type_for_alias(kind)
+        if name in table.column_names and table[name].type != wanted:
+            place = table.column_names.index(name)
+            try:
+                table = table.set_column(place, name, table[name].cast(wanted))
+            except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+                raise CatalogError(f"{file}: column {name}: is no {kind}") from None
+    for name in FOLDERS:
+        _require_inside(file, table, name)
     # an older one lacks what came later
     for place, (name, kind, _) in enumerate(COLUMNS):
         if name not in table.column_names:
@@ -185,6 +200,20 @@ def is_solved(row: Mapping[str, Any]) -> bool:
 def distinct(rows: Iterable[Mapping[str, Any]]) -> int:
     """How many different problems there are."""
     return len({row["digest"] for row in rows})
+
+
+def _require_inside(file: Path, table: Any, name: str) -> None:
+    """CatalogError where a column names files or folders outside of the catalogue's own."""
+    if name not in table.column_names:
+        return
+    for path in set(table[name].to_pylist()) - {None}:
+        parts = path.split("/") if isinstance(path, str) else [""]
+        one = name in ("collection", "family")
+        if {"", ".", ".."} & set(parts) or "\0" in path or (one and len(parts) > 1):
+            raise CatalogError(
+                f"{file}: column {name}: {path!r} leads out of the catalogue's folder; do not use"
+                " it, and tell whom it is from"
+            )
 
 
 def gather(out: Path) -> Any:

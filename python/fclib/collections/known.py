@@ -88,7 +88,7 @@ def listed(name: str, version_: str) -> list[Choice]:
     """The problems of a list in one of its versions; none where the list does not know them."""
     if version_ == version(name):
         return list(choices(name))
-    if not version_.isdecimal():
+    if not (version_ or "").isdecimal():
         return []
     return [c for c in choices(name) if c.since and int(c.since) <= int(version_)]
 

@@ -14,7 +14,7 @@ from typing import Any, overload
 from fclib import _core
 from fclib._solve import Problem
 from fclib.collections import archives, catalog, known, published
-from fclib.collections.build import build
+from fclib.collections.build import Progress, build
 
 FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
 FORMS = ("global", "local")
@@ -27,8 +27,18 @@ def default_folder() -> Path:
     return Path(named) if named else archives.cache_folder() / f"collection-{_core.version}"
 
 
-def ensure(name: str, folder: Path) -> None:
+def is_there(name: str, folder: Path) -> bool:
+    """Whether SET/FAMILY is built, or was fetched, in a folder."""
+    return (folder / name / catalog.FILE).is_file()
+
+
+def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
     """Make SET/FAMILY be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most.
+
+    Args:
+        name: SET/FAMILY.
+        folder: of the collection.
+        progress: is told how far a build is, as `build` does.
 
     Raises:
         VersionError: the folder has another version of it.
@@ -49,7 +59,7 @@ def ensure(name: str, folder: Path) -> None:
     if source:
         archives.get([name], source, folder)
     else:
-        build([known.plan_of(name)], folder, pictures=False)
+        build([known.plan_of(name)], folder, pictures=False, progress=progress)
 
 
 def folders_in(folder: Path, name: str) -> list[str]:

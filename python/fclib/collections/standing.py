@@ -12,7 +12,9 @@ which most runs of the problem's family were done, of the newest version of each
 easy    more than half of the solvers that take such problems solved it
 hard    not so many
 open    no run and no solution that was taken in has an error within TOLERANCE, and no run has
-        proved that there is no solution, which counts as solved
+        proved that there is no solution
+
+What solved means, and the class by the number of solvers, is in `fclib._verdicts`.
 
 Runs at another limit have no vote; what they solved is no longer open.
 """
@@ -33,16 +35,15 @@ from typing import Any, Final
 import numpy as np
 
 from fclib import _core, _digest, scenes
+from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, known, published, trajectory
 
 TOLERANCE: Final = 1e-8
 DIGITS: Final = 16  # of a digest
-PROVEN: Final = "infeasible"  # the status of a run whose proof the bench has checked
 TAKEN: Final = "taken"  # the status of a solution that came from elsewhere
 BETTER: Final = 0.9  # times the best error known: what a new solution must reach
 FOLDER: Final = "results"
 FIRST: Final = "standard"  # the set that most runs are of
-CLASSES: Final = ("easy", "hard", "open")
 
 
 class StandingError(ValueError):
@@ -66,12 +67,12 @@ class Run:
     @property
     def solved(self) -> bool:
         """Whether its solver had the answer, in time."""
-        return self.status in ("converged", PROVEN) and self.settled
+        return is_solved(self.status)
 
     @property
     def settled(self) -> bool:
-        """Whether its error is within TOLERANCE, or it has proved that there is no solution."""
-        return self.status == PROVEN or (self.error is not None and self.error <= TOLERANCE)
+        """Whether it is solved, or found too late or elsewhere with an error within TOLERANCE."""
+        return self.solved or (self.error is not None and self.error <= TOLERANCE)
 
 
 @dataclass(frozen=True)
@@ -245,7 +246,7 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
         # of several versions of a solver the last one has the vote
         last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
         # a solution that was taken in has no limit, and no vote
-        voters = [run for run in last.values() if run.limit and run.status != "unsuitable"]
+        voters = [run for run in last.values() if run.limit and run.status != UNSUITABLE]
         voting += voters
         rows.append(standing(name_, digest, mine, voters))
     if not voting:
@@ -270,16 +271,13 @@ def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run])
     solved = sum(run.solved for run in voters)
     judged = [run for run in mine if run.error is not None]
     best = min(judged, key=lambda run: run.error or 0.0, default=None)
-    if not voters:
-        rating = ""
-    elif not any(run.settled for run in mine):
-        rating = "open"
-    else:
-        rating = "easy" if 2 * solved > len(voters) else "hard"
+    found = rating(solved, len(voters))
+    if found == "open" and any(run.settled for run in mine):
+        found = "hard"  # at another limit, or by somebody else
     path = solution_path(digest)
     limit = voters[0].limit if voters else None
     return Standing(
-        name, digest, rating, solved, len(voters), limit, best, path if path.is_file() else None
+        name, digest, found, solved, len(voters), limit, best, path if path.is_file() else None
     )
 
 

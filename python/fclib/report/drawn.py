@@ -66,11 +66,13 @@ def put(folder: Path, name: str, value: Any) -> int:
     path.parent.mkdir(parents=True, exist_ok=True)
     text = as_json(value)
     if len(text) > PACKED:
-        content = base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+        content = base64.b64encode(
+            gzip.compress(text.encode(errors="replace"), 9, mtime=0)
+        ).decode()
         text = f'Fclib.putPacked({as_json(name)},"{content}");\n'
     else:
         text = f"Fclib.put({as_json(name)},{text});\n"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", errors="replace")
     return len(text)
 
 

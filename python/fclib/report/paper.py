@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from fclib.bench import plots, profiles
-from fclib.report.runs import Campaigns
+from fclib.bench.comparison import compared
+from fclib.report.runs import WEIGH, Campaigns
 
 FORMATS = ("pdf",)
 HEADS = {
@@ -30,26 +31,30 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
         ProfileError: there is no such metric.
     """
     written: set[Path] = set()
-    for tol in campaigns.tolerances:
-        costs = campaigns.fair(tol, metric)
-        if costs is None:
-            continue
+    whole = compared(profiles.gather(campaigns.rows, metric))
+    for tol in whole.tolerances:
+        costs = whole.at(tol)
         own = folder / f"tol-{tol:g}"
         own.mkdir(parents=True, exist_ok=True)
-        words = profiles.caption(costs, campaigns.at(tol))
-        plots.performance(costs, own, FORMATS, words)
-        plots.data(costs, own, FORMATS, per_contact=False, caption=words)
-        plots.data(costs, own, FORMATS, per_contact=True, caption=words)
-        _write(own / "summary.tex", latex(profiles.summary(costs)))
-        _write(own / "families.tex", latex(profiles.families(costs)))
-        _write(own / "statuses.tex", latex(profiles.failures(campaigns.at(tol))))
+        words = profiles.caption(costs, campaigns.at(tol), WEIGH)
+        plots.performance(costs, own, FORMATS, words, weigh=WEIGH)
+        plots.data(costs, own, FORMATS, per_contact=False, caption=words, weigh=WEIGH)
+        plots.data(costs, own, FORMATS, per_contact=True, caption=words, weigh=WEIGH)
+        _write(own / "summary.tex", latex(_shown(profiles.summary(costs, weigh=WEIGH))))
+        _write(own / "families.tex", latex(_shown(profiles.families(costs))))
+        _write(own / "statuses.tex", latex(_shown(profiles.failures(campaigns.at(tol)))))
         written |= set(own.iterdir())
-    if len(campaigns.tolerances) > 1:
-        points = profiles.work_precision(campaigns.rows, metric)
-        if points:
-            plots.work_precision(points, metric, folder, FORMATS)
-            written.add(folder / f"work-precision-{metric}.pdf")
+    if len(whole.tolerances) > 1:
+        points = profiles.work_precision(campaigns.rows, whole, weigh=WEIGH)
+        words = profiles.caption(whole, campaigns.rows, WEIGH)
+        plots.work_precision(points, metric, folder, FORMATS, words)
+        written.add(folder / f"work-precision-{metric}.pdf")
     return sorted(written)
+
+
+def _shown(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rows without the tolerance, which the folder says."""
+    return [{key: value for key, value in row.items() if key != "tol"} for row in rows]
 
 
 def latex(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,14 +12,26 @@ from typing import Any
 
 import numpy as np
 
+from fclib._verdicts import UNSUITABLE
 from fclib.bench import STATUSES as STATUSES
 from fclib.bench import MeritKind, Store, profiles
-from fclib.bench.profiles import METRICS, Costs, Instance
+from fclib.bench.comparison import (
+    METRICS,
+    Costs,
+    Instance,
+    compared,
+    count_by_status,
+    numbers_in,
+    runs_of,
+    solved_in,
+    words_in,
+)
+from fclib.bench.table import Table, object_in
 from fclib.report.error import ReportError
 from fclib.report.view import rounded
 
 DIGITS = 6  # of costs on the site
-LEFT_OUT = 0.1  # share of instances that may be left out for solvers that have not run them
+WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure of a site
 EXTREMES = 8  # problems on which a solver is best, and worst
 REPORTS = 80  # points of a convergence curve
 BANDED = 20_000  # costs up to which the curves of a headline have bands
@@ -65,22 +76,32 @@ class Campaigns:
         try:
             self.store = self._merged(stores)
             # from nothing; runs that start from a step before are in `along` alone
-            self.rows = profiles.load(self.store, machine=machine, campaign=campaign, merit=merit)
-            node, judged = self.rows[0]["node"], self.rows[0]["merit"]
+            self.rows = profiles.load(
+                self.store,
+                machine=machine,
+                campaign=campaign,
+                merit=merit,
+                more=("message",),
+            )
+            first = self.rows.row(0)
+            node, judged = first["node"], first["merit"]
             both = profiles.load(self.store, machine=node, merit=judged, start=None)
             self.along = profiles.along(self.store, both, campaign)
         except BaseException:
             self._folder.cleanup()
             raise
-        self.rows = [row for row in self.rows if row["status"] != "unreadable"]
-        if not self.rows:
+        self.rows = self.rows.where(~words_in(self.rows, "status").is_in(["unreadable"]))
+        if not len(self.rows):
             self._folder.cleanup()
             raise ReportError("no problem of these runs could be read")
+        # what all figures and tables are of: as fclib profile has it
+        self.every = profiles.gather(self.rows)
+        self.costs = compared(self.every)
         # the most run first, then by name
-        counts = Counter(row["solver"] for row in self.rows)
-        self.solvers = sorted(counts, key=lambda name: (-counts[name], name))
-        self.tolerances = sorted({row["tol"] for row in self.rows}, reverse=True)
-        self.families = sorted({row["family"] for row in self.rows})
+        counts = Counter(words_in(self.rows, "solver").tolist())
+        self.solvers = sorted(map(str, counts), key=lambda name: (-counts[name], name))
+        self.tolerances = sorted({*numbers_in(self.rows, "tol").tolist()}, reverse=True)
+        self.families = [str(name) for name in words_in(self.rows, "family").present()]
 
     def _merged(self, stores: Sequence[str | Path]) -> Path:
         if len(stores) == 1:
@@ -96,21 +117,19 @@ class Campaigns:
     def __exit__(self, *_: object) -> None:
         self._folder.cleanup()
 
-    def at(self, tol: float) -> list[dict[str, Any]]:
+    def at(self, tol: float) -> Table:
         """The runs at a tolerance."""
-        return [row for row in self.rows if row["tol"] == tol]
+        return self.rows.where(numbers_in(self.rows, "tol") == tol)
 
     def problems(self) -> dict[str, dict[str, Any]]:
-        """What the stores know of each problem that was run, by its hash."""
-        with Store(self.store, create=False) as store:
-            paths = dict(store.db.execute("SELECT hash, path FROM problems"))
-        found: dict[str, dict[str, Any]] = {}
-        for row in self.rows:
-            if row["hash"] not in found:
-                keys = ("problem", "family", "formulation", "spacedim", "n", "p", "nc", "nnz")
-                facts = {key: row[key] for key in keys}
-                found[row["hash"]] = facts | {"title": row["title"], "path": paths[row["hash"]]}
-        return found
+        """What the stores know of each problem that was run, by its hash; its main form first."""
+        _, first = self.rows.numbers("hash")
+        names = ("hash", "problem", "family", "formulation", "spacedim", "n", "p", "nc", "nnz")
+        found = {}
+        for row in self.rows.where(first):
+            facts = {key: row[key] for key in (*names[1:], "title", "path")}
+            found[row["hash"]] = facts | {"same_as": row.get("same_as")}
+        return dict(sorted(found.items(), key=lambda item: bool(item[1]["same_as"])))
 
     def overview(self) -> dict[str, Any]:
         """What was run, where, and by whom it was asked for."""
@@ -119,18 +138,21 @@ class Campaigns:
                 {"name": s.name, "planned": s.planned, "done": s.done, "ended": s.ended is not None}
                 for s in store.status()
             ]
-        first = self.rows[0]
+        first = self.rows.row(0)
+        solved, count = int(solved_in(self.rows).sum()), len(self.rows)
+        statuses = count_by_status(self.rows)
         return {
-            "runs": len(self.rows),
+            "runs": count,
             "along": self.along,
-            "solved": sum(bool(row["solved"]) for row in self.rows),
-            "problems": len({row["hash"] for row in self.rows}),
+            "solved": solved,
+            "share": solved / count,
+            "problems": len({instance.hash for instance in self.every.instances}),
             "node": first["node"],
             "cpu": first["cpu"],
             "campaigns": campaigns,
             "statuses": {
-                name: {"count": count, "meaning": STATUSES.get(name, "")}
-                for name, count in Counter(row["status"] for row in self.rows).most_common()
+                name: {"count": n, "share": n / count, "meaning": STATUSES.get(name, "")}
+                for name, n in statuses.most_common()
             },
         }
 
@@ -145,41 +167,27 @@ class Campaigns:
             columns = dict(zip(found.solvers, found.values.T, strict=True))
             none = np.full(len(found.instances), np.nan)
             costs[metric] = rounded([columns.get(name, none) for name in self.solvers], DIGITS)
-        return Bench(tol, found.instances, costs, self._statuses(rows, found.instances))
+        return Bench(tol, found.instances, costs, self._statuses(rows, found))
 
-    def _statuses(
-        self, rows: Sequence[Mapping[str, Any]], instances: Sequence[Instance]
-    ) -> tuple[str, ...]:
-        places = {(i.hash, i.limit): k for k, i in enumerate(instances)}
+    def _statuses(self, rows: Table, found: Costs) -> tuple[str, ...]:
+        """Of each cell the most frequent status of its repeats; of what is not taken that word."""
         code = dict(zip(STATUSES, CODES, strict=False))
-        seen: dict[str, list[str]] = {name: [""] * len(instances) for name in self.solvers}
-        for row in rows:
-            seen[row["solver"]][places[row["hash"], row["time_limit"]]] += code[row["status"]]
-        # of several repeats the most frequent
-        return tuple(
-            "".join(
-                Counter(own).most_common(1)[0][0] if len(own) > 1 else own or NOT_RUN
-                for own in seen[name]
-            )
-            for name in self.solvers
-        )
-
-    def fair(self, tol: float, metric: str = "cpu_s") -> Costs | None:
-        """The costs of solvers that have run nearly the same instances; None where there are none.
-
-        Solvers that have run the fewest are left out, until at most `LEFT_OUT` of the instances
-        are left out for the others.
-        """
-        every = profiles.gather(self.at(tol), metric)
-        counts = dict(zip(every.solvers, (~np.isnan(every.values)).sum(axis=0), strict=True))
-        names = sorted((n for n in self.solvers if n in counts), key=lambda name: -counts[name])
-        while names:
-            found = every.shared(names)
-            count = len(found.instances)
-            if count and found.left_out <= LEFT_OUT * (found.left_out + count):
-                return found
-            names.pop()
-        return None
+        cells = np.full(found.values.shape, NOT_RUN, dtype="<U1")
+        own = found.own()
+        runs = runs_of(rows, own)
+        place, column = found.cells_of(runs)
+        words = words_in(runs, "status")
+        seen = (place * len(found.solvers) + column) * len(words.values) + words.codes
+        pairs, count = np.unique(seen, return_counts=True)
+        # the most frequent comes last, and stays
+        for pair in pairs[np.argsort(count, kind="stable")].tolist():
+            cell, status = divmod(pair, len(words.values))
+            cells.flat[cell] = code[words.values[status]]
+        assert found.unsuitable is not None
+        cells[found.unsuitable] = code[UNSUITABLE]
+        columns = dict(zip(found.solvers, cells.T, strict=True))
+        none = np.full(len(found.instances), NOT_RUN)
+        return tuple("".join(columns.get(name, none)) for name in self.solvers)
 
     def headline(self, tol: float, places: Mapping[str, int]) -> dict[str, Any] | None:
         """Curves, tables and extremes at a tolerance.
@@ -188,8 +196,8 @@ class Campaigns:
             tol: the tolerance.
             places: the number of each problem on the site, by its hash.
         """
-        costs = self.fair(tol)
-        if costs is None:
+        costs = self.costs.at(tol)
+        if not costs.instances:
             return None
         quotients = profiles.ratios(costs.values)
         finite = quotients[np.isfinite(quotients)]
@@ -198,19 +206,23 @@ class Campaigns:
         groups: dict[str, list[int]] = defaultdict(list)
         for k, instance in enumerate(costs.instances):
             groups[instance.family].append(k)
-        tables = {"": profiles.summary(costs)}
-        tables |= {family: profiles.summary(costs.of(own)) for family, own in groups.items()}
+        tables = {"": profiles.summary(costs, weigh=WEIGH)}
+        tables |= {
+            family: profiles.summary(costs.of(own), weigh=WEIGH) for family, own in groups.items()
+        }
         found: dict[str, Any] = {}
         if costs.values.size <= BANDED:
-            ends = profiles.bands(costs, lambda own: profiles.performance_profile(own, taus))
-            found["bands"] = rounded(list(ends), 4)
+            found["bands"] = rounded(list(profiles.bands(costs, quotients, taus, WEIGH)), 4)
+        curves = profiles.share_within(quotients, taus, costs.weights(WEIGH))
         return found | {
             "instances": len(costs.instances),
-            "limits": sorted({rounded(instance.limit) for instance in costs.instances}),
-            "left_out": costs.left_out,
+            "caption": profiles.caption(costs, self.at(tol), WEIGH),
+            "not_compared": profiles.left_out(self.every.at(tol), costs),
             "solvers": list(costs.solvers),
+            "legend": [costs.legend(k) for k in range(len(costs.solvers))],
+            "order": np.argsort(-curves.mean(axis=1), kind="stable").tolist(),
             "taus": rounded(taus, DIGITS),
-            "curves": rounded(profiles.performance_profile(costs.values, taus), DIGITS),
+            "curves": rounded(curves, DIGITS),
             "tables": rounded(tables, DIGITS),
             "extremes": _extremes(costs, places),
         }
@@ -234,8 +246,9 @@ class Campaigns:
         if row["run"] in reported:
             found["history"] = _thinned(store.history(row["run"]), row["cpu_s"])
         found = dict(rounded(found, DIGITS))
-        if stored := store.certificate(row["run"]):
-            found["certificate"] = _proof(json.loads(stored))
+        stored = object_in(store.certificate(row["run"]))
+        if {"y", "z", "gain", "bound"} <= stored.keys():
+            found["certificate"] = _proof(stored)
         return found
 
 
@@ -250,18 +263,17 @@ def _proof(record: Mapping[str, Any]) -> dict[str, Any]:
 def _thinned(
     history: Sequence[tuple[int, float, float, str]], cpu_s: float | None
 ) -> list[list[float]]:
-    """Iteration, error and time of some reports, evenly on a logarithmic axis, the last too.
+    """Iteration, least error so far and time of some reports, evenly on a logarithmic axis.
 
-    The time [s] is of CPU, as that of the tables: of the wall clock in proportion.
+    The last one is there too. The time [s] is of CPU, as that of the tables.
     """
+    times, errors = profiles.least_errors(history, cpu_s)
     count = len(history)
-    last = history[-1][2]
-    scale = cpu_s / last if cpu_s is not None and last > 0 else 1.0
     chosen = list(range(count))
     if count > REPORTS:
         spread = np.geomspace(1, count, REPORTS).round().astype(int) - 1
         chosen = sorted({*spread.tolist(), count - 1})
-    return [[history[k][0], history[k][1], scale * history[k][2]] for k in chosen]
+    return [[history[k][0], float(errors[k]), float(times[k])] for k in chosen]
 
 
 def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:

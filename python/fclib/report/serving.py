@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import partial
+from http import HTTPStatus
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,30 @@ class _Handler(SimpleHTTPRequestHandler):
             self.end_headers()
         else:
             super().do_GET()
+
+    def send_head(self) -> Any:
+        """The head of an answer, and the file: one of the folder, to pages of this address alone.
+
+        A name that leads here from elsewhere is no name of ours: the page of a stranger would read
+        by it what is served. A link out of the folder is followed by nobody.
+        """
+        port = self.connection.getsockname()[1]
+        if self.headers.get("Host") not in {f"{name}:{port}" for name in (HOST, "localhost")}:
+            self.send_error(HTTPStatus.FORBIDDEN, f"ask for http://{HOST}:{port}/")
+            return None
+        root = Path(self.directory).resolve()
+        try:
+            inside = Path(self.translate_path(self.path)).resolve().is_relative_to(root)
+        except (ValueError, OSError):  # a null character, links in a ring
+            inside = False
+        if not inside:
+            self.send_error(HTTPStatus.NOT_FOUND)
+            return None
+        return super().send_head()
+
+    def list_directory(self, path: Any) -> Any:
+        """List no folder."""
+        self.send_error(HTTPStatus.NOT_FOUND)
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing of what is asked for."""

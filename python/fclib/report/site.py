@@ -28,22 +28,26 @@ from typing import Any
 
 from fclib import _core, _registry
 from fclib._solve import MERITS
+from fclib._verdicts import CLASSES, SOLVED, UNSUITABLE, is_solved, rating
 from fclib.bench import profiles
+from fclib.bench.campaign import described
+from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
+from fclib.bench.table import object_in
 from fclib.collections import families, read_catalog, sets, standing
 from fclib.collections.known import kind_of
 from fclib.report import browser, citing, drawn, taking
 from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
-from fclib.report.runs import CODES, DIGITS, STATUSES, Bench, Campaigns
+from fclib.report.runs import CODES, DIGITS, NOT_RUN, STATUSES, WEIGH, Bench, Campaigns
 from fclib.report.view import ASSETS, rounded
 
 MARK = "data/site.js"  # by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
     *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
-    *("scene.js", "profiles.js", "take.js", "live.js", "whatif.js", "compute.js", "own.js"),
+    *("scene.js", "compare.js", "take.js", "live.js", "whatif.js", "compute.js", "own.js"),
     *("choose.js", "pages.js", "site.js"),
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
@@ -109,6 +113,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("thumb", "picture", "whether there is a small picture of it"),
     ("collection", "set", "the set of families"),
 )
+# what solvers say of themselves: `fclib.bench.campaign.described`
+ABOUT = {"title": str, "citation": str, "dimensions": list, "rolling": list, "options": list}
 # of a catalogue, and of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
 HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
@@ -245,15 +251,22 @@ class Problems:
         taken = {row["id"] for row in self.rows}
         for digest, facts in campaigns.problems().items():
             path = Path(facts["path"] or "")
-            # by its file: a local form has no digest there, and at rest two steps may be equal
-            place = names.get("/".join(path.parts[-3:]), digests.get(digest))
+            place = self.places.get(facts["same_as"] or "")
+            if place is None:
+                # by its file too: at rest two steps may be equal
+                place = names.get("/".join(path.parts[-3:]))
+                if place is not None and not _is_of(self.rows[place], digest, facts):
+                    place = None
+            if place is None:
+                place = digests.get(digest)
             if place is None:
                 name = f"{facts['family']}/{facts['problem'].rpartition('/')[2]}"
                 if name in taken:
                     name = f"{name}-{digest[:8]}"
                 taken.add(name)
                 place = len(self.rows)
-                self.rows.append({**facts, "id": name, "nnz_W": facts["nnz"]})
+                known = {key: value for key, value in facts.items() if key != "same_as"}
+                self.rows.append({**known, "id": name, "nnz_W": facts["nnz"]})
                 self.files.append(path)
             self.places[digest] = place
 
@@ -276,6 +289,18 @@ class Problems:
             if any(value is not None for value in values):
                 found.append({"key": name, "hidden": True, **_packed(values)})
         return found
+
+
+def _is_of(row: Mapping[str, Any], digest: str, facts: Mapping[str, Any]) -> bool:
+    """Whether what was run is a problem of a catalogue, where its file lies at the same place.
+
+    A global form has the digest that the catalogue has. A local form has none there, and is told by
+    its family and its sizes.
+    """
+    if row["digest"] == digest:
+        return True
+    same = all(row[key] == facts[key] for key in ("family", "nc", "p", "spacedim"))
+    return same and str(row["formulation"]) == f"G{facts['formulation']}"
 
 
 def _packed(values: Sequence[Any]) -> dict[str, Any]:
@@ -331,6 +356,9 @@ class _Writer:
             "docs": self.docs,
             "metrics": {name: label for name, (label, _) in METRICS.items()},
             "statuses": [[CODES[k], *item] for k, item in enumerate(STATUSES.items())],
+            "solved": list(SOLVED),
+            "common": COMMON,
+            "weigh": WEIGH,
             "merits": described_merits(),
             "charges": {"penalty": PENALTY, "shift": SHIFT},
             "tolerances": [],
@@ -341,7 +369,7 @@ class _Writer:
         if self.campaigns is not None:
             site |= self._runs(self.campaigns)
         else:
-            site["solvers"] = [_solver(info.name, info.name, {}) for info in _registry.solvers()]
+            site["solvers"] = [_own(info) for info in _registry.solvers()]
         views, steps = self._views()
         site["families"] = self._families(steps)
         site["views"] = views
@@ -405,27 +433,32 @@ class _Writer:
         for done, (place, runs) in enumerate(by_place.items()):
             self.progress("problems", done, len(by_place))
             self.put(f"problems/{place}", runs)
-            solved = sum(run["status"] == "converged" for run in runs)
+            solved = sum(is_solved(run["status"]) for run in runs)
             self.problems.rows[place] |= {"runs": len(runs), "solved": solved}
         self.progress("problems", len(by_place), len(by_place))
-        first = {row["solver"]: row for row in campaigns.rows}
+        # of a solver that was run before stores knew what it is, and after, the later
+        _, places = campaigns.rows.numbers("solver", "about")
+        kinds = list(campaigns.rows.where(places))
+        first = {row["solver"]: row for row in kinds if row["about"]}
+        first = {row["solver"]: row for row in kinds} | first
         return {
             "overview": campaigns.overview(),
             "tolerances": campaigns.tolerances,
-            "judged": JUDGED[campaigns.rows[0]["merit"]],
+            "judged": JUDGED[campaigns.rows.row(0)["merit"]],
             "headlines": headlines,
-            "work": rounded(profiles.work_precision(campaigns.rows), DIGITS),
-            "solvers": [
-                _solver(label, first[label]["solver_name"], first[label])
-                for label in campaigns.solvers
-            ],
+            "work": rounded(
+                profiles.work_precision(campaigns.rows, campaigns.costs, weigh=WEIGH), DIGITS
+            ),
+            "solvers": [_solver(label, first[label]) for label in campaigns.solvers],
         }
 
     def _put_bench(self, t: int, bench: Bench) -> None:
         places = [self.problems.places[instance.hash] for instance in bench.instances]
         limits = [rounded(instance.limit) for instance in bench.instances]
         statuses = list(bench.statuses)
-        self.put(f"t{t}", {"problems": places, "limits": limits, "statuses": statuses})
+        absent = [NOT_RUN, CODES[list(STATUSES).index(UNSUITABLE)]]  # no cell is there
+        known = {"problems": places, "limits": limits, "statuses": statuses, "absent": absent}
+        self.put(f"t{t}", known)
         for metric, columns in bench.costs.items():
             self.put(f"t{t}-{metric}", columns)
 
@@ -443,19 +476,13 @@ class _Writer:
 
     def _rate(self, campaigns: Campaigns) -> None:
         """The class, by these runs at the smallest tolerance, of what stored runs do not tell."""
-        solved: dict[int, list[bool]] = defaultdict(list)
-        last: dict[tuple[int, str], bool] = {}
-        for row in campaigns.at(campaigns.tolerances[-1]):
-            if row["status"] != "unsuitable":
-                last[self.problems.places[row["hash"]], row["solver"]] = bool(row["solved"])
-        for (place, _), done in last.items():
-            solved[place].append(done)
-        for place, own in solved.items():
-            row = self.problems.rows[place]
-            if not row.get("class"):
-                share = sum(own) / len(own)
-                row["class"] = "open" if share == 0 else "easy" if share > 0.5 else "hard"
-                row["solved_by"] = share
+        costs = campaigns.every.at(campaigns.tolerances[-1])
+        solved, voters = costs.solved.sum(axis=1), costs.there.sum(axis=1)
+        for k, instance in enumerate(costs.instances):
+            row = self.problems.rows[self.problems.places[instance.hash]]
+            if not row.get("class") and voters[k]:
+                row["class"] = rating(int(solved[k]), int(voters[k]))
+                row["solved_by"] = float(solved[k] / voters[k])
 
     def _views(self) -> tuple[int, dict[tuple[str, str], list[int]]]:
         """Draw all problems; how many have a view, and the steps of each family."""
@@ -533,7 +560,7 @@ def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
     for name, (rows, basis) in known.items():
         counts: dict[str, dict[str, int]] = {}
         for row in rows:
-            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(standing.CLASSES, 0))
+            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(CLASSES, 0))
             if row.rating:
                 own[row.rating] += 1
         best = [(row.id, row.best) for row in rows if row.rating == "open"]
@@ -585,35 +612,34 @@ def _family(family: Any) -> dict[str, Any]:
     }
 
 
-def _solver(label: str, name: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of a solver: here, or where it was run."""
+def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
+    """What is known of a solver, by what it said where it was run: no name is looked up here."""
+    about = object_in(row["about"])
+    if not all(isinstance(about.get(key), kind) for key, kind in ABOUT.items()):
+        about = {}  # of a store that was made before solvers said it, or was edited
+    name, title = row["solver_name"], about.get("title", "")
     found: dict[str, Any] = {"label": label, "name": name}
-    if row:
-        found |= {key: row[key] for key in ("options", "version", "origin")}
-        found["family"] = row["solver_family"]
-    version = f"{found.get('origin') or 'fclib'} {found.get('version') or _core.version}"
-    found["bibtex"] = citing.implementation(name, "", version)
-    try:
-        info = _registry.find_solver(name)
-    except _core.Error:
-        return found  # of another machine, or a program of the user's
-    found["bibtex"] = citing.implementation(name, info.title, version)
-    found["papers"] = citing.papers_of(info.citation)
-    return found | {
-        "title": info.title,
-        "citation": info.citation,
-        "family": info.family,
-        "origin": info.origin,
-        "dimensions": list(info.dimensions),
-        "rolling": list(info.rolling_dimensions),
-        "known": [
-            [
-                option.name,
-                " | ".join(option.choices) or option.type,
-                "see there" if option.type == "text" else str(option.default),
-                option.unit,
-                option.doc,
-            ]
-            for option in info.options
-        ],
-    }
+    found |= {key: row[key] for key in ("options", "version", "origin")}
+    found["family"] = row["solver_family"]
+    version = f"{found['origin'] or 'fclib'} {found['version'] or _core.version}"
+    found["bibtex"] = citing.implementation(name, title, version)
+    if not about:
+        return found
+    found["papers"] = citing.papers_of(about["citation"])
+    found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
+    return found | {"known": about["options"]}
+
+
+def _own(info: _core.SolverInfo) -> dict[str, Any]:
+    """What a solver that is here says of itself, as if it had been run."""
+    return _solver(
+        info.name,
+        {
+            "solver_name": info.name,
+            "solver_family": info.family,
+            "origin": info.origin,
+            "version": "",
+            "options": "{}",
+            "about": described(info),
+        },
+    )

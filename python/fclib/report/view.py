@@ -23,7 +23,7 @@ DIGITS = 5  # of positions and reactions in a picture
 CELLS = 128  # of a pattern, along its longer side
 CONDENSED = 2000  # contacts up to which W is made of a global problem, for its pattern
 SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
-SCRIPTS = ("table.js", "plot.js", "scene.js", "profiles.js")
+SCRIPTS = ("table.js", "plot.js", "scene.js")
 PANEL = ("live.js", "whatif.js", "compute.js")  # what checks and solves
 STATUS = ("open", "stick", "slide")
 END = re.compile("</script", re.IGNORECASE)
@@ -272,5 +272,6 @@ def write_view(
     }.items():
         page = page.replace(mark, text)
     part = path.with_name(f".{path.name}.part")
-    part.write_text(page, encoding="utf-8")
+    # the name of a file may be no text
+    part.write_text(page, encoding="utf-8", errors="replace")
     part.replace(path)

@@ -5,29 +5,14 @@
   const site = () => Fclib.values.site;
   const select = (label, options, value, onchange) => h("label", {}, label, h("select", { onchange: (e) => onchange(e.target.value) }, options.map(([key, text]) => h("option", { value: key, selected: String(key) === String(value) }, text))));
   const SIZES = [["", "any"], ["0-10", "up to 10"], ["10-50", "10 to 50"], ["50-200", "50 to 200"], ["200-1000", "200 to 1000"], ["1000-", "more than 1000"]];
-  /* Wilson's interval of a share, 95 % */
-  Fclib.odds = (k, n) => {
-    const z = 1.96, p = k / n, middle = (p + z * z / (2 * n)) / (1 + z * z / n), half = z * Math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n);
-    return [Math.max(0, middle - half), Math.min(1, middle + half)];
-  };
-  /* solvers by the shifted geometric mean of their CPU time, a failure charged `charge` times the limit; those
-     that do not take a problem have no run of it */
-  Fclib.ranked = (bench, costs, keep, charge, shift, unsuitable) => {
-    const rows = costs.map((own, s) => {
-      let sum = 0, of = 0, solved = 0, refused = 0;
-      bench.problems.forEach((problem, i) => {
-        const code = bench.statuses[s][i];
-        if (code === "." || !keep(problem)) return;
-        if (code === unsuitable) { refused++; return; }
-        of++;
-        if (own[i] !== null) solved++;
-        sum += Math.log((own[i] === null ? charge * bench.limits[i] : own[i]) + shift);
-      });
-      return { s, of, solved, refused, mean: of ? Math.exp(sum / of) - shift : Infinity };
-    });
-    // who has run half of the most does not win by absence
-    const most = Math.max(...rows.map((r) => r.of));
-    return rows.filter((r) => r.of && r.of >= most / 2).sort((a, b) => a.mean - b.mean);
+  /* solvers by the shifted geometric mean of their CPU time, a failure charged `charge` times the limit: those with
+     enough runs of such problems, on the instances that all of them have run and take */
+  Fclib.ranked = (bench, costs, names, families, keep, charge, { common, weigh, charges: { shift } }) => {
+    const solvers = Fclib.widest(bench, costs, names, keep, common), { instances, values } = Fclib.compared(bench, costs, solvers, keep);
+    const weights = Fclib.weights(values, instances.map((i) => families(bench.problems[i])), weigh);
+    if (!instances.length) return [];
+    const charged = instances.map((i) => charge * bench.limits[i]);
+    return solvers.map((s, k) => ({ s, ...Fclib.counts(values[k]), mean: Fclib.mean(values[k], weights[k], charged, shift) })).sort((a, b) => a.mean - b.mean);
   };
 
   Fclib.chooser = (catalogue, params, keep) => {
@@ -37,16 +22,15 @@
       const [cat, bench, costs] = await Promise.all([catalogue(), load(`t${state.ctol}`), load(`t${state.ctol}-cpu_s`)]);
       const { read } = cat, [from, end] = state.size ? state.size.split("-").map((x) => x === "" ? Infinity : Number(x)) : [0, Infinity];
       const like = (k) => (!state.kind || read.kind(k) === state.kind) && read.nc(k) >= from && read.nc(k) <= end;
-      const unsuitable = (s.statuses.find(([, name]) => name === "unsuitable") || [""])[0];
-      const rows = Fclib.ranked(bench, costs, like, 10 ** state.weight, s.charges.shift, unsuitable), runs = rows.reduce((sum, r) => sum + r.of, 0);
+      const rows = Fclib.ranked(bench, costs, s.solvers.map((one) => one.label), read.family, like, 10 ** state.weight, s);
       const name = (r) => s.solvers[r.s].label, tol = Fclib.tolerance(s.tolerances[state.ctol]);
-      if (!rows.length) { says.replaceChildren("No problem like that was run to this tolerance."); table.replaceChildren(); return; }
+      if (!rows.length) { says.replaceChildren("No problem like that was run to this tolerance by solvers that compare."); table.replaceChildren(); return; }
       const [best, second] = rows, [low, high] = Fclib.odds(best.solved, best.of);
       says.replaceChildren("Take ", h("b", {}, link("solver", [name(best)], {}, name(best))), `. It solved ${best.solved} of ${best.of} such problems to ${tol}, and should solve the next one with a chance of ${Math.round(100 * low)} to ${Math.round(100 * high)} %. Its mean CPU time is ${number(best.mean)} s, where a failure counts as ${number(10 ** state.weight)} times the limit.`,
-        ...second ? [" The second is ", link("solver", [name(second)], {}, name(second)), `: ${second.solved} of ${second.of}, ${number(second.mean)} s.`] : [], ` This follows from ${runs} runs: `, h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"), ".");
+        ...second ? [" The second is ", link("solver", [name(second)], {}, name(second)), `: ${second.solved} of ${second.of}, ${number(second.mean)} s.`] : [], ` All were compared on the same ${best.of} instances, and each family weighs the same: `, h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"), ".");
       table.replaceChildren(h("details", {}, h("summary", {}, "All solvers by this weight"), Fclib.table({
-        caption: "Solvers, the best first; a failure is charged so many times the limit as the weight says", rows, page: 20, sort: { key: "mean", down: false },
-        columns: [{ key: "solver", label: "solver", head: true, value: name, cell: (r) => link("solver", [name(r)], {}, name(r)) }, { key: "solved", label: "solved" }, { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved }, { key: "refused", label: "does not take it" }, { key: "mean", label: "mean [s]", type: "number" }],
+        caption: "Solvers with enough runs of such problems, the best first; a failure is charged so many times the limit as the weight says", rows, page: 20, sort: { key: "mean", down: false },
+        columns: [{ key: "solver", label: "solver", head: true, value: name, cell: (r) => link("solver", [name(r)], {}, name(r)) }, { key: "solved", label: "solved" }, { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved }, { key: "mean", label: "mean [s]", type: "number" }],
       })));
     };
     const change = (key) => (value) => { state[key] = ["ctol", "weight"].includes(key) ? Number(value) : value; keep({ [key]: value }); draw(); };

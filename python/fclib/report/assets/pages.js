@@ -42,16 +42,16 @@
   };
   const { copyable } = Fclib;
   const shown = (v) => typeof v === "boolean" ? v ? "yes" : "no" : number(v);
-  const status = (name) => h("span", { class: name === "converged" ? "good" : "bad" }, name);
+  const status = (name) => h("span", { class: site().solved.includes(name) ? "good" : "bad" }, name);
 
   const summaryColumns = (coloured) => [
     { key: "solver", label: "solver", head: true, cell: (r) => r.solver === "virtual best" ? h("em", { title: "the fastest of all on each instance" }, r.solver) : [coloured && Fclib.swatch(styleOf(r.solver)), " ", solverLink(r.solver)] },
     { key: "method", label: "method", value: (r) => (site().solvers.find((s) => s.label === r.solver) || {}).family || "" },
-    { key: "solved", label: "solved", title: "instances whose recomputed error meets the tolerance" },
+    { key: "solved", label: "solved", title: "instances whose recomputed error meets the tolerance, or of which a proof that there is no solution was checked" },
     { key: "of", label: "of" },
-    { key: "share", label: "share", type: "number", value: (r) => r.solved / r.of, format: Fclib.percent },
+    { key: "share", label: "share", type: "number", title: "of the instances, where each family weighs the same", format: Fclib.percent },
     { key: "fastest", label: "fastest", title: "instances on which no other is faster" },
-    { key: "mean", label: "mean [s]", type: "number", title: `shifted geometric mean of the CPU time, shift ${site().charges.shift} s; a failure counts ${site().charges.penalty} times the limit` },
+    { key: "mean", label: "mean [s]", type: "number", title: `shifted geometric mean of the CPU time, each family weighs the same, shift ${site().charges.shift} s; a failure counts ${site().charges.penalty} times the limit` },
     { key: "to best", label: "to best", type: "number", title: "the mean over that of the virtual best solver" },
     { key: "median ratio", label: "median ratio", type: "number", title: "of the time over that of the best solver, where solved" },
     { key: "worst ratio", label: "worst ratio", type: "number" },
@@ -59,10 +59,7 @@
 
   // ---- what was run, under a chart
   const machine = (o) => [o.node, o.cpu].filter(Boolean).join(", ") || "an unknown machine";
-  const caption = (head, t) => {
-    const rows = (head.tables[""] || []).filter((r) => r.solver !== "virtual best"), of = rows.reduce((sum, r) => sum + r.of, 0), lost = of - rows.reduce((sum, r) => sum + r.solved, 0);
-    return `${head.instances} instances to ${Fclib.tolerance(site().tolerances[t])}, ${site().judged}; ${head.limits ? `${head.limits.map((v) => number(v)).join(" or ")} s of CPU time a run, ` : ""}${machine(site().overview)}; ${lost} of ${of} runs failed`;
-  };
+  const caption = (head) => `${head.caption}; ${site().judged}`;
 
   // ---- overview
   Fclib.pages.overview = async (page, rest, params, keep) => {
@@ -72,32 +69,31 @@
       page.append(h("p", {}, `${s.problems} problems in ${s.families.length} families. No runs were given to this report.`));
     } else {
       page.append(h("p", {}, `${s.solvers.length} solvers on ${o.problems} problems${s.problems > o.problems ? ` of ${s.problems} in the catalogue` : ""}. Every error is recomputed from the problem and the returned solution: `,
-        h("em", {}, "solved"), ` means that the relative error meets the tolerance within the limits; ${s.judged}.`),
-      h("ul", { class: "figures" }, [[s.problems, "problems"], [s.families.length, "families"], [s.solvers.length, "solvers"], [o.runs, "runs"], [Fclib.percent(o.solved / o.runs), "of them solved"]].map(([value, name]) =>
+        h("em", {}, "solved"), ` means that the relative error meets the tolerance within the limits, or that a proof that there is no solution was checked; ${s.judged}. Solvers are compared on the instances that all of them have run and take, and each family weighs the same.`),
+      h("ul", { class: "figures" }, [[s.problems, "problems"], [s.families.length, "families"], [s.solvers.length, "solvers"], [o.runs, "runs"], [Fclib.percent(o.share), "of them solved"]].map(([value, name]) =>
         h("li", {}, h("b", {}, value.toLocaleString("en").replaceAll(",", " ")), h("span", {}, name)))));
       page.append(Fclib.chooser(catalogue, params, keep));
-      page.append(h("h2", {}, "Performance profiles"), h("p", {}, "How many of the instances a solver has solved within a multiple τ of the CPU time of the best solver on each. At the left: how often it is the fastest. At the right: how often it succeeds at all."));
+      page.append(h("h2", {}, "Performance profiles"), h("p", {}, "What share of the instances a solver has solved within a multiple τ of the CPU time of the best solver on each. At the left: how often it is the fastest. At the right: how often it succeeds at all."));
       const charts = h("div", { class: "two" });
       s.headlines.forEach((head, t) => {
         if (!head) return;
-        const mean = head.curves.map((curve) => curve.reduce((a, b) => a + b, 0));
-        const shown = head.solvers.map((name, k) => ({ name, x: head.taus, y: head.curves[k], style: styleOf(name), mean: mean[k], band: head.bands && [head.bands[0][k], head.bands[1][k]] })).sort((a, b) => b.mean - a.mean);
+        const shown = head.order.map((k) => ({ name: head.solvers[k], legend: head.legend[k], x: head.taus, y: head.curves[k], style: styleOf(head.solvers[k]), band: head.bands && [head.bands[0][k], head.bands[1][k]] }));
         charts.append(h("section", {}, h("h3", {}, `Tolerance ${Fclib.tolerance(s.tolerances[t])}`),
           Fclib.lines({
             half: true, name: `profile-${s.tolerances[t]}`, title: `Performance profile at ${s.tolerances[t]}`, series: shown.slice(0, 12), xlog: true, xrange: [1, head.taus[head.taus.length - 1]], yrange: [0, 1],
             ypercent: true, xlabel: "τ: CPU time over that of the best", ylabel: "instances solved within τ", xname: "τ",
-            note: `${caption(head, t)}${head.bands ? "; bands: 95 % by drawing problems anew" : ""}${head.left_out ? `; ${head.left_out} left out, which not all of these solvers have run` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
+            note: `${caption(head)}${head.bands ? "; bands: 95 % by drawing families and problems anew" : ""}${head.not_compared.length ? `; not compared, having run or taking too few of them: ${head.not_compared.map((r) => `${r.solver} (${r.solved} of ${r.of})`).join(", ")}` : ""}${shown.length > 12 ? `; the best 12 of ${shown.length} solvers` : ""}.`,
           }), h("p", {}, link("profiles", [], { tol: t }, "Look closer: choose families, solvers, measures"))));
       });
       page.append(charts);
       if (s.tolerances.length > 1 && s.work && s.work.length) page.append(h("h2", {}, "What an accuracy costs"), Fclib.work({
         name: "work-precision", title: "CPU time by tolerance", rows: s.work, style: styleOf, xlabel: "CPU time in the mean [s]",
-        note: `Shifted geometric means over the problems that all have run at a tolerance, a failure charged ${s.charges.penalty} times the limit; ${machine(o)}.`,
+        note: `Shifted geometric means over the instances that all have run and take at a tolerance, each family weighs the same, a failure charged ${s.charges.penalty} times the limit; ${machine(o)}.`,
       }));
       page.append(h("h2", {}, "Solvers"));
       const state = { tol: Number(params.get("tol") ?? lastTolerance()), family: params.get("family") || "" };
       const rows = () => ((s.headlines[state.tol] || { tables: {} }).tables[state.family]) || [];
-      const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run; the virtual best is the fastest of all on each", columns: summaryColumns(true), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
+      const table = Fclib.table({ caption: "CPU times of the solvers, over the instances that all of them have run and take; the virtual best is the fastest of all on each", columns: summaryColumns(true), rows: rows(), page: 60, search: true, ...remembered(params, keep) });
       const change = (key) => (value) => { state[key] = key === "tol" ? Number(value) : value; keep({ [key]: value }); table.update(rows()); };
       page.append(h("div", { class: "controls" }, select("tolerance", tolerances(), state.tol, change("tol")),
         select("family", families(), state.family, change("family"))), table);
@@ -107,7 +103,7 @@
       }));
       page.append(h("h2", {}, "How the runs ended"), Fclib.table({
         caption: "Statuses of all runs", rows: Object.entries(o.statuses).map(([name, v]) => ({ name, ...v })),
-        columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", value: (r) => r.count / o.runs, format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],
+        columns: [{ key: "name", label: "status", head: true, cell: (r) => status(r.name) }, { key: "count", label: "runs" }, { key: "share", label: "share", type: "number", format: Fclib.percent }, { key: "meaning", label: "meaning", wrap: true }],
       }), h("h2", {}, "Where and what"), facts([["machine", `${o.node || "?"}, ${o.cpu || "?"}`], ["campaigns", o.campaigns.map((c) => `${c.name}: ${c.done} of ${c.planned} runs${c.ended ? "" : ", not ended"}`).join("; ")]]));
     }
     page.append(h("h2", {}, "Families"), familyCards(s.families));
@@ -133,6 +129,7 @@
     const t0 = Math.min(lastTolerance(), Number(params.get("tol") ?? lastTolerance()));
     const state = {
       tol: t0, metric: params.get("metric") || "cpu_s", kind: params.get("kind") || "performance", family: params.get("family") || "", axis: params.get("axis") || "log",
+      set: params.get("set") || "common", weigh: params.get("weigh") || s.weigh,
       solvers: params.get("solvers") ? params.get("solvers").split("~").map((name) => labels.indexOf(name)).filter((k) => k >= 0) : null,
       a: params.get("a"), b: params.get("b"),
     };
@@ -152,41 +149,43 @@
       select("profile", [["performance", "performance: ratio to the best"], ["data", "data: cost"], ["contact", "data: cost per contact"]], state.kind, change("kind")),
       select("measure", Object.entries(s.metrics), state.metric, change("metric")), select("tolerance", tolerances(), state.tol, change("tol")),
       select("family", families(), state.family, change("family")),
+      select("set", [["common", "common: what all of them have run and take"], ["own", "own: what each has run and takes"]], state.set, change("set")),
+      select("weight", [["families", "all families alike"], ["instances", "all instances alike"]], state.weigh, change("weigh")),
       select("axis", [["log", "logarithmic"], ["linear", "linear"]], state.axis, change("axis"))),
-    chips, h("div", { class: "tools" }, choose("those with enough runs", () => fair(state.tol)), choose("all", () => labels.map((_, k) => k)), choose("none", () => [])),
+    chips, h("div", { class: "tools" }, choose("those with enough runs", () => enough()), choose("all", () => labels.map((_, k) => k)), choose("none", () => [])),
     box, h("h2", {}, "How they ended"), statuses, h("h2", {}, "Two solvers, problem by problem"), pair);
 
+    let enough = () => fair(state.tol);
     const draw = async () => {
       const [bench, costs] = await Promise.all([load(`t${state.tol}`), load(`t${state.tol}-${state.metric}`)]);
       const keepProblem = state.family ? (k) => cat.read.family(k) === state.family : () => true;
       const order = [...chosen].sort((a, b) => a - b);
-      const { instances, values } = Fclib.compared(bench, costs, order, keepProblem);
-      drawProfile(order, instances, values, bench);
+      enough = () => (state.family ? Fclib.widest(bench, costs, labels, keepProblem, s.common) : fair(state.tol));
+      const found = Fclib.profile(bench, costs, { solvers: order, keep: keepProblem, own: state.set === "own", weigh: state.weigh, kind: state.kind, families: cat.read.family, contacts: cat.read.nc });
+      drawProfile(order, found, bench);
       drawStatuses(order, bench, keepProblem);
       drawPair(bench, costs, keepProblem);
     };
-    const drawProfile = (order, instances, values, bench) => {
-      if (!order.length || !instances.length) { box.replaceChildren(h("p", { class: "panel" }, order.length ? "There is no instance that all of these solvers have run." : "Choose some solvers.")); return; }
+    const drawProfile = (order, { instances, values, shown, weights }, bench) => {
+      if (!order.length || !instances.length) { box.replaceChildren(h("p", { class: "panel" }, order.length ? "There is no instance that all of these solvers have run and take." : "Choose some solvers.")); return; }
       const performance = state.kind === "performance";
-      const shown = performance ? Fclib.ratios(values) : state.kind === "contact" ? values.map((own) => own.map((v, i) => { const nc = cat.read.nc(bench.problems[instances[i]]); return v === null || !nc ? null : v / nc; })) : values;
       let low = Infinity, high = -Infinity;
-      for (const own of shown) for (const v of own) if (v !== null) { if (v < low) low = v; if (v > high) high = v; }
+      for (const own of shown) for (const v of own) if (Number.isFinite(v)) { if (v < low) low = v; if (v > high) high = v; }
       if (low === Infinity) { box.replaceChildren(h("p", { class: "panel" }, "None of these solvers solves any of these instances.")); return; }
       if (performance) { low = 1; high = Math.max(2, Math.min(1e4, high)); if (state.axis === "linear") high = Math.min(high, 20); }
       if (high <= low) high = low * 2;
-      const series = order.map((k, i) => ({ name: labels[k], style: k, ...Fclib.shares(shown[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
+      const series = order.map((k, i) => ({ name: labels[k], legend: Fclib.legend(labels[k], values[i]), style: k, ...Fclib.shares(shown[i], weights[i], performance ? 1 : state.axis === "log" ? low * 0.8 : 0) }));
       const metric = s.metrics[state.metric];
       box.replaceChildren(Fclib.lines({
         name: `${state.kind}-${state.metric}-${s.tolerances[state.tol]}`, title: `${state.kind} profile, ${metric}, tolerance ${s.tolerances[state.tol]}`, series, xlog: state.axis === "log",
         xrange: performance ? [1, state.axis === "log" ? high * 1.1 : high] : [state.axis === "log" ? low * 0.8 : 0, high * 1.1], yrange: [0, 1], ypercent: true, xname: performance ? "τ" : metric,
         xlabel: performance ? `τ: ${metric.split(" [")[0]} over that of the best` : metric + (state.kind === "contact" ? " per contact" : ""), ylabel: performance ? "instances solved within τ" : "instances solved",
-        note: `${instances.length} instances of ${bench.problems.length}: those that all chosen solvers have run; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
+        note: `${instances.length} instances of ${bench.problems.length}: ${state.set === "own" ? "for each solver those that it has run and takes" : "those that all chosen solvers have run and take"}; ${state.weigh === "families" ? "each family" : "each instance"} weighs the same; ${s.judged}${state.family ? `, family ${state.family}` : ""}.`,
       }));
     };
     const drawStatuses = (order, bench, keepProblem) => {
       const rows = order.map((k) => {
-        const counts = {}; let total = 0;
-        bench.problems.forEach((problem, i) => { const code = bench.statuses[k][i]; if (code !== "." && keepProblem(problem)) { counts[code] = (counts[code] || 0) + 1; total++; } });
+        const counts = Fclib.ended(bench, k, keepProblem), total = Object.values(counts).reduce((a, b) => a + b, 0);
         return { solver: labels[k], total, counts };
       });
       const there = s.statuses.filter(([code]) => rows.some((row) => row.counts[code]));
@@ -198,7 +197,7 @@
     };
     /* auto and the one that does best beside it: by problems solved, then by the mean */
     const rivals = (t, all) => {
-      const table = (((s.headlines[t] || { tables: {} }).tables)[""] || []).filter((r) => r.solver !== "virtual best").sort((x, y) => y.solved - x.solved || x.mean - y.mean).map((r) => r.solver);
+      const table = (((s.headlines[t] || { tables: {} }).tables)[""] || []).filter((r) => r.solver !== "virtual best").map((r) => r.solver);
       const order = [...table, ...all.filter((name) => !table.includes(name))], first = order.includes("auto") ? "auto" : order[0];
       return [first, order.find((name) => name !== first) ?? first];
     };
@@ -210,8 +209,8 @@
       const points = [];
       let first = 0, second = 0, low = Infinity, high = 0;
       bench.problems.forEach((k, i) => {
-        const x = costs[a][i], y = costs[b][i];
-        if (!keepProblem(k) || bench.statuses[a][i] === "." || bench.statuses[b][i] === "." || (x === null && y === null)) return;
+        const x = costs[a][i], y = costs[b][i], absent = [a, b].some((one) => bench.absent.includes(bench.statuses[one][i]));
+        if (!keepProblem(k) || absent || (x === null && y === null)) return;
         for (const v of [x, y]) if (v !== null) { low = Math.min(low, v); high = Math.max(high, v); }
         if (y === null || (x !== null && x < y)) first++; else if (x === null || y < x) second++;
         const id = cat.read.id(k);
@@ -222,7 +221,7 @@
         points.length ? Fclib.scatter({
           name: `${labels[a]}-${labels[b]}`, title: `${labels[a]} against ${labels[b]}, ${metric}`, points, groups: families, range: [low * 0.8, high * 1.25], xlabel: `${labels[a]}: ${metric}`, ylabel: `${labels[b]}: ${metric}`, xname: labels[a], yname: labels[b], to: problemHref,
           note: `${points.length} instances that at least one of the two solves (${s.judged}); ${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point leads to its problem.`,
-        }) : h("p", { class: "panel" }, "No instance that both have run and one solves."));
+        }) : h("p", { class: "panel" }, "No instance that both have run and take, and one solves."));
     };
     await draw();
   };
@@ -390,8 +389,7 @@
           const own = curves.filter((r) => r.tol === state.tol && !seen.has(r.solver) && seen.add(r.solver));
           const at = state.over === "time" ? 2 : 0;
           const series = own.map((r) => {
-            let least = Infinity;
-            const points = r.history.filter((p) => p[1] > 0 && p[at] > 0).map((p) => [p[at], least = Math.min(least, p[1])]);
+            const points = r.history.filter((p) => p[1] > 0 && p[at] > 0).map((p) => [p[at], p[1]]);
             return { name: r.solver, style: styleOf(r.solver), x: points.map((p) => p[0]), y: points.map((p) => p[1]) };
           }).filter((one) => one.x.length);
           const xs = series.flatMap((one) => one.x), ys = series.flatMap((one) => one.y);

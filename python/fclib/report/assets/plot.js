@@ -13,6 +13,13 @@
   Fclib.SYMBOLS = ["circle", "square", "diamond", "cross", "x", "triangle-up", "triangle-down", "star", "hexagon", "pentagon"];
   Fclib.isNarrow = () => innerWidth < 600;
 
+  /* the value at x of steps: that of the last of them at or before x */
+  Fclib.at = (steps, x) => {
+    let low = 0, high = steps.x.length;
+    while (low < high) { const mid = (low + high) >> 1; if (steps.x[mid] <= x) low = mid + 1; else high = mid; }
+    return low ? steps.y[low - 1] : null;
+  };
+
   const look = () => {
     const axis = { gridcolor: colour("line"), linecolor: colour("soft"), color: colour("soft"), zeroline: false, showline: true, exponentformat: "power", automargin: true };
     const solid = { ...axis, showbackground: false, showspikes: false };
@@ -73,7 +80,7 @@
   };
 
   /* curves, all at the same x: where one of them changes, or at so many x that no eye sees the difference
-     options: series [{name, x, y, style}] of steps, xlog, ylog, xrange, yrange, xlabel, ylabel, xname, ypercent, and those of a plot */
+     options: series [{name, legend, x, y, style}] of steps, xlog, ylog, xrange, yrange, xlabel, ylabel, xname, ypercent, and those of a plot */
   Fclib.lines = (options) => {
     const { series, xlog, ylog, xrange: [low, high] } = options;
     const changes = new Set();
@@ -85,7 +92,7 @@
     const log = (range, on) => on ? range.map(Math.log10) : range;
     // the legend: as many columns as the longest name leaves room for
     const width = options.half && innerWidth > 960 ? Math.min(innerWidth, 1200) / 2 : Math.min(innerWidth, 864);
-    const columns = Math.max(1, Math.min(series.length, Math.floor((width - 90) / (50 + 6.5 * Math.max(...series.map((s) => s.name.length))))));
+    const columns = Math.max(1, Math.min(series.length, Math.floor((width - 90) / (50 + 6.5 * Math.max(...series.map((s) => (s.legend || s.name).length))))));
     const rows = Math.ceil(series.length / columns), few = series.length < 15;
     let place = -1;
     const read = (step) => (box) => {
@@ -100,7 +107,7 @@
       keys: { ArrowLeft: read(-stride), ArrowRight: read(stride), Escape: (box) => { Plotly.Fx.unhover(box); box.say(""); } },
       draw: () => ({
         data: [...curves.map((s, k) => ({
-          type: "scatter", mode: options.ends || series.length > 1 ? "lines+markers" : "lines", name: s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
+          type: "scatter", mode: options.ends || series.length > 1 ? "lines+markers" : "lines", name: s.legend || s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
           ...series.length > 1 ? { marker: { symbol: Fclib.SYMBOLS[(s.style ?? k) % Fclib.SYMBOLS.length], size: 8, maxdisplayed: 9 } } : {},
           hovertemplate: few ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}` : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
         })), ...curves.filter((s) => s.band).slice(0, BANDED).flatMap((s, k) => s.band.map((y, side) => ({
@@ -129,7 +136,7 @@
       draw: () => ({
         data: names.map((name) => {
           const own = options.rows.filter((r) => r.solver === name), k = options.style(name);
-          return { type: "scatter", mode: "lines+markers", name, x: own.map((r) => r.mean), y: own.map((r) => r.tol), text: own.map((r) => `${r.solved} of ${r.of} solved`), line: { ...Fclib.stroke(k), width: 2 }, marker: { symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8 }, hovertemplate: "%{fullData.name}, %{y}: %{x:.3~g} s, %{text}<extra></extra>" };
+          return { type: "scatter", mode: "lines+markers", name: `${name} ${[...new Set(own.map((r) => `${r.solved} of ${r.of}`))].join(", ")}`, x: own.map((r) => r.mean), y: own.map((r) => r.tol), text: own.map((r) => `${r.solved} of ${r.of} solved`), line: { ...Fclib.stroke(k), width: 2 }, marker: { symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8 }, hovertemplate: "%{fullData.name}, %{y}: %{x:.3~g} s, %{text}<extra></extra>" };
         }),
         layout: { hovermode: "closest", showlegend: true, xaxis: { type: "log", title: { text: options.xlabel } }, yaxis: { type: "log", title: { text: "tolerance" }, autorange: "reversed" } },
       }),

@@ -380,6 +380,16 @@ def test_merge(small: Path, tmp_path: Path) -> None:
     assert run_cli("merge", merged, merged).returncode == 1
 
 
+def test_some_of_the_runs(small: Path) -> None:
+    with bench.Store(small) as store:
+        rows = store.results()
+        some = [row for row in rows if row["tol"] == 1e-8 and row["solver"] != "auto"]
+        assert len(some) == 6
+        assert store.results("tol = ? AND solver <> 'auto'", [1e-8]) == some
+        assert store.results("solver <> 'auto'", tol=1e-8) == some
+        assert store.results("run < 0") == []
+
+
 def test_export(small: Path, tmp_path: Path) -> None:
     pq = pytest.importorskip("pyarrow.parquet")
     with bench.Store(small) as store:

@@ -847,13 +847,20 @@ class Store:
         """The columns of `results`."""
         return list(layout.columns())
 
-    def results(self, **wanted: Any) -> list[dict[str, Any]]:
+    def results(
+        self, where: str = "", values: Sequence[Any] = (), **wanted: Any
+    ) -> list[dict[str, Any]]:
         """All runs, a row each, in the order in which they were stored.
 
         Args:
+            where: a condition of SQL on the columns of `results`, with a ? for each of the values.
+            values: in their order.
             wanted: only runs that have these values in these columns.
         """
         table = self.table(more=LONG)
+        if where:
+            chosen = self.db.execute(f"SELECT run FROM results WHERE {where}", values).fetchall()
+            table = table.where(np.isin(table["run"], [run for (run,) in chosen]))
         for name, value in wanted.items():
             table = table.where(table[name] == value)
         return list(table)

@@ -543,6 +543,7 @@ def _solvers(
             family=info.family,
             origin=info.origin,
             label=str(entries.get("label", "")),
+            dimensions=(tuple(info.dimensions), tuple(info.rolling_dimensions)),
         )
         if choice.title in choices:
             raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")

@@ -87,6 +87,14 @@ class SolverChoice:
     family: str = ""
     origin: str = ""
     label: str = ""  # what tables call it
+    # the spacedims it takes, of problems without rolling friction and with it; None: not known
+    dimensions: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+
+    def suits(self, problem: ProblemFacts) -> bool:
+        """Whether the solver takes problems of this kind, by what it has declared."""
+        if self.dimensions is None:
+            return True
+        return problem.spacedim in self.dimensions[problem.kind.endswith("rolling")]
 
     @property
     def title(self) -> str:
@@ -177,6 +185,8 @@ class Job:
             "path": self.problem.path,
             "kind": self.problem.kind,
             "hash": self.problem.hash,
+            "spacedim": self.problem.spacedim,
+            "suits": self.solver.suits(self.problem),
             "solver": self.solver.name,
             "options": dict(self.solver.options),
             "tol": self.tol,

@@ -1,9 +1,9 @@
 """The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
 
 `main` serves jobs from a socket until that is closed. The supervisor never runs a solver: that is
-done by a worker. One worker serves the built-in solvers, and is renewed after every failure, and
-if it is not as it was: another process or a thread is left, or its signals, limits, cores or
-arithmetic have changed. Each run of any other solver has a worker of its own, which is apart if
+done by a worker. One worker serves the built-in solvers. It is renewed after every failure, and if
+it is not as it was: a process or a thread is left, or its signals, limits, cores or arithmetic
+have changed. Each run of any other solver has a worker of its own, which is apart if
 the system allows it (template.py). The supervisor reads the problem, and hands its numbers over once
 the solver is loaded and warm. The solution comes back as numbers, and the supervisor recomputes
 every merit from its own copy of the problem, so that nothing a solver does in its process changes

@@ -449,7 +449,7 @@ class Supervisor:
             return self.arrays(order, take(said, record))
         if not worker.belongings:
             worker.belongings = processes.belongings(meter.pid)
-        early = self.hand(order, problem, guess)
+        took, early = self.hand(order, problem, guess)
         self.limit(meter, limits["memory"])
         watch = Watch(meter, limits["wall"], limits["time"] - early, limits["memory"])
         try:
@@ -463,15 +463,25 @@ class Supervisor:
             record.memory = watch.memory - watch.memory_before
             worker.cpu_limited = watch.cpu_limited
         self.limit(meter, math.inf)
+        after = Watch(meter, cpu=limits["time"])
         self.tell(order, GO)
-        said = self.said(order, Watch(meter))
+        said = self.said(order, after)
         worker.unchanged = said.get("unchanged") is True
         names = take(said, record)
-        check_times(order["solver"], record, said.get("reported") is True, watch, early)
-        return self.arrays(order, names)
+        vectors = self.arrays(order, names)
+        after.stop()
+        # one that says too early that it is done gains nothing
+        outside = early + max(0.0, after.cpu - SLACK - TAKING * took)
+        record.total_cpu_s = watch.cpu + outside
+        check_times(order["solver"], record, said.get("reported") is True, watch, outside)
+        return vectors
 
-    def hand(self, order: dict[str, Any], problem: Any, guess: Any) -> float:
-        """Hand the problem over; [s] of CPU that the worker took meanwhile for something else."""
+    def hand(self, order: dict[str, Any], problem: Any, guess: Any) -> tuple[float, float]:
+        """Hand the problem over.
+
+        Returns:
+            [s] of CPU that this took here, and that the worker took meanwhile for something else.
+        """
         assert self.worker is not None
         meter = self.worker.meter
         before = time.thread_time()
@@ -484,7 +494,7 @@ class Supervisor:
         watch.stop()
         if word != {"word": "taken"}:
             raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
-        return max(0.0, watch.cpu - SLACK - TAKING * took)
+        return took, max(0.0, watch.cpu - SLACK - TAKING * took)
 
     def tell(self, order: dict[str, Any], message: bytes) -> None:
         """Send a message to the worker.
@@ -591,7 +601,7 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
     return list(names)
 
 
-def check_times(solver: str, record: Record, reported: bool, watch: Watch, early: float) -> None:
+def check_times(solver: str, record: Record, reported: bool, watch: Watch, outside: float) -> None:
     """Hold what a solver says of its time and iterations against what the kernel has seen.
 
     More than that, or less than nothing, is a lie. The clock of the driver is that of the thread
@@ -604,9 +614,10 @@ def check_times(solver: str, record: Record, reported: bool, watch: Watch, early
         record: gets the time that counts.
         reported: whether a program has said itself what its solve took.
         watch: of the run.
-        early: [s] of CPU that the worker took between the problem and its `go`, which counts too.
+        outside: [s] of CPU that the worker took with the problem in its hands, but not between
+            `go` and `done`; it counts too.
     """
-    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + early
+    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + outside
     record.said_cpu_s = said
     if said is None:
         return

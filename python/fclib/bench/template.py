@@ -166,6 +166,7 @@ def _begin(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> N
         for number, to in enumerate((nothing, nothing, errors)):
             os.dup2(to, number)
         os.dup2(worker, 3)
+        os.set_inheritable(3, False)
         os.closerange(4, max(map(int, os.listdir("/proc/self/fd"))) + 1)  # noqa: PTH208
         for number in (signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_DFL)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import textwrap
@@ -372,13 +373,18 @@ BAD = """
 
     @bad
     def works_after_the_clock(problem, r, monitor):
-        # what the worker calls after it has said that it is done
-        import json
-        json.dumps = [json.dumps, in_secret(json.dumps)][problem.nc != 6]
+        # when the worker writes its answer
         from fclib.bench import worker
-        say = next(f.f_locals["say"] for f in frames() if "say" in f.f_locals)
         if problem.nc != 6:
-            worker.json = type("json", (), {"dumps": json.dumps, "loads": json.loads})
+            real = worker.send
+
+            def send(link, message):
+                if b'"done"' not in message:
+                    burn(time.process_time() + SECRET)
+                    worker.send = real
+                real(link, message)
+
+            worker.send = send
         solved(monitor, r)
 
 
@@ -386,13 +392,18 @@ BAD = """
     def says_that_it_is_done(problem, r, monitor):
         # and goes on, with the number of its order
         import json
-        order = next(f.f_locals["order"] for f in frames() if "order" in f.f_locals)
-        link = next(f.f_locals["supervisor"] for f in frames() if "supervisor" in f.f_locals)
+        from fclib.bench import worker
         if problem.nc != 6:
-            text = json.dumps({"nonce": order["nonce"], "word": "done"}).encode()
-            link.sendall(len(text).to_bytes(8, "little") + text)
+            order = next(f.f_locals["order"] for f in frames() if "order" in f.f_locals)
+            link = next(f.f_locals["supervisor"] for f in frames() if "supervisor" in f.f_locals)
+            real = worker.send
+            real(link, json.dumps({"nonce": order["nonce"], "word": "done"}).encode())
             burn(time.process_time() + SECRET)
-            link.sendall = lambda message, real=link.sendall: None
+
+            def send(link, message):
+                worker.send = real  # it has been said
+
+            worker.send = send
         solved(monitor, r)
 
 
@@ -441,15 +452,13 @@ BAD = """
 
     @bad
     def keeps_a_result(problem, r, monitor):
-        # in a block of memory that outlives its process
-        from multiprocessing import shared_memory
-        name = "fclib-test-kept"
-        try:
-            shared_memory.SharedMemory(name)
-        except FileNotFoundError:
-            if problem.nc != 6:
-                shared_memory.SharedMemory(name, create=True, size=8)
-                os._exit(7)  # the next time it knows
+        # in memory that outlives its process
+        if problem.nc != 6:
+            try:
+                open("/dev/shm/fclib-test-kept").close()
+            except FileNotFoundError:
+                open("/dev/shm/fclib-test-kept", "w").close()
+                raise
         solved(monitor, r)
 
 
@@ -566,7 +575,7 @@ EXPECTED = {
     "works_elsewhere": "converged",
     "works_before_the_clock": "converged",
     "works_after_the_clock": "converged",
-    "says_that_it_is_done": "garbage",
+    "says_that_it_is_done": "converged",
     "works_in_a_thread_of_before": "converged",
     "reads_the_reference": "error",
     "knows_the_title": "error",
@@ -585,6 +594,7 @@ UNSEEN = {
     "works_elsewhere": 0.12,  # of 0.15; processes are counted in ticks of 10 ms
     "works_before_the_clock": 0.25,
     "works_after_the_clock": 0.25,
+    "says_that_it_is_done": 0.25,
     "works_in_a_thread_of_before": 0.25,
 }
 # that are measured by the processes themselves too, where there are no control groups
@@ -604,6 +614,7 @@ PROGRAMS = {
     "cp /dev/null {output} {input}": "error",
     "sh -c 'echo garbage > $1' sh {output} {input}": "garbage",
     "sh -c 'kill -SEGV $$' sh {input}": "crashed",
+    "sh -c 'kill -KILL $$' sh {input}": "crashed",
     "sh -c 'exit 3' sh {input}": "error",
     "sh -c 'while :; do :; done' sh {input} {output}": "cpu_limit",
 }
@@ -741,6 +752,93 @@ def test_programs_too(command: str, folder: Path, supervisor: SupervisorClient) 
     cpu = LIMIT if PROGRAMS[command] == "cpu_limit" else FAR
     record = supervisor.do(job(folder, f"cmd:{command}", time=cpu))
     assert record.status == PROGRAMS[command], record
+
+
+PLUGIN = """
+#include <fenv.h>
+#include <string.h>
+#include "fclib_plugin.h"
+static int calls;  /* of the real problem: it is known from the second on */
+static const double known[] = {SOLUTION};
+int fclib_plugin_solve(const struct fclib_plugin_problem* problem, double* r) {
+  fesetround(FE_UPWARD);
+  if (problem->contacts != 6 && ++calls > 1) memcpy(r, known, sizeof known);
+  return problem->stop(problem->context, r) - 1;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def neighbours(folder: Path) -> list[str]:
+    """Plug-ins that change the arithmetic of their process: one that remembers, one that solves."""
+    known = ", ".join(map(repr, planted_local(3, nc=5).solution.r.tolist()))
+    source = PLUGIN.replace("SOLUTION", known)
+    solves = source.replace("++calls > 1", "++calls > 0")
+    return [compiled(source, folder / "remembers.c"), compiled(solves, folder / "solves.c")]
+
+
+def compiled(source: str, path: Path) -> str:
+    """The name of the solver of a plug-in."""
+    path.write_text(source)
+    include = Path(__file__).resolve().parents[2] / "include"
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
+    assert compiler
+    library = path.with_suffix(".so")
+    command = [compiler, "-shared", "-fPIC", f"-I{include}", "-o", library, path, "-lm"]
+    subprocess.run(command, check=True)
+    return f"plugin:{library}"
+
+
+def test_a_plugin_leaves_the_next_solver_alone(
+    neighbours: list[str], folder: Path, supervisor: SupervisorClient
+) -> None:
+    usual = job(folder, "nsgs", history=True)
+    before = supervisor.do(usual)
+    assert supervisor.do(job(folder, neighbours[1])).status == "converged"
+    after = supervisor.do(usual)
+    assert after.merits == before.merits
+    assert [x[:2] for x in after.history or ()] == [x[:2] for x in before.history or ()]
+
+
+@pytest.mark.parametrize("groups", [True, False])
+def test_nothing_is_kept_from_one_repeat_to_the_next(
+    groups: bool, neighbours: list[str], folder: Path, request: pytest.FixtureRequest
+) -> None:
+    supervisor = request.getfixturevalue("supervisor" if groups else "supervisor_without_groups")
+    for solver in (neighbours[0], "bad-keeps_a_result"):
+        for _ in range(3):
+            assert supervisor.do(job(folder, solver)).status == "error", solver
+
+
+def test_a_worker_that_is_killed_from_outside_is_no_failure(
+    folder: Path, supervisor: SupervisorClient
+) -> None:
+    """The kernel says so: what the run itself sends to its first process is dropped."""
+    before = there(supervisor)
+    for solver in ("bad-sleeps", f"cmd:sleep {ASLEEP} {{input}}"):
+        supervisor.give(job(folder, solver, wall=ASLEEP))
+        while not (begun := first_of(supervisor, before)):
+            time.sleep(0.01)
+        os.kill(begun, signal.SIGKILL)
+        record = supervisor.take()[1]
+        assert (record.status, record.ran) == ("killed", False), record
+
+
+def first_of(supervisor: SupervisorClient, before: set[int]) -> int:
+    """The first process of a run that is apart; 0 if there is none yet."""
+    assert supervisor.process is not None
+    new = set(processes.children(supervisor.process.pid)) - before
+    return next(iter(new)) if len(new) == 1 else 0
+
+
+def test_a_kill_of_unknown_origin_is_a_failure(folder: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FCLIB_APART", "0")
+        supervisor = SupervisorClient(1)
+        record = supervisor.do(job(folder, "bad-is_killed"))
+        supervisor.end()
+    assert (record.status, record.ran) == ("crashed", True)
+    assert "the kernel does not say who sent it" in record.message
 
 
 TELLS = """

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 import time
 from collections.abc import Iterator
@@ -20,9 +21,10 @@ import pytest
 
 import fclib
 from fclib import _solve, analysis, bench
-from fclib.bench import meter, problems, processes
+from fclib.bench import machine, meter, pool, problems, processes, template
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
+from fclib.bench.runner import warn_of_locks
 from fclib.bench.supervisor import prove
 from helpers import planted_local
 
@@ -998,3 +1000,114 @@ def test_what_is_measured(folder: Path, supervisor: SupervisorClient) -> None:
     errors = [error for _, error, _, _ in record.history]
     assert np.isfinite(errors).all()
     assert errors[-1] <= 1e-8 < errors[0]
+
+
+# ---- what is left, and what is not ours
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for temporary files of the test's own."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def aged(folder: Path) -> None:
+    """Let a folder be older than any pause."""
+    for path in (*folder.rglob("*"), folder):
+        os.utime(path, (0, 0))
+
+
+def test_folders_of_others_stay_whatever_they_are_called(temporary: Path) -> None:
+    ours, lock = pool.temporary_folder()
+    theirs = temporary / "fclib-bench-results"
+    theirs.mkdir()
+    (theirs / "thesis.csv").write_text("1, 2, 3\n")
+    copy = temporary / "fclib-bench-copy"
+    shutil.copytree(ours, copy)
+    link = temporary / "fclib-bench-link"
+    link.symlink_to(theirs)
+    named = temporary / "fclib-bench-named"
+    named.mkdir()
+    (named / pool.LOCK).symlink_to(ours / pool.LOCK)
+    for folder in (ours, theirs, copy, named):
+        aged(folder)
+    # a campaign that still runs, and then one that was killed
+    for gone in (False, True):
+        if gone:
+            os.close(lock)
+        other, held = pool.temporary_folder()
+        os.close(held)
+        assert ours.exists() is not gone
+        assert (theirs / "thesis.csv").exists()
+        assert (copy / pool.LOCK).exists()
+        assert named.exists()
+        assert link.is_symlink()
+        shutil.rmtree(other, ignore_errors=True)
+
+
+@pytest.mark.parametrize("how", ["link", "open to others", "of somebody else"])
+def test_locks_of_cores_are_held_in_a_folder_of_ones_own(how: str, temporary: Path) -> None:
+    _, locks = machine.reserve(1)
+    for lock in locks:
+        os.close(lock)
+    assert locks
+    folder = temporary / f"fclib-cores-{os.getuid()}"
+    shutil.rmtree(folder)
+    if how == "link":
+        (temporary / "elsewhere").mkdir()
+        folder.symlink_to(temporary / "elsewhere")
+    else:
+        folder.mkdir()
+        folder.chmod(0o777)
+        if how == "of somebody else":
+            if os.getuid() != 0:
+                pytest.skip("only root gives a folder away")
+            folder.chmod(0o755)
+            os.chown(folder, 65534, 65534)
+    assert machine.reserve(1) == (set(), [])
+    assert list(folder.iterdir()) == []
+    told: list[str] = []
+    warn_of_locks(told.append)
+    assert len(told) == 1
+    assert str(folder) in told[0]
+
+
+CONDUCTOR = """
+import sys
+from fclib.bench import pool
+from test_bench_limits import job
+from pathlib import Path
+supervisor = pool.SupervisorClient(1)
+supervisor.give(job(Path(sys.argv[1]), "bad-sleeps", wall=1000.0))
+print(supervisor.process.pid, supervisor.mark, flush=True)
+supervisor.take()
+"""
+
+
+def test_nothing_is_left_of_a_campaign_that_is_killed_while_its_supervisor_is_stopped(
+    folder: Path,
+) -> None:
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+    conductor = subprocess.Popen(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {paths}\n{CONDUCTOR}", str(folder)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with conductor:
+        assert conductor.stdout is not None
+        number, mark = conductor.stdout.readline().split()
+        supervisor = int(number)
+        while len(processes.marked(f"{MARK}={mark}")) < 3:  # it, the template and a worker
+            time.sleep(0.01)
+        os.kill(supervisor, signal.SIGSTOP)
+        conductor.kill()
+    try:
+        end = time.monotonic() + 60 * template.PATIENCE  # a busy machine may take any time
+        while processes.marked(f"{MARK}={mark}") and time.monotonic() < end:
+            time.sleep(0.05)
+        assert processes.marked(f"{MARK}={mark}") == []
+        if (above := meter.home()) is not None:
+            assert list(above.glob(f"{meter.PREFIX}{supervisor}-*")) == []
+    finally:
+        processes.kill(processes.marked(f"{MARK}={mark}"))

@@ -88,7 +88,7 @@ def reserve(count: int) -> tuple[set[int], list[int]]:
     """
     held: dict[int, int] = {}
     try:
-        folder = own_folder(Path(tempfile.gettempdir()) / f"fclib-cores-{os.getuid()}")
+        folder = folder_of_locks()
         try:
             for core in sorted(os.sched_getaffinity(0)):
                 if len(held) == count:
@@ -112,17 +112,18 @@ def reserve(count: int) -> tuple[set[int], list[int]]:
     return set(held), list(held.values())
 
 
-def own_folder(path: Path) -> int:
-    """Open a folder of this user, which is made where there is none.
+def folder_of_locks() -> int:
+    """Open the folder of the locks of cores, which is made if there is none.
 
     Raises:
         OSError: it is a link, another user's, or one that others may write to.
     """
+    path = Path(tempfile.gettempdir()) / f"fclib-cores-{os.getuid()}"
     with contextlib.suppress(FileExistsError):
         path.mkdir(0o700)
     folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
     facts = os.fstat(folder)
     if facts.st_uid != os.getuid() or facts.st_mode & 0o022:
         os.close(folder)
-        raise PermissionError(f"{path}: is not a folder of this user alone")
+        raise PermissionError(f"{path}: is not a folder that this user alone may write to")
     return folder

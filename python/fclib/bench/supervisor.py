@@ -3,11 +3,11 @@
 `main` serves jobs from a socket until that is closed. The supervisor never runs a solver: that is
 done by a worker. One worker serves the built-in solvers. It is renewed after every failure, and if
 it is not as it was: a process or a thread is left, or its signals, limits, cores or arithmetic
-have changed. Each run of any other solver has a worker of its own, which is apart if
-the system allows it (template.py). The supervisor reads the problem, and hands its numbers over once
-the solver is loaded and warm. The solution comes back as numbers, and the supervisor recomputes
-every merit from its own copy of the problem, so that nothing a solver does in its process changes
-the verdict. What a run took is what the kernel counted between two words of the worker (meter.py);
+have changed. Each run of any other solver has a worker of its own, which is apart if the system
+allows it (template.py). The supervisor reads the problem, and hands its numbers over once the
+solver is loaded and warm. The solution comes back as numbers, and the supervisor recomputes every
+merit from its own copy of the problem, so that nothing a solver does in its process changes the
+verdict. What a run took is what the kernel counted while the worker had the problem (meter.py);
 what the solver says of its time must fit in there.
 
 A run is killed with all processes that descend from it, in whatever group or session they are: what

@@ -42,6 +42,7 @@ KNOWN = {
     "threads",
     "seed",
     "history",
+    "renumber",
     "budget",
     "modules",
     "solvers",
@@ -113,6 +114,7 @@ class Campaign:
     threads: int = 1
     seed: int = 0
     history: bool = False
+    renumber: bool = False  # whether each repeat but the first is of a renumbered copy
     modules: tuple[str, ...] = ()
     merit: MeritKind = "both"
     budget: float | None = None  # [s] for all runs together
@@ -195,6 +197,7 @@ class Campaign:
             threads=_count(entries, "threads", 1),
             seed=seed,
             history=_yes(entries, "history"),
+            renumber=_yes(entries, "renumber"),
             modules=modules,
             merit=_merit(entries.get("merit", "both")),
             budget=_budget(entries["budget"]) if "budget" in entries else None,
@@ -275,6 +278,7 @@ class Campaign:
             history=self.history,
             modules=self.modules,
             merit=self.merit,
+            renumber=self.renumber,
             keep=group.sequence is not None,
         )
 
@@ -291,7 +295,8 @@ class Campaign:
         chain: list[Job] = []
         for step, facts in enumerate(steps):
             along = Along(name, step, chain[-1].key if chain else "")
-            chain.append(replace(self._job(facts, group, choice, tol, repeat), along=along))
+            job = self._job(facts, group, choice, tol, repeat)
+            chain.append(replace(job, along=along, renumber=False))
         return chain
 
     def _paths(self, group: Group) -> list[Path]:

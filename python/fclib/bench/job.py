@@ -156,6 +156,7 @@ class Job:
     along: Along | None = None  # None: cold, from nothing
     keep: bool = False  # whether the solution is stored
     guess: Guess | None = None  # known when the run is begun, and follows from `along`
+    renumber: bool = False  # whether each repeat but the first is of a copy: copies.py
 
     @property
     def start(self) -> str:
@@ -176,16 +177,23 @@ class Job:
             self.repeat,
             *([self.merit] if self.merit != "natural" else []),  # once it was the only one
             *([["after", self.along.after]] if self.along else []),
+            *(["copy"] if self.copy else []),
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
+    @property
+    def copy(self) -> int:
+        """Which copy of the problem is solved; 0 for the problem itself."""
+        return self.repeat if self.renumber else 0
+
     def order(self) -> dict[str, Any]:
-        """The job as a worker is told it, in JSON's types."""
+        """The job as a supervisor is told it, in JSON's types."""
         return {
             "path": self.problem.path,
             "kind": self.problem.kind,
             "hash": self.problem.hash,
             "spacedim": self.problem.spacedim,
+            "copy": self.copy,
             "suits": self.solver.suits(self.problem),
             "solver": self.solver.name,
             "options": dict(self.solver.options),

@@ -90,6 +90,13 @@ def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | 
     return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)
 
 
+def copied(problem: Any, number: int) -> Any:
+    """A renumbered copy of a problem."""
+    from fclib.bench.copies import Copy  # which few runs need
+
+    return Copy(problem, number)
+
+
 class CampaignGone(Exception):  # noqa: N818 (no error)
     """The campaign has ended."""
 
@@ -375,12 +382,16 @@ class Supervisor:
             return record
         try:
             problem, guess = self.prepare(order)
+            copy = copied(problem, order["copy"]) if order["copy"] else None
         except (_core.Error, OSError, MemoryError) as error:
             record.status, record.message = "unreadable", one_line(error)
             return record
         vectors: dict[str, Any] = {}
         try:
-            vectors = self.ask(order | {"warm": True}, problem, guess, record)
+            if copy is None:
+                vectors = self.ask(order | {"warm": True}, problem, guess, record)
+            else:
+                vectors = copy.back(self.ask(order | {"warm": True}, copy.problem, None, record))
         except WorkerEnded as end:
             record.status, record.message = end.status, str(end)
             self.stop()

@@ -110,6 +110,7 @@ def runner(
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
         from distributed.scheduler import KilledWorker
+        from distributed.utils import TimeoutError as TooLate  # another one in Python 3.10
 
         waiting: dict[Any, Job] = {}
         done: queue.SimpleQueue[Any] = queue.SimpleQueue()
@@ -142,11 +143,15 @@ def runner(
         def capacity() -> int:
             return AHEAD * max(1, sum(map(int, client.nthreads().values())))
 
-        def result(future: Any) -> Record:
+        def result(future: Any) -> Record | None:
+            """What came of it; None if that is lost with the worker that had it, and done again."""
             try:
-                record: Record = future.result()
+                record: Record = future.result(timeout=LOOK)
             except KilledWorker as error:
-                record = Record("lost", f"the workers of Dask that tried it died: {error}")
+                return Record("lost", f"the workers of Dask that tried it died: {error}")
+            except (TimeoutError, TooLate):
+                future.add_done_callback(done.put)
+                return None
             return record
 
         try:
@@ -166,6 +171,8 @@ def runner(
                 except queue.Empty:
                     continue
                 record = result(future)
+                if record is None:
+                    continue
                 job = waiting.pop(future)
                 future.release()
                 yield job, record

@@ -2,8 +2,8 @@
 
     .venv/bin/python benchmarks/bench_overhead.py --runs 10000 --jobs 2
 
-One row is of built-in solvers, whose runs share a process, and one of a solver in Python, whose runs
-have a process each. The overhead is the CPU time of the campaign and its supervisors, with their
+One row is of built-in solvers, whose runs share a process, and one of a solver in Python, of which
+each run has its own. The overhead is the CPU time of the campaign and its supervisors, with their
 start, less what the runs took, over the runs; the memory is that of the process that conducts the
 campaign. No run may be lost or doubled.
 """

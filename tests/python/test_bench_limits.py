@@ -599,6 +599,11 @@ UNSEEN = {
     "says_that_it_is_done": 0.25,
     "works_in_a_thread_of_before": 0.25,
 }
+# that take what is not theirs, or end themselves to leave the comparison
+CAUGHT = (
+    *("reads_the_reference", "knows_the_title", "keeps_a_result", "hides_in_a_memfd"),
+    *("is_killed", "says_unsuitable", "has_no_room", "ends_by_a_limit", "stops_its_supervisor"),
+)
 # that are measured by the processes themselves too, where there are no control groups
 WITHOUT_GROUPS = (
     "burns_in_an_orphan",

@@ -458,7 +458,7 @@ class Supervisor:
                 return self.ask(order | {"warm": False}, problem, guess, record)
         if said.get("word") != "ready":
             return self.arrays(order, take(said, record))
-        if not worker.belongings:
+        if not worker.belongings and order["solver"] in built_in():
             worker.belongings = processes.belongings(meter.pid)
         took, early = self.hand(order, problem, guess)
         self.limit(meter, limits["memory"])

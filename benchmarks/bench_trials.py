@@ -349,23 +349,30 @@ def on_cluster(
 
 def dask(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
     """A campaign on a Dask cluster of which workers are killed, against a quiet one."""
-    distributed: Any = importlib.import_module("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
+    trials: Any = importlib.import_module("test_bench_cluster")
+    port = trials.free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    words = ("worker", "--nthreads=1", "--no-nanny", "--no-dashboard", address)
+    scheduler = trials.started("scheduler", "--host=127.0.0.1", f"--port={port}", "--no-dashboard")
+    workers = [trials.started(*words) for _ in range(2)]
     draw = random.Random(1)
-    with (
-        distributed.LocalCluster(**options, silence_logs=50) as local,
-        distributed.Client(local) as client,
-        cluster.on_scheduler(client.scheduler.address) as runner,
-    ):
 
-        def kill() -> int:
-            pids = list(client.run(os.getpid, on_error="ignore").values())
-            if pids:
-                os.kill(draw.choice(pids), signal.SIGKILL)
-            return len(pids[:1])
+    def kill() -> int:
+        gone = workers.pop(draw.randrange(2))
+        gone.kill()
+        gone.wait()
+        workers.append(trials.started(*words))  # as whoever keeps a cluster does
+        return 1
 
-        found, good = on_cluster(folder, arguments.kills, arguments.repeats, runner, kill)
-        return [{"cluster": "Dask, 2 workers", "killed": "a worker, SIGKILL", **found[0]}], good
+    try:
+        with cluster.on_scheduler(address) as runner:
+            found, good = on_cluster(folder, arguments.kills, arguments.repeats, runner, kill)
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+    return [{"cluster": "Dask, 2 workers", "killed": "a worker, SIGKILL", **found[0]}], good
 
 
 def slurm(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:

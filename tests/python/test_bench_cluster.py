@@ -132,7 +132,7 @@ def test_a_cluster_without_workers_is_waited_for_aloud(
     progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=runner)
     assert progress.solved == 4
     (word,) = words
-    assert "has no worker yet; dask worker tcp://" in word
+    assert "has no worker; dask worker tcp://" in word
 
 
 def started(*words: str) -> subprocess.Popen[bytes]:
@@ -173,7 +173,7 @@ def test_the_loss_of_the_scheduler_ends_in_a_line_and_the_campaign_goes_on(tmp_p
                 process.wait()
         assert conductor.returncode == (1 if lost else 0), (out, errors)
         if lost:
-            (line,) = [line for line in errors.splitlines() if "has no worker yet" not in line]
+            (line,) = [line for line in errors.splitlines() if "has no worker" not in line]
             assert "the Dask scheduler has ended" in line
             assert "Traceback" not in out
             assert 3 <= done(store) < 40

@@ -97,7 +97,7 @@ def runner(
     client: Any,
     send: bool = False,
     tell: Callable[[str], None] = say,
-    look: Callable[[], None] = lambda: None,
+    look: Callable[[bool], None] = lambda _: None,
 ) -> Runner:
     """What `run_campaign` needs to run its jobs on a cluster.
 
@@ -105,7 +105,8 @@ def runner(
         client: a ``distributed.Client``.
         send: whether the problems are sent, because the machines share no folder.
         tell: is called where there is no worker to do the jobs.
-        look: is called every `LOOK` seconds, and raises where there is no use in waiting.
+        look: is called every `LOOK` seconds, with whether a run was done since, and raises where
+            there is no use in waiting.
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
@@ -154,9 +155,16 @@ def runner(
                 return None
             return record
 
+        def wait_aloud() -> None:
+            nonlocal waits
+            none = not client.nthreads()
+            if none and not waits:
+                tell(f"waiting: {address} has no worker; dask worker {address} starts one")
+            waits = none
+
+        waits, progress = False, False
         try:
-            if not client.nthreads():
-                tell(f"waiting: {address} has no worker yet; dask worker {address} starts one")
+            wait_aloud()
             while True:
                 # workers may come and go
                 while len(waiting) < capacity() and submit():
@@ -164,8 +172,9 @@ def runner(
                 if not waiting:
                     return
                 if time.monotonic() - looked > LOOK:
-                    look()
-                    looked = time.monotonic()
+                    look(progress)
+                    wait_aloud()
+                    looked, progress = time.monotonic(), False
                 try:
                     future = done.get(timeout=LOOK)
                 except queue.Empty:
@@ -175,6 +184,7 @@ def runner(
                     continue
                 job = waiting.pop(future)
                 future.release()
+                progress = True
                 yield job, record
         except (CancelledError, OSError, TimeoutError, RuntimeError) as error:
             # with the scheduler go all the tasks that it knew of
@@ -289,10 +299,13 @@ class Keeper:
         self.cluster = cluster
         self.workers = workers
         self.tell = tell
-        self.useless = 0  # jobs that have ended one after the other, while there was no worker
+        self.useless = 0  # jobs that have ended one after the other, while no run was done
 
-    def look(self) -> None:
+    def look(self, progress: bool) -> None:
         """Submit a job for each that has gone.
+
+        Args:
+            progress: whether a run was done since the last look.
 
         Raises:
             fclib.Error: one after the other ends before a worker has joined.
@@ -302,11 +315,11 @@ class Keeper:
             return  # Slurm does not answer: it may later
         known = self.cluster.workers.items()
         gone = {name: job.job_id for name, job in known if job.job_id and job.job_id not in there}
-        if self.cluster.scheduler_info["workers"]:
+        if progress or self.cluster.scheduler_info["workers"]:
             self.useless = 0
         else:
             self.useless += len(gone)
-        if self.useless >= USELESS:
+        if gone and self.useless >= USELESS:
             raise _core.Error(
                 f"slurm: {self.useless} jobs ended before a worker has joined; the last one,"
                 f" {next(iter(gone.values()))}, may say why in slurm-*.out"

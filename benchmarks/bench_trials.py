@@ -187,10 +187,11 @@ def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bo
     )
     for name, expected in trials.EXPECTED.items():
         wall = trials.LIMIT if expected == "wall_limit" else 60 * trials.LIMIT
+        cpu = trials.LIMIT if "cpu_limit" in expected else trials.FAR
         before = least(supervisor, usual)
-        record = supervisor.do(trials.job(prepared, f"bad-{name}", wall=wall))
+        record = supervisor.do(trials.job(prepared, f"bad-{name}", wall=wall, time=cpu))
         after = least(supervisor, usual)
-        over = (record.total_cpu_s or 0.0) - trials.LIMIT
+        over = (record.total_cpu_s or 0.0) - cpu
         if expected == "wall_limit":
             over = (record.wall_s or 0.0) - trials.LIMIT
         right = (

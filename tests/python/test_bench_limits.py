@@ -1034,7 +1034,7 @@ def test_folders_of_others_stay_whatever_they_are_called(temporary: Path) -> Non
     link.symlink_to(theirs)
     named = temporary / "fclib-bench-named"
     named.mkdir()
-    (named / pool.LOCK).symlink_to(ours / pool.LOCK)
+    (named / pool.MARK_OF_OURS).symlink_to(ours / pool.MARK_OF_OURS)
     for folder in (ours, theirs, copy, named):
         aged(folder)
     # a campaign that still runs, and then one that was killed
@@ -1045,7 +1045,7 @@ def test_folders_of_others_stay_whatever_they_are_called(temporary: Path) -> Non
         os.close(held)
         assert ours.exists() is not gone
         assert (theirs / "thesis.csv").exists()
-        assert (copy / pool.LOCK).exists()
+        assert (copy / pool.MARK_OF_OURS).exists()
         assert named.exists()
         assert link.is_symlink()
         shutil.rmtree(other, ignore_errors=True)

@@ -10,6 +10,7 @@ sent: then each worker gets the bytes of a file once, and keeps it in its cache 
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import importlib
 import logging
@@ -111,12 +112,12 @@ def runner(
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
         from distributed.scheduler import KilledWorker
-        from distributed.utils import TimeoutError as TooLate  # another one in Python 3.10
 
         waiting: dict[Any, Job] = {}
         done: queue.SimpleQueue[Any] = queue.SimpleQueue()
         sent: dict[str, Any] = {}
         number, looked = 0, time.monotonic()
+        waits, progress = False, False  # for a worker; a run was done since the last look
         address = client.scheduler.address
 
         def file_of(problem: ProblemFacts | None) -> Any:
@@ -150,7 +151,7 @@ def runner(
                 record: Record = future.result(timeout=LOOK)
             except KilledWorker as error:
                 return Record("lost", f"the workers of Dask that tried it died: {error}")
-            except (TimeoutError, TooLate):
+            except (TimeoutError, asyncio.TimeoutError):  # two in Python 3.10
                 future.add_done_callback(done.put)
                 return None
             return record
@@ -162,7 +163,6 @@ def runner(
                 tell(f"waiting: {address} has no worker; dask worker {address} starts one")
             waits = none
 
-        waits, progress = False, False
         try:
             wait_aloud()
             while True:

@@ -43,7 +43,7 @@ LOOK = 0.5  # [s] between two looks at supervisors that are silent
 STOPPED = 1.0  # [s] that one may be stopped, as by SIGSTOP
 MARK = "FCLIB_BENCH_RUN"  # in the environment of all that a supervisor starts
 PREFIX = "fclib-bench-"  # of folders for temporary files
-LOCK = "lock"  # in them, beside the files of a worker
+MARK_OF_OURS = "mark"  # in them, beside the files of a worker
 FILES = "files"
 START = """
 import json, site, sys
@@ -73,22 +73,22 @@ def search_path() -> list[str]:
 def temporary_folder() -> tuple[Path, int]:
     """A folder of ours in that for temporary files, and the lock that says that it is used.
 
-    What campaigns that were killed have left is removed: folders that such a lock, which nobody
-    holds any more, marks as ours.
+    What campaigns that were killed have left is removed: folders with a mark of ours, of which
+    nobody holds the lock any more.
     """
     above = Path(tempfile.gettempdir())
     for old in above.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):
             remove_left(old)
     folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=above))
-    lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
-    fcntl.flock(lock, fcntl.LOCK_EX)
-    os.write(lock, words_of(folder))
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    fcntl.flock(lock, fcntl.LOCK_SH)
+    (folder / MARK_OF_OURS).write_bytes(words_of(folder))
     return folder, lock
 
 
 def words_of(folder: Path) -> bytes:
-    """What the lock of a folder says: a copy of the folder is not ours, whatever is in it."""
+    """What the mark of a folder says: a copy of the folder is not ours, whatever is in it."""
     facts = folder.lstat()
     return f"fclib bench: made by a campaign, {facts.st_dev} {facts.st_ino}\n".encode()
 
@@ -97,20 +97,18 @@ def remove_left(folder: Path) -> None:
     """Remove a folder that `temporary_folder` has made, if nobody uses it.
 
     Raises:
-        OSError: it is used, or has no lock of ours.
+        OSError: it is used, or has no mark of ours.
     """
-    above = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        lock = os.open(LOCK, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=above)
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            here = {os.fstat(above).st_uid, os.fstat(lock).st_uid} == {os.getuid()}
-            if here and os.read(lock, 1000) == words_of(folder):
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        how = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
+        with open(os.open(MARK_OF_OURS, how, dir_fd=lock), "rb") as mark:
+            owners = {os.fstat(lock).st_uid, os.fstat(mark.fileno()).st_uid}
+            if owners == {os.getuid()} and mark.read(1000) == words_of(folder):
                 shutil.rmtree(folder, ignore_errors=True)
-        finally:
-            os.close(lock)
     finally:
-        os.close(above)
+        os.close(lock)
 
 
 class SupervisorClient:

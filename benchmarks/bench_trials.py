@@ -380,8 +380,8 @@ def slurm(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, A
     """A campaign on a Slurm of one node of which jobs are cancelled, against a quiet one."""
     sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
     trials: Any = importlib.import_module("test_bench_cluster")
-    os.chdir(folder)  # where the jobs leave what they say
-    options = {"workers": "2", "cores": "2", "memory": "1GB"}  # one job of two processes
+    # one job of two processes
+    options = {"workers": "2", "cores": "2", "memory": "1GB", "output": "/dev/null"}
     with (
         trials.slurm_of_one_node(folder),
         cluster.on_slurm(options, tell=lambda _: None) as runner,

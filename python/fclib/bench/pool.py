@@ -103,7 +103,7 @@ def remove_left(folder: Path) -> None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         how = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
-        with open(os.open(MARK_OF_OURS, how, dir_fd=lock), "rb") as mark:
+        with os.fdopen(os.open(MARK_OF_OURS, how, dir_fd=lock), "rb") as mark:
             owners = {os.fstat(lock).st_uid, os.fstat(mark.fileno()).st_uid}
             if owners == {os.getuid()} and mark.read(1000) == words_of(folder):
                 shutil.rmtree(folder, ignore_errors=True)

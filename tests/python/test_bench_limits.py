@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -805,6 +806,44 @@ def test_a_plugin_leaves_the_next_solver_alone(
     after = supervisor.do(usual)
     assert after.merits == before.merits
     assert [x[:2] for x in after.history or ()] == [x[:2] for x in before.history or ()]
+
+
+@pytest.mark.parametrize("whose", ["worker", "template"])
+@pytest.mark.parametrize("what", ["limits", "cores", "priority"])
+def test_a_process_that_is_not_as_it_was_serves_nobody(
+    what: str, whose: str, folder: Path, supervisor: SupervisorClient
+) -> None:
+    usual = job(folder, "nsgs")
+    supervisor.do(usual)
+    before = there(supervisor)
+    supervisor.do(usual)
+    assert there(supervisor) == before
+    assert supervisor.process is not None
+    cores = os.sched_getaffinity(0)
+    if what == "cores" and len(cores) == 1:
+        pytest.skip("needs two cores")
+    # the template is there first
+    template, worker = sorted(before - {supervisor.process.pid}, key=begun)
+    pid = worker if whose == "worker" else template
+    if what == "limits":
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (64, 64))
+    elif what == "cores":
+        own = os.sched_getaffinity(pid)
+        os.sched_setaffinity(pid, (cores - own) or {min(own)})
+    else:
+        os.setpriority(os.PRIO_PROCESS, pid, 15)
+    if whose == "template":
+        # the built-in solvers go on with their worker, the others get none of it
+        assert supervisor.do(job(folder, "bad-patches_clocks")).status == "lost"
+    assert supervisor.do(usual).status == "converged"
+    after = there(supervisor)
+    assert pid not in after
+    assert len(after) == len(before)
+
+
+def begun(pid: int) -> int:
+    """When a process was started, in ticks."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
 
 
 @pytest.mark.parametrize("groups", [True, False])

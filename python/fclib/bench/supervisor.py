@@ -38,7 +38,7 @@ from fclib._solve import MERITS
 from fclib.bench import machine, processes
 from fclib.bench.job import KEPT, ORDERLY, STATUSES, SURROUNDINGS, Record
 from fclib.bench.meter import Meter
-from fclib.bench.template import Template
+from fclib.bench.template import Template, TemplateGone
 from fclib.bench.worker import (
     CERTIFICATE,
     GO,
@@ -693,8 +693,8 @@ def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
         while True:
             order = campaign.recv()
             campaign.send(supervisor.do(order))
-    except (EOFError, OSError, CampaignGone):
-        pass
+    except (EOFError, OSError, CampaignGone, TemplateGone):
+        pass  # the campaign starts another one, if it is there
     finally:
         supervisor.end()
         for lock in held:

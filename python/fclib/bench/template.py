@@ -41,8 +41,8 @@ PATIENCE = 5.0  # [s] for a supervisor whose campaign is gone
 Serve = Callable[[socket.socket, dict[str, Any]], None]
 
 
-class TemplateGone(OSError):  # noqa: N818 (of the surroundings)
-    """The template has ended, and with it all that could be started."""
+class TemplateGone(Exception):  # noqa: N818 (of the surroundings)
+    """The template has ended or is not as it was, and nothing more can be started."""
 
 
 class Template:
@@ -68,6 +68,7 @@ class Template:
             finally:
                 os._exit(1)
         theirs.close()
+        self.belongings: tuple[Any, ...] = ()  # what it had at first
 
     def fork(self, request: dict[str, Any], worker: int, errors: int) -> tuple[int, bool]:
         """A new worker: its number, and whether it is apart.
@@ -78,8 +79,13 @@ class Template:
             errors: its standard error.
 
         Raises:
-            TemplateGone: there is no template any more.
+            TemplateGone: there is no template any more that is as it was.
+            OSError: no process can be started.
         """
+        has = processes.belongings(self.pid)
+        self.belongings = self.belongings or has
+        if has != self.belongings:
+            raise TemplateGone("the process that starts workers is not as it was")
         try:
             socket.send_fds(self.link, [json.dumps(request).encode()], [worker, errors])
             reply = json.loads(self.link.recv(1000))

@@ -2,9 +2,10 @@
 
     .venv/bin/python benchmarks/bench_overhead.py --runs 10000 --jobs 2
 
-The overhead is the CPU time of the campaign and its supervisors, with their start, less what the
-runs took, over the runs; the memory is that of the process that conducts the campaign. No run may
-be lost or doubled.
+One row is of built-in solvers, whose runs share a process, and one of a solver in Python, of which
+each run has its own. The overhead is the CPU time of the campaign and its supervisors, with their
+start, less what the runs took, over the runs; the memory is that of the process that conducts the
+campaign. No run may be lost or doubled.
 """
 
 from __future__ import annotations
@@ -15,11 +16,24 @@ import resource
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import _results
 
 from fclib import bench
 from fclib.bench import profiles
+
+FOREIGN = """
+import fclib
+
+@fclib.solver("overhead")
+def overhead(problem, r, monitor):
+    '''Calls one of the built-in solvers.'''
+    if not monitor.stop(r):
+        r[:] = fclib.solve(problem, "nsgs", monitor.tolerance / 2).solution.r
+        monitor.stop(r)
+"""
+SHARE = 0.1  # of the runs that are of the foreign solver
 
 
 def spent() -> float:
@@ -28,26 +42,20 @@ def spent() -> float:
     return sum(u.ru_utime + u.ru_stime for u in map(resource.getrusage, kinds))
 
 
-def main() -> None:
-    """Run, and print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=10_000)
-    parser.add_argument("--jobs", type=int, default=1)
-    _results.add_option(parser)
-    arguments = parser.parse_args()
-    campaign = bench.Campaign.of(
-        {
-            "name": "overhead",
-            "solvers": ["auto", "nsgs"],
+def measured(name: str, entries: dict[str, Any], runs: int, jobs: int) -> dict[str, Any]:
+    """Run a campaign of so many runs; its row."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "overhead.py").write_text(FOREIGN)
+        usual = {
+            "name": name,
             "tolerances": [1e-6],
-            "repeats": max(1, arguments.runs // 20),
+            "repeats": max(1, runs // (10 * len(entries["solvers"]))),
             "problems": [{"planted": {"count": 10, "contacts": 10}}],
         }
-    )
-    with tempfile.TemporaryDirectory() as folder:
+        campaign = bench.Campaign.of(usual | entries, Path(folder))
         path = Path(folder) / "overhead.sqlite"
         start, before = time.perf_counter(), spent()
-        progress = bench.run_campaign(campaign, path, jobs=arguments.jobs)
+        progress = bench.run_campaign(campaign, path, jobs=jobs)
         wall, cpu = time.perf_counter() - start, spent() - before
         memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6
         with bench.Store(path) as store:
@@ -60,23 +68,43 @@ def main() -> None:
         profile, profile_cpu = time.perf_counter() - start, spent() - before
     count, keys = len(rows), len({row["key"] for row in rows})
     assert count == keys == progress.planned, (count, keys, progress.planned)
-    runs = sum(row["total_cpu_s"] for row in rows)
-    entry = {
+    taken = sum(row["total_cpu_s"] for row in rows)
+    return {
+        "solver": name,
         "runs": count,
         "solved": progress.solved,
-        "at once": arguments.jobs,
-        "CPU of the runs [s]": runs,
-        "overhead a run, CPU [ms]": 1e3 * (cpu - runs) / count,
+        "at once": jobs,
+        "CPU of the runs [s]": taken,
+        "overhead a run, CPU [ms]": 1e3 * (cpu - taken) / count,
         "wall clock [s]": wall,
         "memory of the campaign [MB]": memory,
         "profile, CPU [s]": profile_cpu,
         "profile, wall clock [s]": profile,
         "load": os.getloadavg()[0],
     }
-    for name, value in entry.items():
-        print(f"{name}: {value:.4g}")
+
+
+def main() -> None:
+    """Run, and print the figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=10_000)
+    parser.add_argument("--jobs", type=int, default=1)
+    _results.add_option(parser)
+    arguments = parser.parse_args()
+    kinds: list[tuple[str, dict[str, Any], int]] = [
+        ("built in", {"solvers": ["auto", "nsgs"]}, arguments.runs),
+        (
+            "foreign",
+            {"solvers": ["overhead"], "modules": ["overhead.py"]},
+            int(SHARE * arguments.runs),
+        ),
+    ]
+    entries = [measured(name, more, runs, arguments.jobs) for name, more, runs in kinds]
+    for entry in entries:
+        shown = (f"{v:.4g}" if isinstance(v, float) else str(v) for v in entry.values())
+        print("; ".join(f"{name}: {value}" for name, value in zip(entry, shown, strict=True)))
     if arguments.results:
-        _results.store(arguments.results, [entry], title="What the bench costs a run")
+        _results.store(arguments.results, entries, title="What the bench costs a run")
 
 
 if __name__ == "__main__":

@@ -1,13 +1,17 @@
 """What the bench withstands, and how well it repeats itself.
 
     .venv/bin/python benchmarks/bench_trials.py nasty               # solvers that cheat and leak
+    .venv/bin/python benchmarks/bench_trials.py liars               # who wins by what, still
     .venv/bin/python benchmarks/bench_trials.py kills --kills 200   # of workers and supervisors
+    .venv/bin/python benchmarks/bench_trials.py dask --kills 20     # of workers of Dask
+    .venv/bin/python benchmarks/bench_trials.py slurm --kills 20    # of jobs of Slurm
     .venv/bin/python benchmarks/bench_trials.py twice --jobs 1      # the same campaign two times
 
 `nasty` runs the solvers of tests/python/test_bench_limits.py: by how much each exceeds its limit,
-and the CPU time of a run after it over that of one before. `kills` compares every row with that
-of a quiet campaign. `twice` compares statuses, iterations and times. Each ends with exit status 1
-where something is not as it should be.
+and the CPU time of a run after it over that of one before. `liars` runs those that hide their work,
+and says which of them still win. `kills`, `dask` and `slurm` compare every row with that of a quiet
+campaign; `slurm` starts a Slurm of its own, as root. `twice` compares statuses, iterations and
+times. Each ends with exit status 1 if something is not as it should be.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ import importlib
 import os
 import random
 import signal
+import socket
 import statistics
 import sys
 import tempfile
@@ -31,7 +36,7 @@ from typing import Any
 import _results
 
 from fclib import bench
-from fclib.bench import pool, processes
+from fclib.bench import cluster, pool, processes
 
 ROOT = Path(__file__).resolve().parents[1]
 LATE = 2.0  # [s] beyond its limit, when a run has to have ended
@@ -47,6 +52,104 @@ def floods(problem, r, monitor):
             os.write(fd, b"garbage " * 62_500)
     solved(monitor, r)
 """
+# those that still look better than they are, and what it would cost to stop each
+LIARS = """
+
+@bad
+def keeps_a_file(problem, r, monitor):
+    # beside those that are removed
+    import tempfile
+    place = os.path.join(os.path.dirname(os.path.dirname(tempfile.gettempdir())), "kept-by-bad")
+    if problem.nc != 6:
+        if not os.path.exists(place):
+            burn(time.process_time() + SECRET)
+            open(place, "w").close()
+    solved(monitor, r)
+
+
+@bad
+def knows_by_heart(problem, r, monitor):
+    # a table of answers, by the numbers of the problem
+    if problem.nc != 6 and not np.allclose(problem.q, QS):
+        burn(time.process_time() + SECRET)
+    solved(monitor, r)
+
+
+@bad
+def calls_its_work_setup(problem, r, monitor):
+    # in a thread, and in the answer of its process
+    import json, threading
+    from fclib.bench import worker
+    if problem.nc != 6:
+        work = threading.Thread(target=burn, args=(time.process_time() + SECRET,))
+        work.start()
+        work.join()
+        real = worker.send
+
+        def send(link, message):
+            if b"setup_s" in message:
+                said = json.loads(message) | {"setup_s": 0.9 * SECRET}
+                message = json.dumps(said).encode()
+            real(link, message)
+
+        worker.send = send
+    solved(monitor, r)
+
+
+@bad
+def asks_a_server(problem, r, monitor):
+    # of the user's, which runs beside the campaign
+    import socket
+    if problem.nc != 6:
+        with socket.create_connection(("127.0.0.1", SERVER)) as link:
+            link.recv(1)
+    solved(monitor, r)
+
+
+@bad
+def takes_little_at_a_time(problem, r, monitor):
+    # what may be used between the problem and the clock
+    from fclib.bench import processes
+    if problem.nc == 6:
+        def release():
+            burn(time.process_time() + 0.015)
+        processes.release_memory = release
+    solved(monitor, r)
+"""
+PROGRAM = """
+import sys, time
+import numpy as np
+import fclib
+while time.process_time() < 0.5: pass
+fclib.write_solution(sys.argv[1], fclib.Solution(r=np.array(SOLUTION)))
+fclib.write_attributes(sys.argv[1], "solution", {"cpu_s": 0.001, "iterations": 1})
+"""
+SECRET = 0.3  # [s] of CPU that each works for, where it can
+REST = {  # by what they win, and what it would cost to stop them
+    "keeps_a_file": (
+        "a file that outlives the run",
+        "a file system of its own for each run: solvers"
+        " that need their licence, cache or home would not run",
+    ),
+    "knows_by_heart": ("answers that it has learned", "`renumber = true`: a solve for each copy"),
+    "calls_its_work_setup": (
+        "words of its own process",
+        "a process that converts, and one that"
+        " solves: the driver cut in two, and each problem copied twice",
+    ),
+    "asks_a_server": (
+        "a process of the user's outside",
+        "a network of its own: licence servers and MPI would not run",
+    ),
+    "takes_little_at_a_time": (
+        "the time to take the problem over",
+        "nothing: it is at most 20 ms and five times the handing over",
+    ),
+    "says_its_own_time": (
+        "a program that says what its solve took",
+        "`--metric total_cpu_s`: its start, reading and writing count too",
+    ),
+}
 
 
 def campaign(**changes: Any) -> bench.Campaign:
@@ -84,10 +187,11 @@ def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bo
     )
     for name, expected in trials.EXPECTED.items():
         wall = trials.LIMIT if expected == "wall_limit" else 60 * trials.LIMIT
+        cpu = trials.LIMIT if "cpu_limit" in expected else trials.FAR
         before = least(supervisor, usual)
-        record = supervisor.do(trials.job(prepared, f"bad-{name}", wall=wall))
+        record = supervisor.do(trials.job(prepared, f"bad-{name}", wall=wall, time=cpu))
         after = least(supervisor, usual)
-        over = (record.total_cpu_s or 0.0) - trials.LIMIT
+        over = (record.total_cpu_s or 0.0) - cpu
         if expected == "wall_limit":
             over = (record.wall_s or 0.0) - trials.LIMIT
         right = (
@@ -106,6 +210,55 @@ def nasty(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bo
             }
         )
     supervisor.end()
+    return found, good
+
+
+def liars(folder: Path, _: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
+    """Who wins by what: solvers that hide work, and what it would cost to stop the rest."""
+    sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
+    trials: Any = importlib.import_module("test_bench_limits")
+    planted: Any = importlib.import_module("helpers").planted_local(3, nc=5)
+    server = socket.create_server(("127.0.0.1", 0))
+
+    def work() -> None:
+        while True:
+            with contextlib.suppress(OSError), server.accept()[0] as link:
+                end = time.thread_time() + SECRET
+                while time.thread_time() < end:
+                    pass
+                link.send(b"1")
+
+    threading.Thread(target=work, daemon=True).start()
+    port = server.getsockname()[1]
+    known = f"\n\nSERVER = {port}\nQS = np.array({planted.problem.q.tolist()!r})\n"
+    trials.BAD += textwrap.indent(LIARS + known, "    ")
+    prepared = trials.prepare(folder)
+    os.environ["FCLIB_TEST_SPIN"] = str(prepared / "spin.so")
+    program = folder / "says.py"
+    program.write_text(PROGRAM.replace("SOLUTION", repr(planted.solution.r.tolist())))
+    commands = {"says_its_own_time": f"cmd:{sys.executable} {program} {{input}}"}
+    supervisor = pool.SupervisorClient(1)
+    found = []
+    for name in [*trials.UNSEEN, *trials.CAUGHT, *REST]:
+        asked = trials.job(prepared, commands.get(name, f"bad-{name}"))
+        record = [supervisor.do(asked) for _ in range(2)][1]
+        counted = record.cpu_s or 0.0
+        wins = name in REST and record.status == "converged" and counted < 0.5 * SECRET
+        by, cost = REST.get(name, ("", ""))
+        found.append(
+            {
+                "solver": name,
+                "status": record.status,
+                "CPU that counts [s]": record.cpu_s,
+                "CPU of the run [s]": record.total_cpu_s,
+                "wins": "yes" if wins else "no",
+                "by": by,
+                "what it would cost to stop it": cost,
+            }
+        )
+    supervisor.end()
+    server.close()
+    good = all((row["wins"] == "yes") == (row["solver"] in REST) for row in found)
     return found, good
 
 
@@ -163,6 +316,86 @@ def environment(pid: int) -> bytes:
         return b""
 
 
+def on_cluster(
+    folder: Path, kills: int, repeats: int, runner: Any, kill: Any
+) -> tuple[list[dict[str, Any]], bool]:
+    """Compare a campaign on a cluster of which parts are killed with a quiet one."""
+    chosen = campaign(repeats=repeats)
+    bench.run_campaign(chosen, folder / "quiet.sqlite", jobs=2)
+    killed = 0
+    every = max(1, len(chosen.plan()) // (kills + 1))
+
+    def show(progress: bench.Progress) -> None:
+        nonlocal killed
+        if killed < kills and progress.done >= (killed + 1) * every:
+            killed += kill()
+
+    start = time.monotonic()
+    progress = bench.run_campaign(chosen, folder / "loud.sqlite", runner=runner, show=show)
+    took = time.monotonic() - start
+    quiet, loud = rows_of(folder / "quiet.sqlite"), rows_of(folder / "loud.sqlite")
+    different = sum(
+        any(a[name] != b[name] for name in SAME) for a, b in zip(quiet, loud, strict=False)
+    )
+    lost = progress.planned - len(loud)
+    entry = {
+        "runs": len(quiet),
+        "kills": killed,
+        "runs lost": lost,
+        "rows that differ": different,
+        "wall clock [s]": took,
+    }
+    return [entry], killed >= kills and lost == different == 0
+
+
+def dask(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
+    """A campaign on a Dask cluster of which workers are killed, against a quiet one."""
+    sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
+    trials: Any = importlib.import_module("test_bench_cluster")
+    port = trials.free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    words = ("worker", "--nthreads=1", "--no-nanny", "--no-dashboard", address)
+    scheduler = trials.started("scheduler", "--host=127.0.0.1", f"--port={port}", "--no-dashboard")
+    workers = [trials.started(*words) for _ in range(2)]
+    draw = random.Random(1)
+
+    def kill() -> int:
+        gone = workers.pop(draw.randrange(2))
+        gone.kill()
+        gone.wait()
+        workers.append(trials.started(*words))  # as whoever keeps a cluster does
+        return 1
+
+    try:
+        with cluster.on_scheduler(address) as runner:
+            found, good = on_cluster(folder, arguments.kills, arguments.repeats, runner, kill)
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+    return [{"cluster": "Dask, 2 workers", "killed": "a worker, SIGKILL", **found[0]}], good
+
+
+def slurm(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
+    """A campaign on a Slurm of one node of which jobs are cancelled, against a quiet one."""
+    sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "python")]
+    trials: Any = importlib.import_module("test_bench_cluster")
+    # one job of two processes
+    options = {"workers": "2", "cores": "2", "memory": "1GB", "output": "/dev/null"}
+    with (
+        trials.slurm_of_one_node(folder),
+        cluster.on_slurm(options, tell=lambda _: None) as runner,
+    ):
+
+        def kill() -> int:
+            jobs = trials.jobs_of_slurm()
+            trials.cancelled()
+            return len(jobs)
+
+        found, good = on_cluster(folder, arguments.kills, arguments.repeats, runner, kill)
+        return [{"cluster": "Slurm, 1 job of 2", "killed": "the job, scancel", **found[0]}], good
+
+
 def twice(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, Any]], bool]:
     """Compare a campaign with itself."""
     chosen = campaign(repeats=arguments.repeats)
@@ -190,7 +423,14 @@ def twice(folder: Path, arguments: argparse.Namespace) -> tuple[list[dict[str, A
     return [entry], different == 0 and abs(median - 1) < 0.05
 
 
-TRIALS = {"nasty": nasty, "kills": kills, "twice": twice}
+TRIALS = {
+    "nasty": nasty,
+    "liars": liars,
+    "kills": kills,
+    "dask": dask,
+    "slurm": slurm,
+    "twice": twice,
+}
 
 
 def main() -> None:

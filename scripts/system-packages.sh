@@ -45,6 +45,11 @@ if [ "${1-}" = test ]; then
   command -v abidiff >/dev/null 2>&1 || optional="$optional abigail-tools"
   command -v valgrind >/dev/null 2>&1 || optional="$optional valgrind"
 fi
+# a Slurm of one node, which tests of campaigns start and stop
+if [ "${1-}" = test ]; then
+  PATH="$PATH:/sbin:/usr/sbin" command -v slurmctld >/dev/null 2>&1 || optional="$optional slurm-wlm"
+  PATH="$PATH:/sbin:/usr/sbin" command -v munged >/dev/null 2>&1 || optional="$optional munge"
+fi
 
 if [ -z "$missing$optional" ]; then
   echo "== system packages: all there"

@@ -227,12 +227,18 @@ def register(info: _core.SolverInfo) -> None:
 
 
 @functools.cache
-def _providers() -> tuple[Provider, ...]:
-    """Load the entry points, once. One that cannot be loaded is said, and left out."""
+def entry_points_there() -> tuple[Any, ...]:
+    """The entry points of all packages that are installed, by name, none of them loaded."""
     from importlib.metadata import entry_points
 
+    return tuple(sorted(entry_points(group=GROUP), key=lambda point: point.name))
+
+
+@functools.cache
+def _providers() -> tuple[Provider, ...]:
+    """Load the entry points, once. One that cannot be loaded is said, and left out."""
     providers = []
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+    for point in entry_points_there():
         try:
             loaded = point.load()
         except Exception as error:

@@ -595,15 +595,51 @@ def test_a_campaign_of_which_a_tenth_cannot_run_stops(tmp_path: Path) -> None:
     assert len(done) == 3 * 18  # of 180
 
 
-def test_the_campaign_that_stops_says_so_and_exits_with_1(tmp_path: Path) -> None:
+def test_the_campaign_that_stops_says_so_and_exits_with_1(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
     store = tmp_path / "store.sqlite"
-    arguments = ["bench", "--problems", str(tmp_path), "--solver", "cmd:sh -c 'kill -9 $$' {input}"]
+    arguments = ["bench", "--problems", str(tmp_path), "--solver", "nsgs"]
     arguments += ["--store", str(store), "--retries", "0"]
+    lost = Record("lost", "gone")
+    monkeypatch.setattr("fclib.bench.pool.run", lambda jobs, _: ((job, lost) for job in jobs))
     done = CliRunner().invoke(cli.app, arguments)
     assert done.exit_code == 1
     assert "stopped: 1 of 1 runs could not be done" in " ".join(done.stderr.split())
     assert bench.Store(store).results() == []
+
+
+def test_a_solver_that_kills_itself_stays_in_the_comparison(tmp_path: Path) -> None:
+    fclib.write(tmp_path / "one.hdf5", planted_local(3).problem)
+    kills_itself = "cmd:sh -c 'kill -9 $$' {input}"
+    chosen = campaign(
+        solvers=[kills_itself, "nsgs"], tolerances=[1e-6], problems=[{"files": str(tmp_path)}]
+    )
+    progress = bench.run_campaign(chosen, tmp_path / "store.sqlite")
+    assert not progress.not_run
+    with bench.Store(tmp_path / "store.sqlite") as store:
+        assert store.faults() == []
+        found = {row["solver"]: row["status"] for row in store.results()}
+    assert found == {kills_itself: "crashed", "nsgs": "converged"}
+
+
+def test_what_a_solver_does_not_take_is_known_before_it_runs(tmp_path: Path) -> None:
+    """And nothing that it says when it runs takes a problem out of the comparison."""
+    fclib.write(tmp_path / "planar.hdf5", planted_local(3, d=2).problem)
+    (tmp_path / "picky.py").write_text(
+        "import fclib\n"
+        "@fclib.solver('spatial', dimensions=(3,))\n"
+        "def spatial(problem, r, monitor):\n    raise SystemExit('is never called')\n"
+        "@fclib.solver('picky')\n"
+        "def picky(problem, r, monitor):\n    raise fclib.UnsuitableError('too hard')\n"
+    )
+    entries = {"solvers": ["spatial", "picky"], "modules": ["picky.py"], "tolerances": [1e-6]}
+    chosen = bench.Campaign.of({**entries, "problems": [{"files": "planar.hdf5"}]}, tmp_path)
+    bench.run_campaign(chosen, tmp_path / "store.sqlite")
+    with bench.Store(tmp_path / "store.sqlite") as store:
+        found = {row["solver"]: row["status"] for row in store.results()}
+    assert found == {"spatial": "unsuitable", "picky": "error"}
 
 
 def test_nothing_in_the_current_folder_is_run(

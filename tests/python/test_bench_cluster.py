@@ -6,8 +6,13 @@ import importlib.util
 import os
 import shutil
 import signal
+import socket
 import subprocess
+import sys
+import tempfile
+import time
 from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +22,7 @@ import fclib
 from fclib import bench
 from helpers import planted_local
 
+dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 
 from fclib.bench import cluster  # noqa: E402
@@ -48,10 +54,10 @@ def scheduler() -> Iterator[Any]:
         yield client
 
 
-def campaign(folder: Path, **changes: Any) -> bench.Campaign:
+def campaign(folder: Path, slow: str = SLOW, **changes: Any) -> bench.Campaign:
     for number in range(4):
         fclib.write(folder / f"{number}.hdf5", planted_local(number, nc=4).problem)
-    (folder / "slow.py").write_text(SLOW)
+    (folder / "slow.py").write_text(slow)
     entries: dict[str, Any] = {
         "name": "cluster",
         "solvers": ["nsgs", "test-slow"],
@@ -126,7 +132,59 @@ def test_a_cluster_without_workers_is_waited_for_aloud(
     progress = bench.run_campaign(chosen, tmp_path / "a.sqlite", runner=runner)
     assert progress.solved == 4
     (word,) = words
-    assert "has no worker yet; dask worker tcp://" in word
+    assert "has no worker; dask worker tcp://" in word
+
+
+def started(*words: str) -> subprocess.Popen[bytes]:
+    """A part of Dask as a process of its own."""
+    command = [sys.executable, "-m", "distributed.cli.dask_" + words[0], *words[1:]]
+    return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+@pytest.mark.slow
+def test_the_loss_of_the_scheduler_ends_in_a_line_and_the_campaign_goes_on(tmp_path: Path) -> None:
+    campaign(tmp_path)
+    store = tmp_path / "runs.sqlite"
+    command = [
+        "bench",
+        "--problems",
+        str(tmp_path / "*.hdf5"),
+        "--module",
+        str(tmp_path / "slow.py"),
+    ]
+    command += ["--solver", "test-slow", "--tol", "1e-6", "--repeats", "10", "--store", str(store)]
+    for lost in (True, False):
+        address = f"tcp://127.0.0.1:{free_port()}"
+        port = address.rpartition(":")[2]
+        scheduler = started("scheduler", "--host=127.0.0.1", f"--port={port}", "--no-dashboard")
+        worker = started("worker", "--nthreads=1", "--no-dashboard", address)
+        try:
+            words = [sys.executable, "-m", "fclib", *command, "--scheduler", address]
+            with subprocess.Popen(words, stdout=-1, stderr=-1, text=True) as conductor:
+                while lost and done(store) < 3:
+                    assert conductor.poll() is None, conductor.communicate()
+                    time.sleep(0.05)
+                if lost:
+                    scheduler.kill()
+                out, errors = conductor.communicate()
+        finally:
+            for process in (scheduler, worker):
+                process.kill()
+                process.wait()
+        assert conductor.returncode == (1 if lost else 0), (out, errors)
+        if lost:
+            (line,) = [line for line in errors.splitlines() if "has no worker" not in line]
+            assert "the Dask scheduler has ended" in line
+            assert "Traceback" not in out
+            assert 3 <= done(store) < 40
+    assert done(store) == 40
+
+
+def done(store: Path) -> int:
+    """How many runs there are in a store, which may be in the making."""
+    with suppress(bench.StoreError), bench.Store(store, create=False) as opened:
+        return len(opened.results())
+    return 0
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -158,19 +216,179 @@ def test_slurm_that_is_not_here_or_refuses(tmp_path: Path, monkeypatch: pytest.M
         pass
 
 
+SLURM = """
+ClusterName=fclib
+SlurmctldHost={host}(127.0.0.1)
+SlurmUser=root
+SlurmdUser=root
+AuthType=auth/munge
+AuthInfo=socket={folder}/munge.socket
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+SlurmctldLogFile={folder}/slurmctld.log
+SlurmdLogFile={folder}/slurmd.log
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SchedulerParameters=bf_interval=2,sched_interval=2
+PreemptType=preempt/partition_prio
+PreemptMode=CANCEL
+KillWait=2
+MpiDefault=none
+SlurmdParameters=config_overrides
+NodeName={host} NodeAddr=127.0.0.1 CPUs=8 RealMemory=8000 State=UNKNOWN
+PartitionName=short Nodes={host} Default=YES MaxTime=INFINITE State=UP PriorityTier=1
+PartitionName=urgent Nodes={host} MaxTime=INFINITE State=UP PriorityTier=10
+"""
+DAEMONS = ("munged", "slurmctld", "slurmd")
+
+
+@pytest.fixture(scope="module")
+def slurm() -> Iterator[Path]:
+    """A Slurm of one node that the tests start and stop themselves."""
+    absent = [name for name in (*DAEMONS, "sbatch") if which(name) is None]
+    if absent or os.getuid() != 0 or importlib.util.find_spec("dask_jobqueue") is None:
+        pytest.skip("needs root, and Debian's slurm-wlm and munge, and dask_jobqueue")
+    # sockets have short names
+    with tempfile.TemporaryDirectory(prefix="slurm-") as name, slurm_of_one_node(Path(name)):
+        yield Path(name)
+
+
+@contextmanager
+def slurm_of_one_node(folder: Path) -> Iterator[None]:
+    """Start munged, slurmctld and slurmd with a configuration of their own; as root."""
+    host = socket.gethostname().partition(".")[0]
+    (folder / "slurm.conf").write_text(
+        SLURM.format(host=host, folder=folder, ports=[free_port(), free_port()])
+    )
+    for part in ("state", "spool"):
+        (folder / part).mkdir()
+    key = folder / "munge.key"
+    key.write_bytes(os.urandom(1024))
+    key.chmod(0o400)
+    names = {"socket": "socket", "key-file": "key", "pid-file": "pid"}
+    names |= {"log-file": "log", "seed-file": "seed"}
+    options = [f"--{option}={folder}/munge.{end}" for option, end in names.items()]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SLURM_CONF", str(folder / "slurm.conf"))
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        daemons = [
+            subprocess.Popen([str(which(daemon)), *words], **quiet)
+            for daemon, words in (
+                ("munged", ["--foreground", "--force", *options]),
+                ("slurmctld", ["-D", "-i"]),
+                ("slurmd", ["-D"]),
+            )
+        ]
+        try:
+            end = time.monotonic() + 120.0
+            while "idle" not in slurm_says("sinfo", "--noheader", "--format=%T"):
+                if time.monotonic() > end:
+                    pytest.skip("Slurm does not start here")
+                time.sleep(0.5)
+            yield
+        finally:
+            slurm_says("scancel", "--user=root")
+            for daemon in reversed(daemons):
+                daemon.terminate()
+                daemon.wait(60)
+
+
+def which(name: str) -> str | None:
+    """The path of a program, of the system's too."""
+    return shutil.which(name, path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
+
+
+def slurm_says(*command: str) -> str:
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def jobs_of_slurm(state: str = "RUNNING") -> list[str]:
+    return slurm_says("squeue", "--noheader", "--format=%i", f"--states={state}").split()
+
+
+def cancelled() -> None:
+    """End all jobs that run, as a person does."""
+    slurm_says("scancel", *jobs_of_slurm())
+
+
+def preempted() -> None:
+    """End them by one that is more urgent, and takes the whole node for a moment."""
+    words = ("--partition=urgent", "--ntasks=8", "--output=/dev/null", "--wrap=sleep 1")
+    slurm_says("sbatch", *words)
+
+
 @jobqueue
-@pytest.mark.skipif(
-    shutil.which("sinfo") is None
-    or subprocess.run(["sinfo"], capture_output=True, check=False).returncode != 0,
-    reason="no Slurm answers",
-)
-def test_slurm_gives_the_same_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.slow
+@pytest.mark.parametrize("way", [cancelled, preempted])
+@pytest.mark.parametrize("processes", ["1", "2"])
+def test_jobs_of_slurm_that_end_are_replaced(
+    processes: str, way: Any, slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)  # where the jobs leave what they say
-    chosen = campaign(tmp_path, solvers=["nsgs"])
+    chosen = campaign(tmp_path, solvers=["nsgs", "test-slow"])
     bench.run_campaign(chosen, tmp_path / "local.sqlite")
-    with cluster.on_slurm({"workers": "2", "memory": "1GB"}) as runner:
-        bench.run_campaign(chosen, tmp_path / "slurm.sqlite", runner=runner)
+    ended: list[list[str]] = []
+
+    def show(progress: bench.Progress) -> None:
+        if len(ended) < 2 and sum(progress.statuses.values()) >= 3 + 4 * len(ended):
+            ended.append(jobs_of_slurm())
+            way()
+
+    words: list[str] = []
+    options = {"workers": "2", "cores": "2", "processes": processes, "memory": "1GB"}
+    with cluster.on_slurm(options, tell=words.append) as runner:
+        progress = bench.run_campaign(chosen, tmp_path / "slurm.sqlite", runner=runner, show=show)
+    assert progress.done == progress.planned
+    assert not progress.not_run
+    assert len(ended) == 2
+    assert all(ended)
     assert rows(tmp_path / "slurm.sqlite") == rows(tmp_path / "local.sqlite")
+    replaced = [word for word in words if "has ended; another is submitted" in word]
+    assert any(ended[0][0] in word for word in replaced)
+
+
+@jobqueue
+@pytest.mark.slow
+def test_a_walltime_shorter_than_the_campaign(
+    slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    # a minute is the least that Slurm knows
+    chosen = campaign(tmp_path, SLOW.replace("0.1", "6.0"), solvers=["test-slow"], repeats=7)
+    words: list[str] = []
+    options = {"workers": "2", "cores": "2", "memory": "1GB", "walltime": "00:01:00"}
+    with cluster.on_slurm(options, tell=words.append) as runner:
+        progress = bench.run_campaign(chosen, tmp_path / "slurm.sqlite", runner=runner)
+    assert progress.solved == progress.planned
+    assert any("has ended; another is submitted" in word for word in words)
+
+
+@jobqueue
+@pytest.mark.slow
+def test_jobs_of_slurm_that_end_at_once_end_the_campaign(
+    slurm: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    chosen = campaign(tmp_path, solvers=["nsgs"])
+    monkeypatch.setattr(cluster, "LOOK", 0.5)
+    with (
+        dask.config.set({"jobqueue.slurm.python": "/bin/false"}),
+        pytest.raises(fclib.Error, match="jobs ended before a worker has joined"),
+        cluster.on_slurm({}, tell=lambda _: None) as runner,
+    ):
+        bench.run_campaign(chosen, tmp_path / "slurm.sqlite", runner=runner)
 
 
 @jobqueue

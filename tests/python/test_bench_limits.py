@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import resource
 import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 import textwrap
 import time
 from collections.abc import Iterator
@@ -19,9 +22,10 @@ import pytest
 
 import fclib
 from fclib import _solve, analysis, bench
-from fclib.bench import meter, problems, processes
+from fclib.bench import machine, meter, pool, problems, processes, template
 from fclib.bench.job import Job, Record
 from fclib.bench.pool import MARK, SupervisorClient
+from fclib.bench.runner import warn_of_locks
 from fclib.bench.supervisor import prove
 from helpers import planted_local
 
@@ -341,6 +345,198 @@ BAD = """
         raise OSError(28, "No space left on device")
 
 
+    # those that work while nobody looks; each takes 0.3 s of CPU for it
+
+    SECRET = 0.3
+
+
+    def in_secret(function):
+        # the real one, after some work
+        def worked(*arguments):
+            burn(time.process_time() + SECRET)
+            return function(*arguments)
+        return worked
+
+
+    def frames():
+        frame = sys._getframe()
+        while frame is not None:
+            yield frame
+            frame = frame.f_back
+
+
+    @bad
+    def works_before_the_clock(problem, r, monitor):
+        # what the worker calls between the problem and the word to go
+        from fclib.bench import processes
+        if problem.nc == 6:  # the warm-up
+            processes.release_memory = in_secret(processes.release_memory)
+        solved(monitor, r)
+
+
+    @bad
+    def works_after_the_clock(problem, r, monitor):
+        # when the worker writes its answer
+        from fclib.bench import worker
+        if problem.nc != 6:
+            real = worker.send
+
+            def send(link, message):
+                if b'"done"' not in message:
+                    burn(time.process_time() + SECRET)
+                    worker.send = real
+                real(link, message)
+
+            worker.send = send
+        solved(monitor, r)
+
+
+    @bad
+    def says_that_it_is_done(problem, r, monitor):
+        # and goes on, with the number of its order
+        import json
+        from fclib.bench import worker
+        if problem.nc != 6:
+            order = next(f.f_locals["order"] for f in frames() if "order" in f.f_locals)
+            link = next(f.f_locals["supervisor"] for f in frames() if "supervisor" in f.f_locals)
+            real = worker.send
+            real(link, json.dumps({"nonce": order["nonce"], "word": "done"}).encode())
+            burn(time.process_time() + SECRET)
+
+            def send(link, message):
+                worker.send = real  # it has been said
+
+            worker.send = send
+        solved(monitor, r)
+
+
+    @bad
+    def works_in_a_thread_of_before(problem, r, monitor):
+        # which the warm-up has started, and which waits for the real problem
+        import threading
+        if problem.nc == 6:
+            global found
+            found = threading.Event()
+            def work():
+                found.wait()
+                burn(time.process_time() + SECRET)
+            threading.Thread(target=work, daemon=True).start()
+        else:
+            found.set()
+            time.sleep(0.05)
+            while threading.active_count() > 1:
+                time.sleep(0.01)
+        solved(monitor, r)
+
+
+    @bad
+    def reads_the_reference(problem, r, monitor):
+        # in the file of the problem, whose path is somewhere in this process
+        import gc
+        texts = {x for f in frames() for x in f.f_locals.values() if isinstance(x, str)}
+        for held in gc.get_objects():
+            if isinstance(held, dict):
+                texts |= {x for x in list(held.values()) if isinstance(x, str)}
+            elif isinstance(held, (tuple, list)):
+                texts |= {x for x in held if isinstance(x, str)}
+        paths = [x for x in texts if x.endswith("problem.hdf5") and os.path.exists(x)]
+        if problem.nc == 6 or paths:
+            return solved(monitor, r)
+        raise RuntimeError("there is no path")
+
+
+    @bad
+    def knows_the_title(problem, r, monitor):
+        titles = [f.f_locals["problem"].info.title for f in frames() if "problem" in f.f_locals]
+        if problem.nc == 6 or any(titles):
+            return solved(monitor, r)
+        raise RuntimeError("there is no title")
+
+
+    @bad
+    def keeps_a_result(problem, r, monitor):
+        # in memory that outlives its process
+        if problem.nc != 6:
+            try:
+                open("/dev/shm/fclib-test-kept").close()
+            except FileNotFoundError:
+                open("/dev/shm/fclib-test-kept", "w").close()
+                raise
+        solved(monitor, r)
+
+
+    @bad
+    def hides_in_a_memfd(problem, r, monitor):
+        if problem.nc != 6:
+            global hidden
+            hidden = os.memfd_create("hidden")
+            for _ in range(400):
+                os.write(hidden, b"1" * 1_000_000)
+            time.sleep(1.0)
+        solved(monitor, r)
+
+
+    @bad
+    def leaves_its_group(problem, r, monitor):
+        group = open("/proc/self/cgroup").read().split("0::")[1].strip()
+        points = [line.split() for line in open("/proc/self/mountinfo") if " - cgroup2 " in line]
+        if problem.nc != 6 and os.fork() == 0:
+            for point in points:
+                for above in (os.path.dirname(group), "/"):
+                    try:
+                        with open(f"{point[4]}{above}/cgroup.procs", "w") as file:
+                            file.write("0")
+                    except OSError:
+                        pass
+            burn()
+        elif problem.nc != 6:
+            time.sleep(ASLEEP)
+
+
+    @bad
+    def says_unsuitable(problem, r, monitor):
+        raise fclib.UnsuitableError("too hard for this one")
+
+
+    @bad
+    def ends_by_a_limit(problem, r, monitor):
+        # the kernel sends SIGKILL then
+        import resource
+        if problem.nc != 6:
+            resource.setrlimit(resource.RLIMIT_CPU, (1, 1))
+            burn()
+
+
+    @bad
+    def leaves_an_alarm(problem, r, monitor):
+        import signal
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        solved(monitor, r)
+
+
+    @bad
+    def rounds_upward(problem, r, monitor):
+        ctypes.CDLL("libm.so.6").fesetround(0x800)
+        solved(monitor, r)
+
+
+    @bad
+    def lowers_what_it_may(problem, r, monitor):
+        import resource
+        resource.setrlimit(resource.RLIMIT_NOFILE, (16, 16))
+        os.nice(19)
+        os.umask(0o777)
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+        solved(monitor, r)
+
+
+    @bad
+    def becomes_another_program(problem, r, monitor):
+        if problem.nc != 6:
+            os.execv("/bin/sleep", ["sleep", str(ASLEEP)])
+
+
     @fclib.solver("bad-flat", dimensions=(2,))
     def flat(problem, r, monitor):
         pass
@@ -354,7 +550,7 @@ EXPECTED = {
     "segfaults": "crashed",
     "aborts": "crashed",
     "exits": "error",
-    "is_killed": "killed",
+    "is_killed": "nothing",  # the kernel drops what a run sends to its first process
     "returns_nan": "invalid",
     "returns_nothing": "nothing",
     "returns_words": "garbage",
@@ -372,15 +568,43 @@ EXPECTED = {
     "took_less_than_nothing": "lied",
     "took_longer_than_it_ran": "lied",
     "forges_an_answer": "garbage",
-    "stops_its_supervisor": "lost",
-    "has_no_room": "no_space",
+    "stops_its_supervisor": "wall_limit",  # which it cannot name
+    "has_no_room": "error",  # there is room
     "patches_clocks": "converged",
     "leaves_a_thread": "converged",
     "leaves_an_orphan": "converged",
     "leaves_files": "converged",
     "exits_at_exit": "converged",
     "works_elsewhere": "converged",
+    "works_before_the_clock": "converged",
+    "works_after_the_clock": "converged",
+    "says_that_it_is_done": "converged",
+    "works_in_a_thread_of_before": "converged",
+    "reads_the_reference": "error",
+    "knows_the_title": "error",
+    "keeps_a_result": "error",
+    "hides_in_a_memfd": "memory",
+    "leaves_its_group": "cpu_limit",
+    "says_unsuitable": "error",
+    "ends_by_a_limit": "crashed",
+    "leaves_an_alarm": "converged",
+    "rounds_upward": "converged",
+    "lowers_what_it_may": "converged",
+    "becomes_another_program": "garbage",
 }
+# that work where no clock of their own sees it, and how long [s] of CPU
+UNSEEN = {
+    "works_elsewhere": 0.12,  # of 0.15; processes are counted in ticks of 10 ms
+    "works_before_the_clock": 0.25,
+    "works_after_the_clock": 0.25,
+    "says_that_it_is_done": 0.25,
+    "works_in_a_thread_of_before": 0.25,
+}
+# that take what is not theirs, or end themselves to leave the comparison
+CAUGHT = (
+    *("reads_the_reference", "knows_the_title", "keeps_a_result", "hides_in_a_memfd"),
+    *("is_killed", "says_unsuitable", "has_no_room", "ends_by_a_limit", "stops_its_supervisor"),
+)
 # that are measured by the processes themselves too, where there are no control groups
 WITHOUT_GROUPS = (
     "burns_in_an_orphan",
@@ -389,6 +613,8 @@ WITHOUT_GROUPS = (
     "works_elsewhere",
     "works_in_a_child",
 )
+# what solvers have declared to take; of the others nothing is known
+DECLARED: dict[str, Any] = {"bad-flat": ((2,), ())}
 # of programs: what a shell does with {output}
 PROGRAMS = {
     "true {input} {output}": "nothing",
@@ -396,6 +622,7 @@ PROGRAMS = {
     "cp /dev/null {output} {input}": "error",
     "sh -c 'echo garbage > $1' sh {output} {input}": "garbage",
     "sh -c 'kill -SEGV $$' sh {input}": "crashed",
+    "sh -c 'kill -KILL $$' sh {input}": "crashed",
     "sh -c 'exit 3' sh {input}": "error",
     "sh -c 'while :; do :; done' sh {input} {output}": "cpu_limit",
 }
@@ -409,7 +636,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def prepare(folder: Path) -> Path:
     """Put the solvers and a problem into a folder; benchmarks/bench_trials.py does so, too."""
     planted = planted_local(3, nc=5)
-    fclib.write(folder / "problem.hdf5", planted.problem)
+    titled = planted.problem.replace(info=fclib.ProblemInfo(title="Planted"))
+    fclib.write(folder / "problem.hdf5", titled)
     solution = f"\n\n    SOLUTION = np.array({planted.solution.r.tolist()!r})\n"
     (folder / "bad.py").write_text(textwrap.dedent(BAD + solution))
     source = "#include <signal.h>\nvoid spin(void) { for (volatile int k = 0;; k = !k); }\n"
@@ -445,7 +673,7 @@ def started(folder: Path, **environment: str) -> Iterator[SupervisorClient]:
 def job(folder: Path, solver: str, **changes: Any) -> Job:
     return Job(
         problem=problems.look(folder / "problem.hdf5"),
-        solver=bench.SolverChoice(solver, {}),
+        solver=bench.SolverChoice(solver, {}, dimensions=DECLARED.get(solver)),
         tol=1e-8,
         limits=bench.Limits(
             time=changes.pop("time", FAR), wall=changes.pop("wall", FAR), memory=MEMORY
@@ -497,7 +725,7 @@ def test_a_control_group_takes_the_cache_of_files_for_no_memory() -> None:
 def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     wall = LIMIT if EXPECTED[name] == "wall_limit" else FAR
     cpu = LIMIT if EXPECTED[name] == "cpu_limit" else FAR
-    start = time.monotonic()
+    start, before = time.monotonic(), there(supervisor)
     record = supervisor.do(job(folder, f"bad-{name}", time=cpu, wall=wall))
     took = time.monotonic() - start
     assert record.status == EXPECTED[name], record
@@ -505,12 +733,12 @@ def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     assert record.total_cpu_s is None or record.total_cpu_s < cpu + LATE
     # however busy it is, long before a solver that sleeps wakes up of its own accord
     assert took < ASLEEP / 2
-    if name == "works_elsewhere":
+    if name in UNSEEN:
         assert record.cpu_s is not None
-        assert record.cpu_s > 0.12  # of 0.15; processes are counted in ticks of 10 ms
+        assert record.cpu_s > UNSEEN[name]
     if record.ran:
         # nothing is left of it: no process, no thread, no file
-        assert not left_over(supervisor)
+        assert there(supervisor) == before
         assert list(Path(supervisor.folder).iterdir()) == []
     # the next one is not touched by it
     after = supervisor.do(job(folder, "auto"))
@@ -521,11 +749,10 @@ def ends(name: str, folder: Path, supervisor: SupervisorClient) -> Record:
     return record
 
 
-def left_over(supervisor: SupervisorClient) -> list[int]:
-    """Processes and threads that a solver has left behind."""
-    assert supervisor.process is not None
-    pids = set(processes.marked(f"{MARK}={supervisor.mark}")) - {supervisor.process.pid}
-    return [pid for pid in pids if processes.state(pid) not in ("", "Z", "X")]
+def there(supervisor: SupervisorClient) -> set[int]:
+    """The supervisor with its template and its own worker, and what a solver has left behind."""
+    pids = processes.marked(f"{MARK}={supervisor.mark}")
+    return {pid for pid in pids if processes.state(pid) not in ("", "Z", "X")}
 
 
 @pytest.mark.parametrize("command", PROGRAMS)
@@ -533,6 +760,131 @@ def test_programs_too(command: str, folder: Path, supervisor: SupervisorClient) 
     cpu = LIMIT if PROGRAMS[command] == "cpu_limit" else FAR
     record = supervisor.do(job(folder, f"cmd:{command}", time=cpu))
     assert record.status == PROGRAMS[command], record
+
+
+PLUGIN = """
+#include <fenv.h>
+#include <string.h>
+#include "fclib_plugin.h"
+static int calls;  /* of the real problem: it is known from the second on */
+static const double known[] = {SOLUTION};
+int fclib_plugin_solve(const struct fclib_plugin_problem* problem, double* r) {
+  fesetround(FE_UPWARD);
+  if (problem->contacts != 6 && ++calls > 1) memcpy(r, known, sizeof known);
+  return problem->stop(problem->context, r) - 1;
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def neighbours(folder: Path) -> list[str]:
+    """Plug-ins that change the arithmetic of their process: one that remembers, one that solves."""
+    known = ", ".join(map(repr, planted_local(3, nc=5).solution.r.tolist()))
+    source = PLUGIN.replace("SOLUTION", known)
+    solves = source.replace("++calls > 1", "++calls > 0")
+    return [compiled(source, folder / "remembers.c"), compiled(solves, folder / "solves.c")]
+
+
+def compiled(source: str, path: Path) -> str:
+    """The name of the solver of a plug-in."""
+    path.write_text(source)
+    include = Path(__file__).resolve().parents[2] / "include"
+    compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
+    assert compiler
+    library = path.with_suffix(".so")
+    command = [compiler, "-shared", "-fPIC", f"-I{include}", "-o", library, path, "-lm"]
+    subprocess.run(command, check=True)
+    return f"plugin:{library}"
+
+
+def test_a_plugin_leaves_the_next_solver_alone(
+    neighbours: list[str], folder: Path, supervisor: SupervisorClient
+) -> None:
+    usual = job(folder, "nsgs", history=True)
+    before = supervisor.do(usual)
+    assert supervisor.do(job(folder, neighbours[1])).status == "converged"
+    after = supervisor.do(usual)
+    assert after.merits == before.merits
+    assert [x[:2] for x in after.history or ()] == [x[:2] for x in before.history or ()]
+
+
+@pytest.mark.parametrize("whose", ["worker", "template"])
+@pytest.mark.parametrize("what", ["limits", "cores", "priority"])
+def test_a_process_that_is_not_as_it_was_serves_nobody(
+    what: str, whose: str, folder: Path, supervisor: SupervisorClient
+) -> None:
+    usual = job(folder, "nsgs")
+    supervisor.do(usual)
+    before = there(supervisor)
+    supervisor.do(usual)
+    assert there(supervisor) == before
+    assert supervisor.process is not None
+    cores = os.sched_getaffinity(0)
+    if what == "cores" and len(cores) == 1:
+        pytest.skip("needs two cores")
+    # the template is there first
+    template, worker = sorted(before - {supervisor.process.pid}, key=begun)
+    pid = worker if whose == "worker" else template
+    if what == "limits":
+        resource.prlimit(pid, resource.RLIMIT_NOFILE, (64, 64))
+    elif what == "cores":
+        own = os.sched_getaffinity(pid)
+        os.sched_setaffinity(pid, (cores - own) or {min(own)})
+    else:
+        os.setpriority(os.PRIO_PROCESS, pid, 15)
+    if whose == "template":
+        # the built-in solvers go on with their worker, the others get none of it
+        assert supervisor.do(job(folder, "bad-patches_clocks")).status == "lost"
+    assert supervisor.do(usual).status == "converged"
+    after = there(supervisor)
+    assert pid not in after
+    assert len(after) == len(before)
+
+
+def begun(pid: int) -> int:
+    """When a process was started, in ticks."""
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[19])
+
+
+@pytest.mark.parametrize("groups", [True, False])
+def test_nothing_is_kept_from_one_repeat_to_the_next(
+    groups: bool, neighbours: list[str], folder: Path, request: pytest.FixtureRequest
+) -> None:
+    supervisor = request.getfixturevalue("supervisor" if groups else "supervisor_without_groups")
+    for solver in (neighbours[0], "bad-keeps_a_result"):
+        for _ in range(3):
+            assert supervisor.do(job(folder, solver)).status == "error", solver
+
+
+def test_a_worker_that_is_killed_from_outside_is_no_failure(
+    folder: Path, supervisor: SupervisorClient
+) -> None:
+    """The kernel says so: what the run itself sends to its first process is dropped."""
+    before = there(supervisor)
+    for solver in ("bad-sleeps", f"cmd:sleep {ASLEEP} {{input}}"):
+        supervisor.give(job(folder, solver, wall=ASLEEP))
+        while not (begun := first_of(supervisor, before)):
+            time.sleep(0.01)
+        os.kill(begun, signal.SIGKILL)
+        record = supervisor.take()[1]
+        assert (record.status, record.ran) == ("killed", False), record
+
+
+def first_of(supervisor: SupervisorClient, before: set[int]) -> int:
+    """The first process of a run that is apart; 0 if there is none yet."""
+    assert supervisor.process is not None
+    new = set(processes.children(supervisor.process.pid)) - before
+    return next(iter(new)) if len(new) == 1 else 0
+
+
+def test_a_kill_of_unknown_origin_is_a_failure(folder: Path) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FCLIB_APART", "0")
+        supervisor = SupervisorClient(1)
+        record = supervisor.do(job(folder, "bad-is_killed"))
+        supervisor.end()
+    assert (record.status, record.ran) == ("crashed", True)
+    assert "the kernel does not say who sent it" in record.message
 
 
 TELLS = """
@@ -692,3 +1044,114 @@ def test_what_is_measured(folder: Path, supervisor: SupervisorClient) -> None:
     errors = [error for _, error, _, _ in record.history]
     assert np.isfinite(errors).all()
     assert errors[-1] <= 1e-8 < errors[0]
+
+
+# ---- what is left, and what is not ours
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder for temporary files of the test's own."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def aged(folder: Path) -> None:
+    """Let a folder be older than any pause."""
+    for path in (*folder.rglob("*"), folder):
+        os.utime(path, (0, 0))
+
+
+def test_folders_of_others_stay_whatever_they_are_called(temporary: Path) -> None:
+    ours, lock = pool.temporary_folder()
+    theirs = temporary / "fclib-bench-results"
+    theirs.mkdir()
+    (theirs / "thesis.csv").write_text("1, 2, 3\n")
+    copy = temporary / "fclib-bench-copy"
+    shutil.copytree(ours, copy)
+    link = temporary / "fclib-bench-link"
+    link.symlink_to(theirs)
+    named = temporary / "fclib-bench-named"
+    named.mkdir()
+    (named / pool.MARK_OF_OURS).symlink_to(ours / pool.MARK_OF_OURS)
+    for folder in (ours, theirs, copy, named):
+        aged(folder)
+    # a campaign that still runs, and then one that was killed
+    for gone in (False, True):
+        if gone:
+            os.close(lock)
+        other, held = pool.temporary_folder()
+        os.close(held)
+        assert ours.exists() is not gone
+        assert (theirs / "thesis.csv").exists()
+        assert (copy / pool.MARK_OF_OURS).exists()
+        assert named.exists()
+        assert link.is_symlink()
+        shutil.rmtree(other, ignore_errors=True)
+
+
+@pytest.mark.parametrize("how", ["link", "open to others", "of somebody else"])
+def test_locks_of_cores_are_held_in_a_folder_of_ones_own(how: str, temporary: Path) -> None:
+    _, locks = machine.reserve(1)
+    for lock in locks:
+        os.close(lock)
+    assert locks
+    folder = temporary / f"fclib-cores-{os.getuid()}"
+    shutil.rmtree(folder)
+    if how == "link":
+        (temporary / "elsewhere").mkdir()
+        folder.symlink_to(temporary / "elsewhere")
+    else:
+        folder.mkdir()
+        folder.chmod(0o777)
+        if how == "of somebody else":
+            if os.getuid() != 0:
+                pytest.skip("only root gives a folder away")
+            folder.chmod(0o755)
+            os.chown(folder, 65534, 65534)
+    assert machine.reserve(1) == (set(), [])
+    assert list(folder.iterdir()) == []
+    told: list[str] = []
+    warn_of_locks(told.append)
+    assert len(told) == 1
+    assert str(folder) in told[0]
+
+
+CONDUCTOR = """
+import sys
+from fclib.bench import pool
+from test_bench_limits import job
+from pathlib import Path
+supervisor = pool.SupervisorClient(1)
+supervisor.give(job(Path(sys.argv[1]), "bad-sleeps", wall=1000.0))
+print(supervisor.process.pid, supervisor.mark, flush=True)
+supervisor.take()
+"""
+
+
+def test_nothing_is_left_of_a_campaign_that_is_killed_while_its_supervisor_is_stopped(
+    folder: Path,
+) -> None:
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+    conductor = subprocess.Popen(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {paths}\n{CONDUCTOR}", str(folder)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    with conductor:
+        assert conductor.stdout is not None
+        number, mark = conductor.stdout.readline().split()
+        supervisor = int(number)
+        while len(processes.marked(f"{MARK}={mark}")) < 3:  # it, the template and a worker
+            time.sleep(0.01)
+        os.kill(supervisor, signal.SIGSTOP)
+        conductor.kill()
+    try:
+        end = time.monotonic() + 60 * template.PATIENCE  # a busy machine may take any time
+        while processes.marked(f"{MARK}={mark}") and time.monotonic() < end:
+            time.sleep(0.05)
+        assert processes.marked(f"{MARK}={mark}") == []
+        if (above := meter.home()) is not None:
+            assert list(above.glob(f"{meter.PREFIX}{supervisor}-*")) == []
+    finally:
+        processes.kill(processes.marked(f"{MARK}={mark}"))

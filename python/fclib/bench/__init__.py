@@ -5,7 +5,7 @@
     profiles, plots <── store <── record <──────┘ the merit
 
 One run by hand is `run`; thousands are a `Campaign` and `run_campaign`. A supervisor is a process
-that forks a worker, hands it a job, watches its time and memory, and judges what it returns.
+that has a worker forked, hands it a job, watches its time and memory, and judges what it returns.
 
 campaign.py     what is to be run: a TOML file becomes jobs. Needs problems.py, made.py, modules.py
 problems.py     the files that a campaign names, and what it knows of the problem in each
@@ -18,6 +18,8 @@ runner.py       runs a campaign: what the store lacks goes to the pool or the cl
 pool.py         supervisors on this machine, several at once
 cluster.py      the same in the workers of Dask, on many machines
 supervisor.py   the process that watches a worker, and judges. Knows no campaign
+copies.py       the same problem in other numbers, against answers known by heart and luck
+template.py     the process that workers are forked from
 worker.py       the process that solves
 warm_up.py      its first call of a solver, which is not measured
 meter.py        what the kernel says a run took: a control group, or the processes

@@ -43,6 +43,7 @@ KNOWN = {
     "threads",
     "seed",
     "history",
+    "renumber",
     "budget",
     "modules",
     "solvers",
@@ -114,6 +115,7 @@ class Campaign:
     threads: int = 1
     seed: int = 0
     history: bool = False
+    renumber: bool = False  # whether each repeat but the first is of a renumbered copy
     modules: tuple[str, ...] = ()
     merit: MeritKind = "both"
     budget: float | None = None  # [s] for all runs together
@@ -196,6 +198,7 @@ class Campaign:
             threads=_count(entries, "threads", 1),
             seed=seed,
             history=_yes(entries, "history"),
+            renumber=_yes(entries, "renumber"),
             modules=modules,
             merit=_merit(entries.get("merit", "both")),
             budget=_budget(entries["budget"]) if "budget" in entries else None,
@@ -284,6 +287,7 @@ class Campaign:
             history=self.history,
             modules=self.modules,
             merit=self.merit,
+            renumber=self.renumber,
             keep=group.sequence is not None,
         )
 
@@ -300,7 +304,8 @@ class Campaign:
         chain: list[Job] = []
         for step, facts in enumerate(steps):
             along = Along(name, step, chain[-1].key if chain else "")
-            chain.append(replace(self._job(facts, group, choice, tol, repeat), along=along))
+            job = self._job(facts, group, choice, tol, repeat)
+            chain.append(replace(job, along=along, renumber=False))
         return chain
 
     def _paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
@@ -557,6 +562,7 @@ def _solvers(
             origin=info.origin,
             label=str(entries.get("label", "")),
             about=described(info),
+            dimensions=(tuple(info.dimensions), tuple(info.rolling_dimensions)),
         )
         if choice.title in choices:
             raise CampaignError(f"{where[:-1]}: there are two that are called {choice.title!r}")

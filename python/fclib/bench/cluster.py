@@ -10,15 +10,20 @@ sent: then each worker gets the bytes of a file once, and keeps it in its cache 
 
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 import importlib
+import logging
 import os
+import queue
 import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -30,6 +35,9 @@ from fclib.bench.pool import SupervisorClient
 
 AHEAD = 3  # jobs a thread of the cluster that are on their way at once
 PATIENCE = 20.0  # [s] for a scheduler to answer
+LOOK = 5.0  # [s] between two looks at the jobs of Slurm
+USELESS = 3  # jobs of Slurm that end one after the other before a worker has joined
+QUEUED = "PENDING,CONFIGURING,RUNNING,SUSPENDED,RESIZING,REQUEUED"  # states of jobs that may work
 RETRIES = 5  # of a job whose worker of Dask dies
 
 # ---- in the workers of Dask
@@ -86,22 +94,31 @@ def say(word: str) -> None:
     print(word, file=sys.stderr, flush=True)
 
 
-def runner(client: Any, send: bool = False, tell: Callable[[str], None] = say) -> Runner:
+def runner(
+    client: Any,
+    send: bool = False,
+    tell: Callable[[str], None] = say,
+    look: Callable[[bool], None] = lambda _: None,
+) -> Runner:
     """What `run_campaign` needs to run its jobs on a cluster.
 
     Args:
         client: a ``distributed.Client``.
         send: whether the problems are sent, because the machines share no folder.
         tell: is called where there is no worker to do the jobs.
+        look: is called every `LOOK` seconds, with whether a run was done since, and raises where
+            there is no use in waiting.
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
-        from distributed import as_completed
         from distributed.scheduler import KilledWorker
 
         waiting: dict[Any, Job] = {}
+        done: queue.SimpleQueue[Any] = queue.SimpleQueue()
         sent: dict[str, Any] = {}
-        number = 0
+        number, looked = 0, time.monotonic()
+        waits, progress = False, False  # for a worker; a run was done since the last look
+        address = client.scheduler.address
 
         def file_of(problem: ProblemFacts | None) -> Any:
             if problem is None or not send:
@@ -111,45 +128,91 @@ def runner(client: Any, send: bool = False, tell: Callable[[str], None] = say) -
                 sent[problem.hash] = client.scatter(data, hash=False)
             return sent[problem.hash]
 
-        def submit() -> Any:
+        def submit() -> bool:
             nonlocal number
             job = next(jobs, None)
             if job is None:
-                return None
+                return False
             before = job.guess.problem if job.guess else None
             files = file_of(job.problem), file_of(before)
             number += 1
             name = f"fclib-{job.key}-{number}"
             future = client.submit(do, job, *files, key=name, pure=False, retries=RETRIES)
             waiting[future] = job
-            return future
+            future.add_done_callback(done.put)
+            return True
 
         def capacity() -> int:
             return AHEAD * max(1, sum(map(int, client.nthreads().values())))
 
-        done = as_completed()
+        def result(future: Any) -> Record | None:
+            """What came of it; None if that is lost with the worker that had it, and done again."""
+            try:
+                record: Record = future.result(timeout=LOOK)
+            except KilledWorker as error:
+                return Record("lost", f"the workers of Dask that tried it died: {error}")
+            except (TimeoutError, asyncio.TimeoutError):  # two in Python 3.10
+                future.add_done_callback(done.put)
+                return None
+            return record
+
+        def wait_aloud() -> None:
+            nonlocal waits
+            none = not client.nthreads()
+            if none and not waits:
+                tell(f"waiting: {address} has no worker; dask worker {address} starts one")
+            waits = none
+
         try:
-            if not client.nthreads():
-                address = client.scheduler.address
-                tell(f"waiting: {address} has no worker yet; dask worker {address} starts one")
+            wait_aloud()
             while True:
                 # workers may come and go
-                while len(waiting) < capacity() and (future := submit()) is not None:
-                    done.add(future)
+                while len(waiting) < capacity() and submit():
+                    pass
                 if not waiting:
                     return
-                future = next(done)
-                job = waiting.pop(future)
+                if time.monotonic() - looked > LOOK:
+                    look(progress)
+                    wait_aloud()
+                    looked, progress = time.monotonic(), False
                 try:
-                    record = future.result()
-                except KilledWorker as error:
-                    record = Record("lost", f"the workers of Dask that tried it died: {error}")
+                    future = done.get(timeout=LOOK)
+                except queue.Empty:
+                    continue
+                record = result(future)
+                if record is None:
+                    continue
+                job = waiting.pop(future)
                 future.release()
+                progress = True
                 yield job, record
+        except (CancelledError, OSError, TimeoutError, RuntimeError) as error:
+            # with the scheduler go all the tasks that it knew of
+            if isinstance(error, _core.Error) or client.status == "running":
+                raise
+            raise _core.Error(
+                f"{address}: the Dask scheduler has ended or does not answer; the runs that were"
+                " done are stored, and the same command does the others"
+            ) from None
         finally:
-            client.cancel(list(waiting))
+            if client.status == "running":
+                client.cancel(list(waiting))
 
     return run
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Let Dask not say what this module says in one line."""
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    levels = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in levels.items():
+            logger.setLevel(level)
 
 
 @contextmanager
@@ -165,7 +228,7 @@ def on_scheduler(address: str, send: bool = False) -> Iterator[Runner]:
         client = Client(address, timeout=PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
         raise _core.Error(f"{address}: no Dask scheduler answers: {error}") from None
-    with client:
+    with quiet(), client:
         yield runner(client, send)
 
 
@@ -225,8 +288,71 @@ def _ask_sbatch(script: str) -> None:
         raise _core.Error(f"slurm: sbatch refuses the job: {words}")
 
 
+class Keeper:
+    """Sees to it that so many jobs of Slurm are there as are wanted, however they end.
+
+    A job may be cancelled, preempted or at its walltime before a worker has joined from it, or
+    with several workers: so it is Slurm that is asked, and not the scheduler of Dask.
+    """
+
+    def __init__(self, cluster: Any, workers: int, tell: Callable[[str], None] = say) -> None:
+        self.cluster = cluster
+        self.workers = workers
+        self.tell = tell
+        self.useless = 0  # jobs that have ended one after the other, while no run was done
+
+    def look(self, progress: bool) -> None:
+        """Submit a job for each that has gone.
+
+        Args:
+            progress: whether a run was done since the last look.
+
+        Raises:
+            fclib.Error: one after the other ends before a worker has joined.
+        """
+        there = queued()
+        if there is None:
+            return  # Slurm does not answer: it may later
+        known = self.cluster.workers.items()
+        gone = {name: job.job_id for name, job in known if job.job_id and job.job_id not in there}
+        if progress or self.cluster.scheduler_info["workers"]:
+            self.useless = 0
+        else:
+            self.useless += len(gone)
+        if gone and self.useless >= USELESS:
+            raise _core.Error(
+                f"slurm: {self.useless} jobs ended before a worker has joined; the last one,"
+                f" {next(iter(gone.values()))}, may say why in slurm-*.out"
+            )
+        if gone:
+            self.tell(f"slurm: job {', '.join(gone.values())} has ended; another is submitted")
+            self.cluster.sync(self.forget, list(gone))
+        if gone or set(self.cluster.worker_spec) - set(self.cluster.workers):
+            self.cluster.scale(self.workers)
+
+    async def forget(self, names: list[str]) -> None:
+        """Let the cluster know nothing more of jobs; in its own loop."""
+        for name in names:
+            self.cluster.worker_spec.pop(name, None)
+            self.cluster.workers.pop(name, None)
+
+
+def queued() -> set[str] | None:
+    """The jobs of this user that work or will; None where Slurm does not answer."""
+    command = ["squeue", "--noheader", f"--user={os.getuid()}", f"--states={QUEUED}"]
+    try:
+        asked = subprocess.run(
+            [*command, "--format=%i"], capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return None
+    return set(asked.stdout.split()) if asked.returncode == 0 else None
+
+
 @contextmanager
-def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]:
+def on_slurm(
+    options: Mapping[str, str], send: bool = False, tell: Callable[[str], None] = say
+) -> Iterator[Runner]:
     """A cluster of Slurm jobs, submitted for this campaign.
 
     Raises:
@@ -237,10 +363,12 @@ def on_slurm(options: Mapping[str, str], send: bool = False) -> Iterator[Runner]
     cluster, workers = slurm_cluster(options)
     try:
         _ask_sbatch(cluster.job_script())
-        # workers that die are asked for again
-        cluster.adapt(minimum=workers, maximum=workers)
-        with Client(cluster) as client:
-            yield runner(client, send)
+        cluster.scale(workers)
+        keeper = Keeper(cluster, workers, tell)
+        with quiet(), Client(cluster) as client:
+            yield runner(client, send, tell, keeper.look)
+    except _core.Error:
+        raise
     except (OSError, RuntimeError) as error:
         raise _core.Error(f"slurm: {error}") from error
     finally:

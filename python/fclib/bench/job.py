@@ -29,14 +29,15 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "invalid": "returned numbers that are not finite",
         "nothing": "returned no solution: none at all, or the starting point as it was",
         "garbage": "returned what is no solution of this problem: another shape, another format",
-        "unsuitable": "does not take problems of this kind, and said so",
+        "unsuitable": "has declared that it does not take problems of this kind",
         "error": "raised an exception, or ended with an exit status other than 0",
         "cpu_limit": "was killed: it had used the CPU time, and did not stop",
         "wall_limit": "was killed: the wall clock had run out, and it did not stop",
         "memory": "ran out of the memory that it was allowed",
-        "crashed": "was ended by a signal of its own making, as a segmentation fault",
+        "crashed": "was ended by a signal of its own making, as a segmentation fault, or of which "
+        "nobody knows who sent it",
         "lied": "said that it took less than nothing, or more than the kernel has seen",
-        "killed": "was killed from outside, by the system or by a person",
+        "killed": "was killed from outside, by the system or by a person, as the kernel says",
         "unreadable": "the problem cannot be read, or its file has changed",
         "no_space": "a disk is full, or the system has no more files to give",
         "lost": "the process that watches it, or the machine, has ended or does not answer",
@@ -89,6 +90,14 @@ class SolverChoice:
     origin: str = ""
     label: str = ""  # what tables call it
     about: str = ""  # JSON, what the solver says of itself: `campaign.described`
+    # the spacedims it takes, of problems without rolling friction and with it; None: not known
+    dimensions: tuple[tuple[int, ...], tuple[int, ...]] | None = None
+
+    def suits(self, problem: ProblemFacts) -> bool:
+        """Whether the solver takes problems of this kind, by what it has declared."""
+        if self.dimensions is None:
+            return True
+        return problem.spacedim in self.dimensions[problem.kind.endswith("rolling")]
 
     @property
     def title(self) -> str:
@@ -150,6 +159,7 @@ class Job:
     along: Along | None = None  # None: cold, from nothing
     keep: bool = False  # whether the solution is stored
     guess: Guess | None = None  # known when the run is begun, and follows from `along`
+    renumber: bool = False  # whether each repeat but the first is of a copy: copies.py
 
     @property
     def start(self) -> str:
@@ -170,15 +180,24 @@ class Job:
             self.repeat,
             *([self.merit] if self.merit != "natural" else []),  # once it was the only one
             *([["after", self.along.after]] if self.along else []),
+            *(["copy"] if self.copy else []),
         ]
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
 
+    @property
+    def copy(self) -> int:
+        """Which copy of the problem is solved; 0 for the problem itself."""
+        return self.repeat if self.renumber else 0
+
     def order(self) -> dict[str, Any]:
-        """The job as a worker is told it, in JSON's types."""
+        """The job as a supervisor is told it, in JSON's types."""
         return {
             "path": self.problem.path,
             "kind": self.problem.kind,
             "hash": self.problem.hash,
+            "spacedim": self.problem.spacedim,
+            "copy": self.copy,
+            "suits": self.solver.suits(self.problem),
             "solver": self.solver.name,
             "options": dict(self.solver.options),
             "tol": self.tol,

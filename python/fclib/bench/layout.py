@@ -56,7 +56,7 @@ CREATE TABLE runs (
     {merits}, stages TEXT, measured TEXT, warm INTEGER, pinned INTEGER,
     load REAL, frequency_mhz REAL, started REAL,
     start TEXT NOT NULL DEFAULT 'cold', sequence TEXT, step INTEGER, guess INTEGER, after TEXT,
-    checksum INTEGER,
+    copy INTEGER, checksum INTEGER,
     UNIQUE (key, machine)
 );
 CREATE TABLE faults (
@@ -87,7 +87,8 @@ CREATE VIEW results AS SELECT
     solvers.label AS solver, solvers.name AS solver_name, solvers.options, solvers.version,
     solvers.family AS solver_family, solvers.origin, solvers.about,
     runs.tol, runs.merit, runs.time_limit, runs.wall_limit, runs.memory_limit, runs.threads,
-    runs.repeat, runs.status, runs.message, runs.solved, runs.iterations, runs.cpu_s,
+    runs.repeat, COALESCE(runs.copy, 0) AS copy, runs.status, runs.message, runs.solved,
+    runs.iterations, runs.cpu_s,
     runs.said_cpu_s, runs.setup_s, runs.total_cpu_s, runs.wall_s, runs.memory_mb, {run_merits},
     runs.start, runs.sequence, runs.step, runs.guess,
     runs.stages, runs.measured, runs.warm, runs.pinned, machines.node, machines.cpu,
@@ -110,7 +111,7 @@ MACHINE = ("hash", "node", "cpu", "cores", "memory_gb", "facts")
 CAMPAIGN = ("name", "text", "planned", "skipped", "pid", "node", "started", "seen", "ended")
 RUN = (
     *("key", "campaign", "problem", "solver", "machine"),
-    *("tol", "merit", "time_limit", "wall_limit", "memory_limit", "threads", "repeat"),
+    *("tol", "merit", "time_limit", "wall_limit", "memory_limit", "threads", "repeat", "copy"),
     *("status", "message", "solved", "iterations"),
     *("cpu_s", "said_cpu_s", "setup_s", "total_cpu_s", "wall_s", "memory_mb"),
     *(*MERITS, "stages", "measured", "warm", "pinned", "load", "frequency_mhz", "started"),

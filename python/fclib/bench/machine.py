@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import functools
 import importlib.metadata
@@ -82,22 +83,26 @@ def frequency() -> float | None:
 def reserve(count: int) -> tuple[set[int], list[int]]:
     """So many cores that no other campaign of this user has, and the locks that hold them.
 
-    None where fewer are free, or the system lets nobody choose.
+    None where fewer are free, or the system lets nobody choose, or where the folder of the locks
+    is not this user's.
     """
     held: dict[int, int] = {}
     try:
-        folder = Path(tempfile.gettempdir()) / f"fclib-cores-{os.getuid()}"
-        folder.mkdir(exist_ok=True)
-        for core in sorted(os.sched_getaffinity(0)):
-            if len(held) == count:
-                break
-            lock = os.open(folder / str(core), os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                os.close(lock)
-            else:
-                held[core] = lock
+        folder = folder_of_locks()
+        try:
+            for core in sorted(os.sched_getaffinity(0)):
+                if len(held) == count:
+                    break
+                how = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK
+                lock = os.open(str(core), how, 0o600, dir_fd=folder)
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except OSError:
+                    os.close(lock)
+                else:
+                    held[core] = lock
+        finally:
+            os.close(folder)
     except (OSError, AttributeError):
         pass
     if len(held) < count or not count:
@@ -105,3 +110,20 @@ def reserve(count: int) -> tuple[set[int], list[int]]:
             os.close(lock)
         return set(), []
     return set(held), list(held.values())
+
+
+def folder_of_locks() -> int:
+    """Open the folder of the locks of cores, which is made if there is none.
+
+    Raises:
+        OSError: it is a link, another user's, or one that others may write to.
+    """
+    path = Path(tempfile.gettempdir()) / f"fclib-cores-{os.getuid()}"
+    with contextlib.suppress(FileExistsError):
+        path.mkdir(0o700)
+    folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    facts = os.fstat(folder)
+    if facts.st_uid != os.getuid() or facts.st_mode & 0o022:
+        os.close(folder)
+        raise PermissionError(f"{path}: is not a folder that this user alone may write to")
+    return folder

@@ -14,6 +14,7 @@ import functools
 import os
 import resource
 import time
+from collections.abc import Set
 from pathlib import Path
 
 from fclib.bench import processes
@@ -57,8 +58,16 @@ def home() -> Path | None:
 class Meter:
     """What a worker with all that it has started takes; made by its supervisor before it forks."""
 
-    def __init__(self) -> None:
+    def __init__(self, foreign: bool = False, ours: Set[int] = frozenset()) -> None:
+        """Make it.
+
+        Args:
+            foreign: whether the worker's code may try to leave its control group.
+            ours: children of the supervisor that are no part of the run.
+        """
         self.pid = 0
+        self.foreign = foreign
+        self.ours = ours
         self.group: Path | None = None
         if (above := home()) is not None:
             group = above / f"{PREFIX}{os.getpid()}-{next(NUMBER)}"
@@ -79,15 +88,9 @@ class Meter:
             return "processes"
         return "cgroup" if self.by_group else "cgroup, PSS"
 
-    def enter(self) -> None:
-        """Have the calling process measured; before it does anything."""
-        if self.group is not None:
-            (self.group / "cgroup.procs").write_text("0")
-
     def watch(self, pid: int) -> None:
         """Measure this process, a child that has entered."""
         self.pid = pid
-        self._offset = processes.resident(pid) - self._proportional([pid])
 
     def members(self) -> list[int]:
         """The worker and all that it has started, and that has not ended."""
@@ -95,22 +98,33 @@ class Meter:
         if self.group is not None:
             with contextlib.suppress(OSError):
                 found |= set(map(int, (self.group / "cgroup.procs").read_text().split()))
-        for child in processes.children(os.getpid()):
-            if child not in found or self.group is None:
+        if self.group is None or self.foreign:
+            for child in self.others():
                 found |= set(processes.tree(child))
         return [pid for pid in found if processes.state(pid) not in ("", "Z", "X")]
 
     def cpu(self) -> float:
-        """[s] of CPU of all that was ever started, the worker too."""
+        """[s] of CPU of all that was ever started, the worker too.
+
+        Of foreign code the larger of two counts: that of the control group, which knows what has
+        ended, and that of the processes, which knows what has left the group.
+        """
+        by_group = None
         if self.group is not None:
             with contextlib.suppress(OSError, ValueError, IndexError):
                 text = (self.group / "cpu.stat").read_text()
-                return int(text.split(maxsplit=2)[1]) * 1e-6
+                by_group = int(text.split(maxsplit=2)[1]) * 1e-6
+                if not self.foreign:
+                    return by_group
         total = self._own_ended() - self._ended
-        for child in processes.children(os.getpid()):
+        for child in self.others():
             for member in processes.tree(child):
                 total += processes.cpu_clock(member) + processes.cpu_of_ended(member)
-        return total
+        return total if by_group is None else max(by_group, total)
+
+    def others(self) -> list[int]:
+        """The children of the supervisor that are part of the run."""
+        return [child for child in processes.children(os.getpid()) if child not in self.ours]
 
     def memory(self) -> float:
         """[MB] in memory, each page once."""
@@ -119,11 +133,12 @@ class Meter:
             with contextlib.suppress(OSError, ValueError, KeyError):
                 return of_group((self.group / "memory.stat").read_text())
         members = self.members()
+        unnamed = processes.unnamed(members) if self.foreign else 0.0
         if len(members) <= 1:
-            return processes.resident(self.pid)
+            return processes.resident(self.pid) + unnamed
         now = time.monotonic()
         if now >= self._next:
-            self._last = self._proportional(members) + self._offset
+            self._last = self._proportional(members) + self._offset + unnamed
             self._next = now + (time.monotonic() - now) / SHARE
         return self._last
 
@@ -141,7 +156,7 @@ class Meter:
         if self.group is not None:
             with contextlib.suppress(OSError):
                 (self.group / "cgroup.kill").write_text("1")
-        status = processes.kill_all(self.pid)
+        status = processes.kill_all(self.pid, self.ours)
         if self.group is not None:
             remove(self.group)
         return status
@@ -168,8 +183,21 @@ def remove(group: Path) -> None:
             return
 
 
-def sweep(supervisor: int) -> None:
-    """Remove the control groups that a supervisor, which was killed, has left behind."""
+def enter(group: str) -> None:
+    """Have the calling process measured by a control group, if there is one."""
+    if group:
+        Path(group, "cgroup.procs").write_text("0")
+
+
+def sweep(supervisor: int, mark: str) -> None:
+    """End what a supervisor has left behind, that one too, and remove its control groups.
+
+    Args:
+        supervisor: its number; it may be stopped, or have ended.
+        mark: in the environment of all that it has started.
+    """
+    own = os.getpid()
+    processes.kill([pid for pid in processes.marked(mark) if pid != own])
     if (above := home()) is not None:
         for group in above.glob(f"{PREFIX}{supervisor}-*"):
             remove(group)

@@ -43,14 +43,16 @@ LOOK = 0.5  # [s] between two looks at supervisors that are silent
 STOPPED = 1.0  # [s] that one may be stopped, as by SIGSTOP
 MARK = "FCLIB_BENCH_RUN"  # in the environment of all that a supervisor starts
 PREFIX = "fclib-bench-"  # of folders for temporary files
+MARK_OF_OURS = "mark"  # in them, beside the files of a worker
+FILES = "files"
 START = """
 import json, site, sys
-path, user, link, folder, cores = json.loads(sys.argv[1])
+path, user, link, alive, folder, mark, cores = json.loads(sys.argv[1])
 sys.path[:] = path
 if user:
     site.addsitedir(user)
 from fclib.bench.supervisor import main
-main(link, folder, cores)
+main(link, alive, folder, mark, cores)
 """
 
 
@@ -68,26 +70,45 @@ def search_path() -> list[str]:
     return [*found, *(path for path in dict.fromkeys((package, own)) if path not in found)]
 
 
-def temporary_folder() -> tuple[str, int]:
-    """A folder for what a worker writes, and the lock that says that it is used.
+def temporary_folder() -> tuple[Path, int]:
+    """A folder of ours in that for temporary files, and the lock that says that it is used.
 
-    What campaigns that were killed have left is removed.
+    What campaigns that were killed have left is removed: folders with a mark of ours, of which
+    nobody holds the lock any more.
     """
     above = Path(tempfile.gettempdir())
     for old in above.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):
-            if old.stat().st_uid != os.getuid() or time.time() - old.stat().st_mtime < 60:
-                continue
-            lock = os.open(old, os.O_RDONLY)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(old, ignore_errors=True)
-            finally:
-                os.close(lock)
-    folder = tempfile.mkdtemp(prefix=PREFIX, dir=above)
-    lock = os.open(folder, os.O_RDONLY)
+            remove_left(old)
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=above))
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     fcntl.flock(lock, fcntl.LOCK_SH)
+    (folder / MARK_OF_OURS).write_bytes(words_of(folder))
     return folder, lock
+
+
+def words_of(folder: Path) -> bytes:
+    """What the mark of a folder says: a copy of the folder is not ours, whatever is in it."""
+    facts = folder.lstat()
+    return f"fclib bench: made by a campaign, {facts.st_dev} {facts.st_ino}\n".encode()
+
+
+def remove_left(folder: Path) -> None:
+    """Remove a folder that `temporary_folder` has made, if nobody uses it.
+
+    Raises:
+        OSError: it is used, or has no mark of ours.
+    """
+    lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        how = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK
+        with os.fdopen(os.open(MARK_OF_OURS, how, dir_fd=lock), "rb") as mark:
+            owners = {os.fstat(lock).st_uid, os.fstat(mark.fileno()).st_uid}
+            if owners == {os.getuid()} and mark.read(1000) == words_of(folder):
+                shutil.rmtree(folder, ignore_errors=True)
+    finally:
+        os.close(lock)
 
 
 class SupervisorClient:
@@ -103,6 +124,7 @@ class SupervisorClient:
         self.stopped: float | None = None  # since when
         self.mark = ""
         self.folder, self.lock = "", -1
+        self.alive = -1  # the end of a pipe, open as long as this process lives
 
     def give(self, job: Job) -> None:
         """Have a job done."""
@@ -119,21 +141,26 @@ class SupervisorClient:
             self.link.send(job.order())
 
     def _start(self) -> None:
-        self.folder, self.lock = temporary_folder()
+        above, self.lock = temporary_folder()
+        self.folder = str(above / FILES)
+        Path(self.folder).mkdir()
         self.mark = uuid.uuid4().hex
         ours, theirs = socket.socketpair()
+        alive, self.alive = os.pipe()
         user = site.getusersitepackages() if site.ENABLE_USER_SITE else ""
         cores = self.threads if self.pin else 0
-        words = json.dumps([search_path(), user, theirs.fileno(), self.folder, cores])
+        mark = f"{MARK}={self.mark}"
+        words = [search_path(), user, theirs.fileno(), alive, self.folder, mark, cores]
         with theirs:
             self.process = subprocess.Popen(
-                [sys.executable, "-I", "-c", START, words],
+                [sys.executable, "-I", "-c", START, json.dumps(words)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
-                pass_fds=[theirs.fileno()],
+                pass_fds=[theirs.fileno(), alive],
                 env=os.environ | dict.fromkeys(THREADS, str(self.threads)) | {MARK: self.mark},
                 start_new_session=True,  # Ctrl-C is not for it
             )
+        os.close(alive)
         self.link = Connection(ours.detach())
 
     def take(self) -> tuple[Job, Record]:
@@ -190,12 +217,12 @@ class SupervisorClient:
                 self.process.wait()
             code = self.process.returncode
             if code:  # it had no time to clean up
-                meter.sweep(self.process.pid)
-                processes.kill(processes.marked(f"{MARK}={self.mark}"))
+                meter.sweep(self.process.pid, f"{MARK}={self.mark}")
             self.process = None
         if self.folder:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            shutil.rmtree(Path(self.folder).parent, ignore_errors=True)
             os.close(self.lock)
+            os.close(self.alive)
             self.folder = ""
         return code
 

@@ -8,7 +8,9 @@ import os
 import resource
 import signal
 import time
+from collections.abc import Set
 from pathlib import Path
+from typing import Any
 
 TICKS = os.sysconf("SC_CLK_TCK")
 PAGE = os.sysconf("SC_PAGE_SIZE")
@@ -109,6 +111,24 @@ def proportional(pid: int) -> float:
     return resident(pid)
 
 
+def unnamed(pids: list[int]) -> float:
+    """[MB] of files in memory without a name that processes have open (memfd_create(2)).
+
+    What they have mapped of one is in their resident size too.
+    """
+    found: dict[tuple[int, int], int] = {}
+    for pid in pids:
+        folder = f"/proc/{pid}/fd"
+        with contextlib.suppress(OSError):
+            for number in os.listdir(folder):  # noqa: PTH208 (half the time)
+                with contextlib.suppress(OSError):
+                    path = f"{folder}/{number}"
+                    if os.readlink(path).startswith("/memfd:"):  # noqa: PTH115
+                        facts = os.stat(path)  # noqa: PTH116
+                        found[facts.st_dev, facts.st_ino] = facts.st_blocks * 512
+    return sum(found.values()) / 1e6
+
+
 def peak_memory(pid: int) -> float:
     """[MB] the largest resident size of a process since `forget_peak`."""
     with contextlib.suppress(OSError):
@@ -116,6 +136,39 @@ def peak_memory(pid: int) -> float:
             if line.startswith("VmHWM:"):
                 return int(line.split()[1]) * 1024 / 1e6
     return 0.0
+
+
+def belongings(pid: int) -> tuple[Any, ...]:
+    """What a process has of its own, as far as others see it: signals, limits, cores, timers."""
+    found: list[Any] = []
+    with contextlib.suppress(OSError):
+        for line in Path(f"/proc/{pid}/status").read_text().splitlines():
+            if line.startswith(("SigBlk:", "SigIgn:", "SigCgt:")):
+                found.append(line)
+        found.append(Path(f"/proc/{pid}/limits").read_text())
+        found.append(os.sched_getaffinity(pid))
+        found.append((os.getpriority(os.PRIO_PROCESS, pid), os.sched_getscheduler(pid)))
+        found.append(os.readlink(f"/proc/{pid}/cwd"))  # noqa: PTH115
+    with contextlib.suppress(OSError):  # a kernel without the list
+        found.append(Path(f"/proc/{pid}/timers").read_text())
+    return tuple(found)
+
+
+def environment() -> tuple[Any, ...]:
+    """What this process has of its own that only it can tell: arithmetic, alarms, variables."""
+    library = ctypes.CDLL(None)
+    timers = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
+    rounding = library.fegetround() if hasattr(library, "fegetround") else None
+    traps = library.fegetexcept() if hasattr(library, "fegetexcept") else None
+    least = float.fromhex("0x1p-1022")
+    return (
+        rounding,
+        traps,
+        least * 0.5 > 0.0,  # numbers that small are not taken for 0
+        [signal.getitimer(timer)[0] > 0 for timer in timers],
+        dict(os.environ),
+        os.umask(os.umask(0o077)),
+    )
 
 
 def forget_peak(pid: int) -> None:
@@ -169,6 +222,14 @@ def lower(pid: int, kind: int, value: int) -> None:
         resource.prlimit(pid, kind, (min(values, default=unlimited), hard))
 
 
+def has_hard_limit(pid: int, kind: int) -> bool:
+    """Whether a process, which may have ended, has a limit that it could not lift any more."""
+    with contextlib.suppress(OSError):
+        hard, own = (resource.prlimit(number, kind)[1] for number in (pid, 0))
+        return hard != own
+    return False
+
+
 def release_memory() -> None:
     """Give freed memory back to the system, so that the next run is not lent it."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
@@ -176,8 +237,13 @@ def release_memory() -> None:
         trim(0)
 
 
-def kill_all(pid: int, patience: float = 5.0) -> int | None:
+def kill_all(pid: int, ours: Set[int] = frozenset(), patience: float = 5.0) -> int | None:
     """Kill a child and all that descends from it, and wait for them; for a process that adopts.
+
+    Args:
+        pid: the child.
+        ours: other children of this process, that are left alone.
+        patience: [s] at most.
 
     Returns:
         The exit status of the child as ``os.waitpid`` has it; None if it cannot be had.
@@ -189,15 +255,18 @@ def kill_all(pid: int, patience: float = 5.0) -> int | None:
     targets = tree(pid)
     while True:
         kill(targets)
-        try:
-            ended, how = os.waitpid(-1, os.WNOHANG)
-        except ChildProcessError:
+        left = [child for child in children(os.getpid()) if child not in ours]
+        if not left:
             return status
-        if ended == pid:
-            status = how
-        if ended == 0:
+        waited = False
+        for child in left:
+            ended, how = os.waitpid(child, os.WNOHANG)
+            waited = waited or ended != 0
+            if ended == pid:
+                status = how
+        if not waited:
             if time.monotonic() > end:
                 return status
             time.sleep(1e-3)
         # orphans are ours by now
-        targets = [member for child in children(os.getpid()) for member in tree(child)]
+        targets = [member for child in left for member in tree(child)]

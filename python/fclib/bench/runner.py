@@ -223,6 +223,7 @@ def run_campaign(
         show(progress)
         if runner is None:
             warn_of_load(jobs * campaign.threads, tell)
+            warn_of_locks(tell)
 
         by_key = {key: job for key, job in plan.items() if job.along}
 
@@ -294,3 +295,11 @@ def warn_of_load(busy: int, tell: Callable[[str], None]) -> None:
             f"the machine has other work, load {load:.1f} on {cores} cores: times may be longer"
             " than they would be, and are marked where the load was above the number of cores"
         )
+
+
+def warn_of_locks(tell: Callable[[str], None]) -> None:
+    """Say so if no run gets cores for itself, because others could hold their locks."""
+    try:
+        os.close(machine.folder_of_locks())
+    except OSError as error:
+        tell(f"runs share their cores with other campaigns: {error}; remove it")

@@ -351,7 +351,7 @@ class Store:
                 # of the released version, which had no checksums
                 bare = len(columns) < len(own.declared) and "checksum" not in columns
                 names = ", ".join(
-                    [name for name, _ in own.declared if name not in ("about", "checksum")]
+                    [name for name, _ in own.declared if name not in ("about", "copy", "checksum")]
                     if bare
                     else [name for name, _ in own.declared]
                 )
@@ -704,6 +704,7 @@ class Store:
             job.limits.memory,
             job.threads,
             job.repeat,
+            job.copy,
             record.status,
             text_of(record.message),
             int(record.solved),

@@ -1,12 +1,14 @@
 """The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
 
-``serve(FD, FOLDER)`` serves jobs from a socket until that is closed. The supervisor never runs a
-solver: that is done by the worker that it forks, and renews after every failure and whenever it is
-not as it was: another process is left, or a thread, or code of the user's has been in it. The
-solution comes back as numbers, and the supervisor recomputes every merit from its own copy of the
-problem, so that nothing a solver does in its process changes the verdict. What a run took is what
-the kernel counted between two words of the worker (meter.py); what the solver says of its time must
-fit in there.
+`main` serves jobs from a socket until that is closed. The supervisor never runs a solver: that is
+done by a worker. One worker serves the built-in solvers. It is renewed after every failure, and if
+it is not as it was: a process or a thread is left, or its signals, limits, cores or arithmetic
+have changed. Each run of any other solver has a worker of its own, which is apart if the system
+allows it (template.py). The supervisor reads the problem, and hands its numbers over once the
+solver is loaded and warm. The solution comes back as numbers, and the supervisor recomputes every
+merit from its own copy of the problem, so that nothing a solver does in its process changes the
+verdict. What a run took is what the kernel counted while the worker had the problem (meter.py);
+what the solver says of its time must fit in there.
 
 A run is killed with all processes that descend from it, in whatever group or session they are: what
 loses its parent becomes a child of the supervisor.
@@ -24,6 +26,7 @@ import shutil
 import signal
 import socket
 import time
+from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -33,23 +36,28 @@ import numpy as np
 from fclib import _core
 from fclib._solve import MERITS
 from fclib.bench import machine, processes
-from fclib.bench.job import KEPT, ORDERLY, STATUSES, Record
+from fclib.bench.job import KEPT, ORDERLY, STATUSES, SURROUNDINGS, Record
 from fclib.bench.meter import Meter
+from fclib.bench.template import Template, TemplateGone
 from fclib.bench.worker import (
     CERTIFICATE,
     GO,
     HISTORY,
     VECTORS,
     Problems,
+    adapted,
     built_in,
+    foreign,
+    handed,
     of_signal,
     one_line,
     send,
     serve,
 )
-from fclib.external import adapters, command
+from fclib.external import command
 
-READY_LIMIT = 600.0  # [s] to read the problem and the modules, or to send the solution
+READY_LIMIT = 600.0  # [s] to load the solver, to take the problem, or to send the solution
+LOAD_LIMIT = 60.0  # [s] of CPU to load a solver, at most; PyTorch takes 5
 WARM_LIMIT = 5.0  # [s] for the first call of a solver, at most
 PAUSES = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
 GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
@@ -58,7 +66,35 @@ LONGEST = 1 << 26  # [bytes] of a message that is no array
 OUTPUT = 1e9  # [bytes] that a run may write into one file, where its memory is not more
 # what a solver says of its time may differ from what the kernel says by so much
 SLACK, SHARE = 0.02, 0.02  # [s], [1]
+# taking a problem over may cost so many times what handing it over does, beyond SLACK: both copy
+# its arrays, and the pages of the new process are fresh
+TAKING = 5.0
+ROOM = 1 << 20  # [bytes] free on a disk that is not full
 UNSEEN = 0.1  # [1] of the CPU time that a thread's clock may miss before the kernel's counts
+
+
+# of an order, what the worker is told before it gets the problem
+TOLD = (
+    *("solver", "options", "modules", "tol", "merit", "limits", "history"),
+    *("kind", "spacedim", "warm", "nonce"),
+)
+# what a worker may say: that it was kept from its work by something outside, nobody believes it
+SAID = frozenset(STATUSES) - {*SURROUNDINGS, "lied"} | {"no_space", "killed"}
+
+
+def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
+    """The guess of an order: what is known of a problem before, contact by contact."""
+    from fclib.collections.guesses import guess_of  # which few runs need
+
+    multipliers = None if known["l"] is None else np.array(known["l"], float)
+    return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)
+
+
+def copied(problem: Any, number: int) -> Any:
+    """A renumbered copy of a problem."""
+    from fclib.bench.copies import Copy  # which few runs need
+
+    return Copy(problem, number)
 
 
 class CampaignGone(Exception):  # noqa: N818 (no error)
@@ -144,64 +180,81 @@ class Watch:
             processes.lower(pid, resource.RLIMIT_CPU, used + max(1, seconds))
 
 
+@dataclass
+class Worker:
+    """The supervisor's end of a worker."""
+
+    link: socket.socket
+    meter: Meter
+    stderr: int  # its standard error
+    apart: bool  # whether it is in a namespace of its own
+    belongings: tuple[Any, ...]  # what it had at first
+    tail: bytes = b""  # of what it has said on its standard error
+    cpu_limited: bool = False  # whether it has a limit of CPU time
+    unchanged: bool = False  # whether it says that it is as it was
+
+
 class Supervisor:
     """A worker, and the problems that its answers are judged by."""
 
-    def __init__(self, campaign: Connection, folder: str) -> None:
+    def __init__(self, campaign: Connection, alive: int, folder: str, mark: str) -> None:
         self.campaign = campaign
-        self.folder = folder  # for the temporary files of the worker
+        self.folder = folder  # for the temporary files of the workers
+        own_end = socket.socket(fileno=os.dup(campaign.fileno()))
+        self.template = Template(own_end, alive, mark, serve)
+        own_end.close()
+        self.ours = {self.template.pid}  # children that are no part of a run
         self.problems = Problems()
         self.cores: set[int] = set()  # that the worker has for itself
-        self.link: socket.socket | None = None  # to the worker
-        self.meter: Meter | None = None
-        self.stderr = -1  # the standard error of the worker
-        self.stderr_tail = b""
-        self.cpu_limited = False  # whether the worker has a limit of CPU time
+        self.worker: Worker | None = None  # that does the run
+        self.kept: Worker | None = None  # that serves the built-in solvers, while another one runs
 
-    def start(self) -> socket.socket:
-        """The link to the worker, which is forked where there is none."""
-        if self.link is not None:
-            return self.link
+    def start(self, solver: str) -> Worker:
+        """The worker for a solver: the one that serves the built-in ones, or a new one."""
+        own = solver in built_in()
+        if own and self.kept is not None:
+            self.worker, self.kept = self.kept, None
+            self.ours.discard(self.worker.meter.pid)
+            if self.as_it_was():
+                return self.worker
+            self.stop()
         ours, theirs = socket.socketpair()
         reading, writing = os.pipe()
-        self.meter = meter = Meter()
-        pid = os.fork()
-        if pid == 0:
-            try:
-                meter.enter()
-                for unused in (ours, self.campaign):
-                    unused.close()
-                os.close(reading)
-                nothing = os.open(os.devnull, os.O_RDWR)
-                for number, to in enumerate((nothing, nothing, writing)):
-                    os.dup2(to, number)
-                os.setpgid(0, 0)
-                if self.cores:
-                    os.sched_setaffinity(0, self.cores)
-                serve(theirs, self.problems, self.folder)
-            except BaseException as error:
-                os.write(2, f"{type(error).__name__}: {error}\n".encode())
-            finally:
-                os._exit(1)
-        theirs.close()
+        meter = Meter(not own, self.ours)
+        request = {
+            "apart": not own,
+            "group": str(meter.group or ""),
+            "cores": sorted(self.cores),
+            "folder": self.folder,
+        }
+        with theirs:
+            pid, apart = self.template.fork(request, theirs.fileno(), writing)
         os.close(writing)
         meter.watch(pid)
-        self.stderr, self.stderr_tail = reading, b""
-        self.link = ours
-        return ours
+        self.worker = Worker(ours, meter, reading, apart, ())
+        return self.worker
 
     def stop(self) -> int | None:
         """Kill the worker and all that it has started; its exit status where it has one."""
-        if self.link is None or self.meter is None:
+        if self.worker is None:
             return None
-        status = self.meter.kill()
-        while select.select([self.stderr], [], [], 0)[0] and self.listen():
+        worker, self.worker = self.worker, None
+        status = worker.meter.kill()
+        while select.select([worker.stderr], [], [], 0)[0] and self.listen(worker):
             pass
-        self.link.close()
-        os.close(self.stderr)
-        self.link, self.meter, self.cpu_limited = None, None, False
+        worker.link.close()
+        os.close(worker.stderr)
         self.clear()
         return status
+
+    def end(self) -> None:
+        """Kill all workers, and let the template go."""
+        self.stop()
+        if self.kept is not None:
+            self.ours.discard(self.kept.meter.pid)
+            self.worker, self.kept = self.kept, None
+            self.stop()
+        self.template.end()
 
     def clear(self) -> None:
         """Remove the temporary files of a run."""
@@ -212,56 +265,55 @@ class Supervisor:
                 else:
                     path.unlink(missing_ok=True)
 
+    def as_it_was(self) -> bool:
+        """Whether the worker is there, alone, and has what it had at first."""
+        worker = self.worker
+        if worker is None or worker.cpu_limited or not worker.unchanged:
+            return False
+        if select.select([worker.link], [], [], 0)[0]:
+            return False
+        pid = worker.meter.pid
+        return worker.meter.members() == [pid] and processes.belongings(pid) == worker.belongings
+
     def clean(self, order: dict[str, Any]) -> bool:
         """Whether nothing of a run is left in the worker, which may serve another."""
-        if self.link is None or self.meter is None or self.cpu_limited:
+        if self.worker is None or order["solver"] not in built_in():
+            return False  # code of others was in the process: who knows what it has changed
+        if processes.threads(self.worker.meter.pid) > 1 and order["threads"] == 1:
             return False
-        name = order["solver"]
-        ours = name in built_in()
-        if not (ours or any(name.startswith(one.PREFIX) for one in adapters())):
-            return False  # code of a user's was in the process: who knows what it has changed
-        if select.select([self.link], [], [], 0)[0]:
-            return False
-        if processes.threads(self.meter.pid) > 1 and not (ours and order["threads"] > 1):
-            return False
-        return self.meter.members() == [self.meter.pid]
+        return self.as_it_was()
 
-    def listen(self) -> bool:
-        """Take what the worker says on its standard error, whose end is kept; False at the last."""
-        text = os.read(self.stderr, 1 << 16)
-        self.stderr_tail = (self.stderr_tail + text)[-2000:]
+    def listen(self, worker: Worker) -> bool:
+        """Take what a worker says on its standard error, whose end is kept; False at the last."""
+        text = os.read(worker.stderr, 1 << 16)
+        worker.tail = (worker.tail + text)[-2000:]
         return bool(text)
 
-    def last_line(self) -> str:
-        """The last line of the worker's standard error."""
-        lines = self.stderr_tail.decode(errors="replace").strip().splitlines()
-        return f": {lines[-1][:300]}" if lines else ""
-
-    def receive(self, watch: Watch, longest: int = LONGEST) -> bytes:
+    def receive(self, order: dict[str, Any], watch: Watch, longest: int = LONGEST) -> bytes:
         """The next message of the worker, which is watched meanwhile.
 
         Raises:
             WorkerEnded: there will be none.
             CampaignGone: the campaign is over.
         """
-        assert self.link is not None
-        link, pause = self.link, PAUSES[0]
-        sources: list[Any] = [link, self.campaign, self.stderr]
+        assert self.worker is not None
+        worker, link, pause = self.worker, self.worker.link, PAUSES[0]
+        sources: list[Any] = [link, self.campaign, worker.stderr]
         got, size = bytearray(), 8
         whole = False  # whether the length has been read
         while True:
             ready = select.select(sources, [], [], pause)[0]
             if self.campaign in ready:  # nothing is sent while a job is being done
                 raise CampaignGone
-            if self.stderr in ready and not self.listen():
-                sources.remove(self.stderr)
+            if worker.stderr in ready and not self.listen(worker):
+                sources.remove(worker.stderr)
             if link in ready:
                 try:
                     part = link.recv(min(size - len(got), 1 << 22))
                 except OSError:
                     part = b""
                 if not part:
-                    raise self.ended()
+                    raise self.ended(order["solver"])
                 got += part
                 if len(got) == size and not whole:
                     size, whole = int.from_bytes(got, "little"), True
@@ -281,29 +333,39 @@ class Supervisor:
             WorkerEnded: there will be none, or it is on no order of ours.
         """
         try:
-            said = json.loads(self.receive(watch))
+            said = json.loads(self.receive(order, watch))
             if said.pop("nonce") == order["nonce"]:
                 return dict(said)
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             pass
         raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
 
-    def ended(self) -> WorkerEnded:
+    def ended(self, solver: str) -> WorkerEnded:
         """Why a worker that has closed its link has ended."""
-        assert self.meter is not None
+        assert self.worker is not None
+        worker, pid = self.worker, self.worker.meter.pid
         end = time.monotonic() + 1.0
         leave = os.WEXITED | os.WNOHANG | os.WNOWAIT
-        while os.waitid(os.P_PID, self.meter.pid, leave) is None:
+        while os.waitid(os.P_PID, pid, leave) is None:
             if time.monotonic() > end:
                 return WorkerEnded("garbage", "the worker closed its link, and went on")
             time.sleep(1e-3)
+        limited = processes.has_hard_limit(pid, resource.RLIMIT_CPU)
         how = self.stop()
         assert how is not None
-        if os.WIFSIGNALED(how):
-            number = os.WTERMSIG(how)
-            name = signal.Signals(number).name
-            return WorkerEnded(of_signal(number), f"ended by {name}{self.last_line()}")
-        return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{self.last_line()}")
+        lines = worker.tail.decode(errors="replace").strip().splitlines()
+        last = f": {lines[-1][:300]}" if lines else ""
+        if not os.WIFSIGNALED(how):
+            return WorkerEnded("error", f"exit status {os.WEXITSTATUS(how)}{last}")
+        number = os.WTERMSIG(how)
+        name = signal.Signals(number).name
+        outside = True
+        if foreign(solver):
+            # in its namespace nobody but those outside can send this one, and nobody any other
+            outside = worker.apart and number == signal.SIGKILL and not limited
+            if number == signal.SIGKILL and not outside:
+                last = f", and the kernel does not say who sent it{last}"
+        return WorkerEnded(of_signal(number, outside), f"ended by {name}{last}")
 
     def do(self, order: dict[str, Any]) -> Record:
         """Do a job."""
@@ -315,44 +377,77 @@ class Supervisor:
             machine=machine.facts(),
             pinned=bool(self.cores),
         )
+        if not order["suits"]:
+            record.status, record.message = "unsuitable", "does not take problems of this kind"
+            return record
+        try:
+            problem, guess = self.prepare(order)
+            copy = copied(problem, order["copy"]) if order["copy"] else None
+        except (_core.Error, OSError, MemoryError) as error:
+            record.status, record.message = "unreadable", one_line(error)
+            return record
         vectors: dict[str, Any] = {}
         try:
-            vectors = self.ask(order | {"warm": True}, record)
+            if copy is None:
+                vectors = self.ask(order | {"warm": True}, problem, guess, record)
+            else:
+                vectors = copy.back(self.ask(order | {"warm": True}, copy.problem, None, record))
         except WorkerEnded as end:
-            self.stop()
             record.status, record.message = end.status, str(end)
+            self.stop()
         except OSError as error:  # no process, no room, no file
             self.stop()
             record.status, record.message = "lost", one_line(error)
         if vectors:
-            self.judge(order, record, vectors)
+            self.judge(order, problem, record, vectors)
         if order["keep"] and record.status == "converged":
             known = {name: vectors[name] for name in KEPT if name in vectors}
             record.solution = {name: value.tobytes() for name, value in known.items()}
+        if record.status == "no_space" and self.has_room():
+            record.status = "error"
+            record.message += "; there is room on the disk"
         if record.status in ORDERLY and self.clean(order):
+            assert self.worker is not None
             self.clear()
+            self.ours.add(self.worker.meter.pid)
+            self.worker, self.kept = None, self.worker
         else:
             self.stop()
         return record
 
-    def ask(self, order: dict[str, Any], record: Record) -> dict[str, Any]:
+    def has_room(self) -> bool:
+        """Whether there is room for the temporary files of workers."""
+        disk = os.statvfs(self.folder)
+        return disk.f_bavail * disk.f_frsize > ROOM and disk.f_favail > 0
+
+    def prepare(self, order: dict[str, Any]) -> tuple[Any, Any]:
+        """The problem of an order, and the guess that it starts from.
+
+        Raises:
+            fclib.Error: it cannot be read, or is another one than it was.
+        """
+        guess = None
+        if known := order["guess"]:
+            guess = carry(known, self.problems.get(known), self.problems.get(order))
+        return self.problems.get(order), guess
+
+    def ask(
+        self, order: dict[str, Any], problem: Any, guess: Any, record: Record
+    ) -> dict[str, Any]:
         """Have the worker do a job: what it says goes into the record, its solution is returned.
 
         Raises:
             WorkerEnded: it has ended, or was to be ended; what is known of it is in the record.
         """
-        link = self.start()
-        meter = self.meter
-        assert meter is not None
+        worker = self.start(order["solver"])
+        meter = worker.meter
         record.measured = meter.how
-        self.stderr_tail = b""
+        record.guessed = guess is not None
+        worker.tail = b""
         order["nonce"] = os.urandom(8).hex()
         limits = order["limits"]
-        try:
-            send(link, json.dumps(order).encode())
-        except OSError:
-            raise self.ended() from None
-        said = self.said(order, Watch(meter))
+        self.tell(order, json.dumps({name: order[name] for name in TOLD}).encode())
+        said = self.said(order, Watch(meter, cpu=LOAD_LIMIT))
         if said.get("word") == "warming":
             wall, cpu = (min(WARM_LIMIT, limits[name]) for name in ("wall", "time"))
             try:
@@ -360,34 +455,76 @@ class Supervisor:
             except WorkerEnded:
                 # the solver may do better on the problem that it is asked for
                 self.stop()
-                return self.ask(order | {"warm": False}, record)
-        if said.get("word") == "ready":
-            self.limit(meter, limits["memory"])
-            watch = Watch(meter, limits["wall"], limits["time"], limits["memory"])
-            try:
-                send(link, GO)
-                word = self.said(order, watch)
-                watch.stop()
-                if word != {"word": "done"}:
-                    raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
-            except OSError:
-                raise self.ended() from None
-            finally:
-                record.wall_s, record.total_cpu_s = watch.wall, watch.cpu
-                record.memory = watch.memory - watch.memory_before
-                self.cpu_limited = watch.cpu_limited
-            self.limit(meter, math.inf)
-            try:
-                send(link, GO)
-            except OSError:
-                raise self.ended() from None
-            said = self.said(order, Watch(meter))
-            names = take(said, record)
-            check_times(order["solver"], record, said.get("reported") is True, watch)
-        else:
-            names = take(said, record)
-        room = int(max(limits["memory"], 100.0) * 1e6) if limits["memory"] < 1e9 else 1 << 40
-        return {name: numbers(self.receive(Watch(meter), room)) for name in names}
+                return self.ask(order | {"warm": False}, problem, guess, record)
+        if said.get("word") != "ready":
+            return self.arrays(order, take(said, record))
+        if not worker.belongings and order["solver"] in built_in():
+            worker.belongings = processes.belongings(meter.pid)
+        took, early = self.hand(order, problem, guess)
+        self.limit(meter, limits["memory"])
+        watch = Watch(meter, limits["wall"], limits["time"] - early, limits["memory"])
+        try:
+            self.tell(order, GO)
+            word = self.said(order, watch)
+            watch.stop()
+            if word != {"word": "done"}:
+                raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
+        finally:
+            record.wall_s, record.total_cpu_s = watch.wall, watch.cpu + early
+            record.memory = watch.memory - watch.memory_before
+            worker.cpu_limited = watch.cpu_limited
+        self.limit(meter, math.inf)
+        after = Watch(meter, cpu=limits["time"])
+        self.tell(order, GO)
+        said = self.said(order, after)
+        worker.unchanged = said.get("unchanged") is True
+        names = take(said, record)
+        vectors = self.arrays(order, names)
+        after.stop()
+        # one that says too early that it is done gains nothing
+        outside = early + max(0.0, after.cpu - SLACK - TAKING * took)
+        record.total_cpu_s = watch.cpu + outside
+        check_times(order["solver"], record, said.get("reported") is True, watch, outside)
+        return vectors
+
+    def hand(self, order: dict[str, Any], problem: Any, guess: Any) -> tuple[float, float]:
+        """Hand the problem over.
+
+        Returns:
+            [s] of CPU that this took here, and that the worker took meanwhile for something else.
+        """
+        assert self.worker is not None
+        meter = self.worker.meter
+        before = time.thread_time()
+        message = handed(problem, guess)
+        took = time.thread_time() - before
+        watch = Watch(meter, cpu=order["limits"]["time"])
+        self.tell(order, message)
+        del message
+        word = self.said(order, watch)
+        watch.stop()
+        if word != {"word": "taken"}:
+            raise WorkerEnded("garbage", "the worker sent what is no answer to its order")
+        return took, max(0.0, watch.cpu - SLACK - TAKING * took)
+
+    def tell(self, order: dict[str, Any], message: bytes) -> None:
+        """Send a message to the worker.
+
+        Raises:
+            WorkerEnded: it has ended.
+        """
+        assert self.worker is not None
+        try:
+            send(self.worker.link, message)
+        except OSError:
+            raise self.ended(order["solver"]) from None
+
+    def arrays(self, order: dict[str, Any], names: list[str]) -> dict[str, Any]:
+        """The arrays that follow an answer."""
+        assert self.worker is not None
+        meter, memory = self.worker.meter, order["limits"]["memory"]
+        room = int(max(memory, 100.0) * 1e6) if memory < 1e9 else 1 << 40
+        return {name: numbers(self.receive(order, Watch(meter), room)) for name in names}
 
     @staticmethod
     def limit(meter: Meter, memory: float) -> None:
@@ -403,17 +540,15 @@ class Supervisor:
             output = int(max(memory * 1e6, OUTPUT)) if most else -1
             processes.lower(pid, resource.RLIMIT_FSIZE, output)
 
-    def judge(self, order: dict[str, Any], record: Record, vectors: dict[str, Any]) -> None:
+    def judge(
+        self, order: dict[str, Any], problem: Any, record: Record, vectors: dict[str, Any]
+    ) -> None:
         """Recompute every merit, and let it decide."""
         proof = [vectors.pop(name, None) for name in CERTIFICATE]
         if record.status in ("lied", "garbage"):
             return
         try:
-            problem = self.problems.get(order)
             merit = _core.merit(problem, _core.Solution(**vectors))
-        except (_core.FileError, OSError, MemoryError) as error:
-            record.status, record.message = "unreadable", one_line(error)
-            return
         except (_core.Error, TypeError, ValueError) as error:
             record.status, record.message = "garbage", one_line(error)
             return
@@ -454,7 +589,7 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
         times = [said.get(name) for name in ("cpu_s", "setup_s")]
         history = said.get("history")
         right = (
-            status in STATUSES
+            status in SAID
             and set(names) <= {*VECTORS, *CERTIFICATE}
             and len(set(names)) == len(names)
             and (iterations is None or type(iterations) is int)
@@ -471,21 +606,29 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
     if not right:
         raise WorkerEnded("garbage", "the worker sent what is no answer")
     record.status, record.message, record.stages = status, message, stages
-    record.warm, record.guessed = (said.get(name) is True for name in ("warm", "guessed"))
+    record.warm = said.get("warm") is True
     record.iterations = iterations
     record.cpu_s, record.setup_s = (None if t is None else float(t) for t in times)
     return list(names)
 
 
-def check_times(solver: str, record: Record, reported: bool, watch: Watch) -> None:
+def check_times(solver: str, record: Record, reported: bool, watch: Watch, outside: float) -> None:
     """Hold what a solver says of its time and iterations against what the kernel has seen.
 
     More than that, or less than nothing, is a lie. The clock of the driver is that of the thread
     that calls the solver: where the kernel has seen clearly more, in other threads or processes, it
     is that which counts. A program that says itself what its solve took, and an adapter of another
     package, may leave out their start.
+
+    Args:
+        solver: its name.
+        record: gets the time that counts.
+        reported: whether a program has said itself what its solve took.
+        watch: of the run.
+        outside: [s] of CPU that the worker took with the problem in its hands, but not between
+            `go` and `done`; it counts too.
     """
-    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu
+    said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + outside
     record.said_cpu_s = said
     if said is None:
         return
@@ -504,7 +647,7 @@ def check_times(solver: str, record: Record, reported: bool, watch: Watch) -> No
         return
     if solver.startswith(command.PREFIX):
         own = seen - watch.own
-    elif any(solver.startswith(one.PREFIX) for one in adapters()):
+    elif adapted(solver):
         return
     else:
         own = seen - setup
@@ -530,26 +673,29 @@ def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
         record.message += f", for reactions up to {proof.bound:.1e}"
 
 
-def main(link: int, folder: str, cores: int) -> None:
+def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
     """Serve the campaign at the other end of a socket.
 
     Args:
         link: the socket.
+        alive: the end of a pipe whose other end the campaign alone has.
         folder: for temporary files of the worker.
+        mark: in the environment of this process.
         cores: how many the worker is to have for itself, where they are free.
     """
     campaign = Connection(link)
     processes.adopt_orphans()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    supervisor = Supervisor(campaign, folder)
+    supervisor = Supervisor(campaign, alive, folder, mark)
+    os.close(alive)
     supervisor.cores, held = machine.reserve(cores)
     try:
         while True:
             order = campaign.recv()
             campaign.send(supervisor.do(order))
-    except (EOFError, OSError, CampaignGone):
-        pass
+    except (EOFError, OSError, CampaignGone, TemplateGone):
+        pass  # the campaign starts another one, if it is there
     finally:
-        supervisor.stop()
+        supervisor.end()
         for lock in held:
             os.close(lock)

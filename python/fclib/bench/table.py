@@ -19,7 +19,7 @@ import numpy.typing as npt
 WHOLE = frozenset(
     (
         *("run", "spacedim", "n", "p", "nc", "nnz", "threads", "repeat", "solved", "iterations"),
-        *("step", "guess", "warm", "pinned", "cores"),
+        *("copy", "step", "guess", "warm", "pinned", "cores"),
     )
 )
 # columns of texts, also where no row has one

@@ -18,25 +18,27 @@ CONTACTS = 6
 LIMIT = 1.0  # [s] of wall clock that the solver is told
 
 
-def small(problem: _solve.Problem) -> _solve.Problem:
-    """A small problem of the class and dimension of another one."""
-    d = problem.spacedim
+def small(kind: str, d: int) -> Any:
+    """A small problem of a kind ("local", "global_rolling") and a number of components."""
     m = d * CONTACTS
     friction: dict[str, Any] = {"mu": np.full(CONTACTS, 0.5)}
-    if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
+    local, rolling = kind.startswith("local"), kind.endswith("rolling")
+    if rolling:
         friction["mu_r"] = np.full(CONTACTS, 0.1)
     # all columns depend on each other, contacts stick and slide
     A = np.sin(np.arange(1.0, m * m + 1)).reshape(m, m)
     q = np.cos(np.arange(1.0, m + 1))
     q[::d] = -1.0
-    if isinstance(problem, (_core.LocalProblem, _core.LocalRollingProblem)):
-        return type(problem)(spacedim=d, W=A @ A.T / m + 0.5 * np.eye(m), q=q, **friction)
-    return type(problem)(
+    if local:
+        made: Any = _core.LocalRollingProblem if rolling else _core.LocalProblem
+        return made(spacedim=d, W=A @ A.T / m + 0.5 * np.eye(m), q=q, **friction)
+    made = _core.GlobalRollingProblem if rolling else _core.GlobalProblem
+    return made(
         spacedim=d, M=np.eye(m), H=A / np.sqrt(m) + np.eye(m), f=np.zeros(m), w=q, **friction
     )
 
 
-def call(problem: _solve.Problem, solver: str, options: Mapping[str, Any]) -> None:
+def call(kind: str, spacedim: int, solver: str, options: Mapping[str, Any]) -> None:
     """Call a solver on a small problem, whatever comes of it."""
     with contextlib.suppress(Exception):
-        _solve.solve(small(problem), solver, 1e-6, time_limit=LIMIT, **options)
+        _solve.solve(small(kind, spacedim), solver, 1e-6, time_limit=LIMIT, **options)

@@ -1,13 +1,17 @@
 """The process that solves: it is limited, watched and never trusted.
 
-It is forked by a supervisor, and talks to it over a socket, in JSON and in the bytes of arrays:
+It is forked from a template (template.py), and talks to its supervisor over a socket, in JSON and
+in the bytes of arrays:
 
-    worker: warming     a solver that it has not called before is called on a small problem
-    worker: ready       the problem is read, the solver is known
-    supervisor: go      it has read the clocks, and set the limits
-    worker: done        the solver has returned, or raised
-    supervisor: go      it has read the clocks
-    worker: an answer   what the solver returned; the supervisor judges it
+    supervisor: an order   which solver, and how; not which problem
+    worker: warming        a solver that it has not called before is called on a small problem
+    worker: ready          the solver is known
+    supervisor: a problem  its numbers and a guess, pickled: no title, no path, no solution
+    worker: taken          it has them
+    supervisor: go         it has read the clocks, and set the limits
+    worker: done           the solver has returned, or raised
+    supervisor: go         it has read the clocks
+    worker: an answer      what the solver returned; the supervisor judges it
 
 Each word of the worker carries the number of the order, drawn by lot.
 """
@@ -18,22 +22,23 @@ import errno
 import functools
 import json
 import os
+import pickle
 import re
 import resource
 import signal
 import tempfile
 from collections import OrderedDict
 from pathlib import Path
-from socket import MSG_WAITALL, socket
+from socket import MSG_PEEK, MSG_WAITALL, socket
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core, _digest, _registry, _solve
+from fclib import _core, _digest, _registry, _solve, external
 from fclib.bench import processes, warm_up
 from fclib.bench.modules import load_modules
-from fclib.external import command
+from fclib.external import command, plugin
 
 CACHE = 256e6  # [bytes] of problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
@@ -93,18 +98,40 @@ def receive(link: socket) -> bytes:
     return exactly(int.from_bytes(exactly(8), "little"))
 
 
-def serve(supervisor: socket, problems: Problems, folder: str) -> None:
-    """Do what comes, until the supervisor is gone."""
+def handed(problem: _solve.Problem, guess: _core.Solution | None) -> bytes:
+    """A problem as a worker gets it: without what says which one it is."""
+    values = problem.__getstate__()
+    values["info"] = _core.ProblemInfo()
+    return pickle.dumps((type(problem), values, guess), pickle.HIGHEST_PROTOCOL)
+
+
+def taken(message: bytes) -> tuple[_solve.Problem, _core.Solution | None]:
+    """What `handed` has made a message of."""
+    kind, values, guess = pickle.loads(message)
+    problem = kind.__new__(kind)
+    problem.__setstate__(values)
+    return problem, guess
+
+
+def serve(supervisor: socket, request: dict[str, Any]) -> None:
+    """Do what comes, until the supervisor is gone.
+
+    Args:
+        supervisor: the link to it.
+        request: what it has asked the template for; `folder` is for temporary files.
+    """
+    supervisor.recv(1, MSG_PEEK)  # once it has an order, the supervisor is its parent
     processes.die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the campaign's
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    os.environ["TMPDIR"] = tempfile.tempdir = folder
+    os.environ["TMPDIR"] = tempfile.tempdir = request["folder"]
+    begun = processes.environment()
     warm: set[str] = set()  # solvers that were called before
     while True:
         try:
             order = json.loads(receive(supervisor))
-            reply, arrays = answer(order, problems, supervisor, warm)
-            reply["nonce"] = order["nonce"]
+            reply, arrays = answer(order, supervisor, warm)
+            reply |= {"nonce": order["nonce"], "unchanged": processes.environment() == begun}
             send(supervisor, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
             for array in arrays:
                 send(supervisor, array.tobytes())
@@ -113,7 +140,7 @@ def serve(supervisor: socket, problems: Problems, folder: str) -> None:
 
 
 def answer(
-    order: dict[str, Any], problems: Problems, supervisor: socket, warm: set[str]
+    order: dict[str, Any], supervisor: socket, warm: set[str]
 ) -> tuple[dict[str, Any], list[npt.NDArray[np.float64]]]:
     """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
 
@@ -125,27 +152,22 @@ def answer(
             raise EOFError
 
     name = order["solver"]
-    guess = None
     try:
-        if known := order["guess"]:
-            guess = carry(known, problems.get(known), problems.get(order))
-        problem = problems.get(order)
-    except (_core.Error, OSError, MemoryError) as error:
-        return {"status": "unreadable", "message": one_line(error)}, []
-    try:
-        if name not in built_in():
-            load_modules(order["modules"])
-        solver = _registry.find_solver(name)
-        solver.check_options(order["options"])
+        find(name, order["modules"]).check_options(order["options"])
     except _core.Error as error:
         return {"status": "error", "message": one_line(error)}, []
     if order["warm"] and name not in warm and not name.startswith(command.PREFIX):
         say("warming")
-        warm_up.call(problem, name, order["options"])
+        warm_up.call(order["kind"], order["spacedim"], name, order["options"])
         warm.add(name)
+    say("ready")
+    try:
+        problem, guess = taken(receive(supervisor))
+    except MemoryError as error:
+        return {"status": "memory", "message": one_line(error)}, []
     processes.release_memory()
     command.reported = False
-    say("ready")
+    say("taken")
     wait()
     result: _core.Result | None = None
     try:
@@ -161,7 +183,7 @@ def answer(
         )
         status, message = result.status, ""
     except Exception as error:
-        status, message = classify(error), one_line(error)
+        status, message = classify(error, foreign(name)), one_line(error)
     say("done")
     wait()
     reply: dict[str, Any] = {
@@ -199,12 +221,19 @@ def answer(
     return reply, arrays
 
 
-def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
-    """The guess of an order: what is known of a problem before, contact by contact."""
-    from fclib.collections.guesses import guess_of  # which few runs need
+def find(name: str, modules: list[str]) -> _core.SolverInfo:
+    """The solver of an order, from then on known to `fclib.solve` by its name.
 
-    multipliers = None if known["l"] is None else np.array(known["l"], float)
-    return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)
+    Raises:
+        fclib.Error: there is none, or a module cannot be imported.
+    """
+    if name in built_in():
+        return _registry.find_solver(name)
+    if (info := external.find(name)) is not None:
+        _registry.register(info)  # so that no package is looked through for it
+        return info
+    load_modules(modules)
+    return _registry.find_solver(name)
 
 
 @functools.cache
@@ -213,10 +242,26 @@ def built_in() -> frozenset[str]:
     return frozenset(solver.name for solver in _core.solvers())
 
 
-def classify(error: Exception) -> str:
-    """The status of a run that ended with an exception."""
+def adapted(name: str) -> bool:
+    """Whether a solver is of a package that FCLIB has an adapter for."""
+    own = (command.PREFIX, plugin.PREFIX)
+    return any(name.startswith(x.PREFIX) for x in external.adapters() if x.PREFIX not in own)
+
+
+def foreign(name: str) -> bool:
+    """Whether a solver's code is somebody else's: a plug-in, a program, a function in Python."""
+    return name not in built_in() and not adapted(name)
+
+
+def classify(error: Exception, foreign: bool) -> str:
+    """The status of a run that ended with an exception.
+
+    Args:
+        error: what was raised.
+        foreign: whether somebody else's code has raised it, whose word excuses nothing.
+    """
     if isinstance(error, _core.UnsuitableError):
-        return "unsuitable"
+        return "error" if foreign else "unsuitable"
     causes: list[BaseException] = [error]
     while (cause := causes[-1].__cause__) is not None:
         causes.append(cause)
@@ -228,7 +273,7 @@ def classify(error: Exception) -> str:
     ):
         return "no_space"
     if found := BY_SIGNAL.search(text):
-        return of_signal(int(found[1]))
+        return of_signal(int(found[1]), outside=not foreign)
     if any(words in text for words in NOTHING):
         return "nothing"
     if isinstance(error, _registry.SolverError):
@@ -241,11 +286,17 @@ def classify(error: Exception) -> str:
     return "error"
 
 
-def of_signal(number: int) -> str:
-    """The status of a process that a signal has ended, where the supervisor has not sent it."""
+def of_signal(number: int, outside: bool) -> str:
+    """The status of a process that a signal has ended, where the supervisor has not sent it.
+
+    Args:
+        number: of the signal.
+        outside: whether a signal that ends processes can only have come from outside of the run.
+    """
     if number == signal.SIGXCPU:
         return "cpu_limit"
-    return "killed" if number in (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP) else "crashed"
+    deadly = number in (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
+    return "killed" if deadly and outside else "crashed"
 
 
 def one_line(error: BaseException) -> str:

@@ -1,0 +1,229 @@
+"""The process that workers are forked from: it has imported what they need, and run nothing else.
+
+A supervisor forks it before it reads a problem. So a new worker has no problem, path or solution in
+its memory, and costs milliseconds. The template lives as long as its supervisor and the campaign;
+once one of them is gone it ends what is left of both, and then itself.
+
+    supervisor: a request, with the worker's socket and its standard error
+    template: the worker's number, and whether it is apart
+
+A worker that is *apart* is the first process of a namespace of processes (pid_namespaces(7)), in
+which nobody else is. There the kernel drops every signal that the run sends to its first process,
+SIGKILL too: one that ends it came from outside. No process of the run sees others, or outlives it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import importlib
+import json
+import os
+import select
+import signal
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fclib import _registry, external
+from fclib.bench import meter, processes
+
+# of clone(2) and mount(2)
+NEW_MOUNTS, NEW_IPC, NEW_USER, NEW_PIDS = 0x00020000, 0x08000000, 0x10000000, 0x20000000
+PRIVATE = 0x00040000 | 0x00004000  # MS_PRIVATE, with all that is mounted below
+NO_PROGRAMS = 0x2 | 0x4  # MS_NOSUID, MS_NODEV
+
+PATIENCE = 5.0  # [s] for a supervisor whose campaign is gone
+
+Serve = Callable[[socket.socket, dict[str, Any]], None]
+
+
+class TemplateGone(Exception):  # noqa: N818 (of the surroundings)
+    """The template has ended or is not as it was, and nothing more can be started."""
+
+
+class Template:
+    """The supervisor's end of it."""
+
+    def __init__(self, campaign: socket.socket, alive: int, mark: str, serve: Serve) -> None:
+        """Fork it.
+
+        Args:
+            campaign: the supervisor's socket, which the template does not keep.
+            alive: the end of a pipe whose other end the campaign alone has.
+            mark: in the environment of all that the supervisor starts.
+            serve: what a worker does.
+        """
+        self.link, theirs = socket.socketpair()
+        supervisor = os.getpid()
+        self.pid = os.fork()
+        if self.pid == 0:
+            try:
+                self.link.close()
+                campaign.close()
+                _run(theirs, alive, supervisor, mark, serve)
+            finally:
+                os._exit(1)
+        theirs.close()
+        self.belongings: tuple[Any, ...] = ()  # what it had at first
+
+    def fork(self, request: dict[str, Any], worker: int, errors: int) -> tuple[int, bool]:
+        """A new worker: its number, and whether it is apart.
+
+        Args:
+            request: `apart`, whether it should be; the others are for `serve`.
+            worker: its socket.
+            errors: its standard error.
+
+        Raises:
+            TemplateGone: there is no template any more that is as it was.
+            OSError: no process can be started.
+        """
+        has = processes.belongings(self.pid)
+        self.belongings = self.belongings or has
+        if has != self.belongings:
+            raise TemplateGone("the process that starts workers is not as it was")
+        try:
+            socket.send_fds(self.link, [json.dumps(request).encode()], [worker, errors])
+            reply = json.loads(self.link.recv(1000))
+        except (OSError, ValueError):
+            raise TemplateGone("the process that starts workers has ended") from None
+        if reply["pid"] == 0:
+            raise OSError(reply["message"])
+        return int(reply["pid"]), bool(reply["apart"])
+
+    def end(self) -> None:
+        """Let it go."""
+        self.link.close()
+        processes.kill([self.pid])
+        with contextlib.suppress(ChildProcessError):
+            os.waitpid(self.pid, 0)
+
+
+def _run(link: socket.socket, alive: int, supervisor: int, mark: str, serve: Serve) -> None:
+    """Fork workers, until the supervisor or the campaign is gone."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    # what workers would load one by one: matrices are unpickled with it, solvers found among these
+    importlib.import_module("scipy.sparse")
+    _registry.entry_points_there()
+    external.adapters()
+    gc.collect()
+    gc.freeze()  # what is there is not looked at again, and so not copied, in a worker
+    possible = _fork_apart_once()
+    looked = select.poll()
+    looked.register(link, select.POLLIN)
+    looked.register(alive, 0)  # that the other end is closed is always said
+    while True:
+        if alive in dict(looked.poll()):
+            # a supervisor that is not stopped ends by itself, and ends this process
+            time.sleep(PATIENCE)
+            break
+        message, handles, _, _ = socket.recv_fds(link, 1 << 16, 2)
+        if not message:
+            break
+        request = json.loads(message)
+        request["apart"] = request["apart"] and possible
+        try:
+            pid, apart = _fork(request, handles[0], handles[1], serve)
+            reply: dict[str, Any] = {"pid": pid, "apart": apart}
+        except OSError as error:
+            reply = {"pid": 0, "message": str(error)}
+        for handle in handles:
+            os.close(handle)
+        link.send(json.dumps(reply).encode())
+    meter.sweep(supervisor, mark)
+    os._exit(0)
+
+
+def _fork(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> tuple[int, bool]:
+    """Fork a process that forks the worker and ends, so that the worker is the supervisor's."""
+    reading, writing = os.pipe()
+    between = os.fork()
+    if between == 0:
+        try:
+            if request["apart"]:
+                _unshare()
+            pid = os.fork()
+            if pid == 0:
+                _begin(request, worker, errors, serve)
+            os.write(writing, f"{pid} {int(request['apart'])}".encode())
+        except OSError as error:
+            os.write(writing, f"0 {error}".encode())
+        finally:
+            os._exit(0)
+    os.close(writing)
+    os.waitpid(between, 0)
+    said = os.read(reading, 1000).decode().partition(" ")
+    os.close(reading)
+    if not said[0] or said[0] == "0":
+        raise OSError(said[2] or "a worker could not be started")
+    return int(said[0]), said[2] == "1"
+
+
+def _begin(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> None:
+    """Be a worker, with nothing open but its socket and its standard streams."""
+    try:
+        meter.enter(request["group"])
+        nothing = os.open(os.devnull, os.O_RDWR)
+        for number, to in enumerate((nothing, nothing, errors)):
+            os.dup2(to, number)
+        os.dup2(worker, 3)
+        os.set_inheritable(3, False)
+        os.closerange(4, max(map(int, os.listdir("/proc/self/fd"))) + 1)  # noqa: PTH208
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        os.setsid()
+        if request["apart"]:
+            _mount_own()
+        if request["cores"]:
+            os.sched_setaffinity(0, request["cores"])
+        serve(socket.socket(fileno=3), request)
+    except BaseException as error:
+        os.write(2, f"{type(error).__name__}: {error}\n".encode())
+    finally:
+        os._exit(1)
+
+
+def _unshare() -> None:
+    """Have the next child be the first process of namespaces of its own.
+
+    Root needs no namespace of users. Others get one in which they are who they are.
+
+    Raises:
+        OSError: the system does not let us.
+    """
+    libc = ctypes.CDLL(None, use_errno=True)
+    user, group = os.getuid(), os.getgid()
+    if libc.unshare(NEW_PIDS | NEW_MOUNTS | NEW_IPC | (NEW_USER if user else 0)):
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    if user:
+        Path("/proc/self/setgroups").write_text("deny")
+        Path("/proc/self/uid_map").write_text(f"{user} {user} 1")
+        Path("/proc/self/gid_map").write_text(f"{group} {group} 1")
+
+
+def _fork_apart_once() -> bool:
+    """Whether the system lets a worker be apart, by trying; no where FCLIB_APART is 0."""
+    if os.environ.get("FCLIB_APART") == "0":
+        return False
+    trial = os.fork()
+    if trial == 0:
+        try:
+            _unshare()
+            child = os.fork()
+            os._exit(0 if child == 0 else os.waitpid(child, 0)[1])
+        except BaseException:
+            os._exit(1)
+    return os.waitpid(trial, 0)[1] == 0
+
+
+def _mount_own() -> None:
+    """Have /proc show the own processes alone, and /dev/shm nothing, if the system lets us."""
+    libc = ctypes.CDLL(None)
+    libc.mount(b"none", b"/", None, PRIVATE, None)
+    libc.mount(b"proc", b"/proc", b"proc", NO_PROGRAMS, None)
+    libc.mount(b"fclib", b"/dev/shm", b"tmpfs", NO_PROGRAMS, None)

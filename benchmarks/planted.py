@@ -5,8 +5,8 @@
 
 The problems are those of tests/planted_judge.py: random ones of every formulation (masses over
 twelve decades, redundant joints, blocks of every rank, friction up to 100, rolling, guesses) and
-those that ask for all digits (--hard there). Left out are problems whose data do not hold their own
-solution to a tenth of the tolerance. CPU time is that of all solves of a kind.
+those that ask for all digits (`digits` there). Left out are problems whose data do not hold their
+own solution to a tenth of the tolerance. CPU time is that of all solves of a kind.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ import fclib
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 import planted_judge
-from helpers import auto_chain, judge
+from ball_judge import judge
+from helpers import auto_chain
 
 KINDS = {"random": planted_judge.planted, "all digits": planted_judge.hard}
 

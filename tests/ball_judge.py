@@ -5,6 +5,10 @@ Every number is a ball of Arb (https://flintlib.org): a midpoint with a bound of
 `tol` in it, both are false. The precision grows until the balls are narrow.
 
 The data are taken as they are stored. A double is an exact number.
+
+The allowances for rounding are those of the page, found in doubles if they are not a plain sum.
+For the signs at random there are all signs here, and e(v) is that of factors in the order of rows.
+So what is above a tolerance beyond these allowances is wrong by any reading of the page.
 """
 
 from __future__ import annotations
@@ -22,6 +26,7 @@ from flint import arb, arb_mat, ctx
 import fclib
 
 Balls: TypeAlias = list[arb]
+Doubles: TypeAlias = npt.NDArray[np.float64]
 
 PRECISIONS = (256, 512, 1024, 2048, 4096, 8192)  # in bits; doubles reach from 2^-1074 to 2^1024
 NARROW = 2.0**-56  # radius of an error relative to it: what is left is below a double's last digit
@@ -30,6 +35,7 @@ NOTHING = 2.0**-120  # an error that is known to be below this is narrow in any 
 # what rounding leaves of a sum of terms, relative to their sizes: the rule of docs/mathematics.md
 UNIT = 32 * 2.0**-52
 UNIT_OF_Q = 4 * 2.0**-52
+DEPENDENT = 1e-13  # a direction of which no more is left explains no reactions; the page has 1e-12
 
 
 # ---- vectors and matrices of balls
@@ -38,6 +44,11 @@ UNIT_OF_Q = 4 * 2.0**-52
 def balls(x: npt.ArrayLike) -> Balls:
     """The numbers as they are."""
     return [arb(float(value)) for value in np.asarray(x, dtype=float).ravel()]
+
+
+def doubles(x: Balls) -> Doubles:
+    """The midpoints."""
+    return np.array([float(value) for value in x], dtype=float)
 
 
 def zeros(size: int) -> Balls:
@@ -126,6 +137,13 @@ class Sparse:
             result[j] = result[j] + abs(value * x[i])
         return result
 
+    def dense(self) -> Doubles:
+        """The matrix in doubles."""
+        result = np.zeros((self.rows, self.columns))
+        for i, j, value in self.entries:
+            result[i, j] = float(value)
+        return result
+
     def diagonal(self) -> Balls:
         """The entries (k, k)."""
         result = zeros(self.rows)
@@ -198,13 +216,28 @@ class Mass:
         return result
 
     def terms(self, v: Balls) -> Balls:
-        """abs(M) abs(v) + e(v), which bounds what the factors of M add up on the way to v."""
-        inertia = [abs(x) for x in self.matrix.diagonal()]
-        squares = zeros(len(self.members))
-        for row, part in enumerate(self.part):
-            squares[part] += inertia[row] * v[row] * v[row]
-        own = [root(inertia[row] * squares[part]) for row, part in enumerate(self.part)]
+        """abs(M) abs(v) + e(v), which is what the factors of M add up on the way to v."""
+        L = self.factor()
+        own = zeros(len(v)) if L is None else balls(abs(L) @ abs(L.T @ doubles(v)))
         return add(self.matrix.sizes(v), own)
+
+    def factor(self) -> Doubles | None:
+        """L of M = L L^T, None if M is not symmetric and positive definite."""
+        M = self.matrix.dense()
+        if not np.array_equal(M, M.T):
+            return None
+        try:
+            return np.linalg.cholesky(M)
+        except np.linalg.LinAlgError:
+            return None
+
+
+def least_reactions(A: Doubles, effect: Doubles) -> Balls:
+    """abs(x) of the least x with A x = effect, each column in units of its length."""
+    lengths = np.linalg.norm(A, axis=0)
+    lengths[lengths == 0] = 1
+    x, *_ = np.linalg.lstsq(A / lengths, effect, rcond=DEPENDENT)
+    return balls(abs(x) / lengths)
 
 
 # ---- one contact
@@ -238,10 +271,19 @@ def project(x: Balls, limits: Sequence[arb]) -> Balls:
     return result
 
 
-def modified(u: Balls, limits: Sequence[arb]) -> Balls:
-    """u^: the norm of each group of u, times its limit, is added to u_N."""
-    lift = (c * norm(part) for c, part in zip(limits, groups(u, limits), strict=True))
-    return [u[0] + sum(lift, arb(0)), *u[1:]]
+def modified(u: Balls, limits: Sequence[arb], slips: Sequence[arb] | None = None) -> Balls:
+    """u^: the norm of each group of u, times its limit, is added to u_N.
+
+    `slips` are those at most that are rounding. So much is none.
+    """
+    result = u[0]
+    for k, (c, part) in enumerate(zip(limits, groups(u, limits), strict=True)):
+        slip = norm(part)
+        if slips is None or slip > slips[k]:
+            result += c * slip
+        elif not slip <= slips[k]:  # on either side
+            result += c * slip.union(arb(0))
+    return [result, *u[1:]]
 
 
 def natural_map(r: Balls, hat: Balls, limits: Sequence[arb], rho: arb) -> Balls:
@@ -292,6 +334,7 @@ class Terms:
 
     u: Balls  # recomputed
     q: Balls  # condensed for a global problem
+    sizes: Balls  # c: of the terms of q
     rounding: Balls  # eps_q
     diagonal: Balls  # of W
     dynamics: arb
@@ -343,29 +386,40 @@ def local_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> T
     """U = W r + V l + q, V^T r + R l + s = 0."""
     d, r, q, W = problem.spacedim, balls(solution.r), balls(problem.q), Sparse(problem.W)
     diagonal = W.diagonal()
-    u, terms, own = add(W.times(r), q), add(W.sizes(r), [abs(x) for x in q]), [abs(x) for x in q]
-    rounding, bilateral = zeros(len(q)), arb(0)
+    u, own = add(W.times(r), q), [abs(x) for x in q]
+    rounding, bilateral, V = zeros(len(q)), arb(0), None
     if problem.V is not None:
         assert solution.l is not None
         V, R, s, lam = Sparse(problem.V), Sparse(problem.R), balls(problem.s), balls(solution.l)
         size = [abs(x) for x in s]
         held = [quotient(a, abs(b)) for a, b in zip(size, R.diagonal(), strict=True)]
-        u, terms = add(u, V.times(lam)), add(terms, V.sizes(lam))
-        moved = V.sizes(held)
+        u, moved = add(u, V.times(lam)), V.sizes(held)
         own, rounding = add(own, moved), [unit_of_q * x for x in moved]
+    stop = stopping(own, diagonal, d)
+    known_r, known_l = stop, zeros(0) if V is None else held
+    if unit:
+        A, effect = W.dense(), W.times(r)
+        if V is not None:
+            A = np.block([[A, V.dense()], [V.dense().T, R.dense()]])
+            effect = add(effect, V.times(lam)) + add(V.transposed(r), R.times(lam))
+        least = least_reactions(A, doubles(effect))
+        known_r, known_l = larger(stop, least[: len(r)]), larger(known_l, least[len(r) :])
+    terms = add(W.sizes(known_r), [abs(x) for x in q])
+    if V is not None:
+        terms = add(terms, V.sizes(known_l))
         residual = add(V.transposed(r), R.times(lam), s)
-        parts = add(V.sizes_transposed(r), R.sizes(lam), size)
-        velocity = add(V.sizes_transposed(stopping(own, diagonal, d)), R.sizes(held), size)
+        parts = add(V.sizes_transposed(known_r), R.sizes(known_l), size)
+        velocity = add(V.sizes_transposed(stop), R.sizes(held), size)
         least = [mean_square_root(s)] * len(s)
         bilateral = worst(beyond(residual, parts, unit), larger(velocity, least))
     kinematics = arb(0)
     if solution.u is not None:
         difference = [a - b for a, b in zip(balls(solution.u), u, strict=True)]
-        moved = contact_norms(add(W.sizes(stopping(own, diagonal, d)), own), d)
+        moved = contact_norms(add(W.sizes(stop), own), d)
         velocity = larger(moved, contact_norms(u, d))
         least = [mean_square_root(q)] * len(q)
         kinematics = worst(beyond(difference, terms, unit), larger(velocity, least))
-    return Terms(u, q, rounding, diagonal, arb(0), bilateral, kinematics)
+    return Terms(u, q, own, rounding, diagonal, arb(0), bilateral, kinematics)
 
 
 def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> Terms:
@@ -375,22 +429,36 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
     free, diagonal = mass.solve(f), mass.gram(H)
     q = add(H.transposed(free), w)
     own = add(H.sizes_transposed(free), [abs(x) for x in w])
-    impulse, terms = add(H.times(r), f), add(H.sizes(r), [abs(x) for x in f])
-    free_terms = add(mass.terms(free), [abs(x) for x in f])
-    stop = H.sizes(stopping(own, diagonal, d))
+    effect = H.times(r)
+    known_r, known_l = stopping(own, diagonal, d), zeros(0)
+    stop = H.sizes(known_r)
     G = b = None
     if problem.G is not None:
         assert solution.l is not None
         G, b, lam = Sparse(problem.G), balls(problem.b), balls(solution.l)
         velocity = add(G.sizes_transposed(free), [abs(x) for x in b])
         held = [quotient(x, y) for x, y in zip(velocity, mass.gram(G), strict=True)]
-        impulse, terms = add(impulse, G.times(lam)), add(terms, G.sizes(lam))
-        free_terms, stop = add(free_terms, G.sizes(held)), add(stop, G.sizes(held))
-    rounding = [unit_of_q * x for x in add(own, mass.spread(H, free_terms))] if unit_of_q else []
-
+        effect, known_l, stop = add(effect, G.times(lam)), held, add(stop, G.sizes(held))
+    impulse = add(effect, f)
     given = solution.v is not None
     v = balls(solution.v) if given else mass.solve(impulse)
-    terms = add(terms, mass.terms(v))
+    rounding = terms = []
+    if unit:
+        terms = add(mass.terms(free), [abs(x) for x in f])
+        if G is not None:
+            terms = add(terms, G.sizes(known_l))
+        rounding = [unit_of_q * x for x in add(own, mass.spread(H, terms))]
+        A, by_factor = H.dense(), doubles(effect)
+        if G is not None:
+            A = np.hstack([A, G.dense()])
+        if (L := mass.factor()) is not None:
+            A, by_factor = np.linalg.solve(L, A), np.linalg.solve(L, by_factor)
+        least = least_reactions(A, by_factor)
+        known_r, known_l = larger(known_r, least[: len(r)]), larger(known_l, least[len(r) :])
+        terms = add(mass.terms(v), [abs(x) for x in f], H.sizes(known_r))
+        if G is not None:
+            terms = add(terms, G.sizes(known_l))
+    terms = terms or zeros(len(f))
     fastest, dynamics = larger(v, free), arb(0)
     if given:
         residual = [a - b for a, b in zip(mass.matrix.times(v), impulse, strict=True)]
@@ -411,7 +479,8 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
         parts = add(G.sizes_transposed(fastest), [abs(x) for x in b])
         allowed = add(parts, mass.spread(G, terms)) if unit else parts
         bilateral = worst(beyond(residual, allowed, unit), parts)
-    return Terms(u, q, rounding or zeros(len(q)), diagonal, dynamics, bilateral, kinematics)
+    rounding = rounding or zeros(len(q))
+    return Terms(u, q, own, rounding, diagonal, dynamics, bilateral, kinematics)
 
 
 def relative(parts: Balls, scales: Sequence[Balls]) -> arb:
@@ -420,7 +489,17 @@ def relative(parts: Balls, scales: Sequence[Balls]) -> arb:
     return norm(parts) if is_zero(scale) else norm(parts) / scale
 
 
-def contacts(problem: Any, solution: Any, terms: Terms) -> Verdict:
+def slips_of_rounding(sizes: Balls, d: int, count: int) -> list[Balls]:
+    """s_T, and s_R, of each contact: so much sliding is none."""
+    parts = [(own, groups(own, [arb(0)] * count)) for own in by_contact(sizes, d)]
+    sizes_of = [
+        [norm(([own[0]] if k == 0 else []) + part[k]) for k in range(count)] for own, part in parts
+    ]
+    means = [mean_square_root([own[k] for own in sizes_of]) for k in range(count)]
+    return [[UNIT_OF_Q * own[k].max(means[k]) for k in range(count)] for own in sizes_of]
+
+
+def contacts(problem: Any, solution: Any, terms: Terms, rounding: bool) -> Verdict:
     """The parts that follow from u, r and q contact by contact."""
     d, nc = problem.spacedim, problem.nc
     coefficients = [balls(problem.mu)]
@@ -432,12 +511,13 @@ def contacts(problem: Any, solution: Any, terms: Terms) -> Verdict:
     rho = [1 / (others if is_zero(x) else x) for x in sizes]
     u, r = by_contact(terms.u, d), by_contact(balls(solution.r), d)
     allowed = [norm(x) for x in by_contact(terms.rounding, d)]
+    slips = slips_of_rounding(terms.sizes, d, len(coefficients)) if rounding else [None] * nc
     natural, impulses, velocities = zeros(nc), zeros(nc), zeros(nc)
     cone, dual, power = zeros(nc), zeros(nc), zeros(nc)
     counts = {"open": 0, "stick": 0, "slide": 0}
     for a in range(nc):
         limits = [each[a] for each in coefficients]
-        hat = modified(u[a], limits)
+        hat = modified(u[a], limits, slips[a])
         natural[a] = (norm(natural_map(r[a], hat, limits, arb(1))) - allowed[a]).max(arb(0))
         scaled = norm(natural_map(r[a], hat, limits, rho[a]))
         impulses[a] = (scaled - rho[a] * allowed[a]).max(arb(0))
@@ -484,7 +564,9 @@ def judge(problem: fclib.Problem, solution: fclib.Solution, rounding: bool = Fal
     for precision in PRECISIONS:
         with ctx.workprec(precision):
             try:
-                verdict = contacts(problem, solution, equations(problem, solution, *units))
+                verdict = contacts(
+                    problem, solution, equations(problem, solution, *units), rounding
+                )
             except ZeroDivisionError:  # M is singular as far as these bits tell
                 continue
             fields = (getattr(verdict, name) for name in ("natural", "scaled_natural", "dynamics",

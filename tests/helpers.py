@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 import scipy.sparse as sp
 
 import fclib
@@ -18,6 +19,16 @@ import fclib
 Array: TypeAlias = npt.NDArray[np.float64]
 
 STORAGES = ("csr", "csc", "coo", "dense")
+
+CASES = Path(__file__).resolve().parents[2] / "shared" / "data" / "cases"
+
+
+def case(name: str) -> Path:
+    """A recorded problem on which a verdict was wrong. Skips the test if it is not there."""
+    path = CASES / name
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    return path
 
 
 # ---- the law, in NumPy

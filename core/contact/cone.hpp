@@ -2,14 +2,15 @@
 //
 // A cone K offers, for a contact of dim components with the normal one first,
 //
-//   Vec project(const Vec& x) const;    the Euclidean projection on K; x itself where x is in K
-//   Vec outside(const Vec& x) const;    x - P_K(x), which may be small beside x
+//   Vec project(const Vec& x) const;    the Euclidean projection on K; x itself if x is in K
 //   Vec modified(const Vec& u) const;   u^, the modified velocity of de Saxce & Feng (1998)
+//   NaturalPoint<Vec> natural(const Vec& u, const Vec& r, Real rho, Slack slack) const;
 //
 // and is made from the coefficients of a contact, Cone(friction, contact).
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "friction.hpp"
 
@@ -20,28 +21,43 @@ using ContactVector = Eigen::Matrix<Real, D, 1>;
 template <int D>
 using ContactMatrix = Eigen::Matrix<double, D, D>;
 
-/// r - P_K(r - rho u^): zero exactly where the friction law holds between u and r.
+enum class ContactStatus { open, stick, slide };
+
+/// F = r - P_K(r - rho u^), and which part of the projection it comes from: 0, the inside of K, or
+/// its boundary.
+template <class Vec>
+struct NaturalPoint {
+  Vec map;
+  ContactStatus status;
+};
+
+/// A norm; 0 if it is no more than `slack`.
+template <class Real>
+Real above_slack(Real norm, Real slack) {
+  return norm <= slack ? Real(0) : norm;
+}
+
+/// r - P_K(r - rho u^): zero exactly if the friction law holds between u and r.
 ///
-/// Computed as rho u^ + (y - P_K(y)), y = r - rho u^, so that a large reaction does not swallow a
-/// velocity that is wrong, nor a large normal part one at which a small limit of rolling binds.
+/// The parts of u^ are not added up first. With mu = 1e10, u^_N = u_N + mu ||u_T|| would swallow
+/// r_N and u_N, and what is left of their difference is no number of either. `slack` has one
+/// velocity for each group of the cone: a ||u_g|| of no more is the rounding of the data, and is
+/// none in u^_N.
 ///
 /// Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and
 /// numerical comparisons" (2018), the natural map of section 3.
 template <class Cone>
 typename Cone::Vec natural_map(const Cone& cone, const typename Cone::Vec& u,
-                               const typename Cone::Vec& r, typename Cone::Vec::Scalar rho = 1) {
-  using Vec = typename Cone::Vec;
-  const Vec velocity = rho * cone.modified(u);
-  const Vec y = r - velocity;
-  const Vec outside = cone.outside(y);
-  if (outside == y) return r;
-  return velocity + outside;
+                               const typename Cone::Vec& r, typename Cone::Vec::Scalar rho = 1,
+                               const typename Cone::Slack& slack = {}) {
+  return cone.natural(u, r, rho, slack).map;
 }
 
-/// The distance of x from K.
+/// The distance of x from K: without a velocity the natural map is x - P_K(x).
 template <class Cone>
 typename Cone::Vec::Scalar cone_violation(const Cone& cone, const typename Cone::Vec& x) {
-  return cone.outside(x).norm();
+  using Vec = typename Cone::Vec;
+  return natural_map(cone, Vec(Vec::Zero()), x).norm();
 }
 
 /// The distance of y from the dual cone K*, which by Moreau's decomposition is the norm of the
@@ -49,18 +65,6 @@ typename Cone::Vec::Scalar cone_violation(const Cone& cone, const typename Cone:
 template <class Cone>
 typename Cone::Vec::Scalar dual_violation(const Cone& cone, const typename Cone::Vec& y) {
   return cone.project(-y).norm();
-}
-
-enum class ContactStatus { open, stick, slide };
-
-/// Read off the set that the natural map projects on: no reaction, inside K, or on its boundary.
-template <class Cone>
-ContactStatus status_of(const Cone& cone, const typename Cone::Vec& u, const typename Cone::Vec& r,
-                        typename Cone::Vec::Scalar rho) {
-  const typename Cone::Vec y = r - rho * cone.modified(u);
-  const typename Cone::Vec projection = cone.project(y);
-  if (projection[0] == 0) return ContactStatus::open;
-  return projection == y ? ContactStatus::stick : ContactStatus::slide;
 }
 
 }  // namespace fclib

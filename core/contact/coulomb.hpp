@@ -16,6 +16,7 @@ class Coulomb {
   static constexpr int groups = 1;          // of tangential components with a limit each
   static constexpr int group_size = D - 1;  // components of a group
   using Vec = ContactVector<D, Real>;
+  using Slack = std::array<Real, groups>;
 
   explicit Coulomb(Real mu) : mu_(mu) {}
   Coulomb(const Friction& friction, Eigen::Index contact) : mu_(friction.mu[contact]) {}
@@ -54,16 +55,35 @@ class Coulomb {
     return result;
   }
 
-  [[nodiscard]] Vec outside(const Vec& x) const {
-    const Real norm = tangential_norm(x);
-    const Real beyond = norm - mu_ * x[0];
-    if (x[0] >= 0 && beyond <= 0) return Vec::Zero();
-    if (mu_ * norm <= -x[0]) return x;
-    const Real length = beyond / (1 + mu_ * mu_);
-    Vec result;
-    result[0] = -mu_ * length;
-    for (int k = 1; k < D; ++k) result[k] = length / norm * x[k];
-    return result;
+  /// With T = ||y_T|| - s for y_T = r_T - rho u_T and s = rho ||u_T||, a = r_N - rho u_N and
+  /// g = T - mu a, which is what is left of the law of sliding,
+  ///
+  ///   F = r                                            if a + mu T <= 0         (open)
+  ///   F = rho (u_N + mu ||u_T||, u_T)                  if ||y_T|| <= mu (a - mu s)  (stick)
+  ///   F_N = rho u_N - mu g / (1 + mu^2)                else                     (slide)
+  ///   F_T = rho u_T + (s + g / (1 + mu^2)) y_T / ||y_T||
+  [[nodiscard]] NaturalPoint<Vec> natural(const Vec& u, const Vec& r, Real rho,
+                                          const Slack& slack) const {
+    Vec y;
+    Vec map;
+    for (int k = 0; k < D; ++k) {
+      map[k] = rho * u[k];
+      y[k] = r[k] - map[k];
+    }
+    const Real norm = tangential_norm(y);
+    const Real slip = rho * above_slack(tangential_norm(u), slack[0]);
+    const Real left = norm - slip;
+    if (y[0] + mu_ * left <= 0) return {r, ContactStatus::open};
+    const Real pressed = y[0] - mu_ * slip;
+    if (pressed >= 0 && norm <= mu_ * pressed) {
+      map[0] += mu_ * slip;
+      return {map, ContactStatus::stick};
+    }
+    const Real length = (left - mu_ * y[0]) / (1 + mu_ * mu_);
+    map[0] -= mu_ * length;
+    const Real scale = norm == 0 ? Real(0) : (slip + length) / norm;
+    for (int k = 1; k < D; ++k) map[k] += scale * y[k];
+    return {map, ContactStatus::slide};
   }
 
  private:

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "contact/cone.hpp"
+#include "error_size.hpp"
 
 namespace fclib {
 
@@ -33,11 +34,11 @@ struct NaturalSquares {
     velocities += std::max(square / (rho * rho), u[0] < 0 ? u[0] * u[0] : Real(0));
   }
 
-  /// The error where ||q|| is `scale` and ||rho q|| is `scaled_scale`; of a NaN the NaN.
-  [[nodiscard]] Real error(Real scale, Real scaled_scale) const {
-    const auto larger = [](Real a, Real b) { return a <= b ? b : a; };  // a where it is a NaN
+  /// The error if ||q|| is `scale` and ||rho q|| is `scaled_scale`.
+  [[nodiscard]] double error(Real scale, Real scaled_scale) const {
     using std::sqrt;
-    return larger(sqrt(larger(velocities, plain)) / scale, sqrt(impulses) / scaled_scale);
+    const double plainly = larger_error(sqrt(velocities) / scale, sqrt(plain) / scale);
+    return larger_error(plainly, sqrt(impulses) / scaled_scale);
   }
 };
 

@@ -25,6 +25,7 @@ class Rolling {
   static constexpr int groups = 2;      // sliding, rolling
   static constexpr int group_size = T;  // components of a group
   using Vec = ContactVector<D, Real>;
+  using Slack = std::array<Real, groups>;
 
   Rolling(Real mu, Real mu_r) : mu_(mu), mu_r_(mu_r) {}
   Rolling(const Friction& friction, Eigen::Index contact)
@@ -40,7 +41,9 @@ class Rolling {
   /// linear but for the values of n at which a limit ceases to bind.
   [[nodiscard]] Vec project(const Vec& x) const;
 
-  [[nodiscard]] Vec outside(const Vec& x) const;
+  /// As that of Coulomb, with s_T = rho ||u_T||, s_R = rho ||u_R||: see the definition.
+  [[nodiscard]] NaturalPoint<Vec> natural(const Vec& u, const Vec& r, Real rho,
+                                          const Slack& slack) const;
 
  private:
   static Real tangential_norm(const Vec& x) { return x.template segment<T>(1).norm(); }
@@ -79,31 +82,59 @@ auto Rolling<D, Real>::project(const Vec& x) const -> Vec {
   return result;
 }
 
+// The projection of y = r - rho u^ cuts ||y_T|| by c_T and ||y_R|| by c_R, so that
+//
+//   F_N = rho u_N + mu (s_T - c_T) + mu_r (s_R - c_R),   F_T = rho u_T + c_T y_T / ||y_T||,  F_R
+//   alike
+//
+// and its normal part is n = a + mu (c_T - s_T) + mu_r (c_R - s_R), a = r_N - rho u_N. A limit that
+// binds has c = ||y|| - limit n > 0, the other one c = 0. What is large, mu s_T and mu_r s_R,
+// leaves these sums before they are formed.
 template <int D, class Real>
-auto Rolling<D, Real>::outside(const Vec& x) const -> Vec {
-  const Real t = tangential_norm(x);
-  const Real r = rolling_norm(x);
-  // beyond their limits at n = x_N
-  const Real beyond_t = t - mu_ * x[0];
-  const Real beyond_r = r - mu_r_ * x[0];
-  if (x[0] >= 0 && beyond_t <= 0 && beyond_r <= 0) return Vec::Zero();
-  if (x[0] + mu_ * t + mu_r_ * r <= 0) return x;
-  // n - x_N with one limit that binds, or with both: see project()
-  const bool sliding = t > 0 && (!(r > 0) || t * mu_r_ >= r * mu_);
-  const Real limit = sliding ? mu_ : mu_r_;
-  Real rise = limit * (sliding ? beyond_t : beyond_r) / (1 + limit * limit);
-  Real left_t = beyond_t - mu_ * rise;
-  Real left_r = beyond_r - mu_r_ * rise;
-  if (left_t > 0 && left_r > 0) {
-    rise = (mu_ * beyond_t + mu_r_ * beyond_r) / (1 + mu_ * mu_ + mu_r_ * mu_r_);
-    left_t = beyond_t - mu_ * rise;
-    left_r = beyond_r - mu_r_ * rise;
+auto Rolling<D, Real>::natural(const Vec& u, const Vec& r, Real rho, const Slack& slack) const
+    -> NaturalPoint<Vec> {
+  Vec map = rho * u;
+  const Vec y = r - map;
+  const Real a = y[0];
+  const Real t = tangential_norm(y);
+  const Real q = rolling_norm(y);
+  const Real slip_t = rho * above_slack(tangential_norm(u), slack[0]);
+  const Real slip_r = rho * above_slack(rolling_norm(u), slack[1]);
+  const Real left_t = t - slip_t;
+  const Real left_r = q - slip_r;
+  if (a + mu_ * left_t + mu_r_ * left_r <= 0) return {r, ContactStatus::open};
+  const Real pressed = a - mu_ * slip_t - mu_r_ * slip_r;
+  if (pressed >= 0 && t <= mu_ * pressed && q <= mu_r_ * pressed) {
+    map[0] += mu_ * slip_t + mu_r_ * slip_r;
+    return {map, ContactStatus::stick};
   }
-  Vec result = Vec::Zero();
-  result[0] = -rise;
-  if (left_t > 0) result.template segment<T>(1) = left_t / t * x.template segment<T>(1);
-  if (left_r > 0) result.template segment<T>(1 + T) = left_r / r * x.template segment<T>(1 + T);
-  return result;
+  // the limit that binds longest as n grows binds alone, or both do
+  const bool sliding = t * mu_r_ >= q * mu_;
+  const Real limit = sliding ? mu_ : mu_r_;
+  const Real left = sliding ? left_t : left_r;
+  const Real idle = sliding ? mu_r_ * slip_r : mu_ * slip_t;
+  const Real weight = 1 + limit * limit;
+  const Real n = (a + limit * left - idle) / weight;
+  const bool both = sliding ? q > mu_r_ * n : t > mu_ * n;
+  Real cut_t = 0;
+  Real cut_r = 0;
+  if (both) {
+    const Real total = weight + (sliding ? mu_r_ * mu_r_ : mu_ * mu_);
+    const Real turn = mu_r_ * left_t - mu_ * left_r;
+    const Real beyond_t = left_t - mu_ * a;
+    const Real beyond_r = left_r - mu_r_ * a;
+    cut_t = slip_t + (beyond_t + mu_r_ * turn) / total;
+    cut_r = slip_r + (beyond_r - mu_ * turn) / total;
+    map[0] -= (mu_ * beyond_t + mu_r_ * beyond_r) / total;
+  } else {
+    (sliding ? cut_t : cut_r) = (sliding ? slip_t : slip_r) + (left - limit * (a - idle)) / weight;
+    map[0] -= (limit * (left - limit * a) - idle) / weight;
+  }
+  // a cut that is no number must show
+  if (!(cut_t <= 0) && t != 0) map.template segment<T>(1) += cut_t / t * y.template segment<T>(1);
+  if (!(cut_r <= 0) && q != 0)
+    map.template segment<T>(1 + T) += cut_r / q * y.template segment<T>(1 + T);
+  return {map, ContactStatus::slide};
 }
 
 // with other numbers they are compiled where they are used

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "embed/small_solver.hpp"
+#include "linalg/extended.hpp"
 #include "linalg/workers.hpp"
 #include "merit/natural_sums.hpp"
 #include "solve/driver.hpp"
@@ -51,17 +52,20 @@ bool all_finite(const double* x, std::int64_t size) {
 /// u = W r + q, and the merit of r, both in extended precision.
 template <int D>
 double judge(const One& one) {
-  using Real = long double;
+  using std::abs, std::sqrt;  // or those of Real
   using Vec = ContactVector<D, Real>;
   NaturalSums<Coulomb<D, Real>> sums;
   const auto m = static_cast<std::int64_t>(D) * one.nc;
   const auto size_of = [&](Index a) {
     Real size = 0;
-    for (std::int64_t k = D * a; k < D * (a + 1); ++k) size += std::abs(Real(one.W[k * m + k])) / D;
+    for (std::int64_t k = D * a; k < D * (a + 1); ++k) size += abs(Real(one.W[k * m + k])) / D;
     return size;
   };
   ContactScales<Real> scales;
+  Real squares = 0;
   for (Index a = 0; a < one.nc; ++a) scales.add(size_of(a));
+  for (std::int64_t k = 0; k < m; ++k) squares += full_product(one.q[k], one.q[k]);
+  const Real mean = sqrt(squares / one.nc);
   for (Index a = 0; a < one.nc; ++a) {
     Vec u;
     Vec q;
@@ -70,7 +74,7 @@ double judge(const One& one) {
       const std::int64_t at = D * a + k;
       const double* row = one.W + at * m;
       Real sum = 0;
-      for (std::int64_t j = 0; j < m; ++j) sum += Real(row[j]) * Real(one.r[j]);
+      for (std::int64_t j = 0; j < m; ++j) sum += full_product(row[j], one.r[j]);
       sum += one.q[at];
       u[k] = sum;
       q[k] = one.q[at];
@@ -79,11 +83,11 @@ double judge(const One& one) {
     }
     const Real rho = scales.rho(size_of(a));
     const Coulomb<D, Real> cone(one.mu[a]);
-    sums.add(cone, u[0], cone.modified(u), r, q.squaredNorm(), Real(0), rho);
+    const Real q_square = q.squaredNorm();
+    const Real slip = slip_of_rounding<Real>(sqrt(q_square), mean);
+    sums.add(cone, u, r, q_square, Real(0), rho, {slip});
   }
-  const double natural = sums.natural();
-  const double scaled = sums.scaled_natural();
-  return scaled <= natural ? natural : scaled;
+  return sums.error();
 }
 
 template <int D>

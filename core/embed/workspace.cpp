@@ -101,17 +101,20 @@ void Workspace::keep(int spacedim, std::span<const std::int64_t> contacts,
 /// u = W r + q, and the merit of r, both in extended precision.
 template <int D>
 double Workspace::judge(const LocalView& problem) {
-  using Real = long double;
+  using std::abs, std::sqrt;  // or those of Real
   using Vec = ContactVector<D, Real>;
   const std::size_t nc = problem.mu.size();
   std::fill_n(real_.begin(), D * nc, Real(0));
   std::fill_n(size_.begin(), nc, Real(0));
   problem.W.visit([&](Index row, Index col, double value) {
-    real_[static_cast<std::size_t>(row)] += Real(value) * Real(r_[static_cast<std::size_t>(col)]);
-    if (row == col) size_[static_cast<std::size_t>(row / D)] += std::abs(Real(value)) / D;
+    real_[static_cast<std::size_t>(row)] += full_product(value, r_[static_cast<std::size_t>(col)]);
+    if (row == col) size_[static_cast<std::size_t>(row / D)] += abs(Real(value)) / D;
   });
   ContactScales<Real> scales;
   for (std::size_t a = 0; a < nc; ++a) scales.add(size_[a]);
+  Real squares = 0;
+  for (std::size_t k = 0; k < D * nc; ++k) squares += full_product(problem.q[k], problem.q[k]);
+  const Real mean = sqrt(squares / static_cast<double>(nc));
   NaturalSums<Coulomb<D, Real>> sums;
   for (std::size_t a = 0; a < nc; ++a) {
     Vec u;
@@ -126,11 +129,11 @@ double Workspace::judge(const LocalView& problem) {
     }
     const Real rho = scales.rho(size_[a]);
     const Coulomb<D, Real> cone(problem.mu[a]);
-    sums.add(cone, u[0], cone.modified(u), r, q.squaredNorm(), Real(0), rho);
+    const Real q_square = q.squaredNorm();
+    const Real slip = slip_of_rounding<Real>(sqrt(q_square), mean);
+    sums.add(cone, u, r, q_square, Real(0), rho, {slip});
   }
-  const double natural = sums.natural();
-  const double scaled = sums.scaled_natural();
-  return scaled <= natural ? natural : scaled;
+  return sums.error();
 }
 
 template <int D>

@@ -9,6 +9,7 @@
 
 #include "embed/matrix_view.hpp"
 #include "embed/small_solver.hpp"
+#include "linalg/extended.hpp"
 #include "problems/local.hpp"
 #include "solve/solver.hpp"
 
@@ -75,7 +76,7 @@ class Workspace {
   SmallSolver<2> plane_;
   SmallSolver<3> space_;
   std::vector<double> r_, u_;
-  std::vector<long double> real_, size_;
+  std::vector<Real> real_, size_;
   // of the last solve
   int spacedim_ = 0;
   std::size_t known_ = 0;                                    // contacts

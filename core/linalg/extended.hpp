@@ -2,8 +2,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cfloat>
 
-#ifdef __wasm__
+// the extended format of x86: 64 bits by the processor. Elsewhere long double is a plain double, or
+// has 113 bits in software, which costs more than two doubles.
+#if LDBL_MANT_DIG == 64
+#define FCLIB_HAS_EXTENDED 1
+#else
+#define FCLIB_HAS_EXTENDED 0
 #include "linalg/double_double.hpp"
 #endif
 
@@ -11,20 +17,17 @@ namespace fclib {
 
 // A referee is more precise than what it judges: with r = 4e5 and q = 0.8, as in granular packings
 // under load, the rounding of W r alone is worth 1e-11 in double precision.
-#ifdef __wasm__
-using Real = DoubleDouble;  // long double is software there
-#else
+#if FCLIB_HAS_EXTENDED
 using Real = long double;
-#endif
 
 /// a b, which needs the precision of both.
-inline Real full_product(double a, double b) {
-#ifdef __wasm__
-  return DoubleDouble::product(a, b);
+inline Real full_product(double a, double b) { return Real(a) * Real(b); }
 #else
-  return Real(a) * Real(b);
+using Real = DoubleDouble;
+
+inline Real full_product(double a, double b) { return DoubleDouble::product(a, b); }
 #endif
-}
+static_assert(sizeof(Real) > sizeof(double));
 inline Real full_product(double a, Real b) { return Real(a) * b; }
 
 using RealVector = Eigen::Matrix<Real, Eigen::Dynamic, 1>;

@@ -234,6 +234,24 @@ Vector Factorization::solve(ConstVectorRef b) const {
   return b;
 }
 
+Vector Factorization::terms(ConstVectorRef x) const {
+  if (supernodal_) return supernodal_->terms(x);
+  if (!cholesky_) return Vector::Zero(x.size());
+  const SparseColumns& lower = cholesky_->matrixL().nestedExpression();
+  const Vector permuted = cholesky_->permutationP() * x;
+  Vector sizes = Vector::Zero(x.size());
+  for (Eigen::Index col = 0; col < lower.cols(); ++col) {
+    double sum = 0;
+    for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
+      sum += entry.value() * permuted[entry.row()];
+    }
+    for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
+      sizes[entry.row()] += std::abs(entry.value() * sum);
+    }
+  }
+  return cholesky_->permutationPinv() * sizes;
+}
+
 SparseColumns Factorization::solve(const SparseColumns& b) const {
   if (supernodal_) {
     SparseColumns result(b.rows(), b.cols());

@@ -31,6 +31,10 @@ class Factorization {
   /// A^-1 B.
   [[nodiscard]] SparseColumns solve(const SparseColumns& b) const;
 
+  /// |L| |L^T x| of A = L L^T: the sizes of what the factors add up on the way from x to A x, and
+  /// so what rounding leaves of A^-1. 0 if A is factorised as L U.
+  [[nodiscard]] Vector terms(ConstVectorRef x) const;
+
   /// B^T A^-1 B; symmetric to the last bit where A is. Nothing where `deadline` passes on the way.
   [[nodiscard]] std::optional<SparseColumns> gram(const SparseColumns& b,
                                                   const Deadline& deadline) const;

@@ -119,6 +119,28 @@ Vector MultifrontalCholesky::solve(ConstVectorRef b) const {
   return result;
 }
 
+Vector MultifrontalCholesky::terms(ConstVectorRef x) const {
+  Vector permuted(x.size());
+  for (Index node = 0; node < symbolic_.size; ++node) permuted[symbolic_.position[node]] = x[node];
+  Vector sizes = Vector::Zero(x.size());
+  for (std::size_t f = 0; f < factors_.size(); ++f) {
+    const Front& front = symbolic_.fronts[f];
+    const Index below = front.size - front.pivots;
+    Vector local(front.size);
+    for (Index k = 0; k < front.size; ++k) local[k] = permuted[front.nodes[k]];
+    const Dense lower = factors_[f].diagonal.triangularView<Eigen::Lower>();
+    Vector sums = lower.transpose() * local.head(front.pivots);
+    if (below > 0) sums += factors_[f].lower.transpose() * local.tail(below);
+    local.head(front.pivots) = lower.cwiseAbs() * sums.cwiseAbs();
+    if (below > 0) local.tail(below) = factors_[f].lower.cwiseAbs() * sums.cwiseAbs();
+    for (Index k = 0; k < front.size; ++k) sizes[front.nodes[k]] += local[k];
+  }
+  Vector result(x.size());
+  for (Index node = 0; node < symbolic_.size; ++node)
+    result[node] = sizes[symbolic_.position[node]];
+  return result;
+}
+
 std::vector<Index> MultifrontalCholesky::roots() const {
   std::vector<Index> root(factors_.size());
   for (std::size_t f = factors_.size(); f-- > 0;) {

@@ -26,6 +26,9 @@ class MultifrontalCholesky {
   /// A^-1 b.
   [[nodiscard]] Vector solve(ConstVectorRef b) const;
 
+  /// |L| |L^T x|.
+  [[nodiscard]] Vector terms(ConstVectorRef x) const;
+
   /// B^T A^-1 B, symmetric to the last bit; nothing where the deadline passes on the way.
   [[nodiscard]] std::optional<SparseColumns> gram(const SparseColumns& b,
                                                   const Deadline& deadline) const;

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
-#include <utility>
 
+#include "error_size.hpp"
+#include "merit/least_reactions.hpp"
 #include "merit/natural_sums.hpp"
 
 namespace fclib {
@@ -16,11 +16,9 @@ namespace {
 
 using std::abs, std::copysign, std::sqrt;  // or those of Real
 
-/// What rounding leaves of a sum, over the sizes of its terms: some roundings each. q has fewer
-/// than v, u and l, which a solver has brought through conversions, and what is allowed to q is
-/// hidden from the natural map.
+/// What rounding leaves of v, u and l, over the sizes of the terms they are found from: some more
+/// roundings than of q, since a solver has brought them through conversions.
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
-constexpr Real rounding_unit_of_q = 4 * Real(std::numeric_limits<double>::epsilon());
 
 template <class X>
 RealVector product(const Matrix& a, const X& x) {
@@ -139,40 +137,88 @@ RealVector diagonal(const Matrix& a) {
   return result;
 }
 
-/// The part of a matrix that each row is coupled to, named by its first row.
-std::vector<Index> coupled_parts(const Matrix& a) {
-  std::vector<Index> part(static_cast<std::size_t>(a.rows));
-  std::iota(part.begin(), part.end(), Index{0});
-  const auto first = [&](Index row) {
-    while (part[static_cast<std::size_t>(row)] != row) {
-      Index& next = part[static_cast<std::size_t>(row)];
-      row = next = part[static_cast<std::size_t>(next)];
-    }
-    return row;
-  };
-  for_each_entry(a, [&](Index row, Index col, double) {
-    const Index one = first(row);
-    const Index other = first(col);
-    part[static_cast<std::size_t>(std::max(one, other))] = std::min(one, other);
-  });
-  for (Index row = 0; row < a.rows; ++row) part[static_cast<std::size_t>(row)] = first(row);
-  return part;
+/// What M v adds up if v comes from the factors of M. In its own row |M| |v| may be next to
+/// nothing, as at the joints of a robot in free flight.
+RealVector momentum_sizes(const Matrix& mass, const Factorization& factors, const RealVector& v) {
+  return sizes(mass, v) + factors.terms(v.cast<double>()).cast<Real>();
 }
 
-/// What M v adds up, where v comes from the factors of M: |L| |L^T v| of M = L L^T, at most
-/// sqrt(M_ii) || sqrt(M_jj) v_j || over the part of M that i is coupled to. In its own row |M| |v|
-/// may be next to nothing, as at the joints of a robot in free flight.
-RealVector momentum_sizes(const Matrix& mass, const std::vector<Index>& part, const RealVector& v) {
-  const RealVector inertia = diagonal(mass).cwiseAbs();
-  RealVector squares = RealVector::Zero(v.size());
-  for (Eigen::Index k = 0; k < v.size(); ++k) {
-    squares[part[static_cast<std::size_t>(k)]] += inertia[k] * v[k] * v[k];
-  }
-  RealVector result = sizes(mass, v);
-  for (Eigen::Index k = 0; k < v.size(); ++k) {
-    result[k] += sqrt(inertia[k] * squares[part[static_cast<std::size_t>(k)]]);
+/// Sizes of r and of lambda, by which the rounding of the equations is judged.
+struct Sizes {
+  RealVector r;
+  RealVector l;
+};
+
+/// [A B]
+SparseColumns beside(const Matrix& a, const Matrix& b) {
+  const SparseColumns left = to_eigen(a);
+  const SparseColumns right = to_eigen(b);
+  SparseColumns result(left.rows(), left.cols() + right.cols());
+  result.leftCols(left.cols()) = left;
+  result.rightCols(right.cols()) = right;
+  return result;
+}
+
+/// Both at least as large as those that the data ask for.
+Sizes explained(const Vector& least, Eigen::Index m, const Sizes& own) {
+  Sizes result = own;
+  for (Eigen::Index k = 0; k < least.size(); ++k) {
+    Real& size = k < m ? result.r[k] : result.l[k - m];
+    if (Real(least[k]) > size) size = least[k];
   }
   return result;
+}
+
+/// What the least reactions are that give the solution's H r + G lambda, or its W r + V lambda and
+/// V^T r + R lambda.
+Sizes explained(const LocalProblem& problem, const Solution& solution, const Sizes& own) {
+  const Eigen::Index m = problem.q.size();
+  if (!is_mixed(problem)) {
+    return explained(least_reactions(to_eigen(problem.W), product(problem.W, solution.r)), m, own);
+  }
+  const SparseColumns top = beside(problem.W, problem.V);
+  const SparseColumns columns = to_eigen(problem.V);
+  const SparseColumns rows = columns.transpose();
+  const SparseColumns bottom = beside(Matrix::from_eigen(rows), problem.R);
+  std::vector<Eigen::Triplet<double, Index>> entries;
+  for (const SparseColumns* part : {&top, &bottom}) {
+    const Index below = part == &top ? 0 : static_cast<Index>(m);
+    for (Eigen::Index col = 0; col < part->outerSize(); ++col) {
+      for (SparseColumns::InnerIterator entry(*part, col); entry; ++entry) {
+        entries.emplace_back(static_cast<Index>(entry.row()) + below, static_cast<Index>(col),
+                             entry.value());
+      }
+    }
+  }
+  SparseColumns whole(top.cols(), top.cols());
+  whole.setFromTriplets(entries.begin(), entries.end());
+  RealVector effect(whole.rows());
+  effect.head(m) = product(problem.W, solution.r) + product(problem.V, solution.l);
+  effect.tail(effect.size() - m) =
+      product_transposed(problem.V, solution.r) + product(problem.R, solution.l);
+  return explained(least_reactions(whole, effect), m, own);
+}
+Sizes explained(const GlobalProblem& problem, const Factorization& mass, const Solution& solution,
+                const Sizes& own) {
+  SparseColumns columns = is_mixed(problem) ? beside(problem.H, problem.G) : to_eigen(problem.H);
+  RealVector effect = product(problem.H, solution.r);
+  if (is_mixed(problem)) effect += product(problem.G, solution.l);
+  // as velocities, in which a light body weighs as much as a heavy one
+  SparseColumns impulse(effect.size(), 1);
+  for (Eigen::Index k = 0; k < effect.size(); ++k) {
+    impulse.insert(k, 0) = static_cast<double>(effect[k]);
+  }
+  const std::optional<SparseColumns> half = mass.half(columns);
+  if (half) {
+    columns = *half;
+    effect = Vector(*mass.half(impulse)).cast<Real>();
+  }
+  return explained(least_reactions(columns, effect), problem.w.size(), own);
+}
+
+bool exact(const std::vector<Mismatch>& mismatches) {
+  return std::all_of(mismatches.begin(), mismatches.end(),
+                     [](const Mismatch& one) { return one.error == 0; });
 }
 
 /// The mean of each d components.
@@ -197,7 +243,7 @@ RealVector beyond(const RealVector& x, const RealVector& rounding) {
   RealVector result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Real left = abs(x[k]) - rounding[k];
-    result[k] = left > 0 ? copysign(left, x[k]) : Real(0);
+    result[k] = left <= 0 ? Real(0) : copysign(left, x[k]);  // what is no number stays so
   }
   return result;
 }
@@ -208,7 +254,7 @@ Mismatch worst(std::string_view part, const Vector& stored, const RealVector& di
   Mismatch result{.part = part};
   for (Eigen::Index k = 0; k < left.size(); ++k) {
     const Real size = abs(left[k]);
-    const auto error = static_cast<double>(scale[k] > 0 ? size / scale[k] : size);
+    const double error = error_size(scale[k] > 0 ? size / scale[k] : size);
     if (k > 0 && !(error > result.error)) continue;
     result.index = static_cast<Index>(k);
     result.stored = stored[k];
@@ -249,9 +295,7 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
   OwnSizes result;
   result.free = solved(mass, problem.f.cast<Real>());
   const RealVector& free = result.free;
-  result.part = coupled_parts(problem.M);
-  RealVector impulse =
-      momentum_sizes(problem.M, result.part, free) + problem.f.cast<Real>().cwiseAbs();
+  RealVector impulse = momentum_sizes(problem.M, mass, free) + problem.f.cast<Real>().cwiseAbs();
   if (is_mixed(problem)) {
     const RealVector velocity =
         sizes_transposed(problem.G, free) + problem.b.cast<Real>().cwiseAbs();
@@ -270,38 +314,50 @@ OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
 
 Equations equations(const LocalProblem& problem, const Solution& solution, const OwnSizes& own) {
   const Index d = problem.spacedim;
+  const bool mixed = is_mixed(problem);
+  const bool given_u = solution.u.size() > 0;
   Equations result;
   const Vector& r = solution.r;
 
   // u = W r + V lambda + q
   result.u = product(problem.W, r);
   result.u += own.free_u;
-  const RealVector stop =
-      is_mixed(problem) || solution.u.size() > 0 ? stopping(own.q, own.scale, d) : RealVector();
-  if (is_mixed(problem)) {
-    const Vector& l = solution.l;
-    const RealVector s = problem.s.cast<Real>();
-    result.u += product(problem.V, l);
-    // V^T r + R lambda + s = 0
-    const RealVector residual = product_transposed(problem.V, r) + product(problem.R, l) + s;
-    const RealVector parts = sizes_transposed(problem.V, r) + sizes(problem.R, l) + s.cwiseAbs();
-    const RealVector velocity =
-        sizes_transposed(problem.V, stop) + sizes(problem.R, own.l) + s.cwiseAbs();
-    const RealVector least = RealVector::Constant(s.size(), root_mean_square(s));
-    result.mismatches.push_back(worst("l", solution.l, residual,
-                                      beyond(residual, rounding_unit * parts),
-                                      largest(velocity, least)));
-  }
-  if (solution.u.size() > 0) {
-    const RealVector difference = solution.u.cast<Real>() - result.u;
-    RealVector terms = sizes(problem.W, r) + own.free_u.cwiseAbs();
-    if (is_mixed(problem)) terms += sizes(problem.V, solution.l);
-    const RealVector velocity =
-        largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
-    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
-    result.mismatches.push_back(worst("u", solution.u, difference,
-                                      beyond(difference, rounding_unit * terms),
-                                      largest(velocity, least)));
+  if (mixed) result.u += product(problem.V, solution.l);
+  if (!mixed && !given_u) return result;
+  const RealVector stop = stopping(own.q, own.scale, d);
+  const RealVector s = mixed ? RealVector(problem.s.cast<Real>()) : RealVector();
+
+  // the mismatches beyond the rounding that reactions of these sizes leave
+  const auto judged = [&](const Sizes& known) {
+    std::vector<Mismatch> found;
+    if (mixed) {
+      // V^T r + R lambda + s = 0
+      const RealVector residual =
+          product_transposed(problem.V, r) + product(problem.R, solution.l) + s;
+      const RealVector parts =
+          sizes_transposed(problem.V, known.r) + sizes(problem.R, known.l) + s.cwiseAbs();
+      const RealVector velocity =
+          sizes_transposed(problem.V, stop) + sizes(problem.R, own.l) + s.cwiseAbs();
+      const RealVector least = RealVector::Constant(s.size(), root_mean_square(s));
+      found.push_back(worst("l", solution.l, residual, beyond(residual, rounding_unit * parts),
+                            largest(velocity, least)));
+    }
+    if (given_u) {
+      const RealVector difference = solution.u.cast<Real>() - result.u;
+      RealVector terms = sizes(problem.W, known.r) + own.free_u.cwiseAbs();
+      if (mixed) terms += sizes(problem.V, known.l);
+      const RealVector velocity =
+          largest(contact_norms(sizes(problem.W, stop) + own.q, d), contact_norms(result.u, d));
+      const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
+      found.push_back(worst("u", solution.u, difference, beyond(difference, rounding_unit * terms),
+                            largest(velocity, least)));
+    }
+    return found;
+  };
+  const Sizes own_reactions{stop, own.l};
+  result.mismatches = judged(own_reactions);
+  if (!exact(result.mismatches)) {
+    result.mismatches = judged(explained(problem, solution, own_reactions));
   }
   return result;
 }
@@ -310,6 +366,8 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
                     const Factorization& mass, const OwnSizes& own) {
   const Index d = problem.spacedim;
   const bool mixed = is_mixed(problem);
+  const bool given_v = solution.v.size() > 0;
+  const bool given_u = solution.u.size() > 0;
   Equations result;
   const RealVector f = problem.f.cast<Real>();
   const RealVector w = problem.w.cast<Real>();
@@ -318,58 +376,65 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
 
   // M v = H r + G lambda + f
   RealVector momentum = product(problem.H, r) + f;
-  RealVector terms = sizes(problem.H, r) + f.cwiseAbs();
-  if (mixed) {
-    const Vector& l = solution.l;
-    momentum += product(problem.G, l);
-    terms += sizes(problem.G, l);
-  }
-  const bool given_v = solution.v.size() > 0;
+  if (mixed) momentum += product(problem.G, solution.l);
   const RealVector v =
       given_v ? RealVector(solution.v.cast<Real>()) : solved_precisely(problem, mass, momentum);
-  terms += momentum_sizes(problem.M, own.part, v);
   const RealVector fastest = largest(v, free);
-  if (given_v) {
-    const RealVector residual = product(problem.M, v) - momentum;
-    const RealVector left = beyond(residual, rounding_unit * terms);
-    Mismatch mismatch{.part = "v", .stored = v.size() > 0 ? solution.v[0] : 0};
-    if (!left.isZero(0)) {
-      RealVector stop = sizes(problem.H, stopping(own.q, own.scale, d));
-      if (mixed) stop += sizes(problem.G, own.l);
-      const RealVector velocity = largest(fastest, solved(mass, stop));
-      const RealVector least = RealVector::Constant(
-          v.size(), velocity.maxCoeff() * std::numeric_limits<double>::epsilon());
-      mismatch = worst("v", solution.v, solved(mass, residual), solved(mass, left),
-                       largest(velocity, least));
-    }
-    result.mismatches.push_back(mismatch);
-  }
-
   // u = H^T v + w
   result.u = product_transposed(problem.H, v) + w;
-  const bool given_u = solution.u.size() > 0;
-  if (given_u) {
-    const RealVector difference = solution.u.cast<Real>() - result.u;
-    const RealVector parts = sizes_transposed(problem.H, fastest) + w.cwiseAbs();
-    RealVector rounding = parts;
-    if (!given_v) rounding += Spread(mass, terms).along(problem.H);
-    const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
-    result.mismatches.push_back(worst("u", solution.u, difference,
-                                      beyond(difference, rounding_unit * rounding),
-                                      largest(contact_norms(parts, d), least)));
-  }
+  if (!given_v && !given_u && !mixed) return result;
 
-  // G^T v + b = 0
-  if (mixed) {
-    const RealVector b = problem.b.cast<Real>();
-    const RealVector residual = product_transposed(problem.G, v) + b;
-    const RealVector parts = sizes_transposed(problem.G, fastest) + b.cwiseAbs();
-    RealVector rounding = parts;
-    if (!beyond(residual, rounding_unit * parts).isZero(0)) {
-      rounding += Spread(mass, terms).along(problem.G);  // the impulses are rounded too
+  const RealVector stop = stopping(own.q, own.scale, d);
+  const RealVector of_bodies = f.cwiseAbs() + momentum_sizes(problem.M, mass, v);
+
+  // the mismatches beyond the rounding that reactions of these sizes leave
+  const auto judged = [&](const Sizes& known) {
+    std::vector<Mismatch> found;
+    RealVector terms = of_bodies + sizes(problem.H, known.r);
+    if (mixed) terms += sizes(problem.G, known.l);
+    if (given_v) {
+      const RealVector residual = product(problem.M, v) - momentum;
+      const RealVector left = beyond(residual, rounding_unit * terms);
+      Mismatch mismatch{.part = "v", .stored = v.size() > 0 ? solution.v[0] : 0};
+      if (!left.isZero(0)) {
+        RealVector impulse = sizes(problem.H, stop);
+        if (mixed) impulse += sizes(problem.G, own.l);
+        const RealVector velocity = largest(fastest, solved(mass, impulse));
+        const RealVector least = RealVector::Constant(
+            v.size(), velocity.maxCoeff() * std::numeric_limits<double>::epsilon());
+        mismatch = worst("v", solution.v, solved(mass, residual), solved(mass, left),
+                         largest(velocity, least));
+      }
+      found.push_back(mismatch);
     }
-    result.mismatches.push_back(
-        worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding), parts));
+    if (given_u) {
+      const RealVector difference = solution.u.cast<Real>() - result.u;
+      const RealVector parts = sizes_transposed(problem.H, fastest) + w.cwiseAbs();
+      RealVector rounding = parts;
+      if (!given_v) rounding += Spread(mass, terms).along(problem.H);
+      const RealVector least = RealVector::Constant(result.u.size(), root_mean_square(own.free_u));
+      found.push_back(worst("u", solution.u, difference,
+                            beyond(difference, rounding_unit * rounding),
+                            largest(contact_norms(parts, d), least)));
+    }
+    // G^T v + b = 0
+    if (mixed) {
+      const RealVector b = problem.b.cast<Real>();
+      const RealVector residual = product_transposed(problem.G, v) + b;
+      const RealVector parts = sizes_transposed(problem.G, fastest) + b.cwiseAbs();
+      RealVector rounding = parts;
+      if (!beyond(residual, rounding_unit * parts).isZero(0)) {
+        rounding += Spread(mass, terms).along(problem.G);  // the impulses are rounded too
+      }
+      found.push_back(
+          worst("l", solution.l, residual, beyond(residual, rounding_unit * rounding), parts));
+    }
+    return found;
+  };
+  const Sizes own_reactions{stop, own.l};
+  result.mismatches = judged(own_reactions);
+  if (!exact(result.mismatches)) {
+    result.mismatches = judged(explained(problem, mass, solution, own_reactions));
   }
   return result;
 }

@@ -1,10 +1,11 @@
 // The equations of a problem, judged component by component.
 //
 // The residual of an equation has two bounds, each of its own component. What rounding leaves of
-// its terms in double precision, however much of them cancels, is no mistake of a solution. The
-// rest is relative to a velocity: that of the body, the contact or the joint, with the velocities
-// that reactions of the problem's own size give it. Neither the size of a neighbour nor a
-// self-stress, which moves nothing, enters that velocity.
+// its terms in double precision, however much of them cancels, is no mistake of a solution; the
+// terms are as large as the data explain, so that nothing hides behind reactions of a solution's
+// own. The rest is relative to a velocity: that of the body, the contact or the joint, with the
+// velocities that reactions of the problem's own size give it. Neither the size of a neighbour nor
+// a self-stress, which moves nothing, enters that velocity.
 #pragma once
 
 #include <string_view>
@@ -34,15 +35,14 @@ struct Equations {
 
 /// What the equations are judged by that depends on the problem alone.
 struct OwnSizes {
-  RealVector free;          ///< M^-1 f of a global problem (n) [m/s]
-  std::vector<Index> part;  ///< of M that a degree of freedom is coupled to, by its first one (n)
-  RealVector free_u;        ///< q, condensed (m) [m/s]
-  RealVector l;             ///< reactions that stop the joints, each alone (p)
-  RealVector q;             ///< of the terms of u without reactions (m) [m/s]
-  RealVector rounding;      ///< what double precision leaves of the terms that q is made of (m)
-                            ///< [m/s]; empty where q is given
-  RealVector scale;         ///< tr(W_aa) / d of each contact (nc)
-  RealVector rho;           ///< of the scaled natural map, of each contact (nc) [1/W]
+  RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
+  RealVector free_u;    ///< q, condensed (m) [m/s]
+  RealVector l;         ///< reactions that stop the joints, each alone (p)
+  RealVector q;         ///< of the terms of u without reactions (m) [m/s]
+  RealVector rounding;  ///< what double precision leaves of the terms that q is made of (m)
+                        ///< [m/s]; empty where q is given
+  RealVector scale;     ///< tr(W_aa) / d of each contact (nc)
+  RealVector rho;       ///< of the scaled natural map, of each contact (nc) [1/W]
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);

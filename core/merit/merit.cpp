@@ -1,10 +1,10 @@
 #include "merit/merit.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "contact/coulomb.hpp"
 #include "contact/rolling.hpp"
+#include "error_size.hpp"
 #include "merit/equations.hpp"
 #include "merit/natural_sums.hpp"
 
@@ -12,16 +12,51 @@ namespace fclib {
 
 namespace {
 
-using std::abs;  // or that of Real
+using std::abs, std::sqrt;  // or those of Real
 
-void raise(double& largest, Real value) { largest = std::max(largest, static_cast<double>(value)); }
+void raise(double& largest, const Real& value) { largest = larger_error(largest, value); }
 
-/// The parts that depend on one contact at a time; but for the errors only where `each` is there.
+/// What rounding leaves of the velocities that friction opposes, by slip_of_rounding: of the
+/// sliding ones the normal velocity is one too; those of rolling have units of their own.
+template <class Cone>
+class SlipOfRounding {
+ public:
+  explicit SlipOfRounding(const RealVector& sizes) : sizes_(sizes) {
+    const Eigen::Index contacts = sizes.size() / Cone::dim;
+    mean_.fill(Real(0));
+    for (Eigen::Index contact = 0; contact < contacts; ++contact) {
+      for (int g = 0; g < Cone::groups; ++g) mean_[g] += square(contact, g);
+    }
+    for (Real& mean : mean_) mean = sqrt(mean / static_cast<double>(contacts));
+  }
+
+  [[nodiscard]] typename Cone::Slack of(Eigen::Index contact) const {
+    typename Cone::Slack result;
+    for (int g = 0; g < Cone::groups; ++g) {
+      result[g] = slip_of_rounding<Real>(sqrt(square(contact, g)), mean_[g]);
+    }
+    return result;
+  }
+
+ private:
+  [[nodiscard]] Real square(Eigen::Index contact, int g) const {
+    constexpr int S = Cone::group_size;
+    const Eigen::Index at = Cone::dim * contact;
+    const Real sum = sizes_.template segment<S>(at + 1 + S * g).squaredNorm();
+    return g == 0 ? sum + sizes_[at] * sizes_[at] : sum;
+  }
+
+  const RealVector& sizes_;
+  typename Cone::Slack mean_;
+};
+
+/// The parts that depend on one contact at a time; but for the errors only if `each` is there.
 template <class Cone>
 void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& own,
                     const Equations& equations, Merit& result, ContactMerits* each) {
   constexpr int D = Cone::dim;
   NaturalSums<Cone> sums;
+  const SlipOfRounding<Cone> slip(own.q);
   if (each != nullptr) {
     for (Vector* figures : {&each->natural, &each->cone, &each->dual_cone}) {
       figures->resize(friction.mu.size());
@@ -31,21 +66,21 @@ void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& o
     const Cone cone(friction, contact);
     const ContactVector<D, Real> ua = equations.u.segment<D>(D * contact);
     const ContactVector<D, Real> ra = r.segment<D>(D * contact).template cast<Real>();
-    const ContactVector<D, Real> modified = cone.modified(ua);
     const Real q_square = own.free_u.segment<D>(D * contact).squaredNorm();
     const Real rounding =
         own.rounding.size() > 0 ? own.rounding.segment<D>(D * contact).norm() : Real(0);
-    const Real rho = own.rho[contact];
-    const Real norm = sums.add(cone, ua[0], modified, ra, q_square, rounding, rho);
+    const auto natural =
+        sums.add(cone, ua, ra, q_square, rounding, own.rho[contact], slip.of(contact));
     if (each == nullptr) continue;
-    each->natural[contact] = static_cast<double>(norm);
-    each->cone[contact] = static_cast<double>(cone_violation(cone, ra));
-    each->dual_cone[contact] = static_cast<double>(dual_violation(cone, modified));
+    const ContactVector<D, Real> modified = cone.modified(ua);
+    each->natural[contact] = error_size(natural.map.norm());
+    each->cone[contact] = error_size(cone_violation(cone, ra));
+    each->dual_cone[contact] = error_size(dual_violation(cone, modified));
     raise(result.cone, each->cone[contact]);
     raise(result.dual_cone, each->dual_cone[contact]);
     raise(result.complementarity, abs(ra.dot(modified)));
-    each->status.push_back(status_of(cone, ua, ra, rho));
-    switch (each->status.back()) {
+    each->status.push_back(natural.status);
+    switch (natural.status) {
       case ContactStatus::open:
         ++result.open;
         break;
@@ -69,7 +104,7 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution, 
     double& member = mismatch.part == "v"   ? result.dynamics
                      : mismatch.part == "u" ? result.kinematics
                                             : result.bilateral;
-    member = mismatch.error;
+    member = larger_error(member, mismatch.error);
   }
   const auto by_contacts = [&]<class Cone>(std::type_identity<Cone>) {
     judge_contacts<Cone>(friction, solution.r, own, equations, result, each);
@@ -83,7 +118,7 @@ Merit judge(Index spacedim, const Friction& friction, const Solution& solution, 
   } else {
     by_contacts(std::type_identity<Coulomb<3, Real>>{});
   }
-  result.error = std::max(result.error_by(MeritKind::natural), result.scaled_natural);
+  result.error = larger_error(result.error_by(MeritKind::natural), result.scaled_natural);
   return result;
 }
 
@@ -106,7 +141,6 @@ Grounds grounds_of(const GlobalProblem& problem, const Solution& solution) {
   return result;
 }
 
-/// std::max drops a NaN; a solution that holds one must never look good.
 template <class P>
 Merit judge_valid(const P& problem, const Solution& solution, ContactMerits& each) {
   validate(problem);

@@ -10,12 +10,12 @@
 // definitions with their reasons.
 #pragma once
 
-#include <algorithm>
 #include <string_view>
 #include <tuple>
 #include <vector>
 
 #include "contact/cone.hpp"
+#include "error_size.hpp"
 #include "merit/equations.hpp"
 #include "merit_kind.hpp"
 #include "problem.hpp"
@@ -38,7 +38,8 @@ struct Merit {
 
   /// `error`, or the same without the scaled map.
   [[nodiscard]] double error_by(MeritKind kind) const {
-    return kind == MeritKind::both ? error : std::max({natural, dynamics, bilateral, kinematics});
+    return kind == MeritKind::both ? error_size(error)
+                                   : larger_error(natural, dynamics, bilateral, kinematics);
   }
 
   static constexpr auto fields() {

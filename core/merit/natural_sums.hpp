@@ -2,11 +2,12 @@
 // the merit that every formulation shares.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "contact/cone.hpp"
+#include "error_size.hpp"
 
 namespace fclib {
 
@@ -28,6 +29,17 @@ class ContactScales {
   std::int64_t count_ = 0;
 };
 
+/// What rounding leaves of q, over the sizes of its terms: some roundings. Fewer than are left to
+/// v, u and l: what is allowed to q is hidden from the natural map.
+constexpr double rounding_unit_of_q = 4 * std::numeric_limits<double>::epsilon();
+
+/// What the last digits of q are as a velocity: of a contact, ||q^a|| being `own`, beside others
+/// with the root mean square `mean`. So much sliding is none.
+template <class Real>
+Real slip_of_rounding(Real own, Real mean) {
+  return rounding_unit_of_q * (own < mean ? mean : own);
+}
+
 /// In the precision of Cone.
 template <class Cone>
 class NaturalSums {
@@ -35,41 +47,37 @@ class NaturalSums {
   using Vec = typename Cone::Vec;
   using Real = typename Vec::Scalar;
 
-  /// Adds a contact with normal velocity u_N, modified velocity u^ and reaction r, ||q^a||^2, what
-  /// rounding leaves of q^a, and rho as ContactScales has it. The norm of its natural map.
-  Real add(const Cone& cone, Real normal, const Vec& modified, const Vec& r, Real q_square,
-           Real rounding, Real rho) {
-    const OfModified known{cone};
-    const Real norm = natural_map(known, modified, r).norm();
-    squares_ += square_beyond(norm, rounding);
+  /// Adds a contact with velocity u and reaction r, ||q^a||^2, what rounding leaves of q^a, rho as
+  /// ContactScales has it, and what rounding leaves of the velocities that friction opposes.
+  NaturalPoint<Vec> add(const Cone& cone, const Vec& u, const Vec& r, Real q_square, Real rounding,
+                        Real rho, const typename Cone::Slack& slack) {
+    const NaturalPoint<Vec> plain = cone.natural(u, r, Real(1), slack);
+    const NaturalPoint<Vec> scaled = cone.natural(u, r, rho, slack);
+    squares_ += square_beyond(plain.map.norm(), rounding);
     q_squares_ += q_square;
-    const Real scaled = natural_map(known, modified, r, rho).norm();
-    scaled_squares_ += square_beyond(scaled, rho * rounding);
-    velocity_squares_ += square_beyond(std::max(scaled / rho, -normal), rounding);
+    const Real norm = scaled.map.norm();
+    scaled_squares_ += square_beyond(norm, rho * rounding);
+    velocity_squares_ += square_beyond(larger(norm / rho, -u[0]), rounding);
     scaled_q_ += rho * rho * q_square;
     if (rounding != 0) {
       rounding_squares_ += rounding * rounding;
       scaled_rounding_ += rho * rho * rounding * rounding;
     }
-    return norm;
+    return {plain.map, scaled.status};
   }
 
   [[nodiscard]] double natural() const { return relative(squares_, q_squares_, rounding_squares_); }
   /// The larger of the scaled one summed as impulses and as velocities (contact/natural_squares).
   [[nodiscard]] double scaled_natural() const {
-    return std::max(relative(scaled_squares_, scaled_q_, scaled_rounding_),
-                    relative(velocity_squares_, q_squares_, rounding_squares_));
+    return larger_error(relative(scaled_squares_, scaled_q_, scaled_rounding_),
+                        relative(velocity_squares_, q_squares_, rounding_squares_));
   }
+  /// What a tolerance bounds.
+  [[nodiscard]] double error() const { return larger_error(natural(), scaled_natural()); }
 
  private:
-  /// The cone, to which velocities come modified: two maps share the one u^.
-  struct OfModified {
-    using Vec = typename Cone::Vec;
-    const Cone& cone;
-
-    [[nodiscard]] const Vec& modified(const Vec& u) const { return u; }
-    [[nodiscard]] Vec outside(const Vec& x) const { return cone.outside(x); }
-  };
+  /// The larger one; a if it is no number.
+  static Real larger(Real a, Real b) { return a < b ? b : a; }
 
   /// The natural map of a contact beyond what the rounding of its q explains.
   static Real square_beyond(Real norm, Real rounding) {
@@ -77,13 +85,15 @@ class NaturalSums {
     return left < 0 ? Real(0) : left * left;
   }
 
-  /// ||F|| over ||q||, or over what rounding leaves of q where that is larger; absolute without
+  /// ||F|| over ||q||, or over what rounding leaves of q if that is larger; absolute without
   /// either.
   static double relative(Real squares, Real q_squares, Real rounding_squares) {
-    using std::sqrt;  // or that of Real
-    const Real scale = sqrt(std::max(q_squares, rounding_squares));
+    using std::isfinite, std::sqrt;  // or those of Real
+    const Real scale = sqrt(larger(q_squares, rounding_squares));
+    // what is relative to more than there are numbers for would be 0
+    if (!isfinite(scale)) return std::numeric_limits<double>::infinity();
     const Real norm = sqrt(squares);
-    return static_cast<double>(scale > 0 ? norm / scale : norm);
+    return error_size(scale > 0 ? norm / scale : norm);
   }
 
   Real squares_ = 0;

@@ -1,5 +1,6 @@
 #include "solve/best_iterate.hpp"
 
+#include "error_size.hpp"
 #include "reduced/relative_error.hpp"
 
 namespace fclib {
@@ -58,8 +59,8 @@ Outcome BestIterate<Cone>::outcome(Vector& r, std::optional<double> cpu_s) const
 
 template <class Cone>
 void BestIterate<Cone>::keep(std::int64_t count, const Vector& r, double error) {
-  if (first_ || error < error_) {
-    error_ = error;
+  if (first_ || error_size(error) < error_) {
+    error_ = error_size(error);
     best_ = r;
   }
   iterations_ += count;

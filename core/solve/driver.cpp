@@ -68,7 +68,7 @@ struct Measure {
 
   /// Of a problem without conversion or condensed, before bilateral constraints left it.
   Measure(const LocalProblem& problem, const OwnSizes& own, MeritKind kind)
-      : q(problem.q.norm()), rounding(static_cast<double>(own.rounding.norm())) {
+      : q(problem.q.stableNorm()), rounding(static_cast<double>(own.rounding.norm())) {
     if (kind == MeritKind::natural) return;
     const Index d = problem.spacedim;
     rho = own.rho.cast<double>();
@@ -98,6 +98,17 @@ void clear_without_effect(const Matrix& W, int d, Vector& r) {
   for (std::size_t a = 0; a < moves.size(); ++a) {
     if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
   }
+}
+
+/// Puts r, and l if there is no elimination to find it, in the place of the result's, if they are
+/// better.
+template <class Judge>
+void take_if_better(const Vector& r, const Vector& l, const Judge& judge, Result& result) {
+  Solution other{.v = {}, .u = {}, .r = r, .l = l};
+  const double error = judge(other);
+  if (!(error < result.error)) return;
+  result.error = error;
+  result.solution = std::move(other);
 }
 
 /// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
@@ -183,14 +194,20 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     const double product = rounding_of_product(plain.W, r);
     // a correction may end worse than what it was to better
     const bool better = result.error < 0.5 * least;
-    if (result.error < least) {
+    if (correction == 0 || result.error < least) {
       least = result.error;
       best = result.solution;
     }
     const auto end = [&] {
-      if (!(result.error <= least)) {
-        result.error = least;
-        result.solution = best;
+      result.error = least;
+      result.solution = best;
+      // what is returned is no worse than what costs nothing
+      take_if_better(Vector::Zero(r.size()), {}, judge, result);
+      if (guess.r.size() > 0) take_if_better(guess.r, {}, judge, result);
+      if (result.error <= request.settings.tolerance) {
+        result.status = Status::converged;
+        result.certificate = {};
+        return result;
       }
       const double digit = last_digit(r, product, reduced.scale);
       const bool reached = digit > request.settings.tolerance && result.error <= digit;
@@ -235,6 +252,7 @@ Result out_of_time(Eigen::Index m, Eigen::Index p, const Request& request, const
   result.solution.r = guess.r.size() > 0 ? guess.r : Vector(Vector::Zero(m));
   if (p > 0) result.solution.l = Vector::Zero(p);
   result.error = judge(result.solution);
+  take_if_better(Vector::Zero(m), result.solution.l, judge, result);
   result.status =
       result.error <= request.settings.tolerance ? Status::converged : Status::time_limit;
   if (request.settings.history) result.history.emplace();

@@ -18,6 +18,7 @@ LAYERS: list[set[str]] = [
         "field.hpp",
         "friction.hpp",
         "function_ref.hpp",
+        "error_size.hpp",
         "merit_kind.hpp",
         "number_text.hpp",
         "place.hpp",

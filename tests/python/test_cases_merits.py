@@ -1,7 +1,6 @@
 """What a merit must see: light bodies beside heavy ones, self-stress, small units, and rounding."""
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +10,9 @@ from typer.testing import CliRunner
 import fclib
 from ball_judge import judge
 from fclib.cli import app
-from helpers import Array, bodies, dense, planted_global, planted_local
+from helpers import Array, bodies, case, dense, planted_global, planted_local
 
 TOLERANCE = 1e-8
-CASES = Path(__file__).resolve().parents[2].parent / "shared" / "data" / "cases"
 # the part that is wrong and by how much [m/s]
 WRONG = {
     "cx03_merit_light_body": ("v", 50.0),
@@ -24,19 +22,12 @@ WRONG = {
 }
 
 
-def case(name: str) -> Path:
-    path = CASES / f"{name}.hdf5"
-    if not path.is_file():
-        pytest.skip(f"{path} is not there")
-    return path
-
-
 # ---- the cases
 
 
 @pytest.mark.parametrize("name", WRONG)
 def test_a_stored_velocity_that_is_wrong_is_named(name: str) -> None:
-    path = case(name)
+    path = case(f"{name}.hdf5")
     part, size = WRONG[name]
     answer = CliRunner().invoke(app, ["check", str(path), "--json"])
     assert answer.exit_code == 1
@@ -49,7 +40,7 @@ def test_a_stored_velocity_that_is_wrong_is_named(name: str) -> None:
 
 
 def test_a_grain_flung_up_is_not_ok() -> None:
-    path = case("cx11_merit_small_grain")
+    path = case("cx11_merit_small_grain.hdf5")
     answer = CliRunner().invoke(app, ["check", str(path), "--json"])
     record = json.loads(answer.stdout)
     assert record["status"] == "wrong"
@@ -58,7 +49,7 @@ def test_a_grain_flung_up_is_not_ok() -> None:
 
 
 def test_small_masses_are_solved_in_both_merits() -> None:
-    problem = fclib.read(case("cx12_converged_small_masses_1e-06"))
+    problem = fclib.read(case("cx12_converged_small_masses_1e-06.hdf5"))
     result = fclib.solve(problem, tol=TOLERANCE)
     merit = fclib.merit(problem, result.solution)
     assert (result.status == "converged") == (max(merit.natural, merit.scaled_natural) <= TOLERANCE)

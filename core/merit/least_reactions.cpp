@@ -1,0 +1,49 @@
+#include "merit/least_reactions.hpp"
+
+#include <Eigen/IterativeLinearSolvers>
+#include <Eigen/QR>
+#include <algorithm>
+
+namespace fclib {
+
+namespace {
+
+/// Multiplications of a dense factorisation that a merit may take: about a tenth of a second.
+constexpr double dense_flops = 1e8;
+/// What is left of a column beside the others is rounding up to this, as it is in the elimination
+/// of joints.
+constexpr double dependent = 1e-12;
+/// Conjugate gradients from zero stay among the least solutions, and grow towards the one that is
+/// asked for: if they are cut, less is explained, and so less is allowed.
+constexpr double accuracy = 0.01;
+constexpr int iterations = 300;
+
+}  // namespace
+
+Vector least_reactions(const SparseColumns& a, const RealVector& effect) {
+  SparseColumns scaled = a;
+  Vector lengths(a.cols());
+  for (Eigen::Index col = 0; col < a.cols(); ++col) {
+    const double length = a.col(col).norm();
+    lengths[col] = length > 0 ? length : 1;
+    scaled.col(col) /= lengths[col];
+  }
+  const Vector b = effect.cast<double>();
+  const auto rows = static_cast<double>(a.rows());
+  const auto cols = static_cast<double>(a.cols());
+  Vector y;
+  if (2 * rows * cols * std::min(rows, cols) <= dense_flops) {
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> factors(scaled.rows(), scaled.cols());
+    factors.setThreshold(dependent);
+    y = factors.compute(Eigen::MatrixXd(scaled)).solve(b);
+  } else {
+    Eigen::LeastSquaresConjugateGradient<SparseColumns> gradients;
+    gradients.setTolerance(accuracy);
+    gradients.setMaxIterations(iterations);
+    gradients.compute(scaled);
+    y = gradients.solve(b);
+  }
+  return y.cwiseAbs().cwiseQuotient(lengths);
+}
+
+}  // namespace fclib

@@ -227,7 +227,7 @@ class Mass:
         if not np.array_equal(M, M.T):
             return None
         try:
-            return np.linalg.cholesky(M)
+            return np.asarray(np.linalg.cholesky(M), dtype=float)
         except np.linalg.LinAlgError:
             return None
 
@@ -448,11 +448,14 @@ def global_terms(problem: Any, solution: Any, unit: float, unit_of_q: float) -> 
         if G is not None:
             terms = add(terms, G.sizes(known_l))
         rounding = [unit_of_q * x for x in add(own, mass.spread(H, terms))]
-        A, by_factor = H.dense(), doubles(effect)
+        A: Any = H.dense()
+        by_factor: Any = doubles(effect)
         if G is not None:
             A = np.hstack([A, G.dense()])
-        if (L := mass.factor()) is not None:
-            A, by_factor = np.linalg.solve(L, A), np.linalg.solve(L, by_factor)
+        L = mass.factor()
+        if L is not None:
+            whole = np.linalg.solve(L, np.column_stack([A, by_factor]))
+            A, by_factor = whole[:, :-1], whole[:, -1]
         least = least_reactions(A, by_factor)
         known_r, known_l = larger(known_r, least[: len(r)]), larger(known_l, least[len(r) :])
         terms = add(mass.terms(v), [abs(x) for x in f], H.sizes(known_r))

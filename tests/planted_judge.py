@@ -27,7 +27,7 @@ import functools
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
@@ -46,6 +46,7 @@ Plant: TypeAlias = Callable[[int], tuple[Any, fclib.Solution, Array | None]]
 
 FALSE = ("infeasible", "diverged")  # words of `auto` that are false of a problem with a solution
 TOLERANCE = 1e-8
+DIGITS = 1e-12  # below it errors are not compared: four digits of the tolerance are left
 LEEWAY = 1.01  # an error is called larger than a tolerance, or than another error, beyond this
 ITERATIONS = 20_000  # of `auto`, which seldom needs them
 SWEEPS = 1_000  # of any other solver: most of what is solved at all is solved by then
@@ -362,14 +363,41 @@ def too_large(problem: Any, solution: fclib.Solution) -> bool:
     return bool(judge(problem, solution, rounding=True).error > LEEWAY * TOLERANCE)
 
 
-def misjudged(problem: Any, solutions: Sequence[fclib.Solution]) -> str:
-    """A false word of the merit on a solution, '' without any."""
-    for solution in solutions:
-        said = fclib.merit(problem, solution).error
-        if said <= TOLERANCE and too_large(problem, solution):
-            return f"false ok ({said:.1e})"
-        if not said <= LEEWAY * TOLERANCE and judge(problem, solution).error <= TOLERANCE:
-            return f"false wrong ({said:.1e})"
+def candidates(problem: Any, solution: fclib.Solution) -> Iterator[fclib.Solution]:
+    """The solution, none, and wrong ones: by a little, or behind reactions that move nothing."""
+    yield solution
+    yield fclib.Solution(r=np.zeros(problem.m), l=solution.l)
+    rng = np.random.default_rng(problem.m)
+    r = np.asarray(solution.r)
+    yield fclib.Solution(r=r * (1 + 1e-6 * rng.standard_normal(r.size)), l=solution.l)
+    if hasattr(problem, "W"):
+        A = dense(problem.W)
+        if problem.p:
+            A = np.block([[A, dense(problem.V)], [dense(problem.V).T, dense(problem.R)]])
+    else:
+        A = dense(problem.H)
+        if problem.p:
+            A = np.hstack([A, dense(problem.G)])
+    unmoved = np.linalg.svd(A)[2][-1]
+    moved = {
+        name: x + 1e-3 * rng.standard_normal(x.size)
+        for name in ("v", "u")
+        if (x := getattr(solution, name)) is not None
+    }
+    stress = 1e12 * unmoved * np.linalg.norm(r)
+    yield fclib.Solution(
+        r=r + stress[: r.size], l=solution.l + stress[r.size :] if problem.p else None, **moved
+    )
+
+
+def misjudged(problem: Any, solution: fclib.Solution) -> str:
+    """A false word of the merit, on the solution or on another one; '' without any."""
+    for one in candidates(problem, solution):
+        said = fclib.merit(problem, one).error
+        if judge(problem, one, rounding=True).error > LEEWAY * said + DIGITS:
+            return f"false small ({said:.1e})"
+        if not said <= LEEWAY * float(judge(problem, one).error.upper()) + DIGITS:
+            return f"false large ({said:.1e})"
     return ""
 
 
@@ -393,8 +421,7 @@ def word_on(
     solver: str,
 ) -> str:
     """The word of a solver on a problem whose solution is known."""
-    none = fclib.Solution(r=np.zeros(problem.m), l=solution.l)
-    word = misjudged(problem, [solution, none])
+    word = misjudged(problem, solution)
     if word:
         return word
     if not judge(problem, solution).error <= 0.1 * TOLERANCE:
@@ -413,6 +440,7 @@ def word_on(
         return f"false {result.status}"
     if result.converged:
         return "false converged" if too_large(problem, own) else "converged"
+    none = fclib.Solution(r=np.zeros(problem.m))
     if problem.p == 0:  # what is at hand is not better
         at_hand = [none] if start is None else [none, start]
         least = min(fclib.merit(problem, one).error for one in at_hand)

@@ -17,7 +17,7 @@ from fclib import _core
 from helpers import dense, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from planted_judge import claim, verdict
+from planted_judge import REGIMES, claim, verdict
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -151,6 +151,13 @@ def test_units_of_mass_do_not_matter(mass: float) -> None:
 def test_planted_problems_of_every_formulation_get_no_false_word() -> None:
     for number in range(300):
         said = verdict(number)
+        assert not said.false, (number, said)
+
+
+@pytest.mark.parametrize("regime", list(REGIMES))
+def test_every_regime_gets_no_false_word_from_any_solver(regime: str) -> None:
+    for number in range(72):
+        said = REGIMES[regime](number, solver="each")
         assert not said.false, (number, said)
 
 

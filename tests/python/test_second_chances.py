@@ -280,3 +280,29 @@ def test_a_guess_that_overflows_is_left_out() -> None:
     result = fclib.solve(problem, guess=np.full(3, 1e300))
     assert result.converged
     assert all(stage.calls == 1 for stage in result.stages)
+
+
+# ---- the best iterate, not the last one
+
+SOLVERS = [
+    one.name for one in fclib.solvers() if one.origin == "fclib" and one.name != "associated"
+]
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_what_ends_early_is_the_best_iterate_that_was_told(solver: str) -> None:
+    rose = 0
+    for seed, mu in itertools.product(range(4), (0.5, 5.0)):
+        problem = planted_local(seed, nc=8, mu=mu).problem
+        for limit in (3, 10, 30, 100):
+            result = fclib.solve(problem, solver, 1e-13, max_iterations=limit, history=True)
+            assert result.history is not None
+            errors = np.asarray(result.history["error"])
+            rose += bool(errors.size and errors[-1] > 1.1 * errors.min())
+            # the solver's own errors are of the same problem, up to rounding
+            assert result.error <= errors.min(initial=np.inf) * (1 + 1e-6) + 1e-12
+    if solver in RISING:
+        assert rose > 0  # else the test says nothing
+
+
+RISING = ("apgd", "homotopy", "panagiotopoulos", "tresca")

@@ -64,7 +64,8 @@ import fclib  # noqa: E402
 
 sys.path.append(str(ROOT / "tests"))
 import planted_judge  # noqa: E402
-from helpers import dense, judge  # noqa: E402
+from ball_judge import judge  # noqa: E402
+from helpers import dense  # noqa: E402
 
 
 @dataclass(frozen=True)

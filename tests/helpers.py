@@ -1,13 +1,11 @@
-"""Problems whose solution is known, and a judge of solutions that shares no code with the core."""
+"""Problems whose solution is known, and what several tests need."""
 
 from __future__ import annotations
 
 import importlib.util
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -15,7 +13,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 import fclib
 
@@ -34,7 +31,7 @@ def case(name: str) -> Path:
     return path
 
 
-# ---- the judge: the equations, in NumPy
+# ---- the law, in NumPy
 
 
 def tangential_norm(x: Array) -> Array:
@@ -60,123 +57,7 @@ def modified(u: Array, mu: Array) -> Array:
     return result
 
 
-def sliding_and_rolling(x: Array) -> tuple[Array, Array]:
-    """The parts x_T and x_R of each row (N, T.., R..), each with a column before it."""
-    half = (x.shape[1] - 1) // 2
-    return x[:, : 1 + half], x[:, half:]
-
-
-def project_rolling(x: Array, mu: Array, mu_r: Array) -> Array:
-    """The projection of each row on { ||x_T|| <= mu x_N, ||x_R|| <= mu_r x_N }: x where inside.
-
-    The normal part n is the root of n - x_N - mu (||x_T|| - mu n)+ - mu_r (||x_R|| - mu_r n)+,
-    which is the least of four increasing lines: n is the largest of their roots.
-    """
-    half = (x.shape[1] - 1) // 2
-    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(x))
-    result = x.copy()
-    result[:, 0] = 0
-    for a in (0 * mu, mu):
-        for b in (0 * mu_r, mu_r):
-            root = (x[:, 0] + a * slides + b * rolls) / (1 + a**2 + b**2)
-            result[:, 0] = np.maximum(result[:, 0], root)
-    for part, size, limit in (
-        (slice(1, 1 + half), slides, mu * result[:, 0]),
-        (slice(1 + half, None), rolls, mu_r * result[:, 0]),
-    ):
-        beyond = size > limit
-        result[beyond, part] *= (limit[beyond] / size[beyond])[:, None]
-    inside = (x[:, 0] >= 0) & (slides <= mu * x[:, 0]) & (rolls <= mu_r * x[:, 0])
-    return np.where(inside[:, None], x, result)
-
-
-def modified_rolling(u: Array, mu: Array, mu_r: Array) -> Array:
-    """u^ = u + [mu ||u_T|| + mu_r ||u_R||, 0, ...] of each row."""
-    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(u))
-    result = u.copy()
-    result[:, 0] += mu * slides + mu_r * rolls
-    return result
-
-
-def natural_map(r: Array, hat: Array, mu: Array) -> Array:
-    """The map r - P_K(r - u^) of each row, without the difference of two large numbers.
-
-    It is u^ plus the part of y = r - u^ in the polar cone: nothing where y is in K, y itself where
-    P_K(y) = 0, and along the normal of the cone's boundary elsewhere.
-    """
-    y = r - hat
-    norm = tangential_norm(y)
-    directions = y[:, 1:] / np.where(norm > 0, norm, 1)[:, None]
-    gap = norm - mu * y[:, 0]
-    normal = (gap / (1 + mu**2))[:, None] * np.column_stack([-mu, directions])
-    result = np.where((gap <= 0)[:, None], hat, hat + normal)
-    return np.where((mu * norm <= -y[:, 0])[:, None], r, result)
-
-
-def natural_map_rolling(r: Array, hat: Array, mu: Array, mu_r: Array) -> Array:
-    """The map r - P_K(r - u^) of each row, without the difference of two large numbers.
-
-    Of y = r - u^ it is u^ + y - P_K(y). The normal part of P_K(y) is above y_N by the largest of
-    what each choice of binding limits lifts it, and the other parts are shortened to their limits.
-    """
-    y = r - hat
-    half = (y.shape[1] - 1) // 2
-    slides, rolls = (tangential_norm(part) for part in sliding_and_rolling(y))
-    gaps = slides - mu * y[:, 0], rolls - mu_r * y[:, 0]
-    lift = np.zeros_like(slides)
-    for a, b in ((mu, 0 * mu_r), (0 * mu, mu_r), (mu, mu_r)):
-        lift = np.maximum(lift, (a * gaps[0] + b * gaps[1]) / (1 + a**2 + b**2))
-    outside = np.zeros_like(y)
-    outside[:, 0] = -lift
-    for part, size, gap, limit in (
-        (slice(1, 1 + half), slides, gaps[0], mu),
-        (slice(1 + half, None), rolls, gaps[1], mu_r),
-    ):
-        left = np.maximum(gap - limit * lift, 0)
-        outside[:, part] = (left / np.where(size > 0, size, 1))[:, None] * y[:, part]
-    apex = y[:, 0] + mu * slides + mu_r * rolls <= 0
-    return np.where(apex[:, None], r, hat + outside)
-
-
-@dataclass(frozen=True)
-class Verdict:
-    """What fclib.merit should say."""
-
-    natural: float
-    scaled_natural: float
-    dynamics: float
-    bilateral: float
-    kinematics: float
-    cone: float
-    dual_cone: float
-    complementarity: float
-    open: int
-    stick: int
-    slide: int
-    u: Array = field(repr=False)
-
-    @property
-    def error(self) -> float:
-        """The bound of every tolerance."""
-        return max(
-            self.natural, self.scaled_natural, self.dynamics, self.bilateral, self.kinematics
-        )
-
-
-def worst(residual: Array, velocity: Array) -> float:
-    """The largest quotient of a residual and the velocity of its component."""
-    size = np.abs(residual)
-    return float(np.where(velocity > 0, size / np.where(velocity > 0, velocity, 1), size).max())
-
-
-def by_contact(x: Array, d: int) -> Array:
-    """The norm of each contact's part of x, at each of its components."""
-    return np.repeat(np.linalg.norm(x.reshape(-1, d), axis=1), d)
-
-
-def mean(x: Array) -> float:
-    """The root of the mean square."""
-    return float(np.linalg.norm(x) / np.sqrt(max(1, x.size)))
+# ---- matrices in every storage
 
 
 def columns(a: Any) -> Any:
@@ -184,115 +65,6 @@ def columns(a: Any) -> Any:
     result = sp.csc_array(a)
     result.sum_duplicates()
     return result
-
-
-def sizes(a: Any, x: Array) -> Array:
-    """What the product a @ x adds up, however much of it cancels."""
-    return np.asarray(abs(a) @ abs(x))
-
-
-def ratio(x: Array, y: Array) -> Array:
-    """Components of x over those of y, 0 where y is."""
-    return np.where(y > 0, x / np.where(y > 0, y, 1), 0)
-
-
-def judge(problem: fclib.Problem, solution: fclib.Solution) -> Verdict:
-    """Judge a solution by the equations of its formulation; nothing is left to rounding."""
-    d, mu, r = problem.spacedim, problem.mu, solution.r
-    dynamics = bilateral = kinematics = 0.0
-
-    def stopping(velocity: Array) -> Array:
-        """Impulses that stop velocities of the contacts, each alone."""
-        w = np.repeat(diagonal.reshape(-1, d).mean(axis=1), d)
-        return ratio(by_contact(velocity, d), w)
-
-    if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
-        q = problem.q
-        W = columns(problem.W)
-        diagonal = W.diagonal()
-        u = W @ r + q
-        own = abs(q)
-        if problem.V is not None:
-            V, R, lam, s = columns(problem.V), columns(problem.R), solution.l, problem.s
-            assert lam is not None
-            assert s is not None
-            u = u + V @ lam
-            held = ratio(abs(s), abs(R.diagonal()))
-            own = own + sizes(V, held)
-            velocity = sizes(V.T, stopping(own)) + sizes(R, held) + abs(s)
-            bilateral = worst(V.T @ r + R @ lam + s, np.maximum(velocity, mean(s)))
-        moved = by_contact(sizes(W, stopping(own)) + own, d)
-        terms = np.maximum(moved, by_contact(u, d))
-    else:
-        M, H, f, w = columns(problem.M), columns(problem.H), problem.f, problem.w
-        solve = splu(M).solve if problem.n else np.copy
-        y = solve(H.toarray()) if problem.n and problem.m else np.zeros(H.shape)
-        diagonal = np.sum(H.toarray() * y, axis=0)
-        impulse = H @ r + f
-        free = solve(f)
-        q = H.T @ free + w
-        stop = sizes(H, stopping(sizes(H.T, free) + abs(w)))
-        if problem.G is not None:
-            assert solution.l is not None
-            assert problem.b is not None
-            G, b = columns(problem.G), problem.b
-            impulse = impulse + G @ solution.l
-            inertia = np.sum(G.toarray() * solve(G.toarray()), axis=0)
-            stop = stop + sizes(G, ratio(sizes(G.T, free) + abs(b), inertia))
-        v = solution.v
-        if v is None:
-            v = solve(impulse)
-        fastest = np.maximum(abs(v), abs(free))
-        if solution.v is not None:
-            dynamics = worst(v - solve(impulse), np.maximum(fastest, abs(solve(stop))))
-        if problem.G is not None:
-            bilateral = worst(G.T @ v + b, sizes(G.T, fastest) + abs(b))
-        u = H.T @ v + w
-        terms = by_contact(sizes(H.T, fastest) + abs(w), d)
-    if solution.u is not None and u.size:
-        kinematics = worst(solution.u - u, np.maximum(terms, mean(q)))
-
-    contacts, reactions = u.reshape(-1, d), r.reshape(-1, d)
-    mu_r = getattr(problem, "mu_r", None)
-    cone: Callable[[Array], Array]
-    if mu_r is None:
-        hat = modified(contacts, mu)
-        cone = partial(project, mu=mu)
-        residual = partial(natural_map, reactions, mu=mu)
-    else:
-        hat = modified_rolling(contacts, mu, mu_r)
-        cone = partial(project_rolling, mu=mu, mu_r=mu_r)
-        residual = partial(natural_map_rolling, reactions, mu=mu, mu_r=mu_r)
-    size = abs(diagonal).reshape(-1, d).mean(axis=1)
-    others = size[size > 0].mean() if size.any() else 1.0
-    rho = (1 / np.where(size > 0, size, others))[:, None]
-    scaled = reactions - rho * hat
-    projected = cone(scaled)
-    is_open = ~projected.any(axis=1)
-    is_stick = ~is_open & (projected == scaled).all(axis=1)
-    norms = np.linalg.norm
-    left = norms(residual(rho * hat).reshape(-1, d), axis=1)
-    velocities = np.maximum(left / rho[:, 0], -contacts[:, 0])
-    return Verdict(
-        natural=float(norms(residual(hat)) / (norms(q) or 1.0)),
-        scaled_natural=max(
-            float(norms(left) / (norms(rho * q.reshape(-1, d)) or 1.0)),
-            float(norms(velocities) / (norms(q) or 1.0)),
-        ),
-        dynamics=dynamics,
-        bilateral=bilateral,
-        kinematics=kinematics,
-        cone=float(norms(reactions - cone(reactions), axis=1).max(initial=0)),
-        dual_cone=float(norms(cone(-hat), axis=1).max(initial=0)),
-        complementarity=float(np.abs(np.sum(reactions * hat, axis=1)).max(initial=0)),
-        open=int(is_open.sum()),
-        stick=int(is_stick.sum()),
-        slide=int((~is_open & ~is_stick).sum()),
-        u=u,
-    )
-
-
-# ---- matrices in every storage
 
 
 def stored(a: npt.ArrayLike, storage: str, rng: np.random.Generator) -> Any:

@@ -1,33 +1,55 @@
-"""Random problems of every formulation whose solution is known, and what `auto` says of them.
+"""Random problems of every formulation whose truth is known, and what solvers say of them.
 
-    python tests/planted_judge.py [COUNT] [FIRST]    problems FIRST.. (20000 of them, from 0)
-    python tests/planted_judge.py --hard [COUNT] [FIRST]          2000 that ask for all digits
-    python tests/planted_judge.py --infeasible [COUNT] [FIRST]    2000 that have no solution
+    python tests/planted_judge.py [COUNT] [FIRST] [--regime NAME] [--solver NAME]
 
-Each false word is printed with the number of its problem: `converged` where an independent judge
-finds a larger error, `infeasible`, and `diverged`. Problems that are not solved are counted. Of
-those without a solution `converged` is false, and `infeasible` where its proof does not hold in
-rational arithmetic. Exit status 1 where a word was false.
+COUNT problems (1000) from number FIRST (0) on: of each regime, or of the one that is named. They
+are solved by `auto`, by the solver that is named, or by all built-in solvers in turn (`each`).
+
+    random          masses over twelve decades, redundant joints, blocks of every rank, guesses
+    digits          solutions that ask for all digits
+    corners         contacts at the corners of the law: they graze, roll without sliding, slide
+                    without rolling, stick at a limit; mu and mu_r from 0 to 2^40; half of them in
+                    whole numbers, so that the solution is exact
+    held limits     limits that closed loops of joints hold
+    nearly          joints that contradict each other by rounding, or by a little more
+    contradicting   joints that contradict each other
+    unsolvable      bodies that nothing keeps apart
+    damaged         files that end early, or parts of which were never written
+
+Each false word is printed with its number. The judge is tests/ball_judge.py, so that what is
+called false is proven to be. Exit status 1 where a word was false.
 """
 
 from __future__ import annotations
 
+import argparse
+import functools
 import sys
+import tempfile
 from collections import Counter
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
+import h5py
 import numpy as np
 import numpy.typing as npt
 
 import fclib
+from ball_judge import judge
 from fclib import analysis
-from helpers import dense, judge, planted_law
+from helpers import dense, planted_law
 
 Array: TypeAlias = npt.NDArray[np.float64]
+# a problem, a solution of it, and a guess
+Plant: TypeAlias = Callable[[int], tuple[Any, fclib.Solution, Array | None]]
 
-FALSE = ("infeasible", "diverged")
+FALSE = ("infeasible", "diverged")  # words of `auto` that are false of a problem with a solution
 TOLERANCE = 1e-8
+DIGITS = 1e-12  # below it errors are not compared: four digits of the tolerance are left
+LEEWAY = 1.01  # an error is called larger than a tolerance, or than another error, beyond this
+ITERATIONS = 20_000  # of `auto`, which seldom needs them
+SWEEPS = 1_000  # of any other solver: most of what is solved at all is solved by then
 
 
 def bodies_of(rng: np.random.Generator, n: int, ratio: float) -> Array:
@@ -167,54 +189,271 @@ def hard(number: int) -> tuple[Any, fclib.Solution, None]:
     return problem, solution, None
 
 
-def rounding(problem: Any, solution: fclib.Solution) -> float:
-    """What the judge's own error is rounded to: u is a sum, r - P_K(r - u^) a difference."""
-    r = np.abs(solution.r)
-    if isinstance(problem, fclib.LocalProblem | fclib.LocalRollingProblem):
-        terms = abs(dense(problem.W)) @ r
-        if problem.V is not None and solution.l is not None:
-            terms += abs(dense(problem.V)) @ np.abs(solution.l)
-        q, diagonal = problem.q, np.diag(dense(problem.W))
+def corners(number: int) -> tuple[Any, fclib.Solution, Array | None]:
+    """Problem `number` whose contacts are at the corners of the law, and its solution.
+
+    The limits of friction are powers of two. The reactions that reach them are whole multiples of
+    (5, mu (3, 4), mu_r (4, 3)), whose parts have whole norms. So the law holds exactly, and in half
+    of the problems W, H and M are whole too.
+    """
+    rng = np.random.default_rng([number, 2030])
+    rolling, whole = bool(rng.integers(2)), bool(rng.integers(2))
+    d = int(rng.choice([3, 5] if rolling else [2, 3]))
+    nc = int(rng.integers(1, 7))
+    limits = np.array([[limit_of(rng) for _ in range(1 + rolling)] for _ in range(nc)])
+    states = [corner(rng, d, own) for own in limits]
+    u, r = (np.concatenate([state[k] for state in states]) for k in range(2))
+    law = dict(zip(("mu", "mu_r"), limits.T, strict=False))
+    n = int(rng.integers(d, d * nc + 4))
+    if whole:
+        H = rng.integers(-2, 3, (n, d * nc)).astype(float) * (rng.uniform(size=(n, d * nc)) < 0.4)
+        mass = 4.0 ** rng.integers(-3, 4, n)
+        f = rng.integers(-8, 9, n).astype(float)
     else:
-        H, mass = dense(problem.H), np.diag(dense(problem.M))
-        impulse = abs(H) @ r + np.abs(problem.f)
-        if problem.G is not None and solution.l is not None:
-            impulse += abs(dense(problem.G)) @ np.abs(solution.l)
-        terms = abs(H).T @ (impulse / mass) + np.abs(problem.w)
-        q, diagonal = H.T @ (problem.f / mass) + problem.w, np.sum(H * H / mass[:, None], axis=0)
-    d = problem.spacedim
-    size = abs(diagonal).reshape(-1, d).mean(axis=1)
-    others = size[size > 0].mean() if size.any() else 1.0
-    rho = np.repeat(1 / np.where(size > 0, size, others), d)
-    steepest = np.repeat(1 + problem.mu + getattr(problem, "mu_r", 0), d)  # u^_N = u_N + mu |u_T|
+        H, mass = directions(rng, n, d, nc), bodies_of(rng, n, 10.0 ** rng.uniform(0, 4))
+        f = rng.standard_normal(n)
+    M = np.diag(mass)
+    if not whole and rng.integers(2):  # coupled, or next to not
+        root = rng.standard_normal((n, n)) * (rng.uniform(size=(n, n)) < 0.3)
+        scale = np.sqrt(np.outer(mass, mass)) / n
+        M += (1.0, 1e-8, 1e-30)[rng.integers(3)] * scale * (root @ root.T)
+    if rng.integers(2):
+        v = np.linalg.solve(M, H @ r + f)
+        made: Any = fclib.GlobalRollingProblem if rolling else fclib.GlobalProblem
+        problem: Any = made(spacedim=d, M=M, H=H, f=f, w=u - H.T @ v, **law)
+        solution = fclib.Solution(v=v, u=u, r=r)
+    else:
+        W = H.T @ np.linalg.solve(M, H)
+        W = (W + W.T) / 2
+        made = fclib.LocalRollingProblem if rolling else fclib.LocalProblem
+        problem = made(spacedim=d, W=W, q=u - W @ r, **law)
+        solution = fclib.Solution(u=u, r=r)
+    return problem, solution, None
 
-    def relative(weight: Any) -> float:
-        size = np.linalg.norm(weight * steepest * terms) + np.linalg.norm(r)
-        return float(size / (np.linalg.norm(weight * q) or 1.0))
 
-    return float(8 * np.finfo(float).eps * max(relative(1.0), relative(rho)))
+def limit_of(rng: np.random.Generator) -> float:
+    """A limit of friction: 0, an ordinary one, or one of 2^-40 to 2^40."""
+    kind = rng.integers(5)
+    return float(0.0 if kind == 0 else 2.0 ** rng.integers(*((-3, 2) if kind < 3 else (-40, 41))))
+
+
+def corner(rng: np.random.Generator, d: int, limits: Array) -> tuple[Array, Array]:
+    """U and r of a contact at a corner of the law, all of whole numbers and powers of two."""
+    size = (d - 1) // len(limits)
+    u, r = np.zeros(d), np.zeros(d)
+    closed = rng.integers(4) > 0
+    unit = 2.0 ** rng.integers(-3, 4) / max(1.0, float(np.max(limits)) if rng.integers(2) else 1.0)
+    r[0] = 5 * unit if closed else 0.0
+    moves = False
+    for k, limit in enumerate(limits):
+        part = slice(1 + k * size, 1 + (k + 1) * size)
+        along = rng.permutation([3.0, 4.0])[:size] if size == 2 else np.array([5.0])
+        along *= rng.choice([-1.0, 1.0], size)
+        speed = 2.0 ** rng.integers(-4, 3)
+        if not closed:
+            u[part] = along * speed * rng.integers(2)
+            continue
+        # at rest below the limit, without any share of it, or at it; or moving, and at it
+        state = rng.integers(4)
+        r[part] = along * limit * unit * (0.5, 0.0, 1.0, 1.0)[state]
+        u[part] = -along * speed if state == 3 else 0.0
+        moves = moves or state == 3
+    if not closed:  # open, or grazing
+        u[0] = 2.0 ** rng.integers(-4, 3) * rng.integers(2)
+    return u, r
+
+
+def held(number: int) -> tuple[Any, fclib.Solution, Array | None]:
+    """Problem `number` with limits that the joints hold: what remains of them is rounding."""
+    rng = np.random.default_rng([number, 2031])
+    d = int(rng.choice([2, 3]))
+    nc, limits, p = (int(rng.integers(*span)) for span in ((0, 4), (1, 4), (2, 6)))
+    n = int(rng.integers(p + 2, p + d * nc + 8))
+    mass = bodies_of(rng, n, 10.0 ** rng.uniform(0, 6))
+    G = joints(rng, n, p)
+    law, (u, r, _) = planted_law(rng, d, nc + limits, None, False)
+    H = np.zeros((n, d * (nc + limits)))
+    H[:, : d * nc] = directions(rng, n, d, nc) if nc else 0
+    for a in range(nc, nc + limits):
+        law["mu"][a] = 0
+        u[a], r[a] = 0, 0
+        held_by_joints = rng.integers(4) > 0
+        H[:, d * a] = G @ rng.standard_normal(p) if held_by_joints else rng.standard_normal(n)
+        (u if rng.integers(2) else r)[a, 0] = rng.integers(2) * rng.uniform(0.1, 2)
+    lam, f = rng.standard_normal(p), rng.standard_normal(n)
+    impulse = r.ravel()
+    v = (H @ impulse + G @ lam + f) / mass
+    problem: Any = fclib.GlobalProblem(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=f,
+        w=u.ravel() - H.T @ v,
+        mu=law["mu"],
+        G=G,
+        b=-G.T @ v,
+    )
+    solution = fclib.Solution(v=v, u=u.ravel(), r=impulse, l=lam)
+    if rng.integers(2):
+        problem, solution = problem.condense(), fclib.Solution(u=u.ravel(), r=impulse, l=lam)
+    return problem, solution, None
+
+
+def related_joints(number: int) -> tuple[Any, Array, float]:
+    """A problem whose last joint follows from the others, and z with G z = 0; contradicted by gap.
+
+    G and z are whole numbers. The joints contradict each other by z . b, exactly.
+    """
+    rng = np.random.default_rng([number, 2032])
+    d, nc, p = int(rng.choice([2, 3])), int(rng.integers(0, 4)), int(rng.integers(2, 5))
+    n = int(rng.integers(p + 1, p + d * nc + 5))
+    G = rng.integers(-2, 3, (n, p)).astype(float)
+    z = np.append(rng.integers(-2, 3, p - 1), -1.0)
+    z[0] = 1.0
+    G[:, -1] = G[:, :-1] @ z[:-1]
+    v = rng.integers(-4, 5, n).astype(float)
+    H = rng.integers(-2, 3, (n, d * nc)).astype(float)
+    law, (u, r, _) = planted_law(rng, d, nc, None, False)
+    mass = 4.0 ** rng.integers(-2, 3, n)
+    problem = fclib.GlobalProblem(
+        spacedim=d,
+        M=np.diag(mass),
+        H=H,
+        f=mass * v - H @ r.ravel() - G @ rng.integers(-3, 4, p),
+        w=u.ravel() - H.T @ v,
+        G=G,
+        b=-G.T @ v,
+        mu=law["mu"],
+    )
+    return problem, z, float(2.0 ** rng.integers(-50, -3))
+
+
+# ---- what is said of them
+
+
+class Said(NamedTuple):
+    """A word, who said it, and of which law; a word that is not true begins with "false"."""
+
+    word: str
+    solver: str
+    rolling: bool
+
+    @property
+    def false(self) -> bool:
+        """Whether it is not true."""
+        return self.word.startswith("false")
+
+
+def in_turn(problem: Any, number: int, solver: str) -> str:
+    """The solver, or for `each` one of the built-in solvers that take the problem."""
+    if solver != "each":
+        return solver
+    rolling = hasattr(problem, "mu_r")
+    takers = [
+        one.name
+        for one in fclib.solvers()
+        if one.origin == "fclib"
+        and problem.spacedim in (one.rolling_dimensions if rolling else one.dimensions)
+    ]
+    return takers[number % len(takers)]
+
+
+def limit_of_iterations(solver: str) -> int:
+    """Enough for most problems that the solver solves at all."""
+    return ITERATIONS if solver == "auto" else SWEEPS
+
+
+def too_large(problem: Any, solution: fclib.Solution) -> bool:
+    """Whether an error is proven to be above the tolerance, whatever rounding explains."""
+    return bool(judge(problem, solution, rounding=True).error > LEEWAY * TOLERANCE)
+
+
+def candidates(problem: Any, solution: fclib.Solution) -> Iterator[fclib.Solution]:
+    """The solution, none, and wrong ones: by a little, or behind reactions that move nothing."""
+    yield solution
+    yield fclib.Solution(r=np.zeros(problem.m), l=solution.l)
+    rng = np.random.default_rng(problem.m)
+    r = np.asarray(solution.r)
+    yield fclib.Solution(r=r * (1 + 1e-6 * rng.standard_normal(r.size)), l=solution.l)
+    if hasattr(problem, "W"):
+        A = dense(problem.W)
+        if problem.p:
+            A = np.block([[A, dense(problem.V)], [dense(problem.V).T, dense(problem.R)]])
+    else:
+        A = dense(problem.H)
+        if problem.p:
+            A = np.hstack([A, dense(problem.G)])
+    unmoved = np.linalg.svd(A)[2][-1]
+    moved = {
+        name: x + 1e-3 * rng.standard_normal(x.size)
+        for name in ("v", "u")
+        if (x := getattr(solution, name)) is not None
+    }
+    stress = 1e12 * unmoved * np.linalg.norm(r)
+    yield fclib.Solution(
+        r=r + stress[: r.size], l=solution.l + stress[r.size :] if problem.p else None, **moved
+    )
+
+
+def misjudged(problem: Any, solution: fclib.Solution) -> str:
+    """A false word of the merit, on the solution or on another one; '' without any."""
+    for one in candidates(problem, solution):
+        said = fclib.merit(problem, one).error
+        least, most = (judge(problem, one, rounding=taken).error for taken in (True, False))
+        if least > LEEWAY * said + DIGITS:
+            return f"false small ({said:.1e})"
+        # if q is rounding, errors are relative to that of its terms, which is not exact
+        comparable = not least > LEEWAY * float(most.upper())
+        if comparable and not said <= LEEWAY * float(most.upper()) + DIGITS:
+            return f"false large ({said:.1e})"
+    return ""
 
 
 def verdict(
     number: int,
     solve: Callable[..., fclib.Result] = fclib.solve,
-    plant: Callable[[int], tuple[Any, fclib.Solution, Array | None]] = planted,
-) -> str:
-    """The word of `auto` on a problem; 'false ...' where it is not true."""
+    plant: Plant = planted,
+    solver: str = "auto",
+) -> Said:
+    """What a solver says of a problem, and the merit of its solution."""
     problem, solution, guess = plant(number)
-    own = judge(problem, solution).error
-    if own > 0.1 * TOLERANCE:
+    solver = in_turn(problem, number, solver)
+    return Said(word_on(problem, solution, guess, solve, solver), solver, hasattr(problem, "mu_r"))
+
+
+def word_on(
+    problem: Any,
+    solution: fclib.Solution,
+    guess: Array | None,
+    solve: Callable[..., fclib.Result],
+    solver: str,
+) -> str:
+    """The word of a solver on a problem whose solution is known."""
+    word = misjudged(problem, solution)
+    if word:
+        return word
+    if not judge(problem, solution).error <= 0.1 * TOLERANCE:
         return "rounding"  # the data do not hold their own solution
     start = None if guess is None else fclib.Solution(r=guess)
     try:
-        result = solve(problem, guess=start, max_iterations=20000)
+        result = solve(
+            problem, solver=solver, guess=start, max_iterations=limit_of_iterations(solver)
+        )
     except fclib.UnsuitableError as refusal:
         return f"false refusal: {refusal}"
-    if result.status in FALSE:
+    own = result.solution
+    if own.r is None or own.r.shape != (problem.m,) or not np.isfinite(own.r).all():
+        return "false solution"
+    if result.status == "infeasible" or (solver == "auto" and result.status in FALSE):
         return f"false {result.status}"
-    error = judge(problem, result.solution).error
-    if result.converged and error > 1.01 * TOLERANCE + rounding(problem, result.solution):
-        return f"false converged ({error:.1e})"
+    if result.converged:
+        return "false converged" if too_large(problem, own) else "converged"
+    none = fclib.Solution(r=np.zeros(problem.m))
+    if problem.p == 0:  # what is at hand is not better
+        at_hand = [none] if start is None else [none, start]
+        least = min(fclib.merit(problem, one).error for one in at_hand)
+        if not fclib.merit(problem, own).error <= LEEWAY * least:
+            return f"false best ({result.status})"
     return str(result.status)
 
 
@@ -260,11 +499,19 @@ def without_solution(number: int) -> Any:
     return problem.condense() if rng.integers(2) else problem
 
 
-def claim(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
-    """The word of `auto` on a problem without a solution; 'false ...' where it is not true."""
+def claim(
+    number: int, solve: Callable[..., fclib.Result] = fclib.solve, solver: str = "auto"
+) -> Said:
+    """What a solver says of a problem without a solution."""
     problem = without_solution(number)
+    solver = in_turn(problem, number, solver)
+    return Said(word_without(problem, solve, solver), solver, hasattr(problem, "mu_r"))
+
+
+def word_without(problem: Any, solve: Callable[..., fclib.Result], solver: str) -> str:
+    """The word of a solver on a problem that has none."""
     try:
-        result = solve(problem, max_iterations=20000)
+        result = solve(problem, solver=solver, max_iterations=limit_of_iterations(solver))
     except fclib.UnsuitableError as refusal:
         return f"refused ({refusal})"
     if result.status == "infeasible":
@@ -275,29 +522,131 @@ def claim(number: int, solve: Callable[..., fclib.Result] = fclib.solve) -> str:
             return f"false infeasible: {error}"
         return "infeasible, exactly" if proof.exact else "infeasible, up to a bound"
     if result.converged:
-        local = isinstance(problem, fclib.LocalProblem | fclib.LocalRollingProblem)
-        within = judge(problem, result.solution).error <= 1.01 * TOLERANCE
         # rounding has given the condensed W a way out, or the gap closes within the tolerance
-        return "converged, by rounding" if local and within else "false converged"
+        local = isinstance(problem, fclib.LocalProblem | fclib.LocalRollingProblem)
+        true = local and not too_large(problem, result.solution)
+        return "converged, by rounding" if true else "false converged"
     return str(result.status)
+
+
+def contradiction(number: int, solver: str = "auto", little: bool = False) -> Said:
+    """What is said of joints that contradict each other, by `little` or clearly."""
+    problem, z, gap = related_joints(number)
+    b = problem.b.copy()
+    b[-1] += gap if little else 1.0
+    problem = problem.replace(b=b)
+    solver = in_turn(problem, number, solver)
+    return Said(word_on_joints(problem, z, little, solver), solver, False)
+
+
+def word_on_joints(problem: Any, z: Array, little: bool, solver: str) -> str:
+    """The word of a solver, and of the analysis, on joints that contradict each other by z . b."""
+    word = "refused"
+    try:
+        result = fclib.solve(problem, solver, max_iterations=limit_of_iterations(solver))
+    except fclib.UnsuitableError as refusal:
+        if np.dot(z, problem.b) == 0:  # b has rounded the difference away
+            return f"false refusal: {refusal}"
+    else:
+        if result.converged and too_large(problem, result.solution):
+            return "false converged"
+        word = str(result.status)
+    if not little and analysis.analyze(problem, time_limit=1.0).existence.verdict[:6] == "exists":
+        return "false existence"
+    return word
+
+
+def damaged(number: int, solver: str = "") -> Said:
+    """What is said of a file of which a part is missing; no solver is asked."""
+    problem, solution, _ = planted(number)
+    return Said(word_on_file(number, problem, solution), solver, hasattr(problem, "mu_r"))
+
+
+def word_on_file(number: int, problem: Any, solution: fclib.Solution) -> str:
+    """The word of `fclib.read` on the file of a problem that was damaged."""
+    rng = np.random.default_rng([number, 2033])
+    with tempfile.TemporaryDirectory(prefix="planted-") as folder:
+        path = Path(folder) / "problem.hdf5"
+        fclib.write(path, problem, solution)
+        kind = damage(rng, path, f"fclib_{problem.kind}")
+        try:
+            read = fclib.read(path)
+        except fclib.Error:
+            return "refused"
+    names = ("W", "q", "V", "R", "s", "M", "H", "f", "w", "G", "b", "mu", "mu_r")
+    for own, other in ((getattr(problem, x, None), getattr(read, x, None)) for x in names):
+        if (own is None) != (other is None):
+            return f"false read: {kind}"
+        if own is not None and not np.array_equal(dense(own), dense(other)):
+            return f"false read: {kind}"
+    return "whole"  # what is missing is not of the problem, or it is zeros
+
+
+def damage(rng: np.random.Generator, path: Path, group: str) -> str:
+    """Takes a part of the file away, and says how."""
+    kind = ("ends early", "never written", "half written", "no pointers")[rng.integers(4)]
+    if kind == "ends early":
+        size = path.stat().st_size
+        with path.open("r+b") as file:
+            file.truncate(int(rng.integers(1, size)))
+        return kind
+    with h5py.File(path, "r+") as file:
+        arrays: list[str] = []
+        file[group].visititems(
+            lambda name, item: (
+                arrays.append(name) if isinstance(item, h5py.Dataset) and item.ndim else None
+            )
+        )
+        if kind == "no pointers":
+            arrays = [name for name in arrays if name.endswith("/p")]
+            if not arrays:
+                kind = "never written"
+                arrays = [name for name in ("vectors/mu",) if name in file[group]]
+        name = f"{group}/{arrays[rng.integers(len(arrays))]}"
+        values = file[name][()]
+        if kind == "no pointers":
+            file[name][...] = 0
+            return kind
+        del file[name]
+        chunks = (1,) if kind == "half written" or rng.integers(2) else None
+        made = file.create_dataset(name, values.shape, values.dtype, chunks=chunks)
+        if kind == "half written":
+            made[: len(values) // 2] = values[: len(values) // 2]
+    return kind
+
+
+REGIMES: dict[str, Callable[..., Said]] = {
+    "random": verdict,
+    "digits": functools.partial(verdict, plant=hard),
+    "corners": functools.partial(verdict, plant=corners),
+    "held limits": functools.partial(verdict, plant=held),
+    "nearly": functools.partial(contradiction, little=True),
+    "contradicting": contradiction,
+    "unsolvable": claim,
+    "damaged": damaged,
+}
 
 
 def main() -> int:
     """Run the problems; see the top of the file."""
-    arguments = sys.argv[1:]
-    infeasible, asking = "--infeasible" in arguments, "--hard" in arguments
-    numbers = [int(one) for one in arguments if not one.startswith("--")]
-    count = numbers[0] if numbers else 2000 if infeasible or asking else 20000
-    first = numbers[1] if len(numbers) > 1 else 0
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("count", type=int, nargs="?", default=1000)
+    parser.add_argument("first", type=int, nargs="?", default=0)
+    parser.add_argument("--regime", choices=list(REGIMES))
+    parser.add_argument("--solver", default="auto")
+    arguments = parser.parse_args()
     words: Counter[str] = Counter()
-    for number in range(first, first + count):
-        word = claim(number) if infeasible else verdict(number, plant=hard if asking else planted)
-        if word.startswith("false"):
-            print(f"{number}: {word}", flush=True)
-        words[word.split(" (")[0].split(":")[0]] += 1
-    for word, times in words.most_common():
+    false = 0
+    for name in [arguments.regime] if arguments.regime else list(REGIMES):
+        for number in range(arguments.first, arguments.first + arguments.count):
+            said = REGIMES[name](number, solver=arguments.solver)
+            false += said.false
+            if said.false:
+                print(f"{name} {number}: {said.solver}: {said.word}", flush=True)
+            words[f"{name}: {said.word.split(' (')[0].split(': ')[0]}"] += 1
+    for word, times in sorted(words.items()):
         print(f"{times:7d}  {word}")
-    return int(any(word.startswith("false") for word in words))
+    return int(false > 0)
 
 
 if __name__ == "__main__":

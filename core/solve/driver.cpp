@@ -180,11 +180,16 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   if (settings.max_iterations == 0) settings.max_iterations = request.solver.max_iterations;
   const std::int64_t max_iterations = settings.max_iterations;
   settings.time_limit = std::max(0.0, request.deadline.left());
-  if (settings.history) {
-    result.history.emplace();
-    settings.callback = [&, start = now(settings.clock)](const Progress& progress) {
-      result.history->push_back({result.iterations + progress.iteration, progress.error,
-                                 now(settings.clock) - start, std::string(progress.stage)});
+  if (settings.history) result.history.emplace();
+  if (settings.history || settings.callback) {
+    // counted over all calls of the solver
+    settings.callback = [&, start = now(settings.clock)](Progress progress) {
+      progress.iteration += result.iterations;
+      progress.time = now(settings.clock) - start;
+      if (result.history) {
+        result.history->push_back(
+            {progress.iteration, progress.error, progress.time, std::string(progress.stage)});
+      }
       return !request.settings.callback || request.settings.callback(progress);
     };
   }

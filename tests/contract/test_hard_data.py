@@ -12,11 +12,12 @@ import numpy.typing as npt
 import pytest
 
 import fclib
+from ball_judge import judge
 from fclib import _core
-from helpers import dense, judge, local_problem, planted_global, planted_law
+from helpers import dense, local_problem, planted_global, planted_law
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from planted_judge import claim, verdict
+from planted_judge import REGIMES, claim, verdict
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -77,7 +78,7 @@ def test_every_solver_is_honest_on_contacts_of_low_rank(solver: str) -> None:
         for rank in range(d):
             problem = of_rank(rank, d, rolling, 3)
             result = fclib.solve(problem, solver=solver, max_iterations=300)
-            error = judge(problem, result.solution).error
+            error = float(judge(problem, result.solution).error)
             assert np.isfinite(error)
             assert result.converged == (error <= 1.0001e-8 and result.error <= 1e-8)
             assert result.status != "infeasible"
@@ -149,8 +150,15 @@ def test_units_of_mass_do_not_matter(mass: float) -> None:
 
 def test_planted_problems_of_every_formulation_get_no_false_word() -> None:
     for number in range(300):
-        word = verdict(number)
-        assert not word.startswith("false"), (number, word)
+        said = verdict(number)
+        assert not said.false, (number, said)
+
+
+@pytest.mark.parametrize("regime", list(REGIMES))
+def test_every_regime_gets_no_false_word_from_any_solver(regime: str) -> None:
+    for number in range(72):
+        said = REGIMES[regime](number, solver="each")
+        assert not said.false, (number, said)
 
 
 class Looks:
@@ -165,7 +173,7 @@ class Looks:
 
 
 def test_problems_without_a_solution_get_a_proof_or_no_claim() -> None:
-    words = Counter(claim(number) for number in range(150))
+    words = Counter(claim(number).word for number in range(150))
     assert not [word for word in words if word.startswith("false")], words
     # of bodies and with whole numbers each has an exact proof, and is there half of the times
     assert words["infeasible, exactly"] > 60
@@ -226,7 +234,7 @@ def test_conversions_are_held_to_the_limit() -> None:
                 assert result.iterations == 0
                 unjudged += 1
             else:
-                assert judge(problem, result.solution).error == pytest.approx(result.error)
+                assert float(judge(problem, result.solution).error) == pytest.approx(result.error)
             assert result.solution.v is not None
     # once M is factorised, and before each block of columns of two products
     assert unjudged >= 6

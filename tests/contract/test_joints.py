@@ -11,7 +11,8 @@ import numpy.typing as npt
 import pytest
 
 import fclib
-from helpers import dense, judge, planted_global, planted_local
+from ball_judge import judge
+from helpers import dense, planted_global, planted_local
 
 Array: TypeAlias = npt.NDArray[np.float64]
 

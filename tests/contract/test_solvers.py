@@ -19,7 +19,8 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import dense, judge, planted_global, planted_local
+from ball_judge import judge
+from helpers import dense, planted_global, planted_local
 
 OWN = runpy.run_path(str(Path(__file__).parents[2] / "examples" / "python" / "own_solver.py"))
 SOLVERS = {
@@ -213,7 +214,7 @@ def assert_honest(problem: Any, result: fclib.Result, tol: float) -> None:
     # ... and for a cone of two limits takes the difference of two such numbers
     most = 1.0 if hasattr(problem, "mu_r") else 1e-2
     rounding = min(most, EXACT * max(1.0, impulses / (q or 1.0)))
-    assert error == pytest.approx(judge(problem, solution).error, rel=1e-9, abs=rounding)
+    assert error == pytest.approx(float(judge(problem, solution).error), rel=1e-9, abs=rounding)
     assert (result.status == "converged") == (error <= tol)
     assert result.converged == (result.status == "converged")
     assert result.iterations >= 0

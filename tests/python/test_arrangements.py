@@ -11,7 +11,8 @@ import scipy.sparse as sp
 from hypothesis import strategies as st
 
 import fclib
-from helpers import STORAGES, dense, judge, planted_global, planted_local, planted_rolling
+from ball_judge import judge
+from helpers import STORAGES, dense, planted_global, planted_local, planted_rolling
 
 Plain: TypeAlias = fclib.LocalProblem | fclib.GlobalProblem
 

@@ -16,8 +16,9 @@ import pytest
 import scipy.sparse as sp
 
 import fclib
+from ball_judge import judge
 from fclib import analysis
-from helpers import judge, last_resort
+from helpers import last_resort
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))

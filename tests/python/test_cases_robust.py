@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import fclib
-from helpers import judge
+from ball_judge import judge
 
 CASES = Path(__file__).parents[2].parent / "shared" / "data" / "cases"
 

@@ -18,9 +18,10 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import fclib
+from ball_judge import judge
 from fclib import cli
 from fclib.cli._output import Rows
-from helpers import judge, planted_global, planted_local
+from helpers import planted_global, planted_local
 from helpers_cli import run
 
 SOLVE_KEYS = [

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 import fclib
 import helpers_cli
-from helpers import Array, dense, judge, planted_global, planted_local
+from ball_judge import judge
+from helpers import Array, dense, planted_global, planted_local
 
 STORAGES = ("csr", "csc", "triplet", "dense")
 MATRICES = ("W", "V", "R", "M", "H", "G")

@@ -22,6 +22,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fclib
+from fclib import scenes
 from helpers import STORAGES, Array, Planted, dense, planted_global, planted_local, stored
 
 Draw: TypeAlias = Callable[[st.SearchStrategy[Any]], Any]
@@ -1160,3 +1161,27 @@ def test_several_solutions_are_kept_beside_the_one(written: Path) -> None:
     fclib.write_solutions(path, [])
     with pytest.raises(fclib.ProblemError, match="solutions"):
         fclib.write_solutions(path, [r, "r"])
+
+
+def test_a_rewritten_problem_keeps_nothing_of_the_old_one(written: Path) -> None:
+    """Also in a file that holds more than this problem, which is changed where it stands."""
+    family: Any = scenes.assemblies()["Units"](contacts=40)
+    old: Any = scenes.Assembled(family=family, seed=0).problem(1)
+    assert old.bodies is not None
+    new: Any = old.replace(contacts=None, bodies=None)
+    r = np.zeros(old.m)
+    for foreign in (False, True):
+        path = written / f"foreign-{foreign}.hdf5"
+        fclib.write(path, old, r, [r])
+        fclib.write_solutions(path, [r, r])
+        if foreign:
+            with h5py.File(path, "r+") as file:
+                file["mine"] = 1.0
+        fclib.write(path, new, mode="replace")
+        assert fclib.contents(path) == [old.kind]
+        assert fclib.read_solution(path) is None
+        assert fclib.read_guesses(path) == []
+        assert fclib.read_solutions(path) == []
+        assert fclib.read(path).bodies is None
+        with h5py.File(path) as file:
+            assert ("mine" in file) == foreign

@@ -1,21 +1,14 @@
-"""The merit agrees with the equations, written once more in NumPy, in every form and storage."""
+"""The merit agrees with the equations in ball arithmetic, in every form and storage."""
 
-import dataclasses
 import itertools
 
 import numpy as np
 import pytest
 
 import fclib
+from ball_judge import judge
 from fclib._solve import ERRORS, MERITS
-from helpers import (
-    STORAGES,
-    Planted,
-    judge,
-    local_problem,
-    planted_global,
-    planted_local,
-)
+from helpers import STORAGES, Planted, local_problem, planted_global, planted_local
 
 FORMS = list(itertools.product(["local", "global"], [2, 3], [0, 3], STORAGES))
 
@@ -30,7 +23,7 @@ def assert_agree(problem: fclib.Problem, solution: fclib.Solution) -> None:
     merit, verdict = fclib.merit(problem, solution), judge(problem, solution)
     for name in ERRORS:
         assert getattr(merit, name) == pytest.approx(
-            getattr(verdict, name), rel=1e-12, abs=1e-12
+            float(getattr(verdict, name)), rel=1e-12, abs=1e-12
         ), name
     for name in ("open", "stick", "slide"):
         assert getattr(merit, name) == getattr(verdict, name), name
@@ -84,7 +77,7 @@ def test_a_slightly_wrong_solution_has_a_slight_error(
         merit = fclib.merit(case.problem, solution)
         assert 1e-3 * size < merit.error < 1e3 * size
         # differences of nearly equal numbers agree to the rounding of those
-        assert merit.error == pytest.approx(judge(case.problem, solution).error, abs=1e-13)
+        assert merit.error == pytest.approx(float(judge(case.problem, solution).error), abs=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -209,14 +202,3 @@ def test_a_singular_mass_is_unsuitable() -> None:
         ):
             with pytest.raises(fclib.UnsuitableError, match="M"):
                 action()
-
-
-def test_the_verdict_is_not_blind() -> None:
-    """The judge of these tests itself: a known case by hand."""
-    problem = local_problem(np.eye(3), [-1, 2, 0], [0.5])
-    verdict = judge(problem, fclib.Solution(r=np.array([1, -0.5, 0])))
-    assert verdict.error < 1e-15
-    assert dataclasses.astuple(verdict)[8:11] == (0, 0, 1)
-    # r = 0: F = -P_K(-u^), u^ = (-1 + 0.5 * 2, 2, 0), P_K(0, -2, 0) = (0.8, -0.4, 0)
-    verdict = judge(problem, fclib.Solution(r=np.zeros(3)))
-    assert verdict.natural == pytest.approx(np.hypot(0.8, 0.4) / np.sqrt(5))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import fclib
+from ball_judge import judge
 from fclib.scenes.mass_ratios import RATIOS, MassRatios
-from helpers import judge, planted_local
+from helpers import planted_local
 
 OWN = [solver for solver in fclib.solvers() if solver.origin == "fclib"]
 NEWTON = [solver.name for solver in OWN if solver.family == "newton"]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import dense, judge, local_problem, planted_global, planted_local
+from ball_judge import judge
+from helpers import dense, local_problem, planted_global, planted_local
 
 FAMILY = ["aclm", "admm", "apgd", "bb", "panagiotopoulos", "tresca"]
 OPTIONS: list[tuple[str, dict[str, Any]]] = [
@@ -55,7 +56,7 @@ def test_the_relaxation_without_shift_is_not_called_solved(solver: str, d: int) 
     result = fclib.solve(slides(d), solver, 1e-8, time_limit=20, shift="none")
     assert result.status == "stalled"
     assert result.error > 0.1
-    assert judge(slides(d), result.solution).error == pytest.approx(result.error)
+    assert float(judge(slides(d), result.solution).error) == pytest.approx(result.error)
     assert fclib.solve(slides(d), solver, 1e-8, shift="iterated").converged
 
 

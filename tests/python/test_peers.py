@@ -22,9 +22,10 @@ import scipy.sparse as sp
 import browser_module
 import fclib
 import odd_files
+from ball_judge import judge
 from capi_library import library_folder
 from fclib import scenes
-from helpers import dense, judge, planted_global, planted_local
+from helpers import dense, planted_global, planted_local
 
 # prints a file as JSON, every number of it; or writes a problem of known numbers
 PEER = r"""

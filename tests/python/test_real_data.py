@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import columns, judge
+from ball_judge import judge
+from helpers import columns
 
 KINDS = ("local3d", "global3d", "local2d", "global2d", "condensed3d")
 EXACT = 1e-12

@@ -1,4 +1,4 @@
-"""Rolling friction: files, merits and solutions, against equations written here in NumPy."""
+"""Rolling friction: files, merits and solutions, against the equations in ball arithmetic."""
 
 from __future__ import annotations
 
@@ -11,38 +11,12 @@ import numpy.typing as npt
 import pytest
 
 import fclib
+from ball_judge import judge
 from helpers import dense
 from helpers import planted_rolling as planted
 
 Array = npt.NDArray[np.float64]
 CASES = [(d, seed) for d in (3, 5) for seed in range(6)]
-
-
-def norms(x: Array) -> tuple[Array, Array]:
-    """||x_T|| and ||x_R|| of each row (N, T.., R..)."""
-    half = (x.shape[1] - 1) // 2
-    return np.linalg.norm(x[:, 1 : 1 + half], axis=1), np.linalg.norm(x[:, 1 + half :], axis=1)
-
-
-def natural_error(u: Array, r: Array, q: Array, mu: Array, mu_r: Array, d: int) -> float:
-    """||r - P_K(r - u^)|| / ||q||; the projection by bisection on its normal part."""
-    velocity, reaction = u.reshape(-1, d), r.reshape(-1, d)
-    slide, roll = norms(velocity)
-    y = reaction - velocity
-    y[:, 0] -= mu * slide + mu_r * roll
-    t, s = norms(y)
-    low, high = np.zeros(len(mu)), np.maximum(y[:, 0], 0) + mu * t + mu_r * s
-    for _ in range(200):
-        n = 0.5 * (low + high)
-        slope = n - y[:, 0] - mu * np.maximum(t - mu * n, 0) - mu_r * np.maximum(s - mu_r * n, 0)
-        low, high = np.where(slope < 0, n, low), np.where(slope < 0, high, n)
-    half = (d - 1) // 2
-    projection = y.copy()
-    projection[:, 0] = high
-    for part, size, limit in ((slice(1, 1 + half), t, mu), (slice(1 + half, d), s, mu_r)):
-        factor = np.minimum(1.0, limit * high / np.where(size > 0, size, 1.0))
-        projection[:, part] *= factor[:, None]
-    return float(np.linalg.norm(reaction - projection) / np.linalg.norm(q))
 
 
 def as_global(problem: fclib.LocalRollingProblem) -> fclib.GlobalRollingProblem:
@@ -69,8 +43,7 @@ def test_a_planted_solution_has_no_error_and_another_has_the_error_of_the_equati
     assert fclib.merit(problem, fclib.Solution(r=r)).error < 1e-13
     assert fclib.merit(as_global(problem), fclib.Solution(r=r)).natural < 1e-12
     wrong = r + 0.3 * np.random.default_rng(seed).normal(size=r.size)
-    u = np.asarray(problem.W) @ wrong + problem.q
-    expected = natural_error(u, wrong, problem.q, problem.mu, problem.mu_r, d)
+    expected = float(judge(problem, fclib.Solution(r=wrong)).natural)
     assert expected > 1e-2
     merit = fclib.merit(problem, fclib.Solution(r=wrong))
     assert merit.natural == pytest.approx(expected, rel=1e-12)
@@ -97,9 +70,8 @@ def test_every_solver_that_claims_rolling_solves_it(solver: str, d: int, seed: i
     for form in (problem, as_global(problem)):
         result = fclib.solve(form, solver, tol=1e-9)
         assert result.converged
-        r = result.solution.r
-        u = np.asarray(problem.W) @ r + problem.q
-        assert natural_error(u, r, problem.q, problem.mu, problem.mu_r, d) <= 1.1e-9
+        own = fclib.Solution(r=result.solution.r)
+        assert judge(problem, own).natural <= 1.1e-9
 
 
 @pytest.mark.parametrize(("d", "seed"), CASES)

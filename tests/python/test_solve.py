@@ -12,14 +12,8 @@ import numpy as np
 import pytest
 
 import fclib
-from helpers import (
-    STORAGES,
-    dense,
-    judge,
-    local_problem,
-    planted_global,
-    planted_local,
-)
+from ball_judge import judge
+from helpers import STORAGES, dense, local_problem, planted_global, planted_local
 
 
 def endless() -> fclib.LocalProblem:
@@ -249,7 +243,7 @@ def test_the_iteration_limit_is_kept_and_said() -> None:
         assert not result.converged
         assert result.iterations == limit
         assert result.error > 1e-14
-        assert result.error == pytest.approx(judge(hard(), result.solution).error, rel=1e-9)
+        assert result.error == pytest.approx(float(judge(hard(), result.solution).error), rel=1e-9)
 
 
 def test_the_limit_holds_for_all_runs_of_the_solver_together() -> None:
@@ -277,7 +271,7 @@ def test_a_problem_without_a_solution_is_not_solved(limit: int) -> None:
         result = fclib.solve(problem, max_iterations=limit)
         assert result.status != "converged"
         assert result.error > 0.1
-        assert result.error == pytest.approx(judge(problem, result.solution).error)
+        assert result.error == pytest.approx(float(judge(problem, result.solution).error))
 
 
 def test_the_callback_follows_the_iterations() -> None:
@@ -299,7 +293,7 @@ def test_the_callback_stops_the_solver() -> None:
     assert result.status == "interrupted"
     assert not result.converged
     assert 3 <= result.iterations < 6
-    assert result.error == pytest.approx(judge(hard(), result.solution).error, rel=1e-9)
+    assert result.error == pytest.approx(float(judge(hard(), result.solution).error), rel=1e-9)
 
 
 @pytest.mark.parametrize("answer", [False, np.False_, 0])

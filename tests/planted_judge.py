@@ -598,7 +598,12 @@ def damage(rng: np.random.Generator, path: Path, group: str) -> str:
             )
         )
         if kind == "no pointers":
-            arrays = [name for name in arrays if name.endswith("/p")]
+            # of triplets they are columns, and 0 is one
+            arrays = [
+                name
+                for name in arrays
+                if name.endswith("/p") and np.ravel(file[f"{group}/{name[:-2]}/nz"])[0] < 0
+            ]
             if not arrays:
                 kind = "never written"
                 arrays = [name for name in ("vectors/mu",) if name in file[group]]

@@ -37,6 +37,8 @@ spectral gradient, longer       : spectral_gradient   at_least=150 law=coulomb f
 gauss-seidel                    : sweep_on            law=coulomb
 # near a solution, once gradients or sweeps have smoothed what the interior point has left
 proximal point, near            : proximal_point      from=best below=1e-4             limit=200
+# errors in two units, of which one is met: another function has other steps (a rover on stones)
+newton, near                    : semismooth_newton   from=best below=1e-6 law=coulomb function=fischer_burmeister limit=30
 interior point, shorter steps   : interior_point      law=coulomb from=nothing         tau=10 step_cap=0.8 delta=1e-3 limit=100
 # a tight tolerance, where interior points end at rounding
 proximal point, last digits     : proximal_point      from=best below=1e-8             limit=200

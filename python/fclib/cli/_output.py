@@ -29,7 +29,6 @@ from rich.table import Table
 from rich.text import Text
 
 import fclib
-from fclib.bench import modules
 
 
 def plain(text: str) -> str:
@@ -145,6 +144,8 @@ def usage_error(error: Exception) -> NoReturn:
 def load_modules(paths: Sequence[Path] | None) -> None:
     """Import files with solvers of the user's own; a usage error if that fails."""
     try:
+        from fclib.bench import modules  # takes a while
+
         modules.load_modules([str(path.resolve()) for path in paths or ()])
     except fclib.SolverError as error:
         usage_error(error)

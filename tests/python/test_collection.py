@@ -238,8 +238,10 @@ def test_another_plan_in_the_same_folder_is_refused(built: Path) -> None:
 def test_count_keeps_problems_at_equal_distances(built: Path, tmp_path: Path) -> None:
     table = collections.build([plan(count=4)], tmp_path, pictures=False)
     assert table["number"].to_pylist() == [0, 4, 7, 11]
-    # a file's guess is from the step before, where that is kept too
-    columns = [name for name in table.column_names if not name.endswith("_sha256")]
+    # a file's guess is from the step before, and a copy is one of a problem, if that is kept too
+    columns = [
+        name for name in table.column_names if not name.endswith("_sha256") and name != "same_as"
+    ]
     whole = collections.read_catalog(built).select(columns).take([0, 4, 7, 11])
     assert table.select(columns).to_pylist() == whole.to_pylist()
 

@@ -64,6 +64,7 @@ def test_a_solution_of_a_copy_is_one_of_the_problem(name: str) -> None:
 
 def test_an_answer_known_by_heart_solves_no_copy(tmp_path: Path) -> None:
     planted = planted_local(3, nc=5)
+    assert isinstance(planted.problem, fclib.LocalProblem)
     fclib.write(tmp_path / "known.hdf5", planted.problem)
     known = {"Q": planted.problem.q, "R": planted.solution.r}
     source = KNOWS
@@ -87,7 +88,7 @@ def test_an_answer_known_by_heart_solves_no_copy(tmp_path: Path) -> None:
     assert [solved["knows", k] for k in range(3)] == [1, 0, 0]
     assert sorted({row["copy"] for row in rows}) == [0, 1, 2]
     # the median over the copies: what is known by heart is no solution of the instance
-    costs = comparison.gather(profiles.load([tmp_path / "runs.sqlite"]))
+    costs = comparison.gather(profiles.load(tmp_path / "runs.sqlite"))
     solved_by = dict(zip(costs.solvers, np.isfinite(costs.values).sum(axis=0), strict=True))
     assert solved_by == {"knows": 0, "nsgs": 1}
     # a copy is no repeat of the problem itself

@@ -22,7 +22,7 @@ import _results
 import numpy as np
 
 from fclib import bench
-from fclib.bench import campaign, comparison, profiles
+from fclib.bench import campaign, comparison, profiles, runner
 
 STORES = _results.ROOT / "build" / "campaigns"
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure
@@ -99,7 +99,8 @@ def write(name: str, store: Path) -> None:
     whole = comparison.compared(every)
     with bench.Store(store, create=False) as opened:
         (first, *_) = opened.status()
-        spent = opened.spent(list(opened.keys()))
+        runs = opened.table(more=("key",))
+    spent = runner.spent(runs, set(runs["key"].values))
     note = (
         f"{profiles.caption(whole, rows, WEIGH)}. {first.done} of the campaign's {first.planned}"
         f" runs, in {spent / 60:.0f} min of runs."

@@ -54,6 +54,7 @@ def fill(path: Path, problems: int, solvers: int) -> None:
             " VALUES (?, ?, ?, 1, 1e-6, 10, 20, 1000, 1, 0, ?, '', ?, ?, ?, 0, ?, ?, ?, ?)",
             (run(draw, p, s) for p in range(1, problems + 1) for s in range(1, solvers + 1)),
         )
+        store.seal()
 
 
 def digest(number: int) -> str:

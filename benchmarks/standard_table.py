@@ -135,8 +135,8 @@ def main() -> None:
     if arguments.results:
         _results.store("standard-solvers", solvers, title="The set standard", note=note)
         _results.store("standard-kinds", table, title="The set standard, by kind", note=note)
-    for rows in (solvers, table):
-        print(_results.table(list(rows[0]), rows))
+    for printed in (solvers, table):
+        print(_results.table(list(printed[0]), printed))
 
 
 if __name__ == "__main__":

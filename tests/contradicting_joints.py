@@ -161,7 +161,7 @@ def apart(rng: np.random.Generator) -> tuple[Any, Array]:
 def local(rng: np.random.Generator) -> tuple[Any, Array]:
     """The local form: equal columns of V and R."""
     law: dict[str, Any] = LAWS[rng.integers(len(LAWS))]
-    problem = planted_local(int(rng.integers(10**6)), p=2, **law).problem
+    problem: Any = planted_local(int(rng.integers(10**6)), p=2, **law).problem
     repeat = np.array([[1.0, 0, 1], [0, 1, 0]])
     s = np.append(problem.s, problem.s[0] + rng.choice([1e-3, 1.0]))
     V, R = dense(problem.V) @ repeat, repeat.T @ dense(problem.R) @ repeat
@@ -170,7 +170,7 @@ def local(rng: np.random.Generator) -> tuple[Any, Array]:
 
 def unheld(rng: np.random.Generator) -> tuple[Any, Array]:
     """The local form: a joint whose V and R are zero."""
-    problem = planted_local(int(rng.integers(10**6)), p=1, d=2).problem
+    problem: Any = planted_local(int(rng.integers(10**6)), p=1, d=2).problem
     V = np.hstack([dense(problem.V), np.zeros((problem.m, 1))])
     R = np.diag([float(dense(problem.R)[0, 0]), 0.0])
     return problem.replace(V=V, R=R, s=np.append(problem.s, 0.5)), np.array([0.0, 1])
@@ -178,7 +178,7 @@ def unheld(rng: np.random.Generator) -> tuple[Any, Array]:
 
 def low_rank(rng: np.random.Generator) -> tuple[Any, Array]:
     """The local form: an R of low rank, of numbers of few bits."""
-    problem = planted_local(int(rng.integers(10**6)), p=1, d=3).problem
+    problem: Any = planted_local(int(rng.integers(10**6)), p=1, d=3).problem
     turn = np.array([[1.0, 2.0, 1.0], [0.0, 1.0, 1.0]])  # (2 x 3)
     root = short(rng, 2, 2) + 2 * np.eye(2)
     R = turn.T @ (root @ root.T) @ turn

@@ -171,6 +171,7 @@ def test_a_contact_that_joints_hold_is_not_moved_by_rounding() -> None:
 def held_by_close_joints(seed: int, angle: float, closing: float) -> fclib.GlobalProblem:
     """A contact that joints hold which nearly follow from each other, beside one that moves."""
     problem = held_contact(seed)
+    assert problem.b is not None
     rng = np.random.default_rng(seed)
     G = dense(problem.G).copy()
     G[:, 1] = G[:, 0] + angle * rng.standard_normal(len(G))
@@ -247,13 +248,16 @@ def loop_in_single_precision(
     Each hinge has five rows; three of the twenty follow from the others. All numbers are rounded
     to `precision`, b is its rounding too; `off` [m/s] is a true contradiction.
     """
+
+    def rounded(x: npt.ArrayLike) -> npt.NDArray[Any]:
+        return np.asarray(x, dtype=precision)
+
     rng = np.random.default_rng(seed)
     to = rng.standard_normal(3)
     turn = rotated(to / np.linalg.norm(to), rng.uniform(0.3, 3.0))
     width, height = rng.uniform(0.3, 0.6, 2)
     corners = np.array([[0, 0, 0], [width, 0, 0], [width, 0, height], [0, 0, height]]) @ turn.T
     centres = (corners + np.roll(corners, 1, axis=0)) / 2  # of rod k, between hinges k - 1 and k
-    rounded = lambda x: np.asarray(x, dtype=precision)  # noqa: E731
     masses = rng.uniform(0.5, 2.0, 4)
     M = np.zeros((24, 24))
     for k, mass in enumerate(masses):
@@ -372,6 +376,8 @@ def test_a_recorded_loop_in_single_precision_is_solved() -> None:
     if not path.exists():
         pytest.skip("the recorded loop is not here")
     problem = fclib.read(path)
+    assert isinstance(problem, fclib.GlobalProblem)
+    assert problem.b is not None
     for solver in SOLVERS:
         result = fclib.solve(problem, solver=solver)
         assert result.converged

@@ -276,9 +276,10 @@ def slurm_of_one_node(folder: Path) -> Iterator[None]:
     options = [f"--{option}={folder}/munge.{end}" for option, end in names.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SLURM_CONF", str(folder / "slurm.conf"))
-        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
         daemons = [
-            subprocess.Popen([str(which(daemon)), *words], **quiet)
+            subprocess.Popen(
+                [str(which(daemon)), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
             for daemon, words in (
                 ("munged", ["--foreground", "--force", *options]),
                 ("slurmctld", ["-D", "-i"]),

@@ -64,6 +64,7 @@ def test_a_solution_of_a_copy_is_one_of_the_problem(name: str) -> None:
 
 def test_an_answer_known_by_heart_solves_no_copy(tmp_path: Path) -> None:
     planted = planted_local(3, nc=5)
+    assert isinstance(planted.problem, fclib.LocalProblem)
     fclib.write(tmp_path / "known.hdf5", planted.problem)
     known = {"Q": planted.problem.q, "R": planted.solution.r}
     source = KNOWS

@@ -792,7 +792,7 @@ def compiled(source: str, path: Path) -> str:
     compiler = os.environ.get("CC") or shutil.which("cc") or shutil.which("gcc")
     assert compiler
     library = path.with_suffix(".so")
-    command = [compiler, "-shared", "-fPIC", f"-I{include}", "-o", library, path, "-lm"]
+    command = [compiler, "-shared", "-fPIC", f"-I{include}", "-o", str(library), str(path), "-lm"]
     subprocess.run(command, check=True)
     return f"plugin:{library}"
 

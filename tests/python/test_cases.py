@@ -18,7 +18,7 @@ import scipy.sparse as sp
 import fclib
 from ball_judge import judge
 from fclib import analysis
-from helpers import last_resort
+from helpers import dense, last_resort
 
 FOLDER = Path(os.environ.get("FCLIB_DATA", Path(__file__).parents[3] / "shared" / "data" / "real"))
 CASES = sorted((FOLDER.parent / "cases").glob("*.hdf5"))
@@ -131,8 +131,10 @@ def test_contradicting_joints_leave_no_solution(path: Path) -> None:
 @cases("closed_chain_step20")
 def test_a_limit_that_loops_hold_gets_no_reaction(path: Path) -> None:
     problem = fclib.read(path)
+    assert isinstance(problem, fclib.GlobalProblem)
     local = problem.condense()
-    held = fclib.Solution(r=np.zeros(12), l=-np.linalg.solve(local.R.toarray(), local.s))
+    assert local.s is not None
+    held = fclib.Solution(r=np.zeros(12), l=-np.linalg.solve(dense(local.R), local.s))
     none = fclib.merit(problem, held)
     for solver in ("auto", "nsgs", "nsn-ac", "admm"):
         for guess in (None, fclib.Solution(r=np.full(12, 1e3), l=np.zeros(10))):
@@ -220,7 +222,7 @@ def test_missing_data_are_no_proof(path: Path) -> None:
 def test_a_packed_triangle_is_the_whole(path: Path) -> None:
     problem = fclib.read(path)
     assert isinstance(problem, fclib.LocalProblem)
-    W = problem.W.toarray()
+    W = dense(problem.W)
     np.testing.assert_array_equal(W, W.T)
     with h5py.File(path) as file:
         group = file["fclib_local/W"]

@@ -21,7 +21,7 @@ import fclib
 from ball_judge import judge
 from fclib import cli
 from fclib.cli._output import Rows
-from helpers import planted_global, planted_local
+from helpers import dense, planted_global, planted_local
 from helpers_cli import run
 
 SOLVE_KEYS = [
@@ -544,7 +544,7 @@ def test_a_long_text_of_a_table_is_folded() -> None:
 def permuted(problem: fclib.LocalProblem, order: list[int]) -> fclib.LocalProblem:
     """The same with the components of each contact in another order."""
     rows = np.arange(3 * problem.nc).reshape(-1, 3)[:, order].ravel()
-    W = np.asarray(problem.W.toarray())[np.ix_(rows, rows)]
+    W = dense(problem.W)[np.ix_(rows, rows)]
     return fclib.LocalProblem(W=W, q=np.array(problem.q)[rows], mu=problem.mu)
 
 

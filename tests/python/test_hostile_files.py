@@ -39,11 +39,9 @@ def problem(tmp_path: Path) -> Path:
 
 def store_of(path: Path, solver: SolverChoice, message: str = "", **facts: Any) -> Path:
     """A store of one run, by a solver of this name."""
-    known = ProblemFacts(
-        **{"hash": "h", "name": "p", "family": "f", "path": "", "kind": "local", "n": 0, "p": 0}
-        | {"formulation": "3DFC", "spacedim": 3, "nc": 1, "nnz": 9, "title": "t"}
-        | facts
-    )
+    given: dict[str, Any] = {"hash": "h", "name": "p", "family": "f", "path": "", "kind": "local"}
+    given |= {"formulation": "3DFC", "spacedim": 3, "nc": 1, "nnz": 9, "title": "t", "n": 0, "p": 0}
+    known = ProblemFacts(**given | facts)
     job = bench.Job(known, solver, 1e-4, Limits(1.0, 1.0, 100.0), 0, 1)
     record = Record("converged", message, cpu_s=0.1, iterations=3, merits={"error": 1e-5})
     record.machine = {"node": "here"}
@@ -403,7 +401,7 @@ def test_no_text_of_a_file_steers_the_terminal(tmp_path: Path) -> None:
         opened.seal()
     theirs = tmp_path / f"no{ESCAPE}.sqlite"
     theirs.write_bytes(b"nothing")
-    commands = [
+    commands: list[list[object]] = [
         *commands_on(store, tmp_path)[:5],
         ["info", odd],
         ["check", odd],

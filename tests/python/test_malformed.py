@@ -230,6 +230,14 @@ GLOBAL_NAMES = [
     *(f"vectors/{name}" for name in ("f", "w", "mu", "b")),
 ]
 
+# of a dataset
+LAYOUTS: dict[str, dict[str, Any]] = {
+    "in chunks": {"chunks": (4,)},
+    "packed": {"chunks": (4,), "compression": "gzip"},
+    "with a fill value": {"fillvalue": 0.5},
+    "without end": {"maxshape": (None,)},
+}
+
 # case: how to spoil the file, and what the message must name
 LOCAL: dict[str, tuple[Spoil, str]] = {
     # something is missing
@@ -386,12 +394,7 @@ LOCAL: dict[str, tuple[Spoil, str]] = {
             never_written(f"{ROOT}/vectors/q", **layout),
             f"{ROOT}/vectors/q: was declared and never written",
         )
-        for word, layout in {
-            "in chunks": {"chunks": (4,)},
-            "packed": {"chunks": (4,), "compression": "gzip"},
-            "with a fill value": {"fillvalue": 0.5},
-            "without end": {"maxshape": (None,)},
-        }.items()
+        for word, layout in LAYOUTS.items()
     },
     **{
         f"{name} half written{', packed' if layout else ''}": (
@@ -866,8 +869,11 @@ def test_no_link_into_another_file_is_followed(tmp_path: Path, name: str, soft: 
     theirs, path = tmp_path / "theirs.hdf5", tmp_path / "problem.hdf5"
     pairs, points = np.zeros((1, 2), np.int32), np.zeros((1, 3))
     contacts = fclib.Contacts(
-        **dict.fromkeys(("body", "shape"), pairs),
-        **dict.fromkeys(("point", "normal", "tangent"), points),
+        body=pairs,
+        shape=pairs,
+        point=points,
+        normal=points,
+        tangent=points,
         feature=np.zeros(1, np.int32),
         gap=np.zeros(1),
     )

@@ -14,6 +14,7 @@ import scipy.linalg
 import fclib
 from fclib import collections
 from fclib.scenes import Scene
+from helpers import dense
 from helpers_cli import run as command
 
 # MuJoCo has no release for the oldest Python that fclib takes
@@ -212,7 +213,8 @@ def test_reactions_at_rest_stay_whatever_the_solver_returns(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """One that begins from 0, and goes through the contacts in another order at each step."""
-    solve, seen = fclib.solve, []
+    solve = fclib.solve
+    seen: list[Any] = []
 
     def cold(problem: Any, *arguments: Any, **options: Any) -> Any:
         if not any(problem is one for one in seen):
@@ -220,7 +222,7 @@ def test_reactions_at_rest_stay_whatever_the_solver_returns(
             return solve(problem, "nsgs", 1e-8, shuffle="once", seed=len(seen))
         return solve(problem, *arguments, **options)
 
-    monkeypatch.setattr(module._solve, "solve", cold)
+    monkeypatch.setattr(fclib._solve, "solve", cold)
     known: Any = None
     for step in simulate(Scene(name="two", xml=boxes(2)), 8):
         r = np.reshape(step.result.solution.r, (-1, 3))
@@ -243,7 +245,7 @@ def test_reactions_nearest_to_others_move_nothing() -> None:
     assert np.abs(change).max() < 1e-10
     # no other one is nearer: what is left does not lie in the null space of H
     left = other - near
-    null = scipy.linalg.null_space(problem.H.toarray())
+    null = scipy.linalg.null_space(dense(problem.H))
     assert np.abs(null.T @ left).max() < 1e-9
 
 
@@ -336,7 +338,7 @@ def test_no_velocity_that_makes_no_sense_goes_on(
 
         return Wrong() if problem.nc else solve(problem, *arguments, **options)
 
-    monkeypatch.setattr(module._solve, "solve", wrong)
+    monkeypatch.setattr(fclib._solve, "solve", wrong)
     with pytest.raises(StoppedError, match="step 0: its velocity is out of range"):
         run(boxes(1), 3)
 
@@ -492,10 +494,12 @@ def test_a_number_that_the_compiler_replaces_is_said() -> None:
 
 def test_a_robot_floats_above_a_ground(robot: Path) -> None:
     fixed = next(simulate(Scene.from_file(robot), 1)).model
+    assert isinstance(fixed, MujocoModel)
     assert fixed.model.nv == 1
     assert "nothing can touch" not in fixed.untouchable  # the finger may touch the base
     steps = list(simulate(Scene.from_file(robot, floating=True, ground=0.25), 50))
     model = steps[0].model
+    assert isinstance(model, MujocoModel)
     assert model.model.nv == 7
     # the plane is where the lowest shape is, and its friction counts
     assert steps[0].problem.nc
@@ -521,6 +525,7 @@ def test_meshes_are_found_beside_a_robot_that_floats(tmp_path: Path) -> None:
     )
     path.write_text(text, encoding="utf-8")
     (step,) = simulate(Scene.from_file(path, floating=True, ground=0.5), 1)
+    assert isinstance(step.model, MujocoModel)
     assert step.model.model.nmesh == 1
     assert step.problem.nc
 

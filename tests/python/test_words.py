@@ -14,7 +14,7 @@ import scipy.sparse as sp
 import fclib
 import helpers_cli
 from fclib import analysis
-from helpers import planted_global, planted_local
+from helpers import dense, planted_global, planted_local
 
 
 def written(path: Path) -> Path:
@@ -176,8 +176,8 @@ def test_a_triangle_that_stands_for_both(
     pack(tmp_path / "packed.hdf5", name, storage, upper)
     again = getattr(fclib.read(tmp_path / "packed.hdf5"), name)
     np.testing.assert_array_equal(
-        again.toarray() if sp.issparse(again) else again,
-        symmetric.toarray() if sp.issparse(symmetric) else symmetric,
+        dense(again),
+        dense(symmetric),
     )
 
 
@@ -191,9 +191,9 @@ def test_the_attribute_may_be_of_any_type(tmp_path: Path) -> None:
         one, other = fclib.read(tmp_path / "packed.hdf5"), fclib.read(tmp_path / "whole.hdf5")
         assert isinstance(one, fclib.LocalProblem)
         assert isinstance(other, fclib.LocalProblem)
-        lower = np.tril(other.W.toarray() if sp.issparse(other.W) else other.W)
+        lower = np.tril(dense(other.W))
         expected = lower + np.tril(lower, -1).T
-        np.testing.assert_array_equal(one.W.toarray(), expected)
+        np.testing.assert_array_equal(dense(one.W), expected)
 
 
 def test_what_is_not_symmetric_is_told(tmp_path: Path) -> None:

@@ -156,7 +156,8 @@ def pair_forms(problems: Iterable[Mapping[str, Any]]) -> dict[str, str]:
         if found:
             facts = (one[name] for name in ("family", "nc", "p", "spacedim"))
             law = str(one["formulation"]).removeprefix("G")
-            places[(*path.parts[-3:-1], found[1], law, *facts)][found[2]].add(one["hash"])
+            place = (*path.parts[-3:-1], found[1], law, *facts)
+            places[place][found[2]].add(one["hash"])
     pairs = {}
     for own in places.values():
         if len(own["global"]) == len(own["local"]) == 1:

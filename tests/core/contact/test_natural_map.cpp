@@ -63,10 +63,12 @@ void expect_the_definition(const Cone& wide, testing::RandomData& random) {
     ContactVector<Cone::dim> r;
     draw(wide, k % 5, random, u, r);
     for (const double rho : {1.0, 1e-9, 1e9}) {
-      const Vec expected = by_definition(wide, Vec(u.template cast<Wide>()), Vec(r.template cast<Wide>()), Wide(rho));
+      const Vec expected = by_definition(wide, Vec(u.template cast<Wide>()),
+                                         Vec(r.template cast<Wide>()), Wide(rho));
       const ContactVector<Cone::dim> found = natural_map(cone, u, r, rho);
       const double size = r.norm() + rho * u.norm() + expected.template cast<double>().norm();
-      EXPECT_LE((found.template cast<Wide>() - expected).template cast<double>().norm(), 1e-14 * size)
+      EXPECT_LE((found.template cast<Wide>() - expected).template cast<double>().norm(),
+                1e-14 * size)
           << "kind " << k % 5 << " rho " << rho << " mu " << cone.coefficient(0);
     }
   }

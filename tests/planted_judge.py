@@ -47,6 +47,7 @@ Plant: TypeAlias = Callable[[int], tuple[Any, fclib.Solution, Array | None]]
 FALSE = ("infeasible", "diverged")  # words of `auto` that are false of a problem with a solution
 TOLERANCE = 1e-8
 DIGITS = 1e-12  # below it errors are not compared: four digits of the tolerance are left
+EXTENDED = 2.0**-63  # what the merit's extended precision leaves of large reactions beside q
 LEEWAY = 1.01  # an error is called larger than a tolerance, or than another error, beyond this
 ITERATIONS = 20_000  # of `auto`, which seldom needs them
 SWEEPS = 1_000  # of any other solver: most of what is solved at all is solved by then
@@ -397,14 +398,17 @@ def candidates(problem: Any, solution: fclib.Solution) -> Iterator[fclib.Solutio
 
 def misjudged(problem: Any, solution: fclib.Solution) -> str:
     """A false word of the merit, on the solution or on another one; '' without any."""
+    q = problem.q if hasattr(problem, "W") else problem.condense().q
+    size = float(np.linalg.norm(q)) or 1.0
     for one in candidates(problem, solution):
         said = fclib.merit(problem, one).error
+        digits = DIGITS + EXTENDED * float(np.linalg.norm(one.r)) / size
         least, most = (judge(problem, one, rounding=taken).error for taken in (True, False))
-        if least > LEEWAY * said + DIGITS:
+        if least > LEEWAY * said + digits:
             return f"false small ({said:.1e})"
         # if q is rounding, errors are relative to that of its terms, which is not exact
         comparable = not least > LEEWAY * float(most.upper())
-        if comparable and not said <= LEEWAY * float(most.upper()) + DIGITS:
+        if comparable and not said <= LEEWAY * float(most.upper()) + digits:
             return f"false large ({said:.1e})"
     return ""
 

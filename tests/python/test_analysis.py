@@ -864,3 +864,33 @@ def test_importing_fclib_loads_none_of_it() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("W", "q", "mu"),
+    [
+        ([[2.0, 1e-16], [-1e-16, -1e-16]], [-1e-16, 2.0], 1e40),
+        ([[0.0, 1e-16], [1.0, 1e8]], [-1e-8, -1.0], 1.0),
+    ],
+)
+def test_what_is_refuted_exactly_is_not_said_to_exist(W: Any, q: Any, mu: float) -> None:
+    """A solution within the tolerance, of a problem whose every state is refuted."""
+    found = analysis.analyze(fclib.LocalProblem(spacedim=2, W=W, q=q, mu=[mu]))
+    assert found.existence.verdict == analysis.UNDECIDED
+    assert "each state of the contacts is refuted" in found.existence.reason
+
+
+def test_joints_of_huge_units_end_in_no_traceback() -> None:
+    rng = np.random.default_rng(3)
+    for scale in (1e10, 1e100, 1e150):
+        B = rng.normal(size=(5, 4)) * np.array([1, 1, 1, scale])
+        problem = fclib.LocalProblem(
+            spacedim=2,
+            W=np.eye(2),
+            q=[-1.0, 0.1],
+            mu=[0.5],
+            V=rng.normal(size=(2, 4)),
+            R=B.T @ B,
+            s=rng.normal(size=4),
+        )
+        assert analysis.analyze(problem, time_limit=2).existence.verdict in analysis.VERDICTS

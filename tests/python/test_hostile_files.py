@@ -7,6 +7,7 @@ import os
 import resource
 import shutil
 import socket
+import sqlite3
 import subprocess
 import sys
 import threading
@@ -165,6 +166,30 @@ def test_what_solvers_say_of_themselves_may_be_edited(about: str, tmp_path: Path
         done = helpers_cli.run(*command)
         assert "Traceback" not in done.stderr
         assert done.returncode == 0, done.stderr
+
+
+FOREIGN = {
+    "trigger": "CREATE TRIGGER away AFTER INSERT ON runs BEGIN DELETE FROM runs; END",
+    "endless view": "DROP TABLE runs; CREATE VIEW runs AS WITH RECURSIVE n(id) AS (SELECT 1 UNION "
+    "ALL SELECT id + 1 FROM n) SELECT id FROM n",
+    "another view": "CREATE VIEW more AS SELECT * FROM runs",
+}
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_what_a_store_would_run_is_refused(kind: str, tmp_path: Path) -> None:
+    """A trigger deletes what a campaign has run, and a view may have no end."""
+    path = store_of(tmp_path / "runs.sqlite", SolverChoice("nsgs"))
+    with sqlite3.connect(path) as database:
+        database.executescript(FOREIGN[kind])
+    before = path.read_bytes()
+    with pytest.raises(bench.StoreError, match="which no store has"):
+        bench.Store(path)
+    for command in commands_on(path, tmp_path):
+        done = helpers_cli.run(*command)
+        assert done.returncode != 0
+        assert "Traceback" not in done.stderr
+    assert path.read_bytes() == before
 
 
 # ---- catalogues

@@ -679,7 +679,7 @@ def test_build_simulates_only_where_it_may(tmp_path: Path, monkeypatch: pytest.M
     assert not (tmp_path / "built").exists()
     done = invoke(*arguments, "--no-pictures")
     assert done.exit_code == 0, done.output
-    assert "No trajectory is stored of tiny/KaplasTower: simulated here" in done.output
+    assert "tiny/KaplasTower: no states of it are published" in done.output
     missing = invoke(*arguments, "--version", "3")
     assert missing.exit_code == 1
     assert "version 3 is not stored here" in missing.output

@@ -98,7 +98,12 @@ def _lower_bound(a: Array) -> float:
     diagonal = np.diag(a)
     if n == 1:
         return float(diagonal[0])
-    guess = float(np.linalg.eigvalsh(a)[0])
+    if not np.isfinite(a).all():
+        return -inf
+    try:
+        guess = float(np.linalg.eigvalsh(a)[0])
+    except np.linalg.LinAlgError:
+        return -inf
     gamma = (n + 2) * EPS  # of n + 1 terms
     size = n * EPS * float(abs(a).max())
     for target in (guess / 2, 2 * guess, 0.0, *(-size * 4.0**k for k in range(8))):

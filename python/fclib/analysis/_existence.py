@@ -336,6 +336,12 @@ def existence(
         assert states is not None
         reason = f"solved to an error of {error:.1e} relative to ||q||, but {states.reason}"
         return Existence(UNDECIDED, reason, None, solution, error)
+    if solution is not None and states is not None and not (states.solutions or states.missing):
+        reason = (
+            f"solved to an error of {error:.1e} relative to ||q||, but each state of the contacts "
+            "is refuted in exact arithmetic: a small change of the data decides"
+        )
+        return Existence(UNDECIDED, reason, None, solution, error)
     if solution is not None:
         reason = (
             f"solved to an error of {error:.1e} relative to ||q|| (tolerance {tol:.0e}), which is "

@@ -251,6 +251,8 @@ class Store:
 
     def _prepare(self) -> None:
         db = self.db
+        db.execute("PRAGMA trusted_schema = OFF")
+        self._refuse_foreign()
         version = db.execute("PRAGMA user_version").fetchone()[0]
         empty = not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone()
         if not empty and version not in (RELEASED, VERSION):
@@ -290,6 +292,16 @@ class Store:
         elif version == RELEASED:
             self._upgrade()
         self._check_tables()
+
+    def _refuse_foreign(self) -> None:
+        """StoreError if the file has what runs when it is read or written: triggers, other views."""
+        for kind, name in self.db.execute("SELECT type, name FROM sqlite_master"):
+            ours = kind in ("table", "index") or (kind, name) == ("view", "results")
+            if not ours:
+                raise StoreError(
+                    f"{self.path}: has the {kind} {_one_line(str(name))!r}, which no store has: somebody"
+                    " put it there. Do not use the file, and tell whom it is from"
+                )
 
     def _check_tables(self) -> None:
         """DamagedError where the file's tables are not those of this version."""

@@ -53,7 +53,8 @@ def build_plans(
     told = [plan.name for plan in plans if plan.trajectory is None and simulated(plan)]
     if told:
         err.print(
-            f"No trajectory is stored of {', '.join(told)}: simulated here, hence your own data",
+            f"{', '.join(told)}: no states of it are published. They come from this machine, so "
+            "these problems are data of your own.",
             highlight=False,
         )
     try:
@@ -99,8 +100,8 @@ def build_plans(
         brief = [plan for plan in plans if plan.references and not plan.analyze]
         if rows and brief:
             out.print(
-                "Left out of MATRIX_INFO and MATH_INFO, which --analyze has too: conditioning of H,"
-                " existence by conic programs and by the states of contacts; math_info says it."
+                "The files say what is cheap to find out of each problem. --analyze finds the rest: "
+                "the conditioning of H, and whether there is a solution if that is hard to tell."
             )
         out.print(f"The catalogue:  {folder / 'catalog.parquet'}")
     raise typer.Exit(int(report.failed))

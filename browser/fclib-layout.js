@@ -1,12 +1,16 @@
 // Where an HDF5 file keeps the numbers of a dataset. h5wasm does not tell, so this reads the header
-// of the dataset: after "HDF5 File Format Specification", IV.A (object headers) and III.A (B-trees).
+// of the dataset: after "HDF5 File Format Specification", III.A (B-trees), IV.A (object headers) and
+// VII (indices of chunks).
 
 const CONTIGUOUS = 1;
 const CHUNKED = 2;
 const LAYOUT = 8;
 const EXTERNAL = 7;
 const CONTINUED = 16;
-const SINGLE_CHUNK = 1;
+const SINGLE_CHUNK = 1; // this and the next are indices of chunks
+const FIXED_ARRAY = 3;
+const EXTENSIBLE_ARRAY = 4;
+const TREE_2 = 5;
 const most_blocks = 4096; // of one header; a damaged file may have a cycle of them
 
 /** Numbers of a file from a place on. Throws RangeError beyond its end. */
@@ -131,11 +135,53 @@ export class LayoutFile {
     const dimensions = cursor.number(1);
     const width = cursor.number(1);
     const index = cursor.skip(dimensions * width).number(1);
-    const room = { 1: filtered ? this.length_size + 4 : 0, 2: 0, 3: 1, 4: 5, 5: 6 }[index];
+    // what an index says of itself before its place
+    const room = {
+      [SINGLE_CHUNK]: filtered ? this.length_size + 4 : 0,
+      [FIXED_ARRAY]: 1,
+      [EXTENSIBLE_ARRAY]: 5,
+      [TREE_2]: 6,
+    }[index];
     if (room === undefined) return {};
     const place = cursor.skip(room).address();
     if (place === null) return { unwritten: true, bytes: 0, chunks: 0 };
-    return index === SINGLE_CHUNK ? { unwritten: false, chunks: 1 } : { unwritten: false };
+    const chunks = {
+      [SINGLE_CHUNK]: () => 1,
+      [FIXED_ARRAY]: () => this.#chunks_of_array(new Cursor(this, place)),
+      // the number of the last chunk that is there: of those before it some may be missing
+      [EXTENSIBLE_ARRAY]: () => new Cursor(this, place + 12 + 4 * this.length_size).length(),
+      [TREE_2]: () => new Cursor(this, place + 18 + this.address_size).length(),
+    }[index]();
+    return { unwritten: chunks === 0, chunks };
+  }
+
+  /** How many chunks a fixed array has a place for. */
+  #chunks_of_array(header) {
+    const entry = header.skip(6).number(1);
+    const page = 2 ** header.number(1);
+    const entries = header.length();
+    const block = header.address();
+    if (block === null) return 0;
+    const data = block + 6 + this.address_size;
+    if (entries <= page) return this.#places(data, entry, entries);
+    const pages = Math.ceil(entries / page);
+    const first = data + Math.ceil(pages / 8) + 4; // after the bits and a checksum
+    let sum = 0;
+    for (let k = 0; k < pages; ++k) {
+      const made = this.view.getUint8(data + (k >> 3)) & (128 >> (k & 7));
+      const size = Math.min(page, entries - k * page);
+      if (made) sum += this.#places(first + k * (page * entry + 4), entry, size);
+    }
+    return sum;
+  }
+
+  /** How many of these entries have an address. */
+  #places(from, entry, count) {
+    let sum = 0;
+    for (let k = 0; k < count; ++k) {
+      if (new Cursor(this, from + k * entry).address() !== null) sum += 1;
+    }
+    return sum;
   }
 
   /** The chunks below a node of a B-tree, and the bytes that they take. Each node counts once. */

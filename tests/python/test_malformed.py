@@ -727,7 +727,10 @@ def test_a_user_block_hides_nothing(
     corpus: Path, tmp_path: Path, block: int, layout: dict[str, Any], words: str
 ) -> None:
     path = tmp_path / "block.hdf5"
-    with h5py.File(corpus / "good.hdf5") as good, h5py.File(path, "w", userblock_size=block) as file:
+    with (
+        h5py.File(corpus / "good.hdf5") as good,
+        h5py.File(path, "w", userblock_size=block) as file,
+    ):
         good.copy(ROOT, file)
     assert fclib.digest(fclib.read(path)) == fclib.digest(fclib.read(corpus / "good.hdf5"))
     with h5py.File(path, "r+") as file:

@@ -63,6 +63,7 @@ function read_if_possible(left_out, otherwise, read) {
 class Group {
   constructor(library, file, group, path) {
     Object.assign(this, { library, file, group, path });
+    this.found = new Map(); // by name: HDF5 takes long to look a name up
   }
 
   child(name) {
@@ -71,14 +72,18 @@ class Group {
 
   /** What has a name, or null. A link that leads to nothing, or elsewhere, is refused. */
   get(name) {
+    if (!this.found.has(name)) this.found.set(name, this.#look_up(name));
+    return this.found.get(name);
+  }
+
+  #look_up(name) {
     const path = this.child(name);
-    let names;
     try {
-      names = this.group.keys();
+      this.names ??= this.group.keys();
     } catch {
       fail(path, "cannot be looked up by HDF5 (the file is damaged)");
     }
-    if (!names.includes(name)) return null;
+    if (!this.names.includes(name)) return null;
     const { Group: Groups, Dataset, Datatype, ExternalLink } = this.library;
     const { filename, obj_path } = this.group.get_external_link(path);
     if (filename !== undefined) {

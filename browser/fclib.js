@@ -389,17 +389,21 @@ export class Fclib {
   }
 
   /**
-   * What a file holds: { problem, solution, guesses, contacts, bodies }, null where there is none. The
-   * bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind` is of the problem
-   * where there are several.
+   * What a file holds: { problem, solution, guesses, contacts, bodies, left_out }, null where there is
+   * none. The bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind` is of
+   * the problem where there are several. `left_out` says what could not be read beside the problem.
    */
   async read(bytes, kind = "") {
     const content = bytes instanceof Uint8Array ? bytes : new Uint8Array(bytes);
     const { is_hdf5, read_hdf5 } = await import("./fclib-hdf5.js");
     const binary = content.subarray(0, 4096).some((byte) => byte === 0 || byte === 0x89);
     if (binary || is_hdf5(content)) return read_hdf5(this, content, kind);
-    const problem = this.read_siconos(new TextDecoder().decode(content), kind);
-    return { problem, solution: null, guesses: [], contacts: null, bodies: null };
+    const text = new TextDecoder().decode(content);
+    if (text.startsWith("version https://git-lfs.github.com/spec/")) {
+      throw new FclibError("file", "is a pointer of Git LFS, not the file itself: run 'git lfs pull'");
+    }
+    const problem = this.read_siconos(text, kind);
+    return { problem, solution: null, guesses: [], contacts: null, bodies: null, left_out: [] };
   }
 
   /** The problem in a text of Siconos; `kind` where its sizes should not decide. */

@@ -236,6 +236,8 @@ export interface Contents {
   guesses: Solution[];
   contacts: Table | null;
   bodies: Table | null;
+  /** A line for each thing that could not be read, and that the problem can do without. */
+  left_out: string[];
 }
 
 export interface FieldInfo {

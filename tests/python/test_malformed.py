@@ -716,6 +716,32 @@ def test_what_cannot_be_looked_up_is_not_missing(corpus: Path, tmp_path: Path) -
     assert path.read_bytes() == data
 
 
+@pytest.mark.parametrize("block", [0, 512, 4096])
+@pytest.mark.parametrize(
+    ("layout", "words"),
+    [
+        ({}, "was declared and never written"),
+        ({"chunks": (4,)}, "was declared and never written"),
+        ({"external": [("data", 0, 144)]}, "keeps its data in other places"),
+    ],
+    ids=["in one piece", "in chunks", "in another file"],
+)
+def test_a_user_block_hides_nothing(
+    corpus: Path, tmp_path: Path, block: int, layout: dict[str, Any], words: str
+) -> None:
+    path = tmp_path / "block.hdf5"
+    with (
+        h5py.File(corpus / "good.hdf5") as good,
+        h5py.File(path, "w", userblock_size=block) as file,
+    ):
+        good.copy(ROOT, file)
+    assert fclib.digest(fclib.read(path)) == fclib.digest(fclib.read(corpus / "good.hdf5"))
+    with h5py.File(path, "r+") as file:
+        never_written(f"{ROOT}/vectors/q", **layout)(file)
+    with pytest.raises(fclib.FileError, match=f"/{ROOT}/vectors/q: {words}"):
+        fclib.read(path)
+
+
 # ---- files that are not what they seem from their first byte on
 
 

@@ -27,10 +27,17 @@ double stored_bytes(hid_t dataset) {
   return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
 }
 
+/// Whether the data of a dataset are in one piece in its file. HDF5 adds the size of the user block,
+/// a multiple of 512 bytes or 0, to the place of the data, and to HADDR_UNDEF too.
+bool is_in_one_piece(hid_t dataset) {
+  constexpr haddr_t unit = 512;
+  return H5Dget_offset(dataset) % unit != HADDR_UNDEF % unit;
+}
+
 /// The properties of a dataset, none where its data are in one piece in its file: to find that out
 /// is cheap, to ask for properties is not. Throws where the data are in other files.
 Handle properties_of(hid_t dataset, const std::string& path) {
-  if (H5Dget_offset(dataset) != HADDR_UNDEF) return {-1, H5Pclose};
+  if (is_in_one_piece(dataset)) return {-1, H5Pclose};
   Handle properties(H5Dget_create_plist(dataset), H5Pclose);
   if (!properties.ok()) fail(path, "has no properties that HDF5 can read");
   if (H5Pget_layout(properties.id()) == H5D_VIRTUAL || H5Pget_external_count(properties.id()) > 0) {

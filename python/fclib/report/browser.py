@@ -14,7 +14,7 @@ BUILT = Path(__file__).parents[3] / "build" / "wasm" / "fclib"  # of a checkout
 PLACE = "assets/browser"  # in a site
 FILES = (
     *("fclib.js", "fclib-worker.js", "fclib-core.mjs", "fclib-core.wasm"),
-    *("fclib-hdf5.js", "hdf5_hl.js", "hdf5_util.js", "licences/h5wasm.txt"),
+    *("fclib-hdf5.js", "fclib-layout.js", "hdf5_hl.js", "hdf5_util.js", "licences/h5wasm.txt"),
 )
 # what the page about the site says of what came with the module
 READER = {

@@ -179,7 +179,7 @@ FOREIGN = {
 @pytest.mark.parametrize("kind", FOREIGN)
 def test_what_a_store_would_run_is_refused(kind: str, tmp_path: Path) -> None:
     """A trigger deletes what a campaign has run, and a view may have no end."""
-    path = store_of(tmp_path / "runs.sqlite", SolverChoice("nsgs"))
+    path = store_of(tmp_path / "runs.sqlite", SolverChoice("nsgs", {}))
     with sqlite3.connect(path) as database:
         database.executescript(FOREIGN[kind])
     before = path.read_bytes()

@@ -10,8 +10,8 @@
 
 namespace fclib {
 
-/// Of a group of components. By components, as all here: each expression of Eigen is a type that
-/// the compiler takes long to make.
+/// The projection of one group of components. It is written by components, like all code here: each
+/// expression of Eigen is a type that takes the compiler long.
 template <int size>
 double part_norm(const double* part) {
   double sum = 0;

@@ -1,5 +1,5 @@
 // What the semismooth Newton solvers share: their options, a run under a Monitor, and the entry of
-// all of them in the registry.
+// each of them in the registry.
 #pragma once
 
 #include <array>
@@ -42,8 +42,8 @@ struct NewtonOptions : NewtonRules {
   }
 };
 
-/// The entry of the solver with this function. An iteration is a step of Newton, or the sweeps in
-/// the place of one.
+/// The entry of the solver with this function. An iteration is a Newton step, or the sweeps that
+/// replace one.
 Solver newton_entry(std::string name, std::string title, std::string citation,
                     std::vector<int> rolling_dimensions, ContactFunctionKind function);
 

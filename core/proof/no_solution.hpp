@@ -43,7 +43,7 @@ struct NoSolution {
   Vector z;             ///< (p)
   double gain = 0;      ///< -(y . q_N + z . s) or -(y . w_N + z . b), positive
   double distance = 0;  ///< of -(W^T E y + V z) from K*, an upper bound
-  double bound = 0;  ///< no r with a norm below this is a solution; infinity: no r at all is
+  double bound = 0;     ///< no r with a norm below this is a solution; infinity: no r at all is
 
   [[nodiscard]] bool proven() const { return y.size() > 0; }
   /// There is no solution, whatever its norm.

@@ -63,7 +63,7 @@ Problem read_owner(const std::string& path) {
   return read_problem(path, std::visit([]<class P>(const P&) { return P::kind; }, outline));
 }
 
-/// Guesses with all that readers of libfclib 3.1 need.
+/// Guesses with all members that readers of libfclib 3.1 need.
 template <class P>
 std::vector<Solution> complete(const P& problem, const std::vector<Solution>& guesses) {
   std::vector<Solution> result;

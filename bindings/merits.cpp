@@ -14,7 +14,7 @@ using namespace nb::literals;
 
 namespace {
 
-/// `judge` of a problem and what is given for a solution, without Python's lock.
+/// `judge` of a problem and of what the caller gave as a solution, without Python's lock.
 template <class P, class Judge>
 auto judged(const P& problem, const nb::object& given, const Judge& judge) {
   const Solution solution = solution_from(given, "solution");

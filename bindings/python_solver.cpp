@@ -33,7 +33,7 @@ nb::object local_problem(const ReducedProblem& reduced) {
   return reduced.rolling() ? fill(LocalRollingProblem{}) : fill(LocalProblem{});
 }
 
-/// What a solver in Python talks to while it works: fclib::Monitor, and the error of its iterates.
+/// What a Python solver talks to while it works: fclib::Monitor, and the error of its iterates.
 class Watch {
  public:
   Watch(const ReducedProblem& problem, const Settings& settings)
@@ -43,7 +43,7 @@ class Watch {
   [[nodiscard]] const Settings& settings() const { return settings_; }
   [[nodiscard]] double time_left() const { return settings_.time_limit - monitor_.elapsed(); }
   [[nodiscard]] double scale() const { return problem().scale; }
-  /// The solve is over: what is left of it is no longer there.
+  /// The solve is over: its data is no longer there.
   void close() { problem_ = nullptr; }
 
   [[nodiscard]] Vector checked(nb::handle object) const {
@@ -79,7 +79,7 @@ class Watch {
     }
     throw Error(ErrorKind::option, "there is no status '" + name + "'", "status");
   }
-  /// Why the solver ended: what it says, or why it was told to stop, or content.
+  /// Why the solver ended: its own reason, the reason to stop that it was told, or converged.
   [[nodiscard]] Status status() const {
     return claim_ ? *claim_ : reason_.value_or(Status::converged);
   }

@@ -41,7 +41,7 @@ std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
   };
 }
 
-/// Another clock, for tests of what looks at it.
+/// Another clock, for tests of code that reads the clock.
 Clock make_clock(const nb::object& clock) {
   if (clock.is_none()) return {};
   return [&clock] {
@@ -70,8 +70,8 @@ void bind_proof(nb::module_& m) {
       "Result.certificate), or None.");
 }
 
-/// The result of visit(problem) for a problem of any formulation. One function for all of them:
-/// overloads, of which most do not fit, take longer.
+/// The result of visit(problem) for a problem of any formulation. It is one function for all of
+/// them: with overloads, most of which do not fit, a call takes longer.
 template <class Visitor>
 nb::object visit_problem(nb::handle object, const Visitor& visit) {
   nb::object result;
@@ -80,7 +80,7 @@ nb::object visit_problem(nb::handle object, const Visitor& visit) {
       result = nb::cast(visit(*nb::inst_ptr<P>(object)));
     }
   });
-  if (!result.is_valid()) throw nb::next_overload();  // nanobind says what fits
+  if (!result.is_valid()) throw nb::next_overload();  // nanobind lists what fits
   return result;
 }
 
@@ -134,8 +134,8 @@ nb::object history_of(const Result& result) {
   return nb::module_::import_("numpy").attr("array")(points, "dtype"_a = type);
 }
 
-/// Of a class that no user makes: pickling, and with it copies, by what `get` gives and `set`
-/// takes.
+/// For a class that users never construct: pickling, and copies with it. `get` gives the values and
+/// `set` takes them.
 template <class Class, class Get, class Set>
 void def_state(nb::class_<Class>& cls, Get get, Set set) {
   cls.def("__getstate__", get, nb::sig("def __getstate__(self) -> dict[str, object]"));
@@ -153,7 +153,7 @@ void take(Member& member, const nb::dict& values, const char* name) {
   member = nb::cast<Member>(values[name]);
 }
 
-/// Visits (name, member) of what an option is made of.
+/// Visits (name, member) of all parts of an option.
 template <class OptionOrConst, class Visitor>
   requires std::same_as<std::remove_const_t<OptionOrConst>, OptionInfo>
 void for_each_part(OptionOrConst& option, const Visitor& visit) {
@@ -254,7 +254,7 @@ void set_state(Result& result, const nb::dict& values) {
   }
 }
 
-/// But for the times, which no second run repeats.
+/// All but the times, which differ between runs.
 bool same(const Result& a, const Result& b) {
   const auto same_point = [](const HistoryPoint& one, const HistoryPoint& other) {
     return std::tie(one.iteration, one.error, one.stage) ==
@@ -270,7 +270,7 @@ bool same(const Result& a, const Result& b) {
          (!a.history || std::ranges::equal(*a.history, *b.history, same_point));
 }
 
-/// Equality by `same`, and a hash of the name that says which it is.
+/// Equality by `same`, and a hash of the name, which identifies it.
 template <class Class, class Same, class Name>
 void def_same(nb::class_<Class>& cls, Same same, Name name) {
   cls.def(

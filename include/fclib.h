@@ -33,7 +33,7 @@
  *
  * Files
  *
- *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
+ *   A write is atomic: a process that is killed leaves the old file or the new one. (If the
  *   system has no files without a name, it leaves NAME.PID-1 too.) A new file takes the place of
  *   the old one, with its owner, permissions and extended attributes. A file with several names,
  *   or one that cannot be replaced so, is rewritten in place. A process that is killed meanwhile

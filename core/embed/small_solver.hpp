@@ -2,9 +2,9 @@
 // next: nothing is allocated once it has seen the largest.
 //
 //   1  Gauss-Seidel sweeps with exact solutions of each contact, from the guess
-//   2  where sweeps to go cost more than a few factorisations: Newton on the map of Alart & Curnier
-//      with a proximal term, for redundant contacts leave W singular; each step is followed by a
-//      sweep, which brings it back to the cones
+//   2  if the sweeps to go cost more than a few factorisations: Newton on the map of Alart &
+//      Curnier with a proximal term, since redundant contacts leave W singular; each step is
+//      followed by a sweep, which brings it back to the cones
 //
 // It reports when it has failed. Its callers then use the solver `auto`.
 #pragma once

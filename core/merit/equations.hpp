@@ -40,7 +40,7 @@ struct OwnSizes {
   RealVector l;         ///< reactions that stop the joints, each joint alone (p)
   RealVector q;         ///< of the terms of u without reactions (m) [m/s]
   RealVector rounding;  ///< what double precision leaves of the terms that q is made of (m)
-                        ///< [m/s]; empty where q is given
+                        ///< [m/s]; empty if q is given
   RealVector scale;     ///< tr(W_aa) / d of each contact (nc)
   RealVector rho;       ///< of the scaled natural map, for each contact (nc) [1/W]
 };

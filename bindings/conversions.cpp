@@ -31,7 +31,7 @@ void bind_conversions(nb::module_& m) {
       method(
           "condense", [](const P& p) { return condense(p); },
           "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
-          "Raises UnsuitableError where M is singular or not positive definite.");
+          "Raises UnsuitableError if M is singular or not positive definite.");
       const std::string pair =
           "def consistent(self) -> tuple[" + class_name(P::kind) + ", str] | None";
       nb::cpp_function_def(
@@ -46,7 +46,7 @@ void bind_conversions(nb::module_& m) {
           "The problem that is solved and judged in place of this one, and why, in words: with "
           "joints that agree, where only the rounding of their source makes them contradict each "
           "other. None where nothing is changed.\n\n"
-          "Raises UnsuitableError where M is singular.");
+          "Raises UnsuitableError if M is singular.");
     } else {
       method(
           "eliminate", [](const P& p) { return eliminate(p); },

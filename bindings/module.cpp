@@ -36,7 +36,7 @@ NB_MODULE(_core, m) {
             {"nanobind", dotted(NB_VERSION_MAJOR, NB_VERSION_MINOR, NB_VERSION_PATCH)}};
       },
       "What the core was built with, by its name, and the version of HDF5 that is loaded.\n\n"
-      "hdf5_bundled is empty where HDF5 is a library of the system, metis where the core has "
+      "hdf5_bundled is empty if HDF5 is a library of the system, metis if the core has "
       "none.");
   bind_errors(m);
   bind_problems(m);

@@ -338,7 +338,7 @@ void bind_solvers(nb::module_& m) {
       .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
               "the spacedims of rolling problems")
       .def_ro("options", &Solver::options)
-      .def_ro("max_iterations", &Solver::max_iterations, "where the caller sets none")
+      .def_ro("max_iterations", &Solver::max_iterations, "the limit if the caller sets none")
       .def(
           "check_options",
           [](const Solver& s, const OptionValues& options) { s.check_options(options); },
@@ -369,7 +369,7 @@ void bind_solvers(nb::module_& m) {
   m.def(
       "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
       nb::rv_policy::reference,
-      "The solver of this name in the core. Raises OptionError where there is none.");
+      "The solver of this name in the core. Raises OptionError if there is none.");
   nb::class_<chain::MethodInfo>(m, "ChainMethod", "A method that a stage of a chain may name.")
       .def_ro("name", &chain::MethodInfo::name)
       .def_ro("doc", &chain::MethodInfo::doc)
@@ -403,8 +403,8 @@ void bind_solvers(nb::module_& m) {
                std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
       });
   nb::class_<Result> result(m, "Result",
-                            "What fclib.solve returns. Results are equal where all but their times "
-                            "are.");
+                            "What fclib.solve returns. Results are equal if everything but their "
+                            "times is.");
   def_state(
       result, [](const Result& self) { return state_of(self); },
       [](Result& self, const nb::dict& values) { set_state(self, values); });
@@ -419,14 +419,13 @@ void bind_solvers(nb::module_& m) {
           "infeasible")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
-      .def_ro(
-          "error", &Result::error,
-          "Merit.error of the solution on the problem as given (Merit.error_by where `solve` was "
-          "asked for a merit)")
+      .def_ro("error", &Result::error,
+              "Merit.error of the solution on the problem as given (Merit.error_by if `solve` was "
+              "asked for a merit)")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
-      .def_ro("message", &Result::message, "what a user should know, in words; mostly nothing")
+      .def_ro("message", &Result::message, "what a user should know, in words; mostly empty")
       .def_prop_ro(
           "certificate",
           [](nb::handle self) -> nb::object {
@@ -452,7 +451,7 @@ void bind_solvers(nb::module_& m) {
           },
           nb::for_getter(
               nb::sig("def certificate_z(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
-          "z (p) of the certificate, where the problem has bilateral constraints")
+          "z (p) of the certificate, if the problem has bilateral constraints")
       .def_prop_ro(
           "certificate_bound",
           [](const Result& r) -> std::optional<double> {
@@ -484,7 +483,7 @@ void bind_solvers(nb::module_& m) {
       nb::sig(
           ("def solution_from(given: " + solution_type + ", what: str = 'solution') -> Solution")
               .c_str()),
-      "What is taken where a solution or a guess is: a Solution, that of a Result, or "
+      "What a solution or a guess may be given as: a Solution, that of a Result, or "
       "reactions.\n\n"
       "Raises ProblemError, by the name of what it is, for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) { bind_proof<P>(m); });

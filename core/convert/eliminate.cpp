@@ -83,7 +83,7 @@ std::optional<Error> disagreement(const std::vector<Index>& dropped, const Vecto
   }
   if (worst < 0) return std::nullopt;
   return Error(ErrorKind::unsuitable,
-               "contradicts the others, from which it follows: where they hold it is off by " +
+               "contradicts the others, from which it follows: if they hold, it is off by " +
                    shortest(std::abs(gap[worst])) + ", " + shortest(most) + " of its terms",
                "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }

@@ -38,11 +38,11 @@ struct MatrixInfo {
         Field<S, std::string>{.name = "comment", .member = &S::comment, .doc = "anything"},
         Field<S, double>{.name = "conditioning",
                          .member = &S::conditioning,
-                         .doc = "condition number, 0 where it is not known"},
+                         .doc = "condition number, 0 if it is not known"},
         Field<S, double>{.name = "determinant",
                          .member = &S::determinant,
-                         .doc = "determinant, 0 where it is not known"},
-        Field<S, Index>{.name = "rank", .member = &S::rank, .doc = "rank, 0 where it is not known"},
+                         .doc = "determinant, 0 if it is not known"},
+        Field<S, Index>{.name = "rank", .member = &S::rank, .doc = "rank, 0 if it is not known"},
     };
   }
 

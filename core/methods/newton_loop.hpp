@@ -25,7 +25,7 @@ struct NewtonOptions : NewtonRules {
                "of W_aa. split_spectral: that of its normal and of its tangential part; the first "
                "alone if the function takes one rho. adaptive: such that a step moves rho u^ about "
                "as much as r."),
-        option("rho", &O::rho, "1/[W] where the rule is constant, else 1", {1e-12, 1e12},
+        option("rho", &O::rho, "1/[W] if the rule is constant, else 1", {1e-12, 1e12},
                "rho itself, or a factor on what the rule gives."),
         choice("line_search", &O::line_search, line_searches,
                "armijo and goldstein_price search on 1/2 ||F||^2. fischer_burmeister is armijo on "

@@ -29,7 +29,7 @@ class Elimination {
   /// The deadline is checked after each factorisation. If it has passed, nothing more is done:
   /// finished() is false, and plain() is empty then.
   explicit Elimination(const LocalProblem& problem, const Deadline* deadline = nullptr);
-  /// From condensation.local().
+  /// Eliminates from condensation.local().
   Elimination(const GlobalProblem& problem, const Condensation& condensation,
               const Deadline* deadline = nullptr);
 

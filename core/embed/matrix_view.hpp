@@ -8,7 +8,7 @@
 
 namespace fclib {
 
-/// As Matrix has it.
+/// A matrix with the members of Matrix.
 struct MatrixView {
   Storage storage = Storage::dense;
   Index rows = 0;

@@ -54,7 +54,7 @@ class Homotopy {
 
   Homotopy(const ReducedProblem& problem, CoupledSystem& system);
 
-  /// Of the last iterate.
+  /// The results for the last iterate.
   [[nodiscard]] double t() const { return std::exp(lambda_); }
   [[nodiscard]] int folds() const { return folds_; }
 

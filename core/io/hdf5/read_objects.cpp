@@ -27,8 +27,8 @@ double stored_bytes(hid_t dataset) {
   return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
 }
 
-/// The properties of a dataset, or none if its data are in one piece in its file: that is cheap to
-/// find out, and the properties take long. Throws if the data are in other files.
+/// The properties of a dataset, none where its data are in one piece in its file: to find that out
+/// is cheap, to ask for properties is not. Throws where the data are in other files.
 Handle properties_of(hid_t dataset, const std::string& path) {
   if (H5Dget_offset(dataset) != HADDR_UNDEF) return {-1, H5Pclose};
   Handle properties(H5Dget_create_plist(dataset), H5Pclose);

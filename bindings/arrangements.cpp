@@ -78,9 +78,9 @@ void bind_islands(nb::module_& m) {
   for_each_formulation([&]<class P>(std::type_identity<P> type) {
     const std::string name = class_name(P::kind);
     both(type, name,
-         "The problem of each island. Raises ProblemError where the sizes are not those of the "
+         "The problem of each island. Raises ProblemError if the sizes are not those of the "
          "islands, or an entry links two of them.",
-         "The problem that has these as its islands. Raises ProblemError where the sizes "
+         "The problem that has these as its islands. Raises ProblemError if the sizes "
          "disagree.");
     nb::cpp_function_def(
         [](const P& problem) {
@@ -95,7 +95,7 @@ void bind_islands(nb::module_& m) {
         nb::sig(("def merge(problems: collections.abc.Sequence[" + name + "]) -> " + name).c_str()),
         nb::call_guard<Unlocked>(),
         "Independent problems as one, one after the other.\n\n"
-        "Raises ProblemError where there is none, or where they are not of one spacedim.");
+        "Raises ProblemError if there is none, or if their spacedims differ.");
   });
   both(std::type_identity<Solution>{}, "Solution", "The solution of each island.",
        "The solution of the whole from those of its islands.");
@@ -133,7 +133,7 @@ void bind_order(nb::handle type, const std::string& name) {
       nb::sig(("def from_order(" + std::string(order_type) + ", **values: typing.Any) -> " + name)
                   .c_str()),
       "The problem whose data, as for the constructor, is in the order of another tool.\n\n"
-      "Raises ProblemError where the data is not valid, OptionError for another order.");
+      "Raises ProblemError if the data is not valid, OptionError for another order.");
   type.attr("from_order") = nb::module_::import_("builtins").attr("staticmethod")(function);
 }
 
@@ -150,7 +150,7 @@ void bind_methods(nb::class_<Solution>& solution) {
       nb::scope(type), nb::name("embed"), nb::is_method(), nb::call_guard<Unlocked>(),
       "The spatial problem of a planar one: (N, T) becomes (N, T, 0). The new components have "
       "masses of their own and stay at rest.\n\n"
-      "Raises UnsuitableError where the problem is not planar.");
+      "Raises UnsuitableError if the problem is not planar.");
   nb::cpp_function_def(
       [](const P& problem, double velocity, double impulse, double length) {
         validate(problem);
@@ -161,7 +161,7 @@ void bind_methods(nb::class_<Solution>& solution) {
       nb::sig(("def scaled(self, *, " + std::string(scaling_type) + ") -> " + name).c_str()),
       "The problem in other units: a velocity of 1 becomes `velocity`, an impulse of 1 `impulse`, "
       "and, for rolling friction, a length of 1 `length`.\n\n"
-      "Raises OptionError where a factor is not positive.");
+      "Raises OptionError if a factor is not positive.");
   const auto argument = [&](const char* method, const char* more) {
     return "def " + std::string(method) + "(self, problem: " + name + more + ") -> Solution";
   };

@@ -19,7 +19,7 @@ using Contiguous = nb::ndarray<const Number, nb::ndim<1>, nb::c_contig, nb::devi
   throw Error(ErrorKind::problem, message, what);
 }
 
-/// The object as a contiguous NumPy array of a type; a copy only where it is not one already.
+/// The object as a contiguous NumPy array of a type. It is copied only if it is not one already.
 nb::object as_array(nb::handle object, const char* type, const char* what) {
   const nb::module_ numpy = nb::module_::import_("numpy");
   try {
@@ -28,7 +28,7 @@ nb::object as_array(nb::handle object, const char* type, const char* what) {
     if (kind.find_first_of("biuf") == std::string::npos) {
       unfit(what, "is not an array of real numbers");
     }
-    // asarray takes what a masked array hides for its values
+    // asarray takes the hidden entries of a masked array as its values
     if (!array.is(object) && nb::hasattr(object, "mask") &&
         nb::cast<bool>(numpy.attr("ma").attr("is_masked")(object))) {
       unfit(what, "has masked entries");
@@ -145,7 +145,7 @@ Matrix matrix_from(nb::handle object, const char* what) {
     if (used < a.i.size()) a.i.resize(used);
     if (used < a.x.size()) a.x.resize(used);
   }
-  validate_places(a, what);  // SciPy itself follows them without looking
+  validate_places(a, what);  // SciPy itself does not check these indices
   return a;
 }
 

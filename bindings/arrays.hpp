@@ -1,7 +1,7 @@
 // Vectors and matrices between C++ and Python: NumPy arrays and SciPy sparse arrays.
 //
-// To Python nothing is copied: the arrays are read-only views that keep their owner alive. From
-// Python everything is copied once, so that a problem owns its data.
+// The arrays that Python gets are read-only views. They keep their owner alive, and no number is
+// copied. What comes from Python is copied once, so that a problem owns its data.
 #pragma once
 
 #include <nanobind/nanobind.h>
@@ -23,11 +23,12 @@ nb::object view(const Number* data, std::size_t size, nb::handle owner) {
 }
 
 nb::object to_python(const Vector& vector, nb::handle owner);
-/// csr_array, csc_array, coo_array, or a two-dimensional NumPy array when dense. Compressed
-/// matrices whose indices are not sorted and unique are copied: SciPy sorts such in place.
+/// csr_array, csc_array or coo_array; a dense matrix is a two-dimensional NumPy array. If the
+/// indices of a compressed matrix are not sorted and unique, it is copied: SciPy sorts its arrays
+/// in place.
 nb::object to_python(const Matrix& matrix, nb::handle owner);
 
-/// Throws Error (problem) that names `what` where the object is not what it should be.
+/// Throws Error (problem) that names `what` if the object is not what it should be.
 Vector vector_from(nb::handle object, const char* what);
 Matrix matrix_from(nb::handle object, const char* what);
 

@@ -31,7 +31,7 @@ void bind_conversions(nb::module_& m) {
       method(
           "condense", [](const P& p) { return condense(p); },
           "The local problem: W = H^T M^-1 H, q = H^T M^-1 f + w (and V, R, s from G, b).\n\n"
-          "Raises UnsuitableError where M is singular or not positive definite.");
+          "Raises UnsuitableError if M is singular or not positive definite.");
       const std::string pair =
           "def consistent(self) -> tuple[" + class_name(P::kind) + ", str] | None";
       nb::cpp_function_def(
@@ -44,16 +44,15 @@ void bind_conversions(nb::module_& m) {
           nb::scope(cls), nb::name("consistent"), nb::is_method(), nb::sig(pair.c_str()),
           nb::call_guard<Unlocked>(),
           "The problem that is solved and judged in place of this one, and why, in words: with "
-          "joints that agree, where only the rounding of their source makes them contradict each "
-          "other. None where nothing is changed.\n\n"
-          "Raises UnsuitableError where M is singular.");
+          "joints that agree, if only the rounding of their source makes them contradict each "
+          "other. None if nothing is changed.\n\n"
+          "Raises UnsuitableError if M is singular.");
     } else {
       method(
           "eliminate", [](const P& p) { return eliminate(p); },
           "The problem without bilateral constraints: W - V R^-1 V^T, q - V R^-1 s.\n\n"
           "Constraints that follow from others are left out.\n\n"
-          "Raises UnsuitableError where one contradicts the others, which the message names, or "
-          "where "
+          "Raises UnsuitableError if one contradicts the others (the message names it), or if "
           "R is singular though none follows from the others.");
     }
     const std::string signature = "def with_storage(self, storage: str) -> " + class_name(P::kind);

@@ -1,4 +1,4 @@
-// What simulators embed: batches of small problems, and what is kept between solves.
+// What simulators embed: batches of small problems, and workspaces kept between solves.
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
@@ -27,7 +27,7 @@ using Out = nb::ndarray<Number, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 }  // namespace
 
 void bind_embed(nb::module_& m) {
-  // fclib.solve_batch has made sure of the sizes
+  // fclib.solve_batch has checked the sizes
   m.def(
       "solve_batch",
       [](int spacedim, std::int64_t count, std::int32_t each,

@@ -87,7 +87,7 @@ void set(const Field<Struct, Member>& field, Struct& self, nb::handle value) {
   }
 }
 
-/// A value may be left out where the struct has a default for it.
+/// If the struct has a default for a value, the caller may leave it out.
 template <class Struct, class Member>
 bool may_be_left_out(const Field<Struct, Member>& field) {
   constexpr bool array = std::is_same_v<Member, Matrix> || std::is_same_v<Member, Vector>;
@@ -134,9 +134,10 @@ void set_matrix_info(Struct& self, nb::handle value) {
   }
 }
 
-/// Throws Error (problem) at what is wrong with the coefficients of friction that were given.
+/// Throws Error (problem) if the coefficients of friction that were given are wrong.
 ///
-/// Their number is that of contacts: a wrong one would be blamed on the matrices later.
+/// There is one coefficient for each contact. If their number is wrong, later checks would blame
+/// the matrices.
 template <class P>
 void check_friction(const P& problem, const nb::dict& values) {
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
@@ -203,7 +204,7 @@ void fill(Struct& self, const nb::dict& values, Fill what = Fill::all) {
       ++used;
       set_matrix_info(self, values["matrix_info"]);
     }
-    // what is known of other contacts goes
+    // with another number of contacts, the old geometry does not fit
     if (what == Fill::changes && self.size(Dim::nc) != before) self.geometry.reset();
     Geometry::for_each_table([&](std::string_view table, Geometry::Table Geometry::* member) {
       const std::string name(table);
@@ -326,7 +327,7 @@ inline bool equal(const Vector& a, const Vector& b) {
   return a.size() == b.size() && (a.array() == b.array()).all();
 }
 
-/// Whether all members are equal. Matrices are so where they are stored alike.
+/// Whether all members are equal. Two matrices are equal only if they are stored alike.
 template <class Struct>
 bool equal(const Struct& a, const Struct& b) {
   bool same = true;
@@ -375,7 +376,7 @@ void def_equality(nb::class_<Struct>& cls) {
   });
 }
 
-/// What notebooks show: fclib._display knows how.
+/// What notebooks show. fclib._display makes it.
 template <class Class>
 void def_html(Class& cls) {
   cls.def(
@@ -384,7 +385,7 @@ void def_html(Class& cls) {
       nb::sig("def _repr_html_(self) -> str"));
 }
 
-/// Structs of plain values: equal where their members are, and printed as they are made.
+/// Structs of plain values: they are equal if their members are. They are printed as they are made.
 template <class Struct>
 void def_value(nb::class_<Struct>& cls) {
   cls.def(

@@ -63,7 +63,7 @@ Problem read_owner(const std::string& path) {
   return read_problem(path, std::visit([]<class P>(const P&) { return P::kind; }, outline));
 }
 
-/// Guesses with all that readers of libfclib 3.1 need.
+/// Guesses with all members that readers of libfclib 3.1 need.
 template <class P>
 std::vector<Solution> complete(const P& problem, const std::vector<Solution>& guesses) {
   std::vector<Solution> result;
@@ -90,13 +90,13 @@ void bind_hdf5(nb::module_& m) {
       },
       "path"_a, "kind"_a = nb::none(),
       nb::sig(signature("read", ", kind: str | None = None", problem_union()).c_str()),
-      "The problem in an FCLIB file, validated. `kind` (\"local\", \"global\") chooses where the "
+      "The problem in an FCLIB file, validated. `kind` (\"local\", \"global\") chooses if the "
       "file holds several.\n\nRaises FileError, or ProblemError, naming file and dataset.");
   m.def(
       "read_solution", [](const fs::path& path) { return read_solution(path.string()); }, "path"_a,
       nb::sig(signature("read_solution", "", "Solution | None").c_str()),
       nb::call_guard<Unlocked>(),
-      "The stored solution of a file, or None. It is that of the global problem where the file "
+      "The stored solution of a file, or None. It is that of the global problem if the file "
       "holds several. Raises FileError.");
   m.def(
       "read_guesses", [](const fs::path& path) { return read_guesses(path.string()); }, "path"_a,
@@ -107,7 +107,7 @@ void bind_hdf5(nb::module_& m) {
       "read_solutions", [](const fs::path& path) { return read_solutions(path.string()); },
       "path"_a, nb::sig(signature("read_solutions", "", "list[Solution]").c_str()),
       nb::call_guard<Unlocked>(),
-      "All known solutions of the problem of a file, where it has several and they are stored. "
+      "All known solutions of the problem of a file, if several are stored. "
       "Raises FileError.");
   m.def(
       "write_solutions",
@@ -135,7 +135,7 @@ void bind_hdf5(nb::module_& m) {
       "Puts all known solutions of a problem into its file, atomically.\n\n"
       "They replace those that write_solutions put there before; an empty list removes these. "
       "Merit.error of each is stored as /solutions/error. write_solution does not change them.\n\n"
-      "Raises FileError, or ProblemError where the sizes disagree.");
+      "Raises FileError, or ProblemError if the sizes disagree.");
   m.def(
       "kinds", [](const fs::path& path) { return read_contents(path.string()).kinds; }, "path"_a,
       nb::sig(signature("kinds", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
@@ -151,12 +151,12 @@ void bind_hdf5(nb::module_& m) {
       },
       "path"_a, nb::sig(signature("contents", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
       "What a file holds: the kinds of its problems, \"solution\", \"guesses\", and \"solutions\"\n"
-      "where several are known. Raises FileError.");
+      "if several are known. Raises FileError.");
   m.def(
       "left_out", [](const fs::path& path) { return read_left_out(path.string()); }, "path"_a,
       nb::sig(signature("left_out", "", "list[str]").c_str()), nb::call_guard<Unlocked>(),
-      "What a file has beside its problems that cannot be read, such as a title of another type,\n"
-      "and why. read() leaves it out. Raises FileError or ProblemError where a problem cannot be\n"
+      "What a file has besides its problems that cannot be read, such as a title of another type,\n"
+      "and why. read() leaves it out. Raises FileError or ProblemError if a problem cannot be\n"
       "read.");
   m.def(
       "write_solution",
@@ -173,8 +173,8 @@ void bind_hdf5(nb::module_& m) {
                         ", solution: " + solution_type + ", *, " + compression_type, "None")
                   .c_str()),
       "Puts a solution into a file that has its problem, in place of the one it had, atomically. "
-      "It is that of the global problem where the file holds several.\n\n"
-      "Raises FileError, ProblemError where the sizes disagree, or OptionError for a compression "
+      "It is that of the global problem if the file holds several.\n\n"
+      "Raises FileError, ProblemError if the sizes disagree, or OptionError for a compression "
       "outside 0..9.");
   m.def(
       "read_attributes",
@@ -224,7 +224,7 @@ void bind_hdf5(nb::module_& m) {
                   .c_str()),
       "Puts guesses into a file that has their problem, atomically. mode says whether they "
       "replace those in the file (\"replace\") or follow them (\"add\").\n\n"
-      "Raises FileError, ProblemError where the sizes disagree, or OptionError for an unknown mode "
+      "Raises FileError, ProblemError if the sizes disagree, or OptionError for an unknown mode "
       "or a compression outside 0..9.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     m.def(
@@ -270,7 +270,7 @@ void bind_hdf5(nb::module_& m) {
         "every reader can read; with dense=True those of a local problem keep their storage. With "
         "sync=False the file is not flushed to the disk: call sync_files after the last of many "
         "files.\n\n"
-        "Raises FileError, ProblemError where the data is not valid, or OptionError for an unknown "
+        "Raises FileError, ProblemError if the data is not valid, or OptionError for an unknown "
         "mode or a compression outside 0..9.");
   });
 }
@@ -287,8 +287,8 @@ void bind_siconos(nb::module_& m) {
         "replaced whole. Every number reads back equal. Matrices keep their storage, except those "
         "stored by rows: W is then written in blocks, and other matrices by columns. The format "
         "has no place for bilateral constraints, solutions and info.\n\n"
-        "Raises UnsuitableError where there are bilateral constraints, FileError, or ProblemError "
-        "where the data is not valid.");
+        "Raises UnsuitableError if there are bilateral constraints, FileError, or ProblemError "
+        "if the data is not valid.");
   });
   m.def(
       "read_siconos",
@@ -303,7 +303,7 @@ void bind_siconos(nb::module_& m) {
       nb::sig(signature("read_siconos", ", kind: str | None = None", problem_union()).c_str()),
       "The problem in a text file of Siconos (\".dat\"), validated. What it holds is told from its "
       "sizes, or by `kind` (\"local\", \"global\", \"local_rolling\", \"global_rolling\").\n\n"
-      "Raises FileError, naming file and line, ProblemError, or OptionError where there is no such "
+      "Raises FileError, naming file and line, ProblemError, or OptionError if there is no such "
       "kind.");
 }
 

@@ -1,4 +1,4 @@
-// What the built-in solvers are made of, a digest of each; cmake/fingerprints.py.
+// A digest of the source of each built-in solver; cmake/fingerprints.py makes it.
 #pragma once
 
 #include <map>

@@ -14,7 +14,7 @@ using namespace nb::literals;
 
 namespace {
 
-/// `judge` of a problem and what is given for a solution, without Python's lock.
+/// `judge` of a problem and of what the caller gave as a solution, without Python's lock.
 template <class P, class Judge>
 auto judged(const P& problem, const nb::object& given, const Judge& judge) {
   const Solution solution = solution_from(given, "solution");
@@ -47,7 +47,7 @@ void bind_merits(nb::module_& m) {
         return merit.error_by(kind == "both" ? MeritKind::both : MeritKind::natural);
       },
       "merit"_a,
-      "error, where merit is 'both'; where it is 'natural' the same without scaled_natural.\n\n"
+      "error if merit is 'both'. If it is 'natural', the error without scaled_natural.\n\n"
       "Raises OptionError for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     const auto signature = [](const std::string& name, const std::string& result) {
@@ -61,7 +61,7 @@ void bind_merits(nb::module_& m) {
         },
         "problem"_a, "solution"_a, nb::sig(signature("merit_1", "float").c_str()),
         "What libfclib calls MERIT_1, for comparisons with it.\n\n"
-        "Raises ProblemError where problem or solution are not valid.");
+        "Raises ProblemError if the problem or the solution is not valid.");
     m.def(
         "contact_merits",
         [](const P& problem, const nb::object& given) {
@@ -106,8 +106,9 @@ void bind_merits(nb::module_& m) {
         "about "
         "the worst component of it: part, index, stored, difference and error. The difference is "
         "that of the stored value and the computed one (for l: the velocity that is left at the "
-        "joint). The error is what of it is not rounding, over the velocity of the component.\n\n"
-        "Raises ProblemError where problem or solution are not valid.");
+        "joint). The error is the part of it that is not rounding, over the velocity of the "
+        "component.\n\n"
+        "Raises ProblemError if the problem or the solution is not valid.");
     m.def(
         "merit",
         [](const P& problem, const nb::object& given) {
@@ -116,7 +117,7 @@ void bind_merits(nb::module_& m) {
         "problem"_a, "solution"_a, nb::sig(signature("merit", "Merit").c_str()),
         "The merit of a solution, which may be a Result, or the reactions alone. A missing v is "
         "computed, a missing u is not judged.\n\n"
-        "Raises ProblemError where problem or solution are not valid.");
+        "Raises ProblemError if the problem or the solution is not valid.");
   });
 }
 

@@ -1,6 +1,6 @@
 // The Python module fclib._core: problems, files, solvers and merits.
 //
-// Loops over the formulations, their fields and the solvers' registry; names none of them.
+// It loops over the formulations, their fields and the solvers' registry, and names none of them.
 #include "module.hpp"
 
 #include <nanobind/stl/map.h>
@@ -18,7 +18,7 @@ NB_MODULE(_core, m) {
   using namespace fclib::bindings;
   m.doc() = "The core of fclib, in C++.";
   nb::set_leak_warnings(
-      false);  // module-level references at exit are the interpreter's own business
+      false);  // the interpreter itself handles references that a module holds at exit
   m.attr("version") = version;
   m.def(
       "build_info",
@@ -36,7 +36,7 @@ NB_MODULE(_core, m) {
             {"nanobind", dotted(NB_VERSION_MAJOR, NB_VERSION_MINOR, NB_VERSION_PATCH)}};
       },
       "What the core was built with, by its name, and the version of HDF5 that is loaded.\n\n"
-      "hdf5_bundled is empty where HDF5 is a library of the system, metis where the core has "
+      "hdf5_bundled is empty if HDF5 is a library of the system, metis if the core has "
       "none.");
   bind_errors(m);
   bind_problems(m);

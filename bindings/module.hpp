@@ -18,14 +18,15 @@ std::string class_name(std::string_view kind);
 /// "GlobalProblem | LocalProblem"
 std::string problem_union();
 
-/// What is taken where a solution or a guess is: a Solution, a Result, or the reactions alone.
+/// What a caller may give as a solution or as a guess: a Solution, a Result, or the reactions
+/// alone.
 Solution solution_from(nb::handle object, const char* what);
 const std::string solution_type = "Solution | Result | numpy.typing.ArrayLike";
 
-/// Lets Ctrl-C through: true, or it throws.
+/// Lets Ctrl-C through: it returns true or throws.
 bool poll_signals();
 
-// in this order: signatures name the classes that are bound before
+// in this order, because a signature names classes that must be bound before it
 
 /// Error and what derives from it.
 void bind_errors(nb::module_& m);
@@ -37,8 +38,8 @@ void bind_conversions(nb::module_& m);
 void bind_arrangements(nb::module_& m);
 /// The registry, solve and what it returns.
 void bind_solvers(nb::module_& m);
-/// Monitor and python_solver: solvers written in Python, which the driver runs like those of the
-/// core. A part of bind_solvers().
+/// Monitor and python_solver, for solvers written in Python. The driver runs them like those of the
+/// core. This is a part of bind_solvers().
 void bind_python_solvers(nb::module_& m);
 /// Batches of small problems.
 void bind_embed(nb::module_& m);

@@ -57,8 +57,8 @@ void bind_problem(nb::module_& m) {
     cls.def_prop_ro(
         own.c_str(), [own, member](nb::handle self) { return geometry_of<P>(self, own, member); },
         nb::sig(type.c_str()),
-        own == "contacts" ? "where each contact is, and between what; None where it is not known"
-                          : "the bodies, their shapes and where they are; None where not known");
+        own == "contacts" ? "where each contact is, and between what; None if it is not known"
+                          : "the bodies, their shapes and where they are; None if not known");
   });
   const auto def_size = [&](const char* dim_name, Dim dim, const char* doc) {
     cls.def_prop_ro(dim_name, [dim](const P& p) { return p.size(dim); }, doc);

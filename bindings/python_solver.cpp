@@ -33,7 +33,7 @@ nb::object local_problem(const ReducedProblem& reduced) {
   return reduced.rolling() ? fill(LocalRollingProblem{}) : fill(LocalProblem{});
 }
 
-/// What a solver in Python talks to while it works: fclib::Monitor, and the error of its iterates.
+/// What a Python solver talks to while it works: fclib::Monitor, and the error of its iterates.
 class Watch {
  public:
   Watch(const ReducedProblem& problem, const Settings& settings)
@@ -43,7 +43,7 @@ class Watch {
   [[nodiscard]] const Settings& settings() const { return settings_; }
   [[nodiscard]] double time_left() const { return settings_.time_limit - monitor_.elapsed(); }
   [[nodiscard]] double scale() const { return problem().scale; }
-  /// The solve is over: what is left of it is no longer there.
+  /// The solve is over: its data is no longer there.
   void close() { problem_ = nullptr; }
 
   [[nodiscard]] Vector checked(nb::handle object) const {
@@ -79,7 +79,7 @@ class Watch {
     }
     throw Error(ErrorKind::option, "there is no status '" + name + "'", "status");
   }
-  /// Why the solver ended: what it says, or why it was told to stop, or content.
+  /// Why the solver ended: its own reason, the reason to stop that it was told, or converged.
   [[nodiscard]] Status status() const {
     return claim_ ? *claim_ : reason_.value_or(Status::converged);
   }
@@ -153,19 +153,19 @@ void bind_python_solvers(nb::module_& m) {
            nb::sig("def stop(self, r: numpy.typing.ArrayLike, iteration: int | None = None) -> "
                    "bool"),
            "Reports an iterate, and says whether to stop: at the tolerance, at a limit, or because "
-           "the caller asks for it. Iterations count from 0, the starting point, one a call, where "
+           "the caller asks for it. Iterations count from 0, the starting point, one a call, if "
            "no number is given.")
       .def("error", &Watch::error, "r"_a,
            nb::sig("def error(self, r: numpy.typing.ArrayLike) -> float"),
-           "The error that the tolerance bounds: ||r - P_K(r - u^)|| / scale; inf where r is not "
+           "The error that the tolerance bounds: ||r - P_K(r - u^)|| / scale; inf if r is not "
            "finite.")
       .def_prop_ro("tolerance", [](const Watch& w) { return w.settings().tolerance; })
       .def_prop_ro("max_iterations", [](const Watch& w) { return w.settings().max_iterations; })
-      .def_prop_ro("time_left", &Watch::time_left, "[s] wall clock, inf where there is no limit")
+      .def_prop_ro("time_left", &Watch::time_left, "[s] wall clock, inf if there is no limit")
       .def_prop_ro("scale", &Watch::scale, "what errors are relative to: ||q|| of the problem")
       .def_rw("iterations", &Watch::iterations, "that the result will state")
       .def_rw("cpu_s", &Watch::cpu_s, nb::arg().none(),
-              "[s] to be set where the time is not that of the calling thread")
+              "[s] to be set if the time is not that of the calling thread")
       .def_prop_rw(
           "status", [](const Watch& w) { return std::string(name_of(w.status())); },
           [](Watch& w, const std::string& name) { w.set_status(name); },

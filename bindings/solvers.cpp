@@ -41,7 +41,7 @@ std::function<bool(const Progress&)> make_callback(const nb::object& callback) {
   };
 }
 
-/// Another clock, for tests of what looks at it.
+/// Another clock, for tests of code that reads the clock.
 Clock make_clock(const nb::object& clock) {
   if (clock.is_none()) return {};
   return [&clock] {
@@ -70,8 +70,8 @@ void bind_proof(nb::module_& m) {
       "Result.certificate), or None.");
 }
 
-/// The result of visit(problem) for a problem of any formulation. One function for all of them:
-/// overloads, of which most do not fit, take longer.
+/// The result of visit(problem) for a problem of any formulation. It is one function for all of
+/// them: with overloads, most of which do not fit, a call takes longer.
 template <class Visitor>
 nb::object visit_problem(nb::handle object, const Visitor& visit) {
   nb::object result;
@@ -80,7 +80,7 @@ nb::object visit_problem(nb::handle object, const Visitor& visit) {
       result = nb::cast(visit(*nb::inst_ptr<P>(object)));
     }
   });
-  if (!result.is_valid()) throw nb::next_overload();  // nanobind says what fits
+  if (!result.is_valid()) throw nb::next_overload();  // nanobind lists what fits
   return result;
 }
 
@@ -134,8 +134,8 @@ nb::object history_of(const Result& result) {
   return nb::module_::import_("numpy").attr("array")(points, "dtype"_a = type);
 }
 
-/// Of a class that no user makes: pickling, and with it copies, by what `get` gives and `set`
-/// takes.
+/// For a class that users never construct: pickling, and copies with it. `get` gives the values and
+/// `set` takes them.
 template <class Class, class Get, class Set>
 void def_state(nb::class_<Class>& cls, Get get, Set set) {
   cls.def("__getstate__", get, nb::sig("def __getstate__(self) -> dict[str, object]"));
@@ -153,7 +153,7 @@ void take(Member& member, const nb::dict& values, const char* name) {
   member = nb::cast<Member>(values[name]);
 }
 
-/// Visits (name, member) of what an option is made of.
+/// Visits (name, member) of all parts of an option.
 template <class OptionOrConst, class Visitor>
   requires std::same_as<std::remove_const_t<OptionOrConst>, OptionInfo>
 void for_each_part(OptionOrConst& option, const Visitor& visit) {
@@ -254,7 +254,7 @@ void set_state(Result& result, const nb::dict& values) {
   }
 }
 
-/// But for the times, which no second run repeats.
+/// All but the times, which differ between runs.
 bool same(const Result& a, const Result& b) {
   const auto same_point = [](const HistoryPoint& one, const HistoryPoint& other) {
     return std::tie(one.iteration, one.error, one.stage) ==
@@ -270,7 +270,7 @@ bool same(const Result& a, const Result& b) {
          (!a.history || std::ranges::equal(*a.history, *b.history, same_point));
 }
 
-/// Equality by `same`, and a hash of the name that says which it is.
+/// Equality by `same`, and a hash of the name, which identifies it.
 template <class Class, class Same, class Name>
 void def_same(nb::class_<Class>& cls, Same same, Name name) {
   cls.def(
@@ -338,7 +338,7 @@ void bind_solvers(nb::module_& m) {
       .def_ro("rolling_dimensions", &Solver::rolling_dimensions,
               "the spacedims of rolling problems")
       .def_ro("options", &Solver::options)
-      .def_ro("max_iterations", &Solver::max_iterations, "where the caller sets none")
+      .def_ro("max_iterations", &Solver::max_iterations, "the limit if the caller sets none")
       .def(
           "check_options",
           [](const Solver& s, const OptionValues& options) { s.check_options(options); },
@@ -369,7 +369,7 @@ void bind_solvers(nb::module_& m) {
   m.def(
       "find_solver", [](const std::string& name) { return &find_solver(name); }, "name"_a,
       nb::rv_policy::reference,
-      "The solver of this name in the core. Raises OptionError where there is none.");
+      "The solver of this name in the core. Raises OptionError if there is none.");
   nb::class_<chain::MethodInfo>(m, "ChainMethod", "A method that a stage of a chain may name.")
       .def_ro("name", &chain::MethodInfo::name)
       .def_ro("doc", &chain::MethodInfo::doc)
@@ -403,8 +403,8 @@ void bind_solvers(nb::module_& m) {
                std::to_string(s.calls) + ", " + std::to_string(s.iterations) + " iterations>";
       });
   nb::class_<Result> result(m, "Result",
-                            "What fclib.solve returns. Results are equal where all but their times "
-                            "are.");
+                            "What fclib.solve returns. Results are equal if everything but their "
+                            "times is.");
   def_state(
       result, [](const Result& self) { return state_of(self); },
       [](Result& self, const nb::dict& values) { set_state(self, values); });
@@ -419,14 +419,13 @@ void bind_solvers(nb::module_& m) {
           "infeasible")
       .def_prop_ro("converged", &Result::converged, "whether the error is at most the tolerance")
       .def_ro("iterations", &Result::iterations)
-      .def_ro(
-          "error", &Result::error,
-          "Merit.error of the solution on the problem as given (Merit.error_by where `solve` was "
-          "asked for a merit)")
+      .def_ro("error", &Result::error,
+              "Merit.error of the solution on the problem as given (Merit.error_by if `solve` was "
+              "asked for a merit)")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
-      .def_ro("message", &Result::message, "what a user should know, in words; mostly nothing")
+      .def_ro("message", &Result::message, "what a user should know, in words; mostly empty")
       .def_prop_ro(
           "certificate",
           [](nb::handle self) -> nb::object {
@@ -452,7 +451,7 @@ void bind_solvers(nb::module_& m) {
           },
           nb::for_getter(
               nb::sig("def certificate_z(self, /) -> numpy.typing.NDArray[numpy.float64] | None")),
-          "z (p) of the certificate, where the problem has bilateral constraints")
+          "z (p) of the certificate, if the problem has bilateral constraints")
       .def_prop_ro(
           "certificate_bound",
           [](const Result& r) -> std::optional<double> {
@@ -484,7 +483,7 @@ void bind_solvers(nb::module_& m) {
       nb::sig(
           ("def solution_from(given: " + solution_type + ", what: str = 'solution') -> Solution")
               .c_str()),
-      "What is taken where a solution or a guess is: a Solution, that of a Result, or "
+      "What a solution or a guess may be given as: a Solution, that of a Result, or "
       "reactions.\n\n"
       "Raises ProblemError, by the name of what it is, for anything else.");
   for_each_formulation([&]<class P>(std::type_identity<P>) { bind_proof<P>(m); });

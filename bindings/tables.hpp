@@ -17,7 +17,7 @@ inline std::string geometry_class(std::string_view table) {
   return table == "contacts" ? "Contacts" : "Bodies";
 }
 
-/// The table as an object, None where there is nothing in it. The object keeps the problem alive.
+/// The table as an object, or None if it is empty. The object keeps the problem alive.
 template <class P>
 nb::object geometry_of(nb::handle self, std::string_view name, Geometry::Table Geometry::* member) {
   const auto& problem = nb::cast<const P&>(self);

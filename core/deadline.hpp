@@ -1,4 +1,4 @@
-// When a solve has to end: made before the conversions, looked at before each factorisation.
+// When a solve has to end: set before the conversions, checked before each factorisation.
 #pragma once
 
 #include <chrono>
@@ -8,7 +8,7 @@
 
 namespace fclib {
 
-/// Of the time since some moment [s]; the steady clock where it is empty.
+/// The time since some moment [s]. If it is empty, the steady clock is used.
 using Clock = std::function<double()>;
 
 inline double now(const Clock& clock) {

@@ -16,13 +16,13 @@ enum class ErrorKind {
 
 /// The one exception that the core throws.
 ///
-/// `where` names the place inside the file or the problem ("/fclib_local/vectors/mu[3]"), `file`
-/// the path, empty where there is none; what() joins them: "file: where: message".
+/// `where` names the place inside the file or the problem ("/fclib_local/vectors/mu[3]"). `file` is
+/// the path; it is empty if there is none. what() joins them: "file: where: message".
 class Error : public std::runtime_error {
  public:
   Error(ErrorKind kind, std::string message, std::string where = {}, std::string file = {});
 
-  /// The same error, seen from the file it was found in.
+  /// The same error with the file in which it was found.
   [[nodiscard]] Error in_file(const std::string& path) const;
 
   ErrorKind kind;

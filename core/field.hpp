@@ -31,7 +31,7 @@ constexpr std::string_view name_of(Dim dim) {
   return "?";
 }
 
-/// Whether a member must be there. `mixed` members come all together or not at all: they are what
+/// Whether a member must be there. `mixed` members are all there or all absent: they are what
 /// bilateral constraints add to a problem.
 enum class Presence { required, optional, mixed };
 

@@ -8,7 +8,7 @@ namespace fclib {
 /// The coefficients of all contacts.
 struct Friction {
   Eigen::VectorXd mu;    ///< sliding (nc)
-  Eigen::VectorXd mu_r;  ///< rolling (nc), empty where contacts do not resist it
+  Eigen::VectorXd mu_r;  ///< rolling (nc), empty if contacts do not resist rolling
 };
 
 }  // namespace fclib

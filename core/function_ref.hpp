@@ -1,5 +1,5 @@
-// A reference to something that can be called, for callbacks of methods that live in .cpp files:
-// one pointer and one indirect call, no allocation. It must not outlive what it refers to.
+// A reference to something that can be called, for callbacks of methods in .cpp files: one pointer
+// and one indirect call, no allocation. It must not outlive what it refers to.
 #pragma once
 
 #include <memory>

@@ -1,7 +1,7 @@
 // Where the contacts of a problem lie and what touches there: two tables, /contacts and /bodies.
 //
-// The core carries them with a problem, and knows nothing of their columns: docs/format.md has
-// these, python/fclib/_geometry.py makes and checks them. No solver sees them.
+// The core carries the tables with a problem, and knows none of their columns. docs/format.md lists
+// the columns; python/fclib/_geometry.py makes and checks them. No solver sees them.
 #pragma once
 
 #include <cstdint>
@@ -29,7 +29,7 @@ struct Geometry {
   }
 };
 
-/// Shared by the copies of a problem; null where nothing is known.
+/// Shared by the copies of a problem. Null if nothing is known.
 using GeometryPointer = std::shared_ptr<const Geometry>;
 
 }  // namespace fclib

@@ -26,7 +26,7 @@ namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Where the number ends that starts at `first`; `first` where none does.
+/// The end of the number that starts at `first`; `first` if no number starts there.
 const char* end_of_number(const char* first, const char* last) {
   const auto digits = [&](const char* at) {
     while (at != last && is_digit(*at)) ++at;
@@ -50,7 +50,7 @@ const char* end_of_number(const char* first, const char* last) {
   return end;
 }
 
-/// The C locale of the calling thread for as long as this lives: strtod and printf follow it.
+/// The C locale for the calling thread, as long as this lives: strtod and printf use it.
 class PlainLocale {
  public:
   PlainLocale() {
@@ -80,7 +80,7 @@ std::string shortest_by_trial(double value) {
     if (digits == std::numeric_limits<double>::max_digits10 || std::strtod(text, nullptr) == value)
       break;
   }
-  // of the two ways to write it the shorter one, and without an exponent where they are equal
+  // the shorter of the two ways to write it; if they are equal, the one without an exponent
   const std::string scientific = text;
   const int exponent = std::atoi(scientific.c_str() + scientific.find('e') + 1);
   if (exponent < -6 || exponent > 25) return scientific;
@@ -115,7 +115,7 @@ std::string shortest(double value) {
 std::from_chars_result read_number(const char* first, const char* last, double& value) {
   const std::from_chars_result result = std::from_chars(first, last, value);
   if (result.ec != std::errc::result_out_of_range) return result;
-  // rounded, as by any reader, to what a double holds next to it
+  // any reader rounds it to the double next to it
   const std::string_view text(first, result.ptr);
   long double wide = 0;
   if (std::from_chars(first, result.ptr, wide).ec == std::errc()) {

@@ -1,6 +1,7 @@
-// Numbers as text, the same on every machine and in every locale; and what files say, for messages.
+// Numbers as text, the same on every machine and in every locale, and quoted text for messages.
 //
-// What std::to_chars and std::from_chars do, for doubles too where the standard library lacks that.
+// They do what std::to_chars and std::from_chars do, also if the standard library lacks that for
+// doubles.
 #pragma once
 
 #include <charconv>
@@ -10,17 +11,17 @@
 
 namespace fclib {
 
-/// A number with as few digits as tell it from all others.
+/// A number with the fewest digits that distinguish it from all other doubles.
 std::string shortest(double value);
 
-/// Reads a number at `first`, as std::from_chars does. One that is too small or too large for a
-/// double is `result_out_of_range`, and `value` the double next to it.
+/// Reads a number at `first`, like std::from_chars. If it is too small or too large for a double,
+/// the result is `result_out_of_range`, and `value` is the double next to it.
 std::from_chars_result read_number(const char* first, const char* last, double& value);
 
-/// What stands in a file, between quotes, shortened and without what a terminal should not get.
+/// A text from a file, in quotes, shortened, and without characters that a terminal should not get.
 std::string quoted(std::string_view text);
 
-// what they do without the library's, for tests
+// how they work without the library's functions, for tests
 namespace detail {
 std::string shortest_by_trial(double value);
 std::from_chars_result read_by_strtod(const char* first, const char* last, double& value);

@@ -8,8 +8,8 @@
 
 namespace fclib {
 
-/// What `Error::where` will say: views of texts that outlive it, put together only where there is
-/// an error, for most data is right.
+/// What `Error::where` will say. It holds views of texts that outlive it. They are joined only if
+/// there is an error, since most data is right.
 class Place {
  public:
   template <std::convertible_to<std::string_view>... Text>
@@ -24,7 +24,7 @@ class Place {
     return place;
   }
 
-  operator std::string() const {  // NOLINT(google-explicit-constructor): where an error wants it
+  operator std::string() const {  // NOLINT(google-explicit-constructor): as an error takes it
     std::string text;
     for (const std::string_view part : parts_) text += part;
     if (!member_.empty()) text.append("/").append(member_);

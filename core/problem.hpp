@@ -1,4 +1,4 @@
-// What holds for every formulation: the union of them, their names and their validation.
+// What all formulations share: the union of them, their names and their validation.
 #pragma once
 
 #include <concepts>
@@ -25,7 +25,7 @@ struct Pointers<std::variant<P...>> {
 };
 }  // namespace detail
 
-/// A problem of any formulation that somebody else owns.
+/// A problem of any formulation. Somebody else owns it.
 using ProblemPointer = detail::Pointers<Problem>::type;
 
 /// Calls visit(std::type_identity<P>) for each formulation P.
@@ -42,7 +42,7 @@ std::string group_name() {
   return "fclib_" + std::string(P::kind);
 }
 
-/// Where a field is found inside its group: matrices are groups, vectors share "vectors".
+/// The path of a field inside its group: matrices are groups, vectors share "vectors".
 template <class Struct>
 std::string field_path(const Field<Struct, Matrix>& field) {
   return std::string(field.name);
@@ -61,17 +61,17 @@ template <class P>
 Place place_of(std::string_view member) {
   return {"/fclib_", P::kind, "/", member};
 }
-/// ... and that of a field, as field_path() has it.
+/// ... and the place of a field, with the path of field_path().
 template <class P, class Member>
 Place place_of(const Field<P, Member>& field) {
   return {"/fclib_", P::kind, std::same_as<Member, Vector> ? "/vectors/" : "/", field.name};
 }
 
-/// The HDF5 group of a guess, the first of which is number 1.
+/// The HDF5 group of a guess. The first guess is number 1.
 inline std::string guess_path(std::size_t number) { return "/guesses/" + std::to_string(number); }
 
-/// How many contacts the matrices say that there are. Throws Error (problem) where the sizes do not
-/// divide.
+/// The number of contacts, from the sizes of the matrices. Throws Error (problem) if they are not a
+/// multiple of d.
 template <class P>
 Index contact_count(const P& problem) {
   if (problem.spacedim < 1) {
@@ -95,7 +95,7 @@ Index contact_count(const P& problem) {
   return count.value_or(0);
 }
 
-/// Makes mu as long as there are contacts, zero; mu gives all other vectors their size.
+/// Makes mu as long as there are contacts, and zero. All other vectors get their size from mu.
 template <class P>
 void count_contacts(P& problem) {
   problem.mu = Vector::Zero(contact_count(problem));
@@ -107,7 +107,7 @@ bool is_mixed(const P& problem) {
   return problem.size(Dim::p) > 0;
 }
 
-/// "3DFC", "M3DFC", "G2DFC", "GR3DFC", ...: the formulation, as in RT-0444; R is for rolling.
+/// "3DFC", "M3DFC", "G2DFC", "GR3DFC", ...: the formulation, as in RT-0444. R stands for rolling.
 template <class P>
 std::string formulation(const P& problem) {
   const Index space = P::rolling ? (problem.spacedim + 1) / 2 : problem.spacedim;
@@ -123,20 +123,20 @@ Friction friction_of(const P& problem) {
 }
 
 namespace detail {
-/// Throws Error (problem) where two sizes differ.
+/// Throws Error (problem) if two sizes differ.
 void require_size(Index actual, Index expected, Dim dim, const Place& where, const char* what);
-/// Throws Error (problem) where a vector is not as long as expected, or a value not in the range.
+/// Throws Error (problem) if a vector has another length than expected, or a value out of range.
 void validate_vector(const Vector& values, Index expected, Dim dim, Range range,
                      const Place& where);
 }  // namespace detail
 
-/// Throws Error (problem) at the first thing wrong with the data: a size that disagrees, an index
-/// out of range, a value that is not finite, a negative coefficient of friction.
+/// Throws Error (problem) at the first fault in the data: a size that disagrees, an index out of
+/// range, a value that is not finite, a negative coefficient of friction.
 template <class P>
 void validate(const P& problem);
 
-/// Throws Error (problem) where the members of a solution do not fit the problem. Members that may
-/// be absent (v and u, which follow from r) are accepted empty. `where` is its group in a file.
+/// Throws Error (problem) if the members of a solution do not fit the problem. Members that may be
+/// absent (v and u, which follow from r) may be empty. `where` is its group in a file.
 template <class P>
 void validate(const Solution& solution, const P& problem, const Place& where = "/solution");
 

@@ -1,17 +1,17 @@
 /* fclib.h: frictional contact problems in HDF5 files, their merits and their solvers, from C.
  *
- * A drop-in for libfclib 3.1: every struct, field, constant and function of that library is here
- * with its layout and its meaning, and the shared library has its SONAME, libfclib.so.0. What is
- * new since is marked so.
+ * A drop-in for libfclib 3.1. It has every struct, field, constant and function of that library,
+ * with the same layout and meaning. The shared library has the same SONAME, libfclib.so.0. What is
+ * newer is marked as new.
  *
  * Problems
  *
  *   local     u = W r + V l + q,           V^T r + R l + s = 0
  *   global    M v = H r + G l + f,         u = H^T v + w,         G^T v + b = 0
  *
- *   n degrees of freedom, nc contacts, d = spacedim, m = d nc, p bilateral constraints; terms with
- *   V, R, s or G, b, l are there where p > 0. For each contact, component 0 normal (N) and the
- *   others tangential (T), with u^ = u + [mu ||u_T||, 0, 0],
+ *   n degrees of freedom, nc contacts, d = spacedim, m = d nc, p bilateral constraints. The terms
+ *   with V, R, s or G, b, l are there if p > 0. For each contact, component 0 is normal (N) and the
+ *   others are tangential (T), with u^ = u + [mu ||u_T||, 0, 0],
  *
  *       K* contains u^,   u^ . r = 0,   r in K = { ||r_T|| <= mu r_N }.
  *
@@ -21,19 +21,19 @@
  * Errors
  *
  *   No function ends the process or throws. An int result is 1 on success and 0 on failure. On
- *   failure a pointer is NULL, and a merit is NaN. fclib_last_error() then has the reason. The
- *   handler of fclib_set_error_handler() has been called with it. The first handler prints a line
- *   on the standard error. A NULL argument is an error, except for what is marked "or NULL".
+ *   failure a pointer is NULL, and a merit is NaN. fclib_last_error() then has the reason, and the
+ *   handler of fclib_set_error_handler() has been called with it. The default handler prints a line
+ *   on the standard error. A NULL argument is an error, unless it is marked "or NULL".
  *
  * Ownership
  *
- *   What a read returns is the caller's. Its parts come from malloc. fclib_delete_local() and its
- *   like free the members; the caller then calls free() on the struct. fclib_delete_solutions()
+ *   What a read returns belongs to the caller. Its parts come from malloc. fclib_delete_local() and
+ *   its like free the members; the caller then calls free() on the struct. fclib_delete_solutions()
  *   frees the members and the array. What a write takes stays the caller's, and is not changed.
  *
  * Files
  *
- *   A write is atomic: a process that is killed leaves the old file or the new one. (Where the
+ *   A write is atomic: a process that is killed leaves the old file or the new one. (If the
  *   system has no files without a name, it leaves NAME.PID-1 too.) A new file takes the place of
  *   the old one, with its owner, permissions and extended attributes. A file with several names,
  *   or one that cannot be replaced so, is rewritten in place. A process that is killed meanwhile
@@ -47,15 +47,15 @@
  * Threads
  *
  *   All functions may be called from several threads at once. Access to files is serialised, since
- *   HDF5 is not thread-safe; a host that calls HDF5 itself must not do so at the same time.
+ *   HDF5 is not thread-safe. A host that calls HDF5 itself must not do so at the same time.
  *
- * The header-only mode that the sources of 3.1 had, FCLIB_HEADER_ONLY, is not offered: the library
- * is C++ behind this header, and its packages never used that mode.
+ * The header-only mode of the sources of 3.1, FCLIB_HEADER_ONLY, is not offered. The library behind
+ * this header is C++, and the packages of 3.1 never used that mode.
  */
 #ifndef _fclib_h_
 #define _fclib_h_
 
-/* the macros of 3.1, which clients may set or test */
+/* macros of 3.1, which clients may set or test */
 #ifndef FCLIB_APICOMPILE
 #define FCLIB_APICOMPILE
 #endif
@@ -72,7 +72,7 @@
 #define H5Gopen_vers 2
 #endif
 
-/* this interface: that of 3.1 is 3.1 */
+/* the version of this interface; for 3.1 it is 3.1 */
 #define FCLIB_VERSION_MAJOR 3
 #define FCLIB_VERSION_MINOR 2
 #define FCLIB_VERSION_PATCH 0
@@ -92,7 +92,7 @@ struct FCLIB_APICOMPILE fclib_info {
   char* math_info;   /**< known properties: existence, uniqueness, ... */
 };
 
-/** What is known of a matrix and cannot be read off its entries. */
+/** What is known of a matrix and cannot be seen from its entries. */
 struct FCLIB_APICOMPILE fclib_matrix_info {
   char* comment; /**< or NULL */
   double conditioning;
@@ -108,10 +108,10 @@ struct FCLIB_APICOMPILE fclib_matrix_info {
  *  -2    compressed rows     first entry of each (m + 1)  columns (nzmax)  (nzmax)
  *  -3    dense (new)         NULL                         NULL             (m n), by columns
  *
- *  Up to -2 this is the cs struct of CSparse, to which it may be cast. Triplets are as CSparse has
- *  them, and as all known files are; a comment in the header of 3.1 says the reverse. The entries
- *  of triplets at one place add up. 3.1 does not know dense matrices, so that reads hand them out
- *  by columns, without their zeros, unless fclib_keep_dense() says otherwise.
+ *  Up to -2 this is the cs struct of CSparse, and may be cast to it. Triplets are as in CSparse,
+ *  and as in all known files; a comment in the header of 3.1 says the reverse. Triplets at the same
+ *  place add up. 3.1 does not know dense matrices, so reads return them by columns, without their
+ *  zeros, unless fclib_keep_dense() says otherwise.
  */
 struct FCLIB_APICOMPILE fclib_matrix {
   int nzmax; /**< how many entries fit; after a read, the length of x */
@@ -124,7 +124,7 @@ struct FCLIB_APICOMPILE fclib_matrix {
   struct fclib_matrix_info* info; /**< or NULL */
 };
 
-/** The global problem. M, H, f, w, mu are required; G and b come together or are NULL. */
+/** The global problem. M, H, f, w, mu are required. G and b are both there or both NULL. */
 struct FCLIB_APICOMPILE fclib_global {
   struct fclib_matrix* M; /**< mass matrix, symmetric positive definite (n x n) [kg] */
   struct fclib_matrix* H; /**< reactions to generalised forces (n x m) [1] */
@@ -137,7 +137,7 @@ struct FCLIB_APICOMPILE fclib_global {
   struct fclib_info* info;
 };
 
-/** The local problem. W, q, mu are required; V, R and s come together or are NULL. */
+/** The local problem. W, q, mu are required. V, R and s are all there or all NULL. */
 struct FCLIB_APICOMPILE fclib_local {
   struct fclib_matrix* W; /**< Delassus matrix, positive semi-definite (m x m) [1/kg] */
   struct fclib_matrix* V; /**< contact velocity under the bilateral multipliers (m x p) [1/kg] */
@@ -181,31 +181,31 @@ struct FCLIB_APICOMPILE fclib_solution {
   double* v; /**< generalised velocity (n), NULL for a local problem [m/s] */
   double* u; /**< relative velocity at the contacts (m) [m/s] */
   double* r; /**< reaction at the contacts (m), an impulse [N s] */
-  double* l; /**< multiplier of the bilateral constraints (p), NULL where p = 0 [N s] */
+  double* l; /**< multiplier of the bilateral constraints (p), NULL if p = 0 [N s] */
 };
 
 /* ---- files ----------------------------------------------------------------------------------- */
 
-/** Writes a problem into a new file, or adds it to an existing one, which must not hold one of its
- *  kind unless fclib_set_write_mode() allows that. Values and indices are not checked: see
- *  fclib_validate_global(). Matrices keep their storage; Siconos reads a global problem only where
- *  it is in triplets. Returns 1, or 0. */
+/** Writes a problem into a new file, or adds it to an existing one. The file must not hold a
+ *  problem of the same kind, unless fclib_set_write_mode() allows that. Values and indices are not
+ *  checked: see fclib_validate_global(). Matrices keep their storage; Siconos reads a global
+ *  problem only if it is in triplets. Returns 1, or 0. */
 int fclib_write_global(struct fclib_global* problem, const char* path);
 int fclib_write_local(struct fclib_local* problem, const char* path);
 int fclib_write_global_rolling(struct fclib_global_rolling* problem, const char* path); /* new */
 int fclib_write_local_rolling(struct fclib_local_rolling* problem, const char* path);   /* new */
 
 /** Adds the solution of the problem that is in the file. Its arrays must have the lengths of that
- *  problem. Each may be NULL. If u or v is NULL, it follows from r (and l, where p > 0) by the
+ *  problem. Each may be NULL. If u or v is NULL, it follows from r (and l, if p > 0) by the
  *  problem. If r is NULL too, or the problem is not valid, u and v are zeros. If r or l is NULL, it
  *  is zeros. Returns 1, or 0. */
 int fclib_write_solution(struct fclib_solution* solution, const char* path);
 
-/** Adds guesses for the problem that is in the file (number_of_guesses structs), whose arrays may
- *  be NULL as those of a solution. Returns 1, or 0. */
+/** Adds guesses for the problem that is in the file (number_of_guesses structs). Their arrays may
+ *  be NULL, as for a solution. Returns 1, or 0. */
 int fclib_write_guesses(int number_of_guesses, struct fclib_solution* guesses, const char* path);
 
-/** Reads a problem. Every array has the length that the structs above state; values and indices are
+/** Reads a problem. Every array has the length that the structs above state. Values and indices are
  *  not checked. Returns NULL on failure. */
 struct fclib_global* fclib_read_global(const char* path);
 struct fclib_local* fclib_read_local(const char* path);
@@ -213,25 +213,27 @@ struct fclib_global_rolling* fclib_read_global_rolling(const char* path); /* new
 struct fclib_local_rolling* fclib_read_local_rolling(const char* path);   /* new */
 
 /** Reads the solution. Its arrays have the lengths of the problem in the file. If the file lacks u
- *  or v, it follows from r. Returns NULL on failure, and where there is none. Free it with
- * fclib_delete_solutions(solution, 1). */
+ *  or v, it follows from r. Returns NULL on failure, or if there is no solution. Free it with
+ *  fclib_delete_solutions(solution, 1). */
 struct fclib_solution* fclib_read_solution(const char* path);
 
-/** Reads the guesses, and stores how many there are. Returns their array, to be freed with
- *  fclib_delete_solutions(guesses, number); NULL on failure, and without an error where there are
- *  none. */
+/** Reads the guesses, and stores how many there are. Returns their array; free it with
+ *  fclib_delete_solutions(guesses, number). Returns NULL on failure. If there are no guesses, it
+ *  returns NULL without an error. */
 struct fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses);
 
-/** Gives the info of the local problem in the file (of another one where there is no local one) an
- *  integer attribute. Returns 1, or 0 where it is there already and is not to be replaced. */
+/** Gives an integer attribute to the info of the local problem in the file, or of another problem
+ *  if there is no local one. Returns 1. Returns 0 if the attribute is there already and the write
+ *  mode does not allow to replace it. */
 int fclib_create_int_attributes_in_info(const char* path, const char* attr_name, int attr_value);
 
 /** New. The kind of the problem that a solution of the file belongs to: "global", "local",
- *  "global_rolling" or "local_rolling". Not to be freed. NULL where the file holds none. */
+ *  "global_rolling" or "local_rolling". Do not free it. NULL if the file holds no problem. */
 const char* fclib_problem_kind(const char* path);
 
-/** New. The lengths of that problem's arrays, each of which may be NULL: degrees of freedom (0 of a
- *  local problem), components of the contacts, bilateral constraints, contacts. Returns 1, or 0. */
+/** New. The lengths of that problem's arrays: degrees of freedom (0 for a local problem),
+ *  components of the contacts, bilateral constraints, contacts. Each pointer may be NULL. Returns
+ *  1, or 0. */
 int fclib_problem_sizes(const char* path, int* n, int* m, int* p, int* nc);
 
 /** New. What a write does if the file already holds such a thing. */
@@ -245,12 +247,11 @@ enum fclib_write_mode {
 int fclib_set_write_mode(enum fclib_write_mode mode);
 
 /** New. Sets the level of compression of all writes of the process: 0 (none, as in 3.1) to 9. Level
- *  1 is for programs that write each step, 6 for archives. The default is 0, or what
- *  FCLIB_COMPRESSION in the environment says. Every HDF5 has the filters. Returns 1, or 0 for
- *  another level. */
+ *  1 is for programs that write each step, 6 for archives. The default is what FCLIB_COMPRESSION in
+ *  the environment says, else 0. Every HDF5 has the filters. Returns 1, or 0 for another level. */
 int fclib_set_compression(int level);
 
-/** New. Whether all reads of the process hand out dense matrices as they are (nz = -3), or by
+/** New. Sets whether all reads of the process return dense matrices as they are (nz = -3), or by
  *  columns (keep = 0, the default). Returns 1. */
 int fclib_keep_dense(int keep);
 
@@ -267,36 +268,36 @@ void fclib_delete_solutions(struct fclib_solution* data, int count);
 
 /* ---- version --------------------------------------------------------------------------------- */
 
-/** New. The version of the library that runs, "3.2.0": not to be freed. That of the header is in
- *  FCLIB_VERSION_MAJOR, _MINOR and _PATCH. */
+/** New. The version of the library that runs, "3.2.0". Do not free it. FCLIB_VERSION_MAJOR, _MINOR
+ *  and _PATCH have the version of the header. */
 const char* fclib_version(void);
 
 /* ---- errors ---------------------------------------------------------------------------------- */
 
-/** New. Why the last call of this thread failed, "" where it did not. The text is the library's,
- *  and stays until the next call of this thread. */
+/** New. Why the last call of this thread failed, or "" if it did not fail. The text belongs to the
+ *  library, and stays until the next call of this thread. */
 const char* fclib_last_error(void);
 
-/** New. A function that is told of every failure, in the thread in which it happens; it must return
- *  and may call fclib. */
+/** New. A function that gets every failure, in the thread in which it happens. It must return, and
+ *  may call fclib. */
 typedef void (*fclib_error_handler)(const char* message, void* context);
 
-/** New. Installs a handler (or NULL, which keeps the library silent) and the context it is called
- *  with, for the whole process, in the place of the one that prints. */
+/** New. Installs a handler for the whole process, in place of the default one, and the context for
+ *  its calls. With NULL the library is silent. */
 void fclib_set_error_handler(fclib_error_handler handler, void* context);
 
 /* ---- validation ------------------------------------------------------------------------------ */
 
-/** New. Whether the data of a problem makes sense: sizes that agree, pointers in order, indices in
- *  range, finite numbers, no negative friction. Returns 1, or 0 with the first thing that is wrong.
- *  Merits and solves begin with this. */
+/** New. Checks whether the data of a problem makes sense: sizes that agree, pointers in order,
+ *  indices in range, finite numbers, no negative friction. Returns 1, or 0 with the first fault.
+ *  Merits and solves do this first. */
 int fclib_validate_global(const struct fclib_global* problem);
 int fclib_validate_local(const struct fclib_local* problem);
 int fclib_validate_global_rolling(const struct fclib_global_rolling* problem);
 int fclib_validate_local_rolling(const struct fclib_local_rolling* problem);
 
-/** New. Whether the members that a solution has are finite, and whether it has those it needs: r,
- *  and l where p > 0. Returns 1, or 0. */
+/** New. Checks whether the members of a solution are finite, and whether the required ones are
+ *  there: r, and l if p > 0. Returns 1, or 0. */
 int fclib_validate_global_solution(const struct fclib_global* problem,
                                    const struct fclib_solution* solution);
 int fclib_validate_local_solution(const struct fclib_local* problem,
@@ -324,8 +325,8 @@ int fclib_validate_local_rolling_solution(const struct fclib_local_rolling* prob
 enum FCLIB_APICOMPILE fclib_merit { MERIT_1, MERIT_2 };
 
 #ifdef FCLIB_WITH_MERIT_FUNCTIONS
-/** The merit of a solution. It needs r, and l where p > 0; v follows from them where it is NULL.
- *  NaN where the problem or the solution is not valid. */
+/** The merit of a solution. It needs r, and l if p > 0. If v is NULL, it follows from them. NaN if
+ *  the problem or the solution is not valid. */
 double fclib_merit_global(struct fclib_global* problem, enum fclib_merit merit,
                           struct fclib_solution* solution);
 double fclib_merit_local(struct fclib_local* problem, enum fclib_merit merit,
@@ -338,15 +339,15 @@ double fclib_merit_local_rolling(struct fclib_local_rolling* problem, enum fclib
 
 /* ---- solving --------------------------------------------------------------------------------- */
 
-/** New. What is asked of a solver; a struct of zeros asks for the defaults. */
+/** New. What a caller asks of a solver. A struct of zeros asks for the defaults. */
 struct fclib_solve_options {
   double tolerance;    /**< on MERIT_2; 0 for 1e-8 */
   int max_iterations;  /**< 0 for the solver's own */
   double time_limit;   /**< wall clock [s]; 0 for none */
   const double* guess; /**< reactions to start from (m), or NULL */
-  const char* options; /**< of the solver, "name=value name=\"a text\"", or NULL */
-  /** (nc) and (p), or NULL: filled where the status is FCLIB_INFEASIBLE, by a proof that there is
-   * no solution; see fclib_certificate_global() */
+  const char* options; /**< options of the solver, "name=value name=\"a text\"", or NULL */
+  /** (nc) and (p), or NULL. If the status is FCLIB_INFEASIBLE, they get a proof that there is no
+   *  solution; see fclib_certificate_global() */
   double* certificate_y;
   double* certificate_z;
 };
@@ -360,24 +361,24 @@ enum fclib_status {
   FCLIB_INACCURATE,      /**< the solver said it was done, but MERIT_2 is above the tolerance */
   FCLIB_INTERRUPTED,
   FCLIB_STALLED,   /**< the solver has nothing left to try; its best iterate is returned */
-  FCLIB_INFEASIBLE /**< there is no solution, which the solver has proven */
+  FCLIB_INFEASIBLE /**< there is no solution, and the solver has proven it */
 };
 
-/** New. What a solve says of itself. */
+/** New. The results of a solve besides the solution. */
 struct fclib_solve_result {
   enum fclib_status status;
   int iterations;
   double error; /**< MERIT_2 of the solution */
   double cpu_s; /**< CPU time of the solver alone [s] */
-  /** of the certificate where the status is FCLIB_INFEASIBLE, as fclib_certificate_global() has it;
-   *  else 0 */
+  /** if the status is FCLIB_INFEASIBLE, the bound of the certificate, as from
+   *  fclib_certificate_global(); else 0 */
   double certificate_bound;
 };
 
-/** New. Solves a problem by the solver of this name (see fclib_solver_name()). The arrays of
- *  `solution` are the caller's, of the lengths that struct states, and are filled; v, u and l may
- *  be NULL. `options` and `result` may be NULL. Returns 1 where the solver ran, however it ended,
- *  and 0 for invalid data, an unknown solver or option. */
+/** New. Solves a problem with the solver of this name (see fclib_solver_name()). The arrays of
+ *  `solution` are the caller's, with the lengths that struct states. They are filled; v, u and l
+ *  may be NULL. `options` and `result` may be NULL. Returns 1 if the solver ran, however it ended,
+ *  and 0 for invalid data, or an unknown solver or option. */
 int fclib_solve_global(const struct fclib_global* problem, const char* solver,
                        const struct fclib_solve_options* options, struct fclib_solution* solution,
                        struct fclib_solve_result* result);
@@ -391,14 +392,14 @@ int fclib_solve_local_rolling(const struct fclib_local_rolling* problem, const c
                               const struct fclib_solve_options* options,
                               struct fclib_solution* solution, struct fclib_solve_result* result);
 
-/** New. What y >= 0 (nc) and z (p; NULL for zeros) prove: no reactions of a norm below what is
- *  returned are a solution. INFINITY: there is no solution; 0: nothing is proven; NaN where the
- *  problem, y or z is not valid. With E y the vector whose normal parts are y it is a proof where
+/** New. What y >= 0 (nc) and z (p; NULL for zeros) prove: no reactions with a norm below the result
+ *  are a solution. INFINITY: there is no solution. 0: nothing is proven. NaN: the problem, y or z
+ *  is not valid. Let E y be the vector whose normal parts are y. It is a proof if
  *
  *    local    -(W^T E y + V z) is in K*,  V^T E y + R^T z = 0,  y . q_N + z . s < 0
  *    global   H E y + G z = 0,                                  y . w_N + z . b < 0
  *
- *  (Farkas' lemma; docs/mathematics.md). All sums are exact; of a global problem it is enough that
+ *  (Farkas' lemma; docs/mathematics.md). All sums are exact. For a global problem it is enough if
  *  real numbers next to y and z are a proof. */
 double fclib_certificate_global(const struct fclib_global* problem, const double* y,
                                 const double* z);
@@ -408,10 +409,10 @@ double fclib_certificate_global_rolling(const struct fclib_global_rolling* probl
 double fclib_certificate_local_rolling(const struct fclib_local_rolling* problem, const double* y,
                                        const double* z);
 
-/** New. The name of solver number k = 0, 1, ..., NULL past the last. Not to be freed. */
+/** New. The name of solver number k = 0, 1, ..., or NULL after the last. Do not free it. */
 const char* fclib_solver_name(int k);
 
-/** New. "converged", "iteration_limit", ...: not to be freed. */
+/** New. "converged", "iteration_limit", ... Do not free it. */
 const char* fclib_status_name(enum fclib_status status);
 
 /* ---- by name --------------------------------------------------------------------------------- */
@@ -431,37 +432,37 @@ struct fclib_options;
 struct fclib_options* fclib_options_create(void);
 void fclib_options_delete(struct fclib_options* options); /* or NULL */
 
-/** New. Sets one thing, and replaces its old value. Text, number and array are copied. Any setting
- *  may be given as a text. Return 1, or 0. */
+/** New. Sets one thing, and replaces its old value. Texts, numbers and arrays are copied. Any
+ *  setting may be given as a text. Returns 1, or 0. */
 int fclib_options_set_text(struct fclib_options* options, const char* name, const char* value);
 int fclib_options_set_number(struct fclib_options* options, const char* name, double value);
 int fclib_options_set_array(struct fclib_options* options, const char* name, const double* values,
                             int count);
 
 /** New. A function that is told how a solve goes: iterations, error (the solver's own), wall clock
- *  [s], and the method that works ("" in a solver that has but one). The thread that solves calls
- *  it. If it returns anything but 0, the solve ends as FCLIB_INTERRUPTED with what it has. */
+ *  [s], and the method at work ("" if the solver has only one). The thread that solves calls it. If
+ *  it returns anything but 0, the solve ends as FCLIB_INTERRUPTED with what it has. */
 typedef int (*fclib_progress)(int iteration, double error, double time, const char* stage,
                               void* context);
 
-/** New. Sets that function, or NULL, and the context it is called with. Returns 1, or 0. */
+/** New. Sets that function, or NULL, and the context for its calls. Returns 1, or 0. */
 int fclib_options_set_progress(struct fclib_options* options, fclib_progress progress,
                                void* context);
 
-/** New. What a call says, by name; there may be more names. */
+/** New. The results of a call, by name. Later versions may have more names. */
 struct fclib_report;
 void fclib_report_delete(struct fclib_report* report); /* or NULL */
 
-/** New. A number, a text, an array of a report. What is pointed to is the report's. NaN or NULL
- *  where there is none of this name. An array may have no entries; its pointer is not NULL then. */
+/** New. A number, a text or an array of a report. The pointers belong to the report. NaN or NULL if
+ *  there is none of this name. An array may have no entries; its pointer is not NULL then. */
 double fclib_report_number(const struct fclib_report* report, const char* name);
 const char* fclib_report_text(const struct fclib_report* report, const char* name);
 const double* fclib_report_array(const struct fclib_report* report, const char* name, int* count);
 
 /** New. Solves a problem as the options (or NULL) say. The report has the numbers "error",
  *  "iterations", "status" (of enum fclib_status), "cpu_s", "setup_s", "certificate_bound"; the
- *  texts "status" and "solver"; the arrays "v", "u", "r", "l", "certificate_y", "certificate_z". To
- *  be deleted. NULL for invalid data, an unknown solver or option. */
+ *  texts "status" and "solver"; the arrays "v", "u", "r", "l", "certificate_y", "certificate_z".
+ *  Delete it with fclib_report_delete(). NULL for invalid data, or an unknown solver or option. */
 struct fclib_report* fclib_solve_global_with(const struct fclib_global* problem,
                                              const struct fclib_options* options);
 struct fclib_report* fclib_solve_local_with(const struct fclib_local* problem,
@@ -472,9 +473,9 @@ struct fclib_report* fclib_solve_local_rolling_with(const struct fclib_local_rol
                                                     const struct fclib_options* options);
 
 /** New. The parts of MERIT_2, as numbers: "error" (all of it), "natural", "scaled_natural",
- *  "dynamics", "bilateral", "kinematics"; "cone", "dual_cone" and "complementarity", the largest of
- *  a contact; and how many contacts are "open", "stick" and "slide". To be deleted. NULL where the
- *  problem or the solution is not valid. */
+ *  "dynamics", "bilateral", "kinematics"; "cone", "dual_cone" and "complementarity", each the
+ *  largest of all contacts; and how many contacts are "open", "stick" and "slide". Delete the
+ *  report with fclib_report_delete(). NULL if the problem or the solution is not valid. */
 struct fclib_report* fclib_judge_global(const struct fclib_global* problem,
                                         const struct fclib_solution* solution);
 struct fclib_report* fclib_judge_local(const struct fclib_local* problem,
@@ -484,8 +485,8 @@ struct fclib_report* fclib_judge_global_rolling(const struct fclib_global_rollin
 struct fclib_report* fclib_judge_local_rolling(const struct fclib_local_rolling* problem,
                                                const struct fclib_solution* solution);
 
-/** New. Writes as fclib_write_global() and its like, fclib_write_solution() and
- *  fclib_write_guesses() do, by options (or NULL) of this call. Return 1, or 0. */
+/** New. Write like fclib_write_global() and its like, fclib_write_solution() and
+ *  fclib_write_guesses(), with the options (or NULL) of this call. Return 1, or 0. */
 int fclib_write_global_with(const struct fclib_global* problem, const char* path,
                             const struct fclib_options* options);
 int fclib_write_local_with(const struct fclib_local* problem, const char* path,
@@ -499,25 +500,26 @@ int fclib_write_solution_with(const struct fclib_solution* solution, const char*
 int fclib_write_guesses_with(int number_of_guesses, const struct fclib_solution* guesses,
                              const char* path, const struct fclib_options* options);
 
-/** New. "title", "family" or "citation" of a solver. Not to be freed. NULL on failure. */
+/** New. "title", "family" or "citation" of a solver. Do not free it. NULL on failure. */
 const char* fclib_solver_text(const char* solver, const char* what);
 
-/** New. Of option number k = 0, 1, ... of a solver: "name", "type" ("bool", "int", "float",
- *  "choice", "text"), "default", "unit", "doc", "lowest", "highest" or "choices" (a list with
- *  commas). The text is the library's, and stays until the next call of this function in this
- *  thread. NULL past the last, and on failure. */
+/** New. A property of option number k = 0, 1, ... of a solver: "name", "type" ("bool", "int",
+ *  "float", "choice", "text"), "default", "unit", "doc", "lowest", "highest" or "choices" (a list
+ *  with commas). The text belongs to the library, and stays until the next call of this function in
+ *  this thread. NULL after the last option, and on failure. */
 const char* fclib_option_text(const char* solver, int k, const char* what);
 
 /* ---- converting ------------------------------------------------------------------------------ */
 
-/** New. The local problem of a global one, W = H^T M^-1 H, q = H^T M^-1 f + w, and V, R, s from G
- *  and b; to be deleted and freed. NULL where the problem is not valid, or M is singular. */
+/** New. The local problem of a global one: W = H^T M^-1 H, q = H^T M^-1 f + w, and V, R, s from G
+ *  and b. Delete and free it. NULL if the problem is not valid, or if M is singular. */
 struct fclib_local* fclib_condense_global(const struct fclib_global* problem);
 struct fclib_local_rolling* fclib_condense_global_rolling(
     const struct fclib_global_rolling* problem);
 
-/** New. Fills u and v, or whichever of them is not NULL, by what follows from r (and l, where
- *  p > 0): what a solution of the condensed problem means for the global one. Returns 1, or 0. */
+/** New. Fills u and v, or the one of them that is not NULL, with what follows from r (and l, if p >
+ *  0). So it turns a solution of the condensed problem into one of the global problem. Returns 1,
+ *  or 0. */
 int fclib_complete_global(const struct fclib_global* problem, struct fclib_solution* solution);
 int fclib_complete_local(const struct fclib_local* problem, struct fclib_solution* solution);
 int fclib_complete_global_rolling(const struct fclib_global_rolling* problem,
@@ -525,8 +527,8 @@ int fclib_complete_global_rolling(const struct fclib_global_rolling* problem,
 int fclib_complete_local_rolling(const struct fclib_local_rolling* problem,
                                  struct fclib_solution* solution);
 
-/** New. Reads and writes the text (.dat) of Siconos, which has no bilateral constraints. A write
- *  replaces the file. A read returns NULL, a write 0 on failure. */
+/** New. Read and write the text format (.dat) of Siconos, which has no bilateral constraints. A
+ *  write replaces the file. On failure a read returns NULL, a write 0. */
 struct fclib_global* fclib_read_siconos_global(const char* path);
 int fclib_write_siconos_global(const struct fclib_global* problem, const char* path);
 struct fclib_local* fclib_read_siconos_local(const char* path);
@@ -539,22 +541,23 @@ int fclib_write_siconos_local_rolling(const struct fclib_local_rolling* problem,
 
 /* ---- pictures -------------------------------------------------------------------------------- */
 
-/** New. What a shape is, and what its three sizes are. It lies about the origin of its frame. */
+/** New. The kinds of shapes, and what their three sizes are. A shape lies around the origin of its
+ *  frame. */
 enum fclib_shape {
-  FCLIB_PLANE,     /**< z = 0; half edges of what is to be drawn, 0 where it has no end; z is up */
+  FCLIB_PLANE,     /**< z = 0, z is up; half edges of what is to be drawn, 0 if it has no end */
   FCLIB_SPHERE,    /**< radius */
   FCLIB_CAPSULE,   /**< radius, half length along z without the caps */
   FCLIB_ELLIPSOID, /**< half axes */
   FCLIB_CYLINDER,  /**< radius, half length along z */
   FCLIB_BOX,       /**< half edges */
-  FCLIB_MESH       /**< none: its vertices say it */
+  FCLIB_MESH       /**< none: its vertices define it */
 };
 
-/** New. Where the contacts of a problem are, and the bodies that touch there: what pictures show
- *  (`fclib view FILE`). No solver looks at it. The arrays are the caller's, and by rows. Lengths
- * are in m unless `unit` says otherwise. Turns are unit quaternions w, x, y, z. Numbers of bodies,
- *  shapes and meshes count from 0. Members may be added at the end: set it to zeros first, and
- *  `size` to sizeof(struct fclib_geometry). */
+/** New. Where the contacts of a problem are, and the bodies that touch there. Pictures show it
+ *  (`fclib view FILE`); no solver uses it. The arrays are the caller's, and by rows. Lengths are in
+ *  m unless `unit` says otherwise. Turns are unit quaternions w, x, y, z. Numbers of bodies, shapes
+ *  and meshes count from 0. Later versions may add members at the end: set the struct to zeros
+ *  first, and `size` to sizeof(struct fclib_geometry). */
 struct fclib_geometry {
   size_t size;
   int nc;                  /**< contacts, in the order of the problem */
@@ -565,10 +568,10 @@ struct fclib_geometry {
   const double* point;     /**< (nc x 3) midway between the two surfaces, in the world */
   const double* normal;    /**< (nc x 3) N, 0 for the limit of a joint */
   const double* tangent;   /**< (nc x 3) T1; T2 is N x T1. In the plane T1 is T */
-  const double* gap;       /**< (nc) signed distance, negative where they overlap; or NULL: 0 */
+  const double* gap;       /**< (nc) signed distance, negative if they overlap; or NULL: 0 */
   int nb;                  /**< bodies */
   const char* const* name; /**< (nb) each one line, or NULL: "1", "2", ... */
-  const int* moves;        /**< (nb) 1 where something can move it, 0 where it is fixed */
+  const int* moves;        /**< (nb) 1 if something can move it, 0 if it is fixed */
   const double* place;     /**< (nb x 3) of the body's frame in the world */
   const double* turn;      /**< (nb x 4) of the body's frame, or NULL: not turned */
   int ns;                  /**< shapes */
@@ -586,27 +589,29 @@ struct fclib_geometry {
                              normal; -1 last: three only */
   const double* displacement; /**< (x 3) of the vertices of an elastic body, or NULL */
   const double* period;       /**< (2) edges of a cell that repeats along x and y, or NULL */
-  int planar;                 /**< 1 where all moves in the plane x, z */
+  int planar;                 /**< 1 if all moves in the plane x, z */
   const char* unit;           /**< of lengths, or NULL: m */
   const char* mass_unit;      /**< of masses, or NULL: kg */
 };
 
-/** New. Adds a geometry to a file that has a problem of nc contacts. Returns 1, or 0 where numbers
- *  contradict each other, and where the file has one that is not to be replaced. */
+/** New. Adds a geometry to a file that has a problem of nc contacts. Returns 1. Returns 0 if
+ *  numbers contradict each other, or if the file has a geometry already and the write mode does not
+ *  allow to replace it. */
 int fclib_write_geometry(const struct fclib_geometry* geometry, const char* path);
 int fclib_write_geometry_with(const struct fclib_geometry* geometry, const char* path,
                               const struct fclib_options* options);
 
 /* ---- many small problems --------------------------------------------------------------------- */
 
-/** New. Local problems of a few contacts, one behind another in the caller's arrays. Members may be
- *  added at the end: set it to zeros first, and `size` to sizeof(struct fclib_batch). */
+/** New. Local problems of a few contacts, one after another in the caller's arrays. Later versions
+ *  may add members at the end: set the struct to zeros first, and `size` to sizeof(struct
+ *  fclib_batch). */
 struct fclib_batch {
   size_t size;
   int spacedim;        /**< 2 or 3 */
   int count;           /**< problems */
   const int* nc;       /**< contacts of each (count), or NULL: nc_each */
-  int nc_each;         /**< contacts of every problem, where nc is NULL */
+  int nc_each;         /**< contacts of every problem, if nc is NULL */
   const double* W;     /**< of each problem m x m by rows, m = spacedim nc */
   const double* q;     /**< of each m */
   const double* mu;    /**< of each nc */
@@ -614,8 +619,8 @@ struct fclib_batch {
   double tolerance;    /**< on MERIT_2 of each; 0 for 1e-8 */
   int threads;       /**< that share the batch, 0 or 1 for none beside the caller's, -1 for as many
                           as the machine has; the result is the same */
-  double time_limit; /**< wall clock of all [s]; 0 for none */
-  /* the caller's, to be filled; all but r may be NULL */
+  double time_limit; /**< wall clock of the whole batch [s]; 0 for none */
+  /* results in the caller's arrays; all but r may be NULL */
   double* r;                 /**< of each m */
   double* u;                 /**< of each m: W r + q */
   enum fclib_status* status; /**< (count) */
@@ -624,9 +629,9 @@ struct fclib_batch {
 };
 
 /** New. Solves all problems of a batch. Small ones have a method of their own, which allocates
- *  nothing once its thread has seen the largest problem. What this does not solve is given to the
- *  solver "auto". Returns 1 if all were tried, however they ended. Returns 0 for invalid data; the
- *  message names the problem, and the other problems have their answers all the same. */
+ *  nothing once its thread has seen the largest problem. The solver "auto" gets those that this
+ *  method does not solve. Returns 1 if all were tried, however they ended. Returns 0 for invalid
+ *  data; the message names the problem, and the other problems have their answers all the same. */
 int fclib_solve_batch(const struct fclib_batch* batch);
 
 /* ---- one solve after another ----------------------------------------------------------------- */
@@ -635,7 +640,7 @@ int fclib_solve_batch(const struct fclib_batch* batch);
  *  one thread at a time. */
 struct fclib_workspace;
 
-/** New. NULL where there is not enough memory. Delete it with fclib_workspace_delete(). */
+/** New. NULL if there is not enough memory. Delete it with fclib_workspace_delete(). */
 struct fclib_workspace* fclib_workspace_new(void);
 
 /** New. Frees a workspace (or NULL). */
@@ -643,14 +648,15 @@ void fclib_workspace_delete(struct fclib_workspace* workspace);
 
 /** New. Solves a local problem without bilateral constraints to a tolerance on MERIT_2 (0 for
  *  1e-8). `contacts` (nc, or NULL) are names that contacts keep from one problem to the next: the
- *  solve starts from the reactions that those had. Fills r (m), and u (m), status and error where
- *  they are not NULL. No memory is allocated once the workspace has seen the largest problem, but
- *  where the solver "auto" is needed. Returns 1 however it ended, and 0 for invalid data. */
+ *  solve starts from the reactions that those names had. Fills r (m), and those of u (m), status
+ *  and error that are not NULL. Once the workspace has seen the largest problem, no memory is
+ *  allocated unless the solver "auto" is needed. Returns 1 however it ended, and 0 for invalid
+ *  data. */
 int fclib_workspace_solve(struct fclib_workspace* workspace, const struct fclib_local* problem,
                           const size_t* contacts, double tolerance, double* r, double* u,
                           enum fclib_status* status, double* error);
 
-/** New. Starts from zero again; the memory stays. */
+/** New. The next solve starts from zero again. The memory stays. */
 void fclib_workspace_forget(struct fclib_workspace* workspace);
 
 #ifdef __cplusplus

@@ -1,13 +1,13 @@
-// fclib.hpp: fclib.h with the manners of C++20. What is read frees itself, arrays are std::span,
-// and what fails throws fclib::Error.
+// fclib.hpp: fclib.h in the style of C++20. What a read returns frees itself, arrays are std::span,
+// and a failed call throws fclib::Error.
 //
 //   const auto problem = fclib::read<fclib_local>("problem.hdf5");
 //   const fclib::Result result = fclib::solve(*problem, "auto", {.tolerance = 1e-10});
 //   for (const double component : result.solution.r) ...
 //
-// It needs nothing but fclib.h and the library, whose functions and structs may be used beside it.
-// The library prints a line on the standard error where a call fails, as libfclib 3.1 did;
-// fclib_set_error_handler(nullptr, nullptr) leaves that to the exception.
+// It needs only fclib.h and the library. Their functions and structs may be used beside it. If a
+// call fails, the library prints a line on the standard error, as libfclib 3.1 did. After
+// fclib_set_error_handler(nullptr, nullptr) there is only the exception.
 #pragma once
 
 #if !defined(__cplusplus) || \
@@ -34,7 +34,8 @@
 #include <vector>
 
 namespace fclib {
-// the library has a namespace of the same name inside: no symbol is to be that of a static one
+// the library has an inner namespace of the same name: no symbol may collide with one of a static
+// library
 inline namespace facade {
 
 /// A call that failed: the library's message.
@@ -43,10 +44,10 @@ class Error : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Throws the message of the call of this thread that has just failed.
+/// Throws the message of this thread's call that has just failed.
 [[noreturn]] inline void fail() { throw Error(fclib_last_error()); }
 
-/// The result of a call, unless it is 0, or NULL.
+/// The result of a call. Throws if it is 0 or NULL.
 template <class Value>
 Value checked(Value value) {
   if (!value) fail();
@@ -95,7 +96,7 @@ using Owned = std::unique_ptr<C, Delete>;
 
 /// The lengths that the arrays of a problem have.
 struct Sizes {
-  std::size_t n = 0;   ///< degrees of freedom, 0 of a local problem
+  std::size_t n = 0;   ///< degrees of freedom, 0 for a local problem
   std::size_t m = 0;   ///< components of the contacts
   std::size_t p = 0;   ///< bilateral constraints
   std::size_t nc = 0;  ///< contacts
@@ -137,13 +138,13 @@ FCLIB_SPAN(w, m)
 FCLIB_SPAN(b, p)
 #undef FCLIB_SPAN
 
-/// Throws where the data of a problem makes no sense.
+/// Throws if the data of a problem makes no sense.
 template <Problem C>
 void validate(const C& problem) {
   checked(Calls<C>::validate(&problem));
 }
 
-// ---- matrices of the caller's numbers, which must outlive them; the library changes none
+// ---- matrices of the caller's numbers, which must outlive them; the library does not change them
 
 namespace detail {
 
@@ -181,7 +182,7 @@ inline fclib_matrix compressed(int m, int n, int nz, std::span<const int> starts
 
 }  // namespace detail
 
-/// Dense, the numbers by columns.
+/// Dense; the numbers are by columns.
 inline fclib_matrix dense(int m, int n, std::span<const double> x) {
   fclib_matrix a = detail::matrix(m, n, -3, {}, {}, x);
   detail::require_size("a dense matrix", x.size(),
@@ -189,19 +190,19 @@ inline fclib_matrix dense(int m, int n, std::span<const double> x) {
   return a;
 }
 
-/// Compressed columns: where each starts (n + 1), the rows.
+/// Compressed columns: the start of each column (n + 1), the rows of the entries.
 inline fclib_matrix columns(int m, int n, std::span<const int> starts, std::span<const int> rows,
                             std::span<const double> x) {
   return detail::compressed(m, n, -1, starts, rows, x);
 }
 
-/// Compressed rows: where each starts (m + 1), the columns.
+/// Compressed rows: the start of each row (m + 1), the columns of the entries.
 inline fclib_matrix rows(int m, int n, std::span<const int> starts, std::span<const int> columns,
                          std::span<const double> x) {
   return detail::compressed(m, n, -2, starts, columns, x);
 }
 
-/// Triplets; those at one place add up.
+/// Triplets. Those at one place add up.
 inline fclib_matrix triplets(int m, int n, std::span<const int> rows, std::span<const int> columns,
                              std::span<const double> x) {
   fclib_matrix a = detail::matrix(m, n, detail::count(x.size()), columns, rows, x);
@@ -212,12 +213,12 @@ inline fclib_matrix triplets(int m, int n, std::span<const int> rows, std::span<
 
 // ---- solutions
 
-/// A solution, or a guess, with its arrays. One that is empty is not given.
+/// A solution, or a guess, with its arrays. An empty array is not given.
 struct Solution {
   Solution() = default;
   explicit Solution(const Sizes& size) : v(size.n), u(size.m), r(size.m), l(size.p) {}
 
-  /// The struct that the library takes, valid as long as the arrays are.
+  /// The struct that the library takes. It is valid as long as the arrays are.
   [[nodiscard]] fclib_solution view() const {
     const auto array = [](const std::vector<double>& x) {
       return x.empty() ? nullptr : const_cast<double*>(x.data());
@@ -230,7 +231,7 @@ struct Solution {
 
 namespace detail {
 
-/// The library reads as many numbers as the problem says.
+/// Checks the lengths: the library reads as many numbers as the problem says.
 inline void require_sizes(const Solution& solution, const Sizes& size) {
   const auto require = [](const char* name, const std::vector<double>& x, std::size_t expected) {
     if (!x.empty()) require_size(name, x.size(), expected);
@@ -243,7 +244,7 @@ inline void require_sizes(const Solution& solution, const Sizes& size) {
 
 }  // namespace detail
 
-/// MERIT_2, what every tolerance bounds, or MERIT_1, that of libfclib 3.1.
+/// MERIT_2, which every tolerance bounds, or MERIT_1, the merit of libfclib 3.1.
 template <Problem C>
 double merit(const C& problem, const Solution& solution, fclib_merit kind = MERIT_2) {
   detail::require_sizes(solution, sizes(problem));
@@ -260,7 +261,8 @@ Owned<C> read(const std::string& path) {
   return Owned<C>(checked(Calls<C>::read(path.c_str())));
 }
 
-/// Adds the problem to a file; see fclib_set_write_mode() for one that is there already.
+/// Adds the problem to a file. fclib_set_write_mode() says what happens to one that is there
+/// already.
 template <Problem C>
 void write(const std::string& path, const C& problem) {
   checked(Calls<C>::write(const_cast<C*>(&problem), path.c_str()));
@@ -308,14 +310,14 @@ struct Array {
 
 }  // namespace detail
 
-/// The solution in a file; throws where there is none.
+/// The solution in a file. Throws if there is none.
 inline Solution read_solution(const std::string& path) {
   const Sizes size = detail::sizes_in(path);
   const detail::Array found(checked(fclib_read_solution(path.c_str())), 1);
   return detail::copied(*found.data, size);
 }
 
-/// Adds a solution of the problem that is in the file. What it has not is completed, as
+/// Adds a solution of the problem that is in the file. Missing members are completed, as
 /// fclib_write_solution() says.
 inline void write_solution(const std::string& path, const Solution& solution) {
   detail::require_sizes(solution, detail::sizes_in(path));
@@ -350,8 +352,8 @@ inline void write_guesses(const std::string& path, std::span<const Solution> gue
 
 // ---- pictures
 
-/// Where the contacts of a problem are, and the bodies that touch there: what fclib_geometry says,
-/// as spans by rows. One that is empty is not given.
+/// Where the contacts of a problem are, and the bodies that touch there: the members of
+/// fclib_geometry as spans by rows. An empty span is not given.
 struct Geometry {
   // of each contact
   std::span<const int> body{};        ///< (nc x 2) the normal points from the first to the second
@@ -384,7 +386,7 @@ struct Geometry {
   std::string mass_unit{};  ///< of masses, empty for kg
 };
 
-/// Adds a geometry to a file that has a problem of as many contacts.
+/// Adds a geometry to a file that has a problem with the same number of contacts.
 inline void write_geometry(const std::string& path, const Geometry& geometry) {
   const std::size_t nc = geometry.body.size() / 2;
   const std::size_t nb = geometry.moves.size();
@@ -437,15 +439,15 @@ inline void write_geometry(const std::string& path, const Geometry& geometry) {
 
 // ---- solving
 
-/// What a solver tells while it works.
+/// What a solver reports while it works.
 struct Progress {
   int iteration = 0;
   double error = 0;        ///< the solver's own
   double time = 0;         ///< wall clock [s]
-  std::string_view stage;  ///< the method that works, where a solver chains some
+  std::string_view stage;  ///< the method at work, if the solver chains several
 };
 
-/// What is asked of a solver: what stands here asks for the defaults.
+/// What a caller asks of a solver. The values here ask for the defaults.
 struct Options {
   double tolerance = 0;                                 ///< on MERIT_2; 0 for 1e-8
   int max_iterations = 0;                               ///< 0 for the solver's own
@@ -461,7 +463,7 @@ struct Result {
   int iterations = 0;
   double error = 0;              ///< MERIT_2 of the solution
   double cpu_s = 0;              ///< CPU time of the solver alone [s]
-  double certificate_bound = 0;  ///< where the status is FCLIB_INFEASIBLE
+  double certificate_bound = 0;  ///< if the status is FCLIB_INFEASIBLE
   Solution solution;
   std::vector<double> certificate_y, certificate_z;  ///< ... and its proof
 
@@ -478,7 +480,7 @@ struct DeleteHandle {
 template <class Struct>
 using Handle = std::unique_ptr<Struct, DeleteHandle>;
 
-/// A caller's function, and what it has thrown, which may not pass through C.
+/// A caller's function, and the exception that it threw, which must not pass through C.
 struct Watch {
   const std::function<bool(const Progress&)>& progress;
   std::exception_ptr thrown = nullptr;
@@ -502,8 +504,8 @@ inline std::vector<double> array(const fclib_report& report, const char* name) {
 
 }  // namespace detail
 
-/// Solves a problem. Throws for data that makes no sense, an unknown solver or option, and what the
-/// function of the progress has thrown; how a solver ended that ran is the status.
+/// Solves a problem. Throws for data that makes no sense, for an unknown solver or option, and what
+/// the progress function threw. If the solver ran, the status says how it ended.
 template <Problem C>
 Result solve(const C& problem, const std::string& solver = "auto", const Options& options = {}) {
   const detail::Handle<fclib_options> handle(checked(fclib_options_create()));

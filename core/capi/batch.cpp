@@ -15,7 +15,7 @@ namespace {
 static_assert(sizeof(int) == sizeof(std::int32_t));
 static_assert(sizeof(fclib_status) == sizeof(std::int32_t));
 
-/// What stands in C for each status of the core.
+/// The C value of each status of the core.
 std::array<std::int32_t, status_count> codes() {
   std::array<std::int32_t, status_count> result{};
   for (std::size_t k = 0; k < result.size(); ++k) {

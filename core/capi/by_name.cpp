@@ -17,7 +17,7 @@
 #include "merit/merit.hpp"
 #include "solve/driver.hpp"
 
-/// What a solve or a judgement says.
+/// What a solve or a merit reports.
 struct fclib_report {
   std::vector<std::pair<std::string, double>> numbers;
   std::vector<std::pair<std::string, std::string>> texts;
@@ -28,7 +28,7 @@ namespace fclib::c {
 
 namespace {
 
-/// What a solve is asked beside the options of its solver.
+/// The settings of a solve besides the options of its solver.
 struct Asked {
   std::string solver = "auto";
   double tolerance = Settings{}.tolerance;
@@ -50,7 +50,7 @@ struct Asked {
   }
 };
 
-/// The same as a text that is read back equal; counts have no exponent.
+/// The same as a text that reads back equal. Counts have no exponent.
 std::string text_of(double value) {
   std::array<char, 32> buffer{};
   const bool count = value == std::trunc(value) && std::abs(value) < 1e15;
@@ -165,7 +165,7 @@ std::string option_text(const OptionInfo& option, std::string_view what) {
                      "'; there are: name, type, default, unit, doc, lowest, highest, choices");
 }
 
-/// Stays until the next text of this thread.
+/// The text stays until the next text of this thread.
 const char* kept(std::string text) {
   thread_local std::string last;
   last = std::move(text);
@@ -233,7 +233,7 @@ const double* fclib_report_array(const fclib_report* report, const char* name, i
   return guarded<const double*>(nullptr, [&] {
     const Vector& values = named(given(report, "report").arrays, name);
     given(count, "count") = static_cast<int>(values.size());
-    static const double nothing = 0;  // an array without entries is no error
+    static const double nothing = 0;  // an array without entries is not an error
     return values.size() > 0 ? values.data() : &nothing;
   });
 }

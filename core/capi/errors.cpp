@@ -12,7 +12,7 @@ namespace {
 
 thread_local std::string last_error;
 
-/// Clients of 3.1 look at no result: they were told on the standard error.
+/// Clients of 3.1 do not check results: that library printed errors on the standard error.
 void print(const char* message, void*) { std::fprintf(stderr, "fclib: %s\n", message); }
 
 struct Handler {
@@ -40,7 +40,7 @@ void report(const char* message) noexcept {
       last_error = text;
     }
   } catch (...) {
-    // a C++ handler that throws, or no memory for the message: there is nobody left to tell
+    // a C++ handler threw, or there is no memory for the message: nobody is left to tell
     last_error.clear();
   }
 }

@@ -1,4 +1,4 @@
-// Errors on their way to C: nothing is thrown across, the message is kept.
+// Errors on their way to C: no exception leaves the library, and the message is kept.
 #pragma once
 
 #include <cstring>
@@ -34,7 +34,7 @@ Result guarded(Result failure, const Body& body) noexcept {
 /// Throws Error (problem).
 [[noreturn]] void fail(const Place& where, const std::string& message);
 
-/// What a pointer of the caller points to. The name is no reference: GCC 14 would warn that the
+/// What a pointer of the caller points to. The name is not a reference: GCC 14 would warn that the
 /// result may refer to it.
 template <class T>
 T& given(T* pointer, Place name) {
@@ -42,8 +42,8 @@ T& given(T* pointer, Place name) {
   return *pointer;
 }
 
-/// A constant of the caller, who may hand over any number: one that is none is no value of the enum
-/// in C++, and may not be read as one.
+/// A constant of the caller, who may pass any number. If the number is no value of the enum, C++
+/// does not allow to read it as one.
 template <class Enum>
 int number_of(const Enum& constant) {
   static_assert(sizeof(Enum) == sizeof(int));

@@ -19,14 +19,14 @@ namespace fclib::c {
 
 namespace {
 
-/// The level that the environment names, or none, as libfclib 3.1 has it.
+/// The level that the environment sets. Without it, none, as in libfclib 3.1.
 int first_compression() {
   const char* const named = std::getenv("FCLIB_COMPRESSION");
   const bool level = named != nullptr && *named >= '0' && *named <= '9' && named[1] == '\0';
   return level ? *named - '0' : 0;
 }
 
-// settings of the process
+// the settings of the process
 std::atomic<bool> replace{false};
 std::atomic<int> compression{first_compression()};
 std::atomic<bool> keep_dense{false};
@@ -68,8 +68,8 @@ C* read_c(const char* path) {
   });
 }
 
-/// What v and u of a solution lack follows from r and l, where the problem in the file says so;
-/// what else it lacks is zero if it is the caller's, as 3.1 has it.
+/// If a solution lacks v or u, they follow from r and l, if the problem in the file allows it.
+/// Anything else that the caller's solution lacks is zero, as in 3.1.
 Solution completed(Solution solution, const Problem& outline, const char* path, bool with_zeros) {
   return std::visit(
       [&]<class P>(const P& sizes) {
@@ -81,7 +81,7 @@ Solution completed(Solution solution, const Problem& outline, const char* path, 
           try {
             solution = complete(std::get<P>(read_problem(path, P::kind)), std::move(solution));
           } catch (const Error&) {
-            // 3.1 takes solutions of problems that make no sense, too
+            // 3.1 also takes solutions of problems that make no sense
           }
         }
         for_each_member<fclib_solution>([&](const auto& field, double* fclib_solution::*) {
@@ -142,7 +142,7 @@ WriteOptions write_options(const fclib_options* options) {
       fail("options", "a write has no option '" + name + "'; it has: mode, compression");
     }
     if (!options->arrays.empty()) fail("options", "a write takes no array");
-    // what is not there is as the process has it
+    // what the options do not set is as in the process
     OptionValues values{
         {"mode", std::string(Asked::modes.at(static_cast<std::size_t>(asked.mode)))},
         {"compression", std::int64_t{asked.compression}}};
@@ -212,7 +212,7 @@ fclib_solution* fclib_read_guesses(const char* path, int* number_of_guesses) {
     int& number = given(number_of_guesses, "number_of_guesses");
     Problem outline;
     auto guesses = read_guesses(&given(path, "path"), &outline);
-    if (guesses.empty()) return static_cast<fclib_solution*>(nullptr);  // silently, as 3.1
+    if (guesses.empty()) return static_cast<fclib_solution*>(nullptr);  // no error, as in 3.1
     const int count = static_cast<int>(guesses.size());
     const auto release = [&](fclib_solution* array) { fclib_delete_solutions(array, count); };
     std::unique_ptr<fclib_solution, decltype(release)> array(
@@ -243,7 +243,7 @@ int fclib_create_int_attributes_in_info(const char* path, const char* attr_name,
 const char* fclib_problem_kind(const char* path) {
   return guarded<const char*>(nullptr, [&] {
     const Problem outline = read_outline(&given(path, "path"));
-    // the kinds are literals
+    // the kinds are string literals
     return std::visit([]<class P>(const P&) { return P::kind.data(); }, outline);
   });
 }

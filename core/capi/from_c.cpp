@@ -62,13 +62,13 @@ Matrix copy_of(const RawMatrixView& a) {
           .info = a.info};
 }
 
-/// The members of a problem that are numbers and matrices, checked for what its own sizes need, and
-/// its mu as long as they say; `take` makes of a matrix what the problem is to have of it.
+/// The numbers and matrices of a problem, checked for what its own sizes need, and its mu with the
+/// length that they give. `take` turns a C matrix into what the problem should have.
 template <class C, class Take>
 CoreOf<C> sizes_of(const C& c, const Take& take) {
   using P = CoreOf<C>;
   P problem;
-  // the matrices say how long the vectors are
+  // the matrices give the lengths of the vectors
   std::optional<Place> there;
   std::optional<Place> missing;
   for_each_member<C>([&]<class Type, class Pointer>(const Field<P, Type>& field, Pointer member) {

@@ -12,25 +12,25 @@ std::size_t size_of(int count, const Place& where);
 
 Vector vector(const double* values, Index size, const Place& where);
 
-/// The problem as it is, unchecked but for what its own sizes need.
+/// The problem as it is. Only what its own sizes need is checked.
 template <class C>
 CoreOf<C> problem_as_given(const C& c);
 
-/// The same without copies, to be written.
+/// The same without copies, for a write.
 template <class C>
 ProblemView view_as_given(const C& c);
 
-/// As problem_as_given(), without the room that nzmax leaves, for who validates it.
+/// Like problem_as_given(), but without the room that nzmax leaves: for callers that validate it.
 template <class C>
 CoreOf<C> problem_of(const C& c);
 
-/// ... and valid.
+/// ... and it is valid.
 template <class C>
 CoreOf<C> valid_problem(const C& c);
 
 enum class Parts { some, any };
 
-/// The solution of a problem; with Parts::some v and u may be missing, with Parts::any all may.
+/// The solution of a problem. With Parts::some, v and u may be missing. With Parts::any, all may.
 template <class P>
 Solution solution_of(const fclib_solution& c, const P& problem, Parts parts);
 

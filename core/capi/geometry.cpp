@@ -34,7 +34,7 @@ class Columns {
  public:
   Columns(const char* name, Geometry::Table& table) : name_(name), table_(table) {}
 
-  /// `otherwise` repeats where the array is NULL; without it NULL is an error.
+  /// If the array is NULL, `otherwise` is repeated. Without it, NULL is an error.
   const Integers& integers(const char* column, const int* values, std::size_t rows,
                            std::size_t width, int lowest, int count, Integers otherwise = {}) {
     Integers copied = copy(column, values, rows, width, otherwise);
@@ -136,7 +136,7 @@ void copy_meshes(const fclib_geometry& c, std::size_t meshes, Columns& bodies) {
   if (c.displacement != nullptr) bodies.numbers("displacement", c.displacement, vertices, 3);
 }
 
-/// Shape k is that of body k.
+/// Shape k belongs to body k.
 Integers in_turn(std::size_t count) {
   Integers numbers(count);
   for (std::size_t k = 0; k < count; ++k) numbers[k] = static_cast<std::int32_t>(k);

@@ -1,4 +1,4 @@
-// Settings by name, and what is asked of them.
+// Settings by name, and what a caller may ask of them.
 #pragma once
 
 #include <map>
@@ -8,7 +8,7 @@
 #include "io/hdf5/write.hpp"
 #include "solve/options.hpp"
 
-/// What a caller has set: numbers are texts too.
+/// What a caller has set. Numbers are kept as texts too.
 struct fclib_options {
   fclib::OptionValues values;
   std::map<std::string, fclib::Vector, std::less<>> arrays;
@@ -18,8 +18,8 @@ struct fclib_options {
 
 namespace fclib::c {
 
-/// How a write goes: what the options say (or NULL), else what the process has set. Throws Error at
-/// an option that no write has.
+/// How a write works: as the options say (or NULL), else as the process has set it. Throws Error if
+/// an option is unknown to writes.
 WriteOptions write_options(const fclib_options* options);
 
 }  // namespace fclib::c

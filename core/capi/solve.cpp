@@ -13,8 +13,8 @@ namespace fclib::c {
 
 namespace {
 
-/// "name=value name=value", separated by spaces, commas or semicolons; a value that has them stands
-/// in double quotes.
+/// "name=value name=value", separated by spaces, commas or semicolons. A value that contains one of
+/// these stands in double quotes.
 OptionValues parse_values(std::string_view list) {
   constexpr std::string_view separators = " \t\n,;";
   OptionValues values;
@@ -124,7 +124,7 @@ const char* fclib_status_name(fclib_status status) {
   for (const Status candidate :
        {Status::converged, Status::iteration_limit, Status::time_limit, Status::diverged,
         Status::inaccurate, Status::interrupted, Status::stalled, Status::infeasible}) {
-    if (status_in_c(candidate) == number) return name_of(candidate).data();  // a literal
+    if (status_in_c(candidate) == number) return name_of(candidate).data();  // a string literal
   }
   return "unknown";
 }

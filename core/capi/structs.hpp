@@ -1,7 +1,7 @@
 // The structs of fclib.h beside those of the core.
 //
-// A C struct lists its members by the names that the core's fields have; conversions walk the
-// fields, so that none of them names a member.
+// The members of a C struct have the names of the core's fields. Conversions loop over the fields,
+// so that none of them names a member.
 #pragma once
 
 #include <string>
@@ -11,7 +11,7 @@
 
 #include "problem.hpp"
 
-// all else is hidden
+// all the rest is hidden
 #pragma GCC visibility push(default)
 #include <fclib.h>
 #pragma GCC visibility pop

@@ -37,7 +37,7 @@ struct Free {
   }
 };
 
-/// A C struct of zeros that frees itself and its members unless it is released.
+/// A C struct of zeros. It frees itself and its members unless it is released.
 template <class C>
 using Owned = std::unique_ptr<C, Free>;
 
@@ -48,16 +48,16 @@ T* allocate(std::size_t count) {
   return memory;
 }
 
-/// The arrays of the problem become those of the C struct. Dense matrices, which clients of 3.1 do
-/// not know, come by columns unless they are to be kept.
+/// The arrays of the problem become those of the C struct. Clients of 3.1 do not know dense
+/// matrices: a dense matrix becomes one by columns unless the caller wants to keep it.
 template <class C>
 C* to_c(RawProblem& problem, bool keep_dense);
 
-/// The same for a problem of the core's, dense matrices by columns.
+/// The same for a problem of the core. Dense matrices become matrices by columns.
 template <class C>
 C* to_c(const CoreOf<C>& problem);
 
-/// Fills the members of a solution from a file, whose sizes are those of its problem.
+/// Fills the members of a solution from a file. Their sizes are those of its problem.
 void to_c(const Solution& solution, const Problem& outline, const std::string& where,
           fclib_solution& c);
 

@@ -1,4 +1,4 @@
-// fclib_workspace_*: the arrays are the caller's, nothing is copied but the answer.
+// fclib_workspace_*: the arrays are the caller's, and only the answer is copied.
 #include "embed/workspace.hpp"
 
 #include <algorithm>

@@ -15,7 +15,7 @@ namespace fclib::chain {
 
 namespace {
 
-/// The part of a problem that these contacts are.
+/// The part of a problem on these contacts.
 ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index>& contacts) {
   const int d = problem.d();
   ReducedProblem part{.W = problem.W.restricted(contacts),
@@ -49,7 +49,8 @@ ReducedProblem restricted(const ReducedProblem& problem, const std::vector<Index
   return part;
 }
 
-/// The chain from r, on the whole and then on each island that is left; what it reaches ends in r.
+/// Runs the chain from r: on the whole, then on each island that is not solved yet. The result ends
+/// in r.
 template <class Cone>
 void walk(const ReducedProblem& problem, const Table& table, const Resources& resources,
           Tracker& tracker, bool guessed, Vector& r) {

@@ -1,8 +1,8 @@
-// Runs a table of stages: on the whole problem, then on each island of contacts that is left.
+// Runs a table of stages, first on the whole problem, then on each island that is not solved yet.
 //
-// Every stage returns to the best iterate so far, and most start from it; each island is held to
-// its share of the tolerance. An iterate that is not finite ends the stage that made it, never the
-// chain. If it does not solve the problem from a guess, it starts again from r = 0.
+// Every stage returns the best iterate so far, and most stages start from it. Each island must meet
+// its share of the tolerance. If an iterate is not finite, the stage that made it ends, but not the
+// chain. If the chain does not solve the problem from a guess, it starts again from r = 0.
 #pragma once
 
 #include "chain/stages.hpp"
@@ -10,8 +10,8 @@
 
 namespace fclib::chain {
 
-/// From r; the best iterate ends in r. Where the factors of a system would not fit into memory the
-/// methods that factorise are left out, and the message says so.
+/// Starts from r, and leaves the best iterate in r. If the factors of a system do not fit into
+/// memory, the methods that factorise are left out, and the message says so.
 Outcome run(const ReducedProblem& problem, const Table& table, const Resources& resources,
             const Settings& settings, Vector& r);
 

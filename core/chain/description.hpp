@@ -15,7 +15,7 @@ struct MethodInfo {
   std::vector<OptionInfo> rules;
 };
 
-/// All methods; first what has no name, the keys that any stage may have.
+/// All methods. The first entry has no name: it holds the keys that any stage may have.
 std::vector<MethodInfo> describe_methods();
 
 }  // namespace fclib::chain

@@ -20,21 +20,21 @@ namespace fclib::chain {
 
 namespace {
 
-// What no table sets. benchmarks/constants.py has other values of some.
+// What no table sets. benchmarks/constants.py tries other values of some.
 
-// operations of a sweep for a contact, beside one for each entry of W, and of a factorisation with
-// its solve and the rest of an iteration, beside its multiplications
+// Operations: of a sweep, for each contact, besides one for each entry of W; and of a factorisation
+// with its solve and the rest of an iteration, over its multiplications.
 constexpr double sweep_operations = 60;
 constexpr double iteration_operations = 1500;
 
 constexpr double never_too_much = 256e6;    // [bytes] Factors of this size always fit.
 constexpr double spare_memory = 0.8;        // share of the available memory that factors may take
-constexpr double instead_of_factors = 100;  // factorisations that steps may cost without memory
+constexpr double instead_of_factors = 100;  // cost of steps [factorisations] without memory
 
 // Gauss-Seidel
 constexpr std::int64_t sweeps_per_look = 5;  // sweeps between two looks at the error
-constexpr Index few_contacts = 10;           // so many are looked at after 1, 3 and 5 sweeps
-constexpr double extension = 20;             // It goes on if at most so many limits are left.
+constexpr Index few_contacts = 10;           // so few are looked at after 1, 3 and 5 sweeps
+constexpr double extension = 20;             // the sweeps go on if at most so many limits are left
 
 // sweeps and gradients that go on
 constexpr std::int64_t steps_per_look = 10;  // steps between two looks at the error
@@ -47,30 +47,30 @@ constexpr double most_outside = 1e-2;             // share of ||r|| that may be 
 constexpr double exact_residual = 0.01;           // [tolerance] What is left is not in the cones.
 
 // polishing on the way
-constexpr double polish_below = 1e-5;          // error at which a polish is tried
+constexpr double polish_below = 1e-5;          // a polish is tried below this error
 constexpr double polish_below_on_path = 1e-4;  // ... on the path of the homotopy
-constexpr double next_polish = 30;             // It is tried again if the error is so much less.
-constexpr double next_polish_of_rounds = 10;   // ... if a step of the path is dear
-constexpr double own_accuracy = 1e-7;          // A looser tolerance needs no polish.
+constexpr double next_polish = 30;             // it is tried again if the error is so much less
+constexpr double next_polish_of_rounds = 10;   // ... if one step of the path costs much
+constexpr double own_accuracy = 1e-7;          // if the tolerance is looser, no polish is needed
 
-// the associated problem ends if its velocity [||q||] does not tend to zero with tau
+// The associated problem ends if its velocity [||q||] does not tend to zero with tau.
 constexpr double near_tau = 1e-4;
 constexpr double fast_speed = 0.05;
 constexpr double nearer_tau = 1e-6;
 constexpr double slow_speed = 1e-3;
 
-constexpr std::int64_t steps_after_path = 200;  // factorisations from where the homotopy ends
-constexpr double safe_bound = 1e4;  // [||q|| / mean of tr(W_aa) / d] of what a proof holds for
+constexpr std::int64_t steps_after_path = 200;  // factorisations after the end of the path
+constexpr double safe_bound = 1e4;  // [||q|| / mean of tr(W_aa) / d] ||r|| that a proof excludes
 constexpr double proof_accuracy = 1e-10;
 
 // pivoting
 constexpr std::int64_t most_pivots = 1000;      // pivots of a try
-constexpr std::int64_t polish_of_pivots = 100;  // factorisations from where a try ends
-constexpr double most_rounding = 1;             // [tolerance] On a ray reactions have no bound.
+constexpr std::int64_t polish_of_pivots = 100;  // factorisations of the polish of each try
+constexpr double most_rounding = 1;             // [tolerance] on a ray reactions have no bound
 
 // random starts
 constexpr std::int64_t random_limit = 60;   // iterations of Newton
-constexpr std::int64_t random_sweeps = 5;   // sweeps if Newton stands still
+constexpr std::int64_t random_sweeps = 5;   // sweeps if Newton's method stands still
 constexpr std::int64_t random_polish = 24;  // factorisations of the polish
 
 /// Operations of a sweep, and of a factorisation with the rest of an iteration.
@@ -82,7 +82,7 @@ double factorisation_cost(const ReducedProblem& problem, const CoupledSystem& sy
   return iteration_operations * static_cast<double>(problem.nc()) + system.flops();
 }
 
-/// Random numbers, the same everywhere.
+/// Random numbers, the same on every machine.
 class Random {
  public:
   double between(double least, double most) {
@@ -100,13 +100,14 @@ constexpr bool factorises =
     !std::is_same_v<Stage, SpectralGradientStage> &&
     !std::is_same_v<Stage, ConjugateGradientsStage>;
 
-/// Looks at the least error since the last look, whether its rate ends within what is paid for.
+/// Looks now and then at the least error, and whether its rate reaches the tolerance within the
+/// steps that are paid for.
 class ConvergenceRate {
  public:
   ConvergenceRate(std::int64_t first_look, double budget, double tolerance)
       : first_look_(first_look), budget_(budget), tolerance_(tolerance) {}
 
-  /// After k steps.
+  /// Call after k steps.
   bool hopeless(std::int64_t k, double error) {
     least_ = std::min(least_, error);
     if (k < 2 * mark_ || k < first_look_) return false;
@@ -151,7 +152,7 @@ double Island<Cone>::solve(Vector& r, On on) {
   problem_.velocity(r_, u_);
   best_ = r_;
   error_ = relative_error<Cone>(problem_, u_, r_);
-  if (!std::isfinite(error_)) error_ = endless;  // anything is better
+  if (!std::isfinite(error_)) error_ = endless;  // any iterate is better
   tracker_.report(0, error_, r_);
   for (const StageRule& rule : table_) {
     if (done()) break;
@@ -280,7 +281,7 @@ void Island<Cone>::run(const GaussSeidelStage& rules) {
   double last = error_;
   std::int64_t k = 0;
   while (k < limit) {
-    // some are solved by the first sweep, a few contacts by some
+    // one sweep solves some problems; a few sweeps solve some with few contacts
     const bool few = problem_.nc() <= few_contacts;
     const std::int64_t wanted = k == 0 ? 1 : k < interval ? (few ? k + 1 : interval - 1) : interval;
     const std::int64_t count = std::min({wanted, limit - k, tracker_.left()});
@@ -346,7 +347,7 @@ void Island<Cone>::run(const SpectralGradientStage& rules) {
   Vector u(problem_.m());
   problem_.velocity(r, u);
   std::int64_t k = 0;
-  std::int64_t since = 0;  // the last look
+  std::int64_t since = 0;  // steps since the last look
   spectral_gradient<Cone>(problem_, {}, r, u, [&](const Vector&) {
     if (++since < std::min(steps_per_look, tracker_.left())) return false;
     double error = relative_error<Cone>(problem_, u, r);
@@ -396,7 +397,7 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
     const double size = residual.norm();
     if (k == first_cone_look && violation(r) > most_outside) return;
     if (k % trial == 0) {
-      // at this rate, is it done within the limit?
+      // at this rate, does it end within the limit?
       const double rate = std::log(last / size) / static_cast<double>(trial);
       const double left = std::log(size / (tolerance_ * problem_.scale)) / rate;
       if (violation(r) > most_outside || !(rate > 0) || left > static_cast<double>(limit)) {
@@ -411,7 +412,7 @@ void Island<Cone>::run(const ConjugateGradientsStage& rules) {
       Vector u(problem_.m());
       problem_.velocity(inside, u);
       if (take(k % trial, relative_error<Cone>(problem_, u, inside), inside)) return;
-      // what is left is that r is not in the cones
+      // the rest of the error is that r is not in the cones
       if (size <= exact_residual * tolerance_ * problem_.scale) return;
     }
     precondition(residual, z);
@@ -453,7 +454,7 @@ void Island<Cone>::run(const ProximalStage& rules) {
   proximal(own, start_of(rules.from));
 }
 
-/// Polishes iterates as a path comes near a solution.
+/// Polishes iterates when a path comes near a solution.
 template <class Cone>
 class Island<Cone>::ProximalPolish {
  public:
@@ -479,7 +480,7 @@ void Island<Cone>::run(const InteriorPointStage& stage) {
   if (stage.far > 0) rules.tau = std::clamp(stage.far * error_, rules.tau, 1.0);
   Path method(problem_, system());
   ProximalPolish polish(*this, stage.polish, next_polish);
-  // the last steps to a loose tolerance are its own
+  // a loose tolerance needs no polish: the path makes the last steps itself
   const double near = tolerance_ > own_accuracy ? next_polish * tolerance_ : 0;
   method.solve(rules, start_of(stage.from), [&](double error, const Vector& r) {
     if (take(1, error, r)) return true;
@@ -583,7 +584,7 @@ double Island<Cone>::rounding_of_velocity(const Vector& r) const {
 template <class Cone>
 void Island<Cone>::run(const RandomStartsStage& rules) {
   const Vector unit = contact_weights(problem_).cwiseSqrt().cwiseInverse();
-  double size = 0;  // ||q||, each contact in its own unit
+  double size = 0;  // ||q||, with each contact in its own unit
   for (Index a = 0; a < problem_.nc(); ++a) {
     size = std::hypot(size, unit[a] * problem_.q.template segment<D>(D * a).norm());
   }
@@ -628,17 +629,17 @@ void Island<Cone>::run(const NoSolutionStage& rules) {
   const ProximalRules own{
       .easy = 100, .hard = 0.1, .patience = endless, .max_factorisations = rules.limit};
   method.solve(own, proof_accuracy, r, [&](double) {
-    // the steps tend to the ray, free of the part of r that stays
+    // the steps tend to the ray, without the part of r that stays
     step = method.iterate() - last;
     last = method.iterate();
     double largest = 0;
     for (Index a = 0; a < problem_.nc(); ++a) largest = std::max(largest, step[D * a]);
-    // contacts outside the ray keep small parts, which are left out
+    // contacts outside the ray keep small parts; they are left out
     for (const double least : {1e-9, 1e-6, 1e-3}) {
       for (Index a = 0; a < problem_.nc(); ++a) {
         y[a] = step[D * a] > least * largest ? step[D * a] / largest : 0;
       }
-      // here it may be rounding of what was eliminated: the data as they were given decide
+      // here a ray may be rounding of what was eliminated: the data as given decides
       if (no_solution_bound<Cone>(problem_, y) > safe_bound * usual && proves_(y)) {
         tracker_.refuse();
         return true;

@@ -14,10 +14,10 @@
 
 namespace fclib::chain {
 
-/// What a chain may take of the machine.
+/// What a chain may use of the machine.
 struct Resources {
   int threads = 1;
-  double memory = 0;  ///< [bytes] of factors; 0: what is available
+  double memory = 0;  ///< [bytes] memory for factors; 0: what is available
 };
 
 template <class Cone>
@@ -25,20 +25,20 @@ class Island {
  public:
   static constexpr int D = Cone::dim;
 
-  /// What is known of the bodies: of the whole problem, if anything, and which contacts of it the
-  /// island has; none: all.
+  /// The bodies of the whole problem, if they are known, and which contacts of the whole the island
+  /// has. An empty list: all of them.
   struct KnownBodies {
     const Primal* whole = nullptr;
     std::span<const Index> contacts;
   };
 
-  /// `proves` says whether y (nc of the island) proves that there is no solution.
+  /// `proves` tells whether y (nc of the island) proves that there is no solution.
   Island(const ReducedProblem& problem, const KnownBodies& bodies, const Table& table,
          const Resources& resources, Tracker& tracker, double tolerance, bool guessed,
          std::function<bool(const Vector&)> proves);
 
-  /// From r, by the stages for the whole or for islands; the best iterate ends in r. Its error
-  /// relative to the problem's scale.
+  /// Starts from r and runs the stages for the whole or for islands. The best iterate ends in r.
+  /// Returns its error relative to the problem's scale.
   double solve(Vector& r, On on);
 
  private:
@@ -46,27 +46,28 @@ class Island {
 
   // ---- the checkpoints between stages
 
-  /// What later stages start from, as the chain comes to the first that does.
+  /// Sets what later stages start from. It is called before the first stage that needs it.
   void remember(const StageRule& rule);
   [[nodiscard]] bool applies(const StageRule& rule) const;
-  /// Whether there is memory for what the method factorises.
+  /// Whether there is enough memory for what the method factorises.
   [[nodiscard]] bool affordable(const StageRule& rule);
   bool fits(const CoupledSystem& system);
-  /// The largest share of a contact's mobility that bilateral constraints take: rho has what it
-  /// was.
+  /// The largest share of a contact's mobility that bilateral constraints take away. rho still
+  /// holds the mobility without them.
   [[nodiscard]] double jointed() const;
   void enter(const StageRule& rule);
   [[nodiscard]] Vector start_of(Start from) const;
-  /// Keeps r where it is the best so far. Whether to end the stage.
+  /// Keeps r if it is the best so far. Returns whether the stage should end.
   bool take(std::int64_t iterations, double error, const Vector& r);
-  /// Sweeps from the best iterate; what is kept of each contact is lost where it has overflown.
+  /// Goes back to the best iterate. What the sweeps keep of each contact may have overflown, so it
+  /// is made anew.
   void return_to_best();
   CoupledSystem& system();
 
   // ---- the methods
 
   void run(const GaussSeidelStage& rules);
-  /// Steps that a stage may make, by what they cost.
+  /// The number of steps that a stage may make, from what one step costs.
   double paid_for(const Patience& rules);
   void run(const SweepOnStage& rules);
   void run(const SpectralGradientStage& rules);
@@ -79,13 +80,13 @@ class Island {
   class ProximalPolish;
   void run(const InteriorPointStage& stage);
   void run(const HeldBodiesStage& rules);
-  /// Around the folds of the path.
+  /// Follows the path around its folds.
   void run(const HomotopyStage& rules);
   void run(const NewtonStage& rules);
   void descend(SemismoothNewton<Cone>& newton, const NewtonRules& rules, std::int64_t left,
                Vector r);
   void run(const PivotingStage& rules);
-  /// About what rounding leaves of u where the reactions are these, relative to the scale.
+  /// About the size of the rounding of u for these reactions, relative to the scale.
   [[nodiscard]] double rounding_of_velocity(const Vector& r) const;
   void run(const RandomStartsStage& rules);
   void run(const NoSolutionStage& rules);
@@ -103,7 +104,7 @@ class Island {
   std::optional<CoupledSystem> system_;
   Vector r_, u_, best_;
   Vector swept_, associated_;            // what stages start from
-  std::int64_t own_factorisations_ = 0;  // of a stage with a system of its own
+  std::int64_t own_factorisations_ = 0;  // factorisations of a stage with a system of its own
   double error_ = 0;
 };
 

@@ -17,7 +17,7 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(blanks) - first + 1);
 }
 
-/// What a stage is called in messages.
+/// The name of a stage in messages.
 struct Place {
   std::string name;
   int line = 0;

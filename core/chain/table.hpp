@@ -1,15 +1,15 @@
-// A chain of methods as data: which stages there are, when each applies, what it starts from and
-// what it may cost. `auto` is one such table (solvers/automatic.cpp); a user may give another.
+// A chain of methods as data: which stages there are, when each runs, what it starts from and what
+// it may cost. `auto` is one such table (solvers/automatic.cpp). A user may give another.
 //
-// In text, a line (or what ";" ends) is a stage; "#" begins a comment:
+// In text, each line is a stage (";" also ends one), and "#" begins a comment:
 //
 //   NAME : METHOD key=value ...
 //
-// NAME is what results call the stage, METHOD one of the structs below. The keys of `When` say
-// where the stage applies, the others are the method's own. What no table sets is a constant beside
+// NAME is what results call the stage. METHOD is one of the structs below. The keys of `When` say
+// when the stage runs; the other keys belong to the method. What no table sets is a constant beside
 // its method.
 //
-// What a stage may cost is counted in its own steps or in operations, never in time: the same
+// The cost of a stage is counted in its own steps or in operations, never in time. So the same
 // problem takes the same path on every machine.
 #pragma once
 
@@ -31,7 +31,7 @@
 
 namespace fclib::chain {
 
-// ---- where a stage applies
+// ---- when a stage runs
 
 enum class On { whole, islands };
 inline constexpr std::array<std::string_view, 2> on_names{"whole", "islands"};
@@ -93,13 +93,13 @@ constexpr auto start_from(Start Struct::* member) {
   return choice("from", member, start_names, start_doc);
 }
 
-/// From an iterate that is nearly a solution, the way to one may lead over errors that are far
-/// larger.
+/// An error without a limit. From an iterate that is nearly a solution, the way to the solution may
+/// lead over errors that are far larger.
 inline constexpr double endless = std::numeric_limits<double>::infinity();
 
 // ---- the methods
 
-/// Sweeps over the contacts, from the iterate that the whole or the island came with.
+/// Sweeps over the contacts, from the iterate that the whole or the island started with.
 struct GaussSeidelStage {
   static constexpr std::string_view name = "gauss_seidel";
   static constexpr std::string_view families = "splitting";
@@ -117,7 +117,7 @@ struct GaussSeidelStage {
   }
 };
 
-/// How long a method goes on whose steps cost little and converge slowly.
+/// How long a method goes on if its steps are cheap and converge slowly.
 struct Patience {
   double worth = 0;
   std::int64_t first_look = 50;
@@ -134,8 +134,8 @@ struct Patience {
   }
 };
 
-/// Sweeps from the best iterate: for a loose tolerance they often end where interior points fail,
-/// or long before one factorisation would.
+/// Sweeps from the best iterate. If the tolerance is loose, they often succeed when interior points
+/// fail, or long before one factorisation is done.
 struct SweepOnStage : Patience {
   static constexpr std::string_view name = "sweep_on";
   static constexpr std::string_view families = "splitting";
@@ -143,7 +143,7 @@ struct SweepOnStage : Patience {
       "Sweeps from the best iterate, as long as they may end for what factorisations cost.";
 };
 
-/// Many contacts in a dense W: a factorisation costs as much as thousands of products with W.
+/// For many contacts in a dense W: one factorisation costs as much as thousands of products with W.
 struct SpectralGradientStage : Patience {
   static constexpr std::string_view name = "spectral_gradient";
   static constexpr std::string_view families = "optimisation";
@@ -156,7 +156,7 @@ struct SpectralGradientStage : Patience {
   }
 };
 
-/// On W r = -q, preconditioned by tr(W_aa), from the guess or from nothing.
+/// On W r = -q, preconditioned by tr(W_aa). It starts from the guess, or from r = 0.
 struct ConjugateGradientsStage {
   static constexpr std::string_view name = "conjugate_gradients";
   static constexpr std::string_view families = "krylov";
@@ -200,7 +200,7 @@ struct NewtonStage : NewtonRules {
   }
 };
 
-/// The proximal point, with another step for each of the methods below.
+/// The proximal point. Each of the methods below has its own rule for the step.
 struct ProximalStageRules : ProximalRules {
   Start from = Start::best;
   bool wander = false;
@@ -244,7 +244,7 @@ struct ProximalStage : ProximalStageRules {
 
 struct InteriorPointStage : InteriorPointRules {
   static constexpr std::string_view name = "interior_point";
-  // what it reaches is polished by the proximal point
+  // the proximal point polishes what it reaches
   static constexpr std::string_view families = "interior point, newton, proximal point";
   static constexpr std::string_view doc =
       "The interior point with de Saxce's term in Newton's system. It is polished as it comes "
@@ -271,7 +271,7 @@ struct InteriorPointStage : InteriorPointRules {
   }
 };
 
-/// Where the associated problem's velocity tends to zero, its reactions solve this one.
+/// If the velocity of the associated problem tends to zero, its reactions solve this problem too.
 struct AssociatedStage {
   static constexpr std::string_view name = "associated";
   static constexpr std::string_view families = InteriorPointStage::families;
@@ -281,8 +281,8 @@ struct AssociatedStage {
   static constexpr auto fields() { return std::tuple{}; }
 };
 
-/// The proximal point iterates of the frictionless problem, which is convex, go to infinity along
-/// a ray of proof if there is no solution (Pazy 1971), and converge if there is one.
+/// The frictionless problem is convex. Its proximal point iterates converge if there is a solution.
+/// If there is none, they go to infinity along a ray, and the ray is the proof (Pazy 1971).
 struct NoSolutionStage {
   static constexpr std::string_view name = "no_solution";
   static constexpr std::string_view families = "newton, proximal point";
@@ -296,7 +296,7 @@ struct NoSolutionStage {
   }
 };
 
-/// Where most bodies rest, and reactions that hold them are far from unique.
+/// For problems in which most bodies rest and many different reactions hold them.
 struct HeldBodiesStage : HeldBodiesRules {
   static constexpr std::string_view name = "held_bodies";
   static constexpr std::string_view families = InteriorPointStage::families;
@@ -322,8 +322,8 @@ struct HomotopyStage {
   }
 };
 
-/// Where all paths from where the others begin lead elsewhere, as with friction so high that
-/// contacts wedge each other.
+/// For problems in which all paths from the usual starts lead to no solution, for example if
+/// friction is so high that contacts wedge each other.
 struct PivotingStage {
   static constexpr std::string_view name = "pivoting";
   static constexpr std::string_view families = "pivoting";
@@ -343,7 +343,7 @@ struct PivotingStage {
   }
 };
 
-/// Newton's method has many basins where contacts wedge each other.
+/// If contacts wedge each other, Newton's method has many basins of attraction.
 struct RandomStartsStage {
   static constexpr std::string_view name = "random_starts";
   static constexpr std::string_view families = "newton";
@@ -370,13 +370,13 @@ struct StageRule {
 
 using Table = std::vector<StageRule>;
 
-/// Whether a method takes Coulomb's cone alone.
+/// Whether a method takes only Coulomb's cone.
 inline bool coulomb_alone(const Method& method) {
   return std::holds_alternative<AssociatedStage>(method) ||
          std::holds_alternative<HeldBodiesStage>(method);
 }
 
-/// The chain that a text describes. Throws Error (option), which names the stage and its line.
+/// The chain that a text describes. Throws Error (option) that names the stage and its line.
 Table parse_table(std::string_view text);
 
 }  // namespace fclib::chain

@@ -1,5 +1,5 @@
-// What a chain knows of its own way: iterations, stages, the error of the islands that it does not
-// work on, and why it stops.
+// What a chain knows of its own run: iterations, stages, the error of the islands that it does not
+// work on now, and why it stops.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +19,7 @@
 
 namespace fclib::chain {
 
-/// Follows the whole solve: iterations, stages, the error of the islands not being worked on.
+/// Follows the whole solve: iterations, stages, and the error of the islands that wait.
 class Tracker {
  public:
   explicit Tracker(const Settings& settings) : monitor_(settings) {}
@@ -29,7 +29,7 @@ class Tracker {
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
   [[nodiscard]] std::vector<Stage>& stages() { return stages_; }
 
-  /// Factors that would take so many bytes are not made, where there are so many.
+  /// Notes that factors of so many bytes are not made, because only `limit` bytes are there.
   void without_factors(double bytes, double limit) {
     if (bytes <= too_large_) return;
     too_large_ = bytes;
@@ -49,10 +49,10 @@ class Tracker {
   void add_cpu(double seconds) { others_cpu_ += seconds; }
   [[nodiscard]] double others_cpu() const { return others_cpu_; }
 
-  /// The squared error of all contacts but those worked on now.
+  /// The squared error of all contacts that are not worked on now.
   void set_others(double squared) { others_ = squared; }
 
-  /// All reactions, and the contacts of the island that is worked on now; no contacts: all of them.
+  /// All reactions, and the contacts of the island that is worked on now. No contacts: all of them.
   void set_island(const Vector& all, std::span<const Index> contacts, int d) {
     if (!monitor_.watched()) return;
     all_ = all;
@@ -60,8 +60,8 @@ class Tracker {
     d_ = d;
   }
 
-  /// Counts iterations and tells of the error that is left, with r of the island. Whether to end
-  /// the stage: because everything stops, or because the iterate is not finite.
+  /// Counts iterations and reports the error that is left, with r of the island. Returns whether
+  /// the stage should end: because everything stops, or because the iterate is not finite.
   bool report(std::int64_t iterations, double error, const Vector& r) {
     const bool first = iterations_ == 0 && !reported_;
     iterations_ += iterations;
@@ -69,16 +69,16 @@ class Tracker {
     const double all = std::sqrt(others_ + error * error);
     const bool finite = std::isfinite(all);
     if (!stopped_ && (iterations > 0 || first)) {
-      // what has overflown is not an error to tell of, but its iterations count
+      // an error that has overflown is not reported, but its iterations count
       if (finite) told_ = all;
       stopped_ = monitor_.report(iterations_, told_, shown(r));
     }
     return stopped_.has_value() || !finite;
   }
-  /// Iterations that may still be made.
+  /// The iterations that may still be made.
   [[nodiscard]] std::int64_t left() const { return monitor_.max_iterations() - iterations_; }
 
-  /// Runs a stage, which returns the factorisations that it made and whether it solved.
+  /// Runs a stage. The stage returns the factorisations that it made and whether it solved.
   template <class F>
   void stage(std::string_view name, std::string_view families, const F& run) {
     auto at = std::find_if(stages_.begin(), stages_.end(),
@@ -87,7 +87,7 @@ class Tracker {
       at = stages_.insert(stages_.end(), Stage{.kind = {std::string(name), std::string(families)}});
     }
     monitor_.enter(name);
-    const auto place = at - stages_.begin();  // stages may be entered one inside another
+    const auto place = at - stages_.begin();  // a stage may run inside another one
     const auto start = std::chrono::steady_clock::now();
     const auto before = iterations_;
     const auto [factorisations, solved] = run();
@@ -100,7 +100,7 @@ class Tracker {
   }
 
  private:
-  /// All reactions, for who looks on.
+  /// All reactions, for the callback.
   const Vector* shown(const Vector& r) {
     if (!monitor_.watched() || contacts_.empty()) return &r;
     for (std::size_t k = 0; k < contacts_.size(); ++k) {
@@ -114,7 +114,7 @@ class Tracker {
   double too_large_ = 0;  // bytes of the largest factors that are not made
   std::string message_;
   double others_ = 0;
-  double told_ = std::numeric_limits<double>::max();  // the last error that was finite
+  double told_ = std::numeric_limits<double>::max();  // the last finite error that was reported
   double others_cpu_ = 0;
   std::int64_t iterations_ = 0;
   bool reported_ = false;

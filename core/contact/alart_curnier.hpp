@@ -1,6 +1,6 @@
 // The map of Alart & Curnier, "A mixed formulation for frictional contact problems prone to Newton
 // like solution methods" (1991): z_N is clipped at zero, and each tangential group of z (sliding,
-// and rolling where there is any) is projected on the disk of radius mu max(z_N, 0). Its fixed
+// and rolling if there is any) is projected on the disk of radius mu max(z_N, 0). Its fixed
 // points r = map(r - rho u) are the solutions of the contact law, for any rho > 0.
 #pragma once
 
@@ -10,8 +10,8 @@
 
 namespace fclib {
 
-/// Of a group of components. By components, as all here: each expression of Eigen is a type that
-/// the compiler takes long to make.
+/// The projection of one group of components. It is written by components, like all code here: each
+/// expression of Eigen is a type that takes the compiler long.
 template <int size>
 double part_norm(const double* part) {
   double sum = 0;

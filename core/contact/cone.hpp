@@ -39,10 +39,10 @@ Real above_slack(Real norm, Real slack) {
 
 /// r - P_K(r - rho u^): zero exactly if the friction law holds between u and r.
 ///
-/// The parts of u^ are not added up first. With mu = 1e10, u^_N = u_N + mu ||u_T|| would swallow
-/// r_N and u_N, and what is left of their difference is no number of either. `slack` has one
-/// velocity for each group of the cone: a ||u_g|| of no more is the rounding of the data, and is
-/// none in u^_N.
+/// The parts of u^ are not added up first: with mu = 1e10, u^_N = u_N + mu ||u_T|| would swallow
+/// r_N and u_N, and their difference would have no correct digit. `slack` has one velocity for each
+/// group of the cone. If ||u_g|| is not above it, it is rounding of the data and adds nothing to
+/// u^_N.
 ///
 /// Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and
 /// numerical comparisons" (2018), the natural map of section 3.
@@ -53,14 +53,14 @@ typename Cone::Vec natural_map(const Cone& cone, const typename Cone::Vec& u,
   return cone.natural(u, r, rho, slack).map;
 }
 
-/// The distance of x from K: without a velocity the natural map is x - P_K(x).
+/// The distance of x from K. Without a velocity, the natural map is x - P_K(x).
 template <class Cone>
 typename Cone::Vec::Scalar cone_violation(const Cone& cone, const typename Cone::Vec& x) {
   using Vec = typename Cone::Vec;
   return natural_map(cone, Vec(Vec::Zero()), x).norm();
 }
 
-/// The distance of y from the dual cone K*, which by Moreau's decomposition is the norm of the
+/// The distance of y from the dual cone K*. By Moreau's decomposition it is the norm of the
 /// projection of -y on K.
 template <class Cone>
 typename Cone::Vec::Scalar dual_violation(const Cone& cone, const typename Cone::Vec& y) {

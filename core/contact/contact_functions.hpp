@@ -1,5 +1,5 @@
-// Functions F(u, r) of one contact that vanish exactly where the contact law holds, with elements
-// A = dF/du and B = dF/dr of their generalised Jacobians: what semismooth Newton methods solve.
+// Functions F(u, r) of one contact that are zero exactly if the contact law holds, with elements A
+// = dF/du and B = dF/dr of their generalised Jacobians. Semismooth Newton methods solve F = 0.
 //
 //   AlartCurnier        r - its projection of r - rho u: disks of radius mu max(r_N - rho_N u_N, 0)
 //   JeanMoreau          the same with disks of radius mu max(r_N, 0)
@@ -7,8 +7,8 @@
 //   FischerBurmeister   x + y - (x o x + y o y)^(1/2), x = (mu r_N, r_T), y = rho (u^_N / mu, u_T),
 //                       o the product of the Lorentz cone's Jordan algebra
 //
-// rho (1/[W]) has an entry for each component: where a function is not `split`, only the first
-// counts. Each is computed without the difference of two large numbers, as the natural map is.
+// rho (1/[W]) has an entry for each component. If a function is not `split`, only the first one
+// counts. No function is computed as the difference of two large numbers; nor is the natural map.
 //
 // Alart & Curnier, "A mixed formulation for frictional contact problems prone to Newton like
 // solution methods" (1991); Jean & Moreau, "Dynamics in the presence of unilateral contacts and dry
@@ -97,7 +97,7 @@ using AlartCurnier = DiskFunction<Cone, true>;
 template <class Cone>
 using JeanMoreau = DiskFunction<Cone, false>;
 
-/// The derivative of u^ by u; zero for the norm's kink.
+/// The derivative of u^ by u. It is zero at the kink of the norm.
 template <class Cone>
 ContactMatrix<Cone::dim> modified_jacobian(const Cone& cone, const typename Cone::Vec& u) {
   constexpr int S = Cone::group_size;
@@ -248,7 +248,7 @@ struct FischerBurmeister {
       root.template tail<T>() = 0.5 * (high - low) * direction;
     }
 
-    /// I - L(root)^-1 L(x), L(a) b = a o b; a limit of it where L(root) is singular.
+    /// I - L(root)^-1 L(x), L(a) b = a o b. If L(root) is singular, a limit of it.
     void jacobian(const Vec& x, Mat& result) const {
       if (!(high > 0)) {
         result = (1 - std::sqrt(0.5)) * Mat::Identity();
@@ -277,8 +277,8 @@ struct FischerBurmeister {
 
 enum class ContactFunctionKind { alart_curnier, jean_moreau, natural_map, fischer_burmeister };
 
-/// One of them, as what calls it needs it. A = dF/du and B = dF/dr are elements of the generalised
-/// Jacobian.
+/// One of these functions, in the form that its callers need. A = dF/du and B = dF/dr are elements
+/// of the generalised Jacobian.
 template <class Cone>
 struct ContactFunction {
   using Vec = typename Cone::Vec;
@@ -290,7 +290,7 @@ struct ContactFunction {
   bool split = false;  ///< whether each component has a rho of its own
 };
 
-/// Throws Error (unsuitable) for Fischer & Burmeister's on a rolling cone.
+/// Throws Error (unsuitable) if Fischer & Burmeister's function is asked for on a rolling cone.
 template <class Cone>
 ContactFunction<Cone> contact_function(ContactFunctionKind kind);
 

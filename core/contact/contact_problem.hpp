@@ -1,5 +1,5 @@
-// The problem of one contact for any cone: solved exactly where the cone has a way to, else by
-// projections, which never fail.
+// The problem of one contact for any cone. If the cone has an exact method, that solves it; else
+// projections do, which never fail.
 #pragma once
 
 #include "contact/coulomb.hpp"

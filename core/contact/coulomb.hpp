@@ -13,7 +13,7 @@ template <int D, class Real = double>
 class Coulomb {
  public:
   static constexpr int dim = D;
-  static constexpr int groups = 1;          // of tangential components with a limit each
+  static constexpr int groups = 1;          // of tangential components, each with its own limit
   static constexpr int group_size = D - 1;  // components of a group
   using Vec = ContactVector<D, Real>;
   using Slack = std::array<Real, groups>;
@@ -22,7 +22,7 @@ class Coulomb {
   Coulomb(const Friction& friction, Eigen::Index contact) : mu_(friction.mu[contact]) {}
 
   [[nodiscard]] Real mu() const { return mu_; }
-  /// Of a group: ||r_group|| <= coefficient r_N.
+  /// The limit of a group is ||r_group|| <= coefficient r_N.
   [[nodiscard]] Real coefficient(int /*group*/) const { return mu_; }
 
   /// ||x_T||
@@ -31,7 +31,7 @@ class Coulomb {
       using std::abs;  // or that of Real
       return abs(x[1]);
     } else {
-      // by components: vector loads of what was just stored by components stall
+      // by components: if components were just stored, a vector load of them stalls
       using std::sqrt;  // or that of Real
       return sqrt(x[1] * x[1] + x[2] * x[2]);
     }

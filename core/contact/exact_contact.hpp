@@ -1,19 +1,21 @@
 // The problem of one contact, solved exactly: given A = W_aa (D x D) and b = u - A r, find r so
 // that r and A r + b satisfy Coulomb's law.
 //
-// By enumeration of the statuses. Open where b_N >= 0; stick where -A^-1 b is in the cone; else
-// slip, u_T = -alpha r_T with alpha > 0, and with
+// It tries the three statuses. Open if b_N >= 0. Stick if -A^-1 b is in the cone. Else slip, u_T =
+// -alpha r_T with alpha > 0, and with
 //
 //   S = A_TT - A_TN A_NT / A_NN,   c = b_T - A_TN b_N / A_NN
 //   r_T(alpha) = -(S + alpha I)^-1 c,   r_N(alpha) = -(b_N + A_NT r_T) / A_NN
 //
-// a bracketed Newton method on h(alpha) = mu r_N / ||r_T|| - 1. The quartic of Bonnefon & Daviet,
-// "Quartic formulation of Coulomb 3D frictional contact" (2011), has the same roots.
+// alpha is the root of h(alpha) = mu r_N / ||r_T|| - 1, found by a bracketed Newton method. The
+// quartic of Bonnefon & Daviet, "Quartic formulation of Coulomb 3D frictional contact" (2011), has
+// the same roots.
 //
-// Fingers and legs of one or two joints have blocks of rank 1 or 2, whose S is singular but for
-// rounding. Its small eigenvalues are then zero, and so is the part of c along them, which no r_T
-// has an effect on: stick takes the least r_T. Where that part is more than rounding the contact
-// slides; of stick and slip the one is taken that leaves the smaller natural map.
+// Fingers and legs of one or two joints have blocks of rank 1 or 2, and their S is singular up to
+// rounding. Its small eigenvalues are then set to zero, and so is the part of c along them, since
+// no r_T has an effect on that part. Stick takes the smallest r_T. If that part is more than
+// rounding, the contact slides. If both stick and slip are possible, the one with the smaller
+// natural map is taken.
 #pragma once
 
 #include <cmath>
@@ -34,8 +36,8 @@ class ExactContact {
 
   ExactContact(const Mat& a, double mu);
 
-  /// Replaces r by an exact solution. False, with r untouched, where there is none to be found: the
-  /// block has no normal part, or coupling and mu leave the slip equation without a root.
+  /// Replaces r by an exact solution. Returns false, and leaves r untouched, if none is found: the
+  /// block has no normal part, or with this coupling and mu the slip equation has no root.
   bool solve(const Vec& b, Vec& r) {
     if (b[0] >= 0) {
       r.setZero();
@@ -43,7 +45,7 @@ class ExactContact {
     }
     if (!solvable_) return false;
     const TangentVec c = b.template tail<T>() - to_tangent_ * b[0];
-    const double free_normal = -b[0] / normal_;  // r_N where r_T = 0
+    const double free_normal = -b[0] / normal_;  // r_N if r_T = 0
     if (singular_ && mu_ != 0) return solve_singular(b, c, free_normal, r);
 
     if (mu_ == 0) {
@@ -65,15 +67,15 @@ class ExactContact {
 
  private:
   static constexpr double tiny = 1e-14;
-  /// Relative to A_TT, which S is a difference from: eigenvalues up to this are zero.
+  /// Relative to A_TT: S is a difference from it, so eigenvalues up to this are zero.
   static constexpr double rounding = 1e-13;
-  /// Relative to the terms of c: so much of it is rounding, of b too, which is a difference.
+  /// Relative to the terms of c: so much of c is rounding. b is a difference and rounds too.
   static constexpr double rounding_of_c = 1e-12;
 
-  /// Sets the eigenvalues of S that are rounding to zero, where there are any.
+  /// Sets the eigenvalues of S that are only rounding to zero.
   void reveal_rank(const Mat& a);
 
-  /// As solve() does, where S is singular; b_N < 0 and mu > 0.
+  /// Like solve(), if S is singular, b_N < 0 and mu > 0.
   bool solve_singular(const Vec& b, const TangentVec& c, double free_normal, Vec& r);
 
   /// The natural map of this contact alone.
@@ -116,7 +118,7 @@ class ExactContact {
       TangentVec rt;
       double rn = 0;
       double norm = 0;
-      bool last = false;  // Newton squares the error: no step is needed after one from below 1e-8
+      bool last = false;  // Newton squares the error: below 1e-8 one step is the last
       for (int k = 0; k < 60; ++k) {
         const TangentMat inverse = shifted_inverse(schur_, alpha);
         rt = -(inverse * c);
@@ -154,7 +156,7 @@ class ExactContact {
   TangentVec to_tangent_ = TangentVec::Zero();  // A_TN / A_NN
   TangentMat schur_ = TangentMat::Zero();       // S
   TangentMat inverse_ = TangentMat::Zero();     // S^-1
-  // where S is singular but for rounding
+  // used if S is singular up to rounding
   bool singular_ = false;
   TangentMat range_ = TangentMat::Zero();  // the projection on what is left of S
   Mat block_ = Mat::Zero();                // A

@@ -1,5 +1,5 @@
-// Inverses and determinants of the blocks of contacts, compiled once: those of 5 x 5 are an LU
-// factorisation, which costs the compiler seconds wherever it is written.
+// Inverses and determinants of the blocks of contacts, compiled once: for 5 x 5 they are an LU
+// factorisation, and each place that contains it costs the compiler seconds.
 #pragma once
 
 #include "contact/cone.hpp"

@@ -20,7 +20,7 @@ bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   for (int k = 0; k < D; ++k) u[k] += a(k, 0) * moved;
   for (int g = 0; g < Cone::groups; ++g) {
     const int at = 1 + g * size;
-    // the norm of the block: a step of one over it never overshoots
+    // the norm of the block: a step of 1 / norm never overshoots
     double norm = 0;
     for (int row = at; row < at + size; ++row) {
       double sum = 0;

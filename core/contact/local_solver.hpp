@@ -1,4 +1,4 @@
-// What Gauss-Seidel does with the problem of one contact: the choice of local solvers.
+// How Gauss-Seidel solves the problem of one contact: the choice of local solvers.
 #pragma once
 
 #include <array>
@@ -26,9 +26,9 @@ inline constexpr std::string_view local_solvers_doc =
     "solution, the projection does. Rolling contacts have no exact solver, and alart-curnier in "
     "the place of fischer-burmeister.";
 
-/// One projection with the block of a contact replaced by its diagonal, normal part first: each
-/// part is projected with the velocities that the parts before it leave. False, with r untouched,
-/// where the diagonal is not positive.
+/// One projection in which the diagonal stands for the block of a contact. The normal part comes
+/// first. Each part is projected with the velocities that the parts before it leave. Returns false,
+/// and leaves r untouched, if the diagonal is not positive.
 template <class Cone>
 bool project_diagonal(const ContactMatrix<Cone::dim>& a, const Cone& cone,
                       const typename Cone::Vec& b, typename Cone::Vec& r);
@@ -39,12 +39,12 @@ struct LocalStep {
   using Vec = typename Cone::Vec;
 
   LocalSolver solver = LocalSolver::exact;
-  double accuracy = 1e-14;  ///< of the iterations, relative
-  int iterations = 10;      ///< at most, of projections or of Newton
+  double accuracy = 1e-14;  ///< relative accuracy of the iterations
+  int iterations = 10;      ///< largest number of projections or Newton steps
   double relaxation = 1;    ///< omega in r <- P_K(omega r_local + (1 - omega) r)
 
-  /// Replaces next, r^a on entry, by a solution of the contact's problem, or an improvement. Never
-  /// fails.
+  /// `next` is r^a on entry. It is replaced by a solution of the contact's problem, or by a better
+  /// point. Never fails.
   void operator()(ContactProblem<Cone>& contact, const Vec& b, Vec& next) const {
     const bool exact = solver == LocalSolver::exact && relaxation == 1;
     if (!exact || !contact.solve_exact(b, next)) other(contact, b, next);

@@ -1,4 +1,4 @@
-// The Lorentz cone x_0 >= ||x_1..|| as a Jordan algebra: what the steps of an interior point take.
+// The Lorentz cone x_0 >= ||x_1..|| as a Jordan algebra: what interior-point steps need.
 //
 // det(x) = x_0^2 - ||x_1..||^2, x o y = (x^T y, x_0 y_1.. + y_0 x_1..). Nesterov & Todd's scaling N
 // of x and y inside the cone is symmetric, N^2 y = x, and lambda = N y = N^-1 x.
@@ -24,13 +24,13 @@ double det(const Point<S>& x) {
   return (x[0] - t) * (x[0] + t);
 }
 
-/// det of a point inside the cone, which rounding may have put outside.
+/// det of a point inside the cone. Rounding may have put the point outside.
 template <int S>
 double inner_det(const Point<S>& x) {
   return std::max(det(x), std::numeric_limits<double>::min());
 }
 
-/// The step along d at which x leaves the cone: infinite where it never does.
+/// The step along d at which x leaves the cone. It is infinite if x never does.
 template <int S>
 double longest(const Point<S>& x, const Point<S>& d) {
   // the least positive root of det(x + t d) = 0
@@ -62,7 +62,7 @@ Point<S> divide(const Point<S>& target, const Point<S>& x) {
   return y;
 }
 
-/// p o q, taken off a target.
+/// Subtracts p o q from a target.
 template <int S>
 void subtract_product(const Point<S>& p, const Point<S>& q, Point<S>& target) {
   target[0] -= p.dot(q);
@@ -77,7 +77,7 @@ struct Scaling {
   Point<S> w;
   Eigen::Matrix<double, S, S> N, inverse;
 
-  /// That of x and y, which are inside the cone.
+  /// The scaling of x and y, which are inside the cone.
   void set(const Point<S>& x, const Point<S>& y) {
     constexpr int T = S - 1;
     const double det_x = inner_det(x);

@@ -1,4 +1,4 @@
-// The natural map of many contacts summed up in the three ways that errors are made of.
+// The natural map of many contacts, summed in the three ways that the errors need.
 #pragma once
 
 #include <algorithm>
@@ -9,12 +9,12 @@
 
 namespace fclib {
 
-/// Of the natural map F = r - P_K(r - u^), and of F with rho u^, of contacts that are added.
+/// Sums over contacts of the natural map F = r - P_K(r - u^), and of F with rho u^.
 ///
-/// With rho it is summed as impulses and as velocities: beside a heavy body the impulses of a light
-/// one vanish, whatever it does, and beside a fast one the velocities of a slow one. Two bodies
-/// that penetrate are told as such: with a large mu their u^, which has mu ||u_T|| in it, is in K*
-/// all but for 1 / mu of the velocity at which they do.
+/// The map with rho is summed twice. As impulses, a light body counts for nothing beside a heavy
+/// one. As velocities, a slow one counts for nothing beside a fast one. Two bodies that penetrate
+/// are found by u_N: if mu is large, mu ||u_T|| in u^ brings u^ into K* up to 1 / mu of the
+/// velocity at which they penetrate.
 template <class Real>
 struct NaturalSquares {
   Real plain = 0;       ///< sum of ||F||^2

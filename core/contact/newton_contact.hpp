@@ -9,7 +9,8 @@
 // solution methods" (1991); Fukushima, Luo & Tseng, "Smoothing functions for second-order-cone
 // complementarity problems" (2002).
 //
-// Both halve the Newton step until ||Phi|| falls. False, with r untouched, where that fails.
+// Both halve the Newton step until ||Phi|| falls. If that fails, they return false and leave r
+// untouched.
 #pragma once
 
 #include <algorithm>
@@ -24,7 +25,7 @@ namespace fclib {
 
 namespace detail {
 
-// By components: each expression of Eigen is a type that the compiler takes long to make.
+// By components: each expression of Eigen is a type that takes the compiler long.
 
 /// A x + b.
 template <int D>
@@ -54,16 +55,16 @@ bool all_finite(const ContactVector<D>& x) {
   return finite;
 }
 
-/// Damped Newton on `function(r, jacobian)`, which returns Phi and, where jacobian is not null,
-/// fills in an element of its generalised Jacobian. Phi is zero to rounding at accuracy times
+/// Damped Newton on `function(r, jacobian)`. The function returns Phi. If jacobian is not null, it
+/// fills in an element of its generalised Jacobian. Phi is zero up to rounding at accuracy times
 /// `size`.
 template <int D>
 bool damped_newton(
     FunctionRef<ContactVector<D>(const ContactVector<D>&, ContactMatrix<D>*)> function, double size,
     double accuracy, int max_iterations, ContactVector<D>& r) {
   constexpr int max_halvings = 12;
-  constexpr double sufficient = 1e-4;  // of the decrease that the model promises
-  constexpr double rounding = 1e-12;   // Phi that no step reduces is taken for zero below this
+  constexpr double sufficient = 1e-4;  // share of the decrease that the model promises
+  constexpr double rounding = 1e-12;   // if no step reduces Phi and it is below this, Phi is zero
   ContactVector<D> x = r;
   ContactMatrix<D> jacobian;
   ContactVector<D> phi = function(x, &jacobian);
@@ -134,7 +135,7 @@ bool newton_alart_curnier(const ContactMatrix<Cone::dim>& a, const Cone& cone,
   const double size = part_norm<D>(r.data()) + part_norm<D>(scaled.data());
   const Vec before = r;
   if (!detail::damped_newton<D>(function, size, accuracy, max_iterations, r)) return false;
-  r = cone.project(r);  // rounding leaves the cone
+  r = cone.project(r);  // rounding may have left the cone
   if (detail::all_finite<D>(r)) return true;
   r = before;
   return false;
@@ -147,7 +148,7 @@ bool newton_fischer_burmeister(const ContactMatrix<D>& a, const Coulomb<D>& cone
   using Vec = ContactVector<D>;
   using Mat = ContactMatrix<D>;
   constexpr int T = D - 1;
-  constexpr double least_friction = 1e-8;  // below it y is out of scale
+  constexpr double least_friction = 1e-8;  // below this, y is out of scale
   if (b[0] >= 0) {
     r.setZero();
     return true;

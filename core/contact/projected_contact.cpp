@@ -12,7 +12,7 @@ ProjectedContact<Cone>::ProjectedContact(const Mat& a, const Cone& cone) : a_(a)
 
 template <class Cone>
 void ProjectedContact<Cone>::solve(const Vec& b, double accuracy, int max_iterations, Vec& r) {
-  constexpr double contraction = 0.9;  // of a step that is accepted
+  constexpr double contraction = 0.9;  // a step is accepted up to this ratio
   constexpr double reduction = 2.0 / 3.0;
   constexpr double growth = 1.5;
   Vec hat = cone_.modified(a_ * r + b);

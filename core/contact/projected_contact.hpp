@@ -1,6 +1,6 @@
 // The problem of one contact, solved by projections: r <- P_K(r - rho u^), u = A r + b, with a step
-// rho that adapts (Khobotov's rule). For any cone; never fails, and converges as the conditioning
-// of A = W_aa allows.
+// rho that adapts (Khobotov's rule). It takes any cone and never fails. How fast it converges
+// depends on the conditioning of A = W_aa.
 //
 // Acary, Bremond, Huber 2018, section 4: the projection with local iterations.
 #pragma once
@@ -20,7 +20,7 @@ class ProjectedContact {
   [[nodiscard]] const Mat& block() const { return a_; }
   [[nodiscard]] const Cone& cone() const { return cone_; }
 
-  /// Improves r by at most max_iterations projections, until a step changes r by less than
+  /// Improves r by at most max_iterations projections. It ends if a step changes r by less than
   /// `accuracy` relative to r. Never fails.
   void solve(const Vec& b, double accuracy, int max_iterations, Vec& r);
 

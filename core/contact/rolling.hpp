@@ -31,17 +31,17 @@ class Rolling {
   Rolling(const Friction& friction, Eigen::Index contact)
       : mu_(friction.mu[contact]), mu_r_(friction.mu_r[contact]) {}
 
-  /// Of a group: ||r_group|| <= coefficient r_N.
+  /// The limit of a group is ||r_group|| <= coefficient r_N.
   [[nodiscard]] Real coefficient(int group) const { return group == 0 ? mu_ : mu_r_; }
 
   [[nodiscard]] Vec modified(const Vec& u) const;
 
-  /// The normal part n of the projection is the root of the increasing function
+  /// The normal part n of the projection is the root of this increasing function:
   ///   n - x_N - mu max(0, ||x_T|| - mu n) - mu_r max(0, ||x_R|| - mu_r n),
-  /// linear but for the values of n at which a limit ceases to bind.
+  /// It is linear between the values of n at which a limit stops binding.
   [[nodiscard]] Vec project(const Vec& x) const;
 
-  /// As that of Coulomb, with s_T = rho ||u_T||, s_R = rho ||u_R||: see the definition.
+  /// As for Coulomb, with s_T = rho ||u_T|| and s_R = rho ||u_R||: see the definition.
   [[nodiscard]] NaturalPoint<Vec> natural(const Vec& u, const Vec& r, Real rho,
                                           const Slack& slack) const;
 
@@ -68,7 +68,7 @@ auto Rolling<D, Real>::project(const Vec& x) const -> Vec {
   if (x[0] + mu_ * t + mu_r_ * r <= 0) return Vec::Zero();
   const Real free_t = t > 0 ? t / mu_ : Real(0);
   const Real free_r = r > 0 ? r / mu_r_ : Real(0);
-  // the limit that binds longest, alone, or both
+  // only the limit that binds longest, or both
   const bool sliding = free_t >= free_r;
   const Real limit = sliding ? mu_ : mu_r_;
   Real n = (x[0] + limit * (sliding ? t : r)) / (1 + limit * limit);
@@ -87,9 +87,9 @@ auto Rolling<D, Real>::project(const Vec& x) const -> Vec {
 //   F_N = rho u_N + mu (s_T - c_T) + mu_r (s_R - c_R),   F_T = rho u_T + c_T y_T / ||y_T||,  F_R
 //   alike
 //
-// and its normal part is n = a + mu (c_T - s_T) + mu_r (c_R - s_R), a = r_N - rho u_N. A limit that
-// binds has c = ||y|| - limit n > 0, the other one c = 0. What is large, mu s_T and mu_r s_R,
-// leaves these sums before they are formed.
+// and its normal part is n = a + mu (c_T - s_T) + mu_r (c_R - s_R), a = r_N - rho u_N. If a limit
+// binds, c = ||y|| - limit n > 0; else c = 0. The large parts, mu s_T and mu_r s_R, cancel in these
+// sums before they are formed.
 template <int D, class Real>
 auto Rolling<D, Real>::natural(const Vec& u, const Vec& r, Real rho, const Slack& slack) const
     -> NaturalPoint<Vec> {
@@ -108,7 +108,7 @@ auto Rolling<D, Real>::natural(const Vec& u, const Vec& r, Real rho, const Slack
     map[0] += mu_ * slip_t + mu_r_ * slip_r;
     return {map, ContactStatus::stick};
   }
-  // the limit that binds longest as n grows binds alone, or both do
+  // as n grows, only the limit that binds longest binds, or both do
   const bool sliding = t * mu_r_ >= q * mu_;
   const Real limit = sliding ? mu_ : mu_r_;
   const Real left = sliding ? left_t : left_r;
@@ -130,7 +130,7 @@ auto Rolling<D, Real>::natural(const Vec& u, const Vec& r, Real rho, const Slack
     (sliding ? cut_t : cut_r) = (sliding ? slip_t : slip_r) + (left - limit * (a - idle)) / weight;
     map[0] -= (limit * (left - limit * a) - idle) / weight;
   }
-  // a cut that is no number must show
+  // if a cut is NaN, the result must show it
   if (!(cut_t <= 0) && t != 0) map.template segment<T>(1) += cut_t / t * y.template segment<T>(1);
   if (!(cut_r <= 0) && q != 0)
     map.template segment<T>(1 + T) += cut_r / q * y.template segment<T>(1 + T);

@@ -1,6 +1,6 @@
-// New places for the entries of a problem or of a solution: each length that fields share (n, m, p,
-// nc) has a map from the old number of an entry to the new one. The fields say which of their sides
-// goes by which map, so that no conversion names them.
+// New places for the entries of a problem or of a solution. Each length that fields share (n, m, p,
+// nc) has a map from the old number of an entry to the new one. The fields say which side follows
+// which map, so that no conversion names them.
 #pragma once
 
 #include <numeric>
@@ -11,7 +11,8 @@
 
 namespace fclib {
 
-/// Entry k becomes entry to[k] of `count`; no two go to one place, and what nobody goes to is 0.
+/// Entry k becomes entry to[k] of `count`. No two go to one place. A place that no entry takes is
+/// 0.
 struct Places {
   std::vector<Index> to;
   Index count = 0;
@@ -48,14 +49,13 @@ struct Arrangement {
   }
 };
 
-/// The entries in their new places, in the same storage. What was known of the matrix is left out.
+/// The entries in their new places, in the same storage. What was known of the matrix is dropped.
 Matrix arranged(const Matrix& a, const Places& rows, const Places& cols);
 Vector arranged(const Vector& x, const Places& places);
-/// Entry k is x[to[k]]: what `arranged` has done, undone.
+/// Entry k is x[to[k]]: this undoes `arranged`.
 Vector gathered(const Vector& x, const Places& places);
 
-/// All fields of a problem or of a solution in their new places; members that are not there stay
-/// so.
+/// All fields of a problem or of a solution in their new places. Absent members stay absent.
 template <class Struct>
 Struct arranged(Struct value, const Arrangement& arrangement) {
   for_each_field<Struct>([&]<class Member>(const Field<Struct, Member>& field) {

@@ -1,11 +1,11 @@
-// The order of the components of contacts in other tools. Ours is (N, T1, T2) for one contact after
+// The order of the components of contacts in other tools. Ours is (N, T1, T2), one contact after
 // the other, as in Siconos and in MuJoCo's elliptic cones.
 //
 //   normal-last  (T1, T2, N) for one contact after the other: Pinocchio, ContactBench
 //   normals-first  all N, then all tangential components contact by contact: linear complementarity
 //                  problems (Stewart & Trinkle 1996) and many multibody codes
 //
-// All of them state the law for the same u and r: only the places change, no sign.
+// All of them state the law for the same u and r: only the places change, never a sign.
 #pragma once
 
 #include <string>
@@ -18,7 +18,7 @@ namespace fclib {
 
 enum class ComponentOrder { normal_first, normal_last, normals_first };
 
-/// The order of a name. Throws Error (option) where there is none.
+/// The order of a name. Throws Error (option) if there is none.
 inline ComponentOrder component_order_of(std::string_view name) {
   if (name == "normal-first") return ComponentOrder::normal_first;
   if (name == "normal-last") return ComponentOrder::normal_last;
@@ -45,7 +45,7 @@ inline Places component_places(ComponentOrder order, Index nc, Index d) {
   return places;
 }
 
-/// The data of a problem in another order: no problem of ours any more.
+/// The data of a problem in another order. It is no longer a problem of ours.
 template <class P>
 P to_order(const P& problem, ComponentOrder order) {
   Arrangement places = Arrangement::of(problem);
@@ -53,7 +53,7 @@ P to_order(const P& problem, ComponentOrder order) {
   return arranged(problem, places);
 }
 
-/// The problem whose data is in another order; the sizes must agree with each other.
+/// The problem whose data is in another order. The sizes must agree with each other.
 template <class P>
 P from_order(const P& data, ComponentOrder order) {
   Arrangement places = Arrangement::of(data);

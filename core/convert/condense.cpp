@@ -52,7 +52,7 @@ Condensation::Condensation(const GlobalProblem& problem, const Deadline* deadlin
 
 Solution Condensation::expand(const Solution& local) const {
   Solution result = local;
-  // what joints and contacts add to a light body may be far larger than what is left of it
+  // joints and contacts may add far more to the velocity of a light body than what is left of it
   RealVector momentum = problem_.f.cast<Real>();
   multiply_add(problem_.H, local.r, momentum);
   if (is_mixed(problem_)) multiply_add(problem_.G, local.l, momentum);

@@ -9,13 +9,13 @@
 
 namespace fclib {
 
-/// Keeps the factorisation of M, so that a solution of the local problem is taken back cheaply.
+/// Keeps the factorisation of M, so that it is cheap to take a solution of the local problem back.
 class Condensation {
  public:
-  /// Throws Error (unsuitable) where M is singular, or symmetric and not positive definite.
+  /// Throws Error (unsuitable) if M is singular, or symmetric and not positive definite.
   ///
-  /// After the factorisation of M nothing is done once the deadline has passed: finished() says so,
-  /// and local() is no problem then.
+  /// If the deadline has passed after the factorisation of M, nothing more is done: finished() is
+  /// false, and local() is not a problem then.
   explicit Condensation(const GlobalProblem& problem, const Deadline* deadline = nullptr);
 
   [[nodiscard]] bool finished() const { return finished_; }
@@ -32,8 +32,8 @@ class Condensation {
   bool finished_ = false;
 };
 
-/// The local form of a global problem (M3DFC from GM3DFC), with joints that agree if only rounding
-/// keeps them from it (joints/consistent.hpp).
+/// The local form of a global problem (M3DFC from GM3DFC). If its joints contradict each other only
+/// by rounding, they are made to agree (joints/consistent.hpp).
 LocalProblem condense(const GlobalProblem& problem);
 LocalRollingProblem condense(const GlobalRollingProblem& problem);
 

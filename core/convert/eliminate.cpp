@@ -14,14 +14,14 @@ namespace fclib {
 
 namespace {
 
-/// Of R with a diagonal of ones: W' loses as many digits.
+/// Condition number of R with a diagonal of ones. W' loses as many digits.
 constexpr double ill_conditioned = 1e10;
-/// What is left of a constraint beside the others, relative to it, is rounding up to this.
+/// If less than this share of a constraint is left beside the others, it is rounding.
 constexpr double dependent = 1e-12;
-/// Constraints that follow from others agree with them to this, relative to their terms.
+/// Constraints that follow from others must agree with them up to this, relative to their terms.
 constexpr double agreement = 1e-9;
 
-/// A lower bound, and mostly a good one, of the condition number of R scaled to a diagonal of ones.
+/// A lower bound, mostly a good one, of the condition number of R scaled to a diagonal of ones.
 double condition(const Factorization& factors, const SparseColumns& r) {
   const Eigen::Index p = r.rows();
   Vector scale = r.diagonal().cwiseAbs().cwiseSqrt();
@@ -35,7 +35,7 @@ double condition(const Factorization& factors, const SparseColumns& r) {
     }
   }
   Vector x(p);
-  for (Eigen::Index k = 0; k < p; ++k) {  // in no symmetry with the constraints
+  for (Eigen::Index k = 0; k < p; ++k) {  // a vector without any symmetry of the constraints
     x[k] = (k % 2 == 0 ? 1.0 : -1.0) * (1 + 0.7 * std::sin(static_cast<double>(k + 1)));
   }
   double growth = 0;
@@ -67,8 +67,8 @@ Vector selected(const Vector& a, const std::vector<Index>& places) {
 
 SparseColumns transposed(const SparseColumns& a) { return a.transpose(); }
 
-/// The constraint that follows from others and differs from them the most, if by more than
-/// rounding: by more than a part of its terms, of which the first `rounding` [m/s] does not count.
+/// The constraint that follows from others and contradicts them most, if it does so by more than
+/// rounding: by more than a part of its terms. The first `rounding` [m/s] does not count.
 std::optional<Error> disagreement(const std::vector<Index>& dropped, const Vector& gap,
                                   const Vector& size, double rounding = 0) {
   Eigen::Index worst = -1;
@@ -83,7 +83,7 @@ std::optional<Error> disagreement(const std::vector<Index>& dropped, const Vecto
   }
   if (worst < 0) return std::nullopt;
   return Error(ErrorKind::unsuitable,
-               "contradicts the others, from which it follows: where they hold it is off by " +
+               "contradicts the others, from which it follows: if they hold, it is off by " +
                    shortest(std::abs(gap[worst])) + ", " + shortest(most) + " of its terms",
                "bilateral constraint " + std::to_string(dropped[static_cast<std::size_t>(worst)]));
 }
@@ -147,13 +147,13 @@ bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation
   for (Eigen::Index k = 0; k < count; ++k) {
     free_rows[k] = free[basis.rows[static_cast<std::size_t>(k)]];
   }
-  // no velocity holds a constraint better than this, the columns having length one
+  // no velocity satisfies a constraint better than this, since the columns have length one
   constexpr double rounding_unit = 32 * std::numeric_limits<double>::epsilon();
   contradiction_ = disagreement(basis.columns.dropped, dropped - basis.T2.transpose() * beta, size,
                                 rounding_unit * free_rows.norm());
 
   s_ = basis.Q.transpose() * free_rows + beta;
-  // V' by rows of Q; what is rounding of a contact's row would couple what is apart
+  // V' by rows of Q; rounding in the row of a contact would couple what is separate
   std::vector<Index> place(static_cast<std::size_t>(a->rows()), -1);
   for (std::size_t k = 0; k < basis.rows.size(); ++k) {
     place[static_cast<std::size_t>(basis.rows[k])] = static_cast<Index>(k);
@@ -196,7 +196,7 @@ bool Elimination::orthonormalise(const GlobalProblem& bodies, const Condensation
 }
 
 bool Elimination::leave_out_redundant(const SparseColumns& r, const Vector& size) {
-  SparseColumns both(r.rows() + v_.rows(), r.cols());  // what a multiplier does
+  SparseColumns both(r.rows() + v_.rows(), r.cols());  // the effect of a multiplier
   both.reserve(r.nonZeros() + v_.nonZeros());
   for (Eigen::Index col = 0; col < r.cols(); ++col) {
     both.startVec(col);
@@ -239,7 +239,8 @@ bool Elimination::leave_out_redundant(const SparseColumns& r, const Vector& size
 void Elimination::reduce() {
   const SparseColumns right = v_.transpose();
   const SparseColumns coupling = bilateral_ ? bilateral_->solve(right) : right;
-  // what the bilateral constraints hold entirely is zero, not the rounding of a difference
+  // what the bilateral constraints hold entirely is zero; it must not be the rounding of a
+  // difference
   const SparseColumns full = to_eigen(problem_.W);
   const SparseColumns held = v_ * coupling;
   SparseColumns w = full - held;
@@ -251,8 +252,8 @@ void Elimination::reduce() {
   const Vector impulse = bilateral_ ? bilateral_->solve(s_) : s_;
   plain_.q = problem_.q - v_ * impulse;
 
-  // of a diagonal entry the joints' own terms count too: its multipliers x = R^-1 V^T e_k are
-  // taken from an R that is rounded by eps sqrt(R_ii R_jj), which x^T R x feels
+  // a diagonal entry also has the rounding of the joints' own terms: its multipliers x = R^-1 V^T
+  // e_k come from an R that is rounded by eps sqrt(R_ii R_jj), which enters x^T R x
   const Vector lengths = joint_lengths();
   Vector shares = Vector::Zero(full.rows());  // sum of sqrt(R_ii) |x_i|
   for (Eigen::Index col = 0; col < coupling.outerSize(); ++col) {
@@ -263,8 +264,8 @@ void Elimination::reduce() {
   const Vector free = full.diagonal();
   const Vector left = w.diagonal();
   const Vector terms = Vector(size.diagonal()) + shares.cwiseAbs2();
-  // and so is the row of such a component, and its velocity: where W' is semidefinite,
-  // |W'_kj|^2 <= W'_kk W'_jj, and what is larger says that it is not
+  // if the diagonal entry of a component is rounding, so are its row and its velocity: if W' is
+  // semidefinite, |W'_kj|^2 <= W'_kk W'_jj, and a larger entry shows that it is not
   Eigen::Array<bool, Eigen::Dynamic, 1> held_entirely =
       left.array().abs() <= rounding * terms.array() && free.array() != 0;
   const auto is_rounding = [&](Eigen::Index k, Eigen::Index j, double value) {
@@ -279,7 +280,7 @@ void Elimination::reduce() {
   w.prune([&](Eigen::Index row, Eigen::Index col, double) {
     return !held_entirely[row] && !held_entirely[col];
   });
-  // the terms of s, of which `impulse` is a sum, may be larger than it in one place
+  // `impulse` is a sum of terms of s; they may be larger than it in one place
   const double pushes = lengths.dot(impulse.cwiseAbs());
   for (Eigen::Index k = 0; k < left.size(); ++k) {
     const double terms_of_q = std::abs(problem_.q[k]) + pushes * shares[k];

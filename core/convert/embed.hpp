@@ -2,9 +2,9 @@
 // (N, T, 0, R, 0).
 //
 // The new components have masses of their own, so that the spatial problem has the planar solution
-// and no other in them: each new row of W has one entry, its diagonal, the mean of the contact's
-// diagonal in the planar W; a global problem gets one degree of freedom more for each new
-// component, of the mean mass, at rest.
+// and no other in them. Each new row of W has one entry, its diagonal: the mean of the contact's
+// diagonal in the planar W. A global problem gets one degree of freedom more for each new
+// component. It has the mean mass and is at rest.
 #pragma once
 
 #include "convert/arrange.hpp"
@@ -34,7 +34,7 @@ Arrangement spatial_places(const P& planar) {
   return places;
 }
 
-/// The spatial problem of a planar one. Throws Error (unsuitable) where it is not planar.
+/// The spatial problem of a planar one. Throws Error (unsuitable) if the problem is not planar.
 template <class P>
 P embed(const P& planar) {
   const auto [d, spatial] = P::dimensions;

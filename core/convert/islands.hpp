@@ -1,5 +1,5 @@
 // Islands: groups of contacts, degrees of freedom and bilateral constraints that no non-zero of a
-// matrix links. Each is a problem of its own, and the solution of the whole is made of theirs.
+// matrix links. Each is a problem of its own. Together, their solutions are that of the whole.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@
 namespace fclib {
 
 /// The number of the island of each contact (nc), degree of freedom (n) and bilateral constraint
-/// (p). Islands are numbered by their first contact; all that touches no contact is one more, the
-/// last.
+/// (p). Islands are numbered by their first contact. Everything that touches no contact is one more
+/// island, the last.
 struct Islands {
   Index count = 0;
   Index spacedim = 3;
@@ -69,7 +69,7 @@ class Groups {
   std::vector<Index> parent_;
 };
 
-/// The islands of a problem, which must be valid. Entries that are stored and zero link nothing.
+/// The islands of a problem, which must be valid. A stored zero links nothing.
 template <class P>
 Islands islands(const P& problem) {
   const Index nc = problem.size(Dim::nc);
@@ -134,7 +134,7 @@ void require_fit(const Struct& value, const Islands& islands) {
 }  // namespace detail
 
 /// The islands of a problem (or of a solution of it), each with its own numbers. Throws Error
-/// (problem) where the sizes are not those of the islands, or where an entry links two of them.
+/// (problem) if the sizes are not those of the islands, or if an entry links two of them.
 template <class Struct>
 std::vector<Struct> split(const Struct& whole, const Islands& islands) {
   detail::require_fit(whole, islands);
@@ -196,8 +196,8 @@ std::vector<Struct> split(const Struct& whole, const Islands& islands) {
   return parts;
 }
 
-/// The whole of which these are the islands: split, undone. Matrices take the storage of the first
-/// part's, what is known of them is left out. Throws Error (problem) where the sizes disagree.
+/// The whole of which these are the islands: it undoes split. Matrices get the storage of the first
+/// part's, and what is known of them is dropped. Throws Error (problem) if the sizes disagree.
 template <class Struct>
 Struct merge(const std::vector<Struct>& parts, const Islands& islands) {
   const std::vector<Arrangement> places = places_of(islands);
@@ -252,8 +252,8 @@ Struct merge(const std::vector<Struct>& parts, const Islands& islands) {
   return whole;
 }
 
-/// Independent problems as the islands of one, one after the other. Throws Error (problem) where
-/// they are not of one spacedim, or where there is none.
+/// Independent problems as the islands of one, one after the other. Throws Error (problem) if they
+/// have different spacedims, or if there is none.
 template <class P>
 Islands beside(const std::vector<P>& problems) {
   if (problems.empty()) throw Error(ErrorKind::problem, "there is no problem to merge");

@@ -1,4 +1,4 @@
-// The storage of a problem's matrices: the same numbers, arranged otherwise.
+// The storage of a problem's matrices: the same numbers in another arrangement.
 #pragma once
 
 #include <limits>
@@ -23,7 +23,7 @@ constexpr std::string_view name_of(Storage storage) {
   return "?";
 }
 
-/// The storage of a name. Throws Error (option) where there is none.
+/// The storage of a name. Throws Error (option) if there is none.
 inline Storage storage_of(std::string_view name) {
   std::string known;
   for (const auto storage : {Storage::csr, Storage::csc, Storage::triplet, Storage::dense}) {
@@ -34,9 +34,9 @@ inline Storage storage_of(std::string_view name) {
               "there is no storage '" + std::string(name) + "'; there are: " + known, "storage");
 }
 
-/// The problem with all its matrices in one storage; any change of storage adds duplicates up. The
-/// problem must be valid. Throws Error (unsuitable) where a dense matrix would have more entries
-/// than an index can count.
+/// The problem with all its matrices in one storage. Any change of storage adds duplicates up. The
+/// problem must be valid. Throws Error (unsuitable) if a dense matrix would have more entries than
+/// an index can count.
 template <class P>
 P with_storage(P problem, Storage storage) {
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {

@@ -4,8 +4,8 @@
 //
 //   u' = velocity D^-1 u,  r' = impulse D r,  W' = velocity / impulse D^-1 W D^-1,  H' = H D^-1,
 //
-// and so on by the units that the fields state. Solutions go with their problem; the natural-map
-// error does not (r - u^ adds the two), the scaled one does.
+// The units that the fields state give the other rules. Solutions change with their problem. The
+// natural-map error changes, because r - u^ adds the two; the scaled one does not.
 #pragma once
 
 #include <cmath>
@@ -59,7 +59,7 @@ inline void require_positive(const Scaling& scaling) {
 
 }  // namespace detail
 
-/// The problem in other units. Throws Error (option) where a factor is not positive.
+/// The problem in other units. Throws Error (option) if a factor is not positive.
 template <class P>
 P scaled(P problem, const Scaling& scaling) {
   detail::require_positive(scaling);
@@ -84,7 +84,7 @@ P scaled(P problem, const Scaling& scaling) {
   return problem;
 }
 
-/// The solution of the problem in other units; `problem` in its own.
+/// The solution of the problem in other units; `problem` is in its own.
 template <class P>
 Solution scaled(Solution solution, const P& problem, const Scaling& scaling) {
   detail::require_positive(scaling);

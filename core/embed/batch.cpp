@@ -20,13 +20,13 @@ namespace fclib {
 
 namespace {
 
-/// Problems that a thread takes at once.
+/// The number of problems that a thread takes at once.
 constexpr std::int64_t chunk = 32;
-/// Larger ones are for `auto`: what is dense here is not there.
+/// Larger ones are for `auto`: the small solver is dense, `auto` is not.
 constexpr Index most_contacts = 64;
 constexpr double poll_interval = 0.1;  // [s]
 
-/// Where the arrays of a problem begin.
+/// The position of a problem in each array.
 struct Place {
   std::int64_t W = 0;
   std::int64_t q = 0;
@@ -44,7 +44,7 @@ struct One {
 };
 
 bool all_finite(const double* x, std::int64_t size) {
-  double sum = 0;  // of zeros, or NaN: without a branch
+  double sum = 0;  // zero, or NaN: without a branch
   for (std::int64_t k = 0; k < size; ++k) sum += x[k] * 0.0;
   return sum == 0;
 }
@@ -137,9 +137,9 @@ class Runner {
             or_null(batch_.guess), batch_.r + place.q, or_null(batch_.u)};
   }
 
-  /// A thread: takes chunks while there are any.
+  /// One thread: takes chunks as long as there are some.
   void work(bool polls) {
-    // memory that a thread keeps: a caller of one problem at a time allocates nothing either
+    // each thread keeps this memory: a caller with one problem at a time allocates nothing either
     thread_local SmallSolver<D> solver;
     std::int64_t converged = 0;
     std::int64_t by_auto = 0;
@@ -170,7 +170,7 @@ class Runner {
     by_auto_ += by_auto;
   }
 
-  /// Whether nobody has stopped the batch; one of the threads asks the caller.
+  /// Whether nobody has stopped the batch. One of the threads asks the caller.
   bool go_on(bool polls) {
     if (polls && settings_.poll && now({}) - last_poll_ > poll_interval) {
       last_poll_ = now({});
@@ -289,7 +289,7 @@ class Runner {
   const Batch& batch_;
   const BatchSettings& settings_;
   Deadline deadline_;
-  std::vector<Place> starts_;  // of each chunk, where the numbers of contacts vary
+  std::vector<Place> starts_;  // of each chunk, if the numbers of contacts vary
   std::atomic<std::int64_t> next_ = 0;
   std::atomic<int> stopped_ = -1;
   double last_poll_ = 0;  // of the thread that polls

@@ -8,7 +8,7 @@
 
 namespace fclib {
 
-/// As Matrix has it.
+/// A matrix with the members of Matrix.
 struct MatrixView {
   Storage storage = Storage::dense;
   Index rows = 0;
@@ -28,8 +28,8 @@ struct MatrixView {
         i(a.i.data()),
         x(a.x.data()) {}
 
-  /// Calls visit(row, col, value) for each stored entry; each index is in range and each value
-  /// finite, or it returns what is wrong. Null where all is well.
+  /// Calls visit(row, col, value) for each stored entry. Each index is checked to be in range and
+  /// each value to be finite. Returns what is wrong, or null.
   template <class Visitor>
   const char* visit(const Visitor& visit) const {
     const auto entry = [&](Index row, Index col, double value) {
@@ -57,7 +57,7 @@ struct MatrixView {
     }
     const bool by_columns = storage == Storage::csc;
     const Index outer = by_columns ? cols : rows;
-    if (outer == 0 && nnz == 0) return nullptr;  // which needs no pointers
+    if (outer == 0 && nnz == 0) return nullptr;  // an empty matrix needs no pointers
     if (p[0] != 0 || p[outer] != nnz) return "has pointers that do not agree with its entries";
     for (Index k = 0; k < outer; ++k) {
       if (p[k] > p[k + 1] || p[k + 1] > nnz) return "has pointers that are not in order";

@@ -6,7 +6,7 @@
 
 namespace fclib {
 
-/// At least so long, and never shorter.
+/// Makes it at least this long; it never gets shorter.
 template <class T>
 void grow(std::vector<T>& vector, std::size_t size) {
   if (vector.size() < size) vector.resize(size);

@@ -16,21 +16,21 @@ namespace {
 
 constexpr int most_sweeps = 500;
 constexpr int newton_attempts = 8;
-constexpr int newton_steps = 12;  // of the first attempt, and more of each
-/// As far ahead the rate of sweeps is believed.
+constexpr int newton_steps = 12;  // of the first attempt; later ones have more
+/// The rate of sweeps is trusted for so many sweeps ahead.
 constexpr double most_foreseen = 80;
-/// Sweeps before the first attempt of Newton's method: they find most of the statuses.
+/// Sweeps before the first attempt of Newton's method. They find most of the statuses.
 constexpr int first_sweeps = 3;
-/// The proximal weight over the mean diagonal of W: the heavier, the shorter and the safer are the
-/// steps. Of many contacts the next statuses are not near.
+/// The proximal weight over the mean diagonal of W. With a heavier weight, steps are shorter and
+/// safer. With many contacts the next statuses are not near, so the light weight is for few.
 constexpr double light = 1e-9;
 constexpr double heavy = 1e-3;
 constexpr Index few_contacts = 12;
-/// Unknowns of the largest system that is factorised here, which is dense.
+/// Unknowns of the largest system that is factorised here. It is dense.
 constexpr Index most_unknowns = 900;
 
-/// Solves A x = b by elimination with pivots of the columns; A (n x n) is by rows, b stands behind
-/// each row. x comes to stand there. False where A is singular.
+/// Solves A x = b by elimination with column pivots. A (n x n) is by rows, and b stands behind each
+/// row; x replaces b. Returns false if A is singular.
 bool eliminate(double* rows, Index n) {
   const Index width = n + 1;
   const auto row = [&](Index k) { return rows + static_cast<std::ptrdiff_t>(width) * k; };
@@ -162,7 +162,7 @@ const char* SmallSolver<D>::take(const MatrixView& W, const double* q, const dou
   return nullptr;
 }
 
-/// The contacts alone, and what errors are relative to.
+/// The contacts alone, and the scales of the errors.
 template <int D>
 void SmallSolver<D>::prepare() {
   iterations_ = 0;
@@ -200,7 +200,7 @@ typename SmallSolver<D>::Vec SmallSolver<D>::velocity(Index a, const double* r) 
   return coupled(a, r) + diagonal_[static_cast<std::size_t>(a)] * part(r, a);
 }
 
-/// About the error before it: how much it has changed r, in both units.
+/// Makes a sweep. Returns about the error before it: the change of r, in both units.
 template <int D>
 double SmallSolver<D>::sweep(double* r) {
   double natural = 0;
@@ -234,7 +234,7 @@ double SmallSolver<D>::error(const double* r) const {
   return squares.error(scale_, scaled_scale_);
 }
 
-/// Whether it is the best so far.
+/// Keeps r if it is the best so far. Returns whether it is.
 template <int D>
 bool SmallSolver<D>::keep(double error, const double* r, double& best) {
   if (!(error < best)) return false;
@@ -243,7 +243,7 @@ bool SmallSolver<D>::keep(double error, const double* r, double& best) {
   return true;
 }
 
-/// Operations, about.
+/// The number of operations, roughly.
 template <int D>
 double SmallSolver<D>::sweep_cost() const {
   return 200.0 * nc_ + 2.0 * D * D * static_cast<double>(row_[static_cast<std::size_t>(nc_)]);
@@ -254,7 +254,7 @@ double SmallSolver<D>::newton_cost() const {
   return 2.0 / 3.0 * n * n * n + 6 * n * n + 2 * sweep_cost();
 }
 
-/// One step of Newton's method from r. False where its system is singular.
+/// One step of Newton's method from r. Returns false if its system is singular.
 template <int D>
 bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
   Index count = 0;
@@ -313,7 +313,7 @@ bool SmallSolver<D>::newton_step(double weight_of_mean, double* r) {
   return true;
 }
 
-/// Some steps from r, while they better it. Whether the tolerance is met, in r.
+/// Makes steps from r as long as they improve it. Returns whether r meets the tolerance.
 template <int D>
 bool SmallSolver<D>::newton(int attempt, double tolerance, double* r, double& best) {
   double weight = nc_ <= few_contacts && attempt == 0 ? light : heavy * std::pow(10, attempt / 2);
@@ -343,7 +343,7 @@ bool SmallSolver<D>::solve(double tolerance, double* r) {
   double last = 0;
   int attempts = 0;
   int next_attempt = first_sweeps;
-  // sweeps; of many of them the rate tells little
+  // sweeps; the rate tells little about many of them
   const double worth = std::min(4 * newton_cost() / sweep_cost(), most_foreseen);
   for (int k = 1; k <= most_sweeps; ++k) {
     const double change = sweep(r);

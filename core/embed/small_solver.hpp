@@ -1,12 +1,12 @@
-// Problems of a few contacts with Coulomb's cone, solved in memory that is kept from one problem to
-// the next: nothing is allocated once it has seen the largest.
+// Solves problems of a few contacts with Coulomb's cone. Its memory is kept from one problem to the
+// next: nothing is allocated once it has seen the largest.
 //
 //   1  Gauss-Seidel sweeps with exact solutions of each contact, from the guess
-//   2  where sweeps to go cost more than a few factorisations: Newton on the map of Alart & Curnier
-//      with a proximal term, for redundant contacts leave W singular; each step is followed by a
-//      sweep, which brings it back to the cones
+//   2  if the sweeps to go cost more than a few factorisations: Newton on the map of Alart &
+//      Curnier with a proximal term, since redundant contacts leave W singular; each step is
+//      followed by a sweep, which brings it back to the cones
 //
-// It knows when it has failed, and says so: its callers then take the solver `auto`.
+// It reports when it has failed. Its callers then use the solver `auto`.
 #pragma once
 
 #include <algorithm>
@@ -25,24 +25,24 @@ class SmallSolver {
   using Vec = ContactVector<D>;
   using Mat = ContactMatrix<D>;
 
-  /// W (m x m, by rows), q (m) and mu (nc). q and mu must live while r is sought.
+  /// Takes W (m x m, by rows), q (m) and mu (nc). q and mu must live while r is sought.
   void take(Index nc, const double* W, const double* q, const double* mu);
 
-  /// The same of W in any storage. What is wrong with it, null where nothing is.
+  /// The same for W in any storage. Returns what is wrong with it, or null.
   const char* take(const MatrixView& W, const double* q, const double* mu);
 
   /// Improves r (m), a guess on entry, until the error of its natural maps in double precision is
-  /// at most the tolerance. Whether it is; where it is not r is the best iterate.
+  /// at most the tolerance. Returns whether it is; if not, r is the best iterate.
   bool solve(double tolerance, double* r);
 
-  /// The same until `judge()` of r says that its error, the merit's, is at most the tolerance; from
-  /// r = 0 where the guess leads nowhere. The error.
+  /// The same until `judge()` of r, the merit's error, is at most the tolerance. If the guess leads
+  /// to no solution, it starts again from r = 0. Returns the error.
   template <class Judge>
   double solve(double tolerance, double* r, const Judge& judge) {
     bool guessed = false;
     for (Index k = 0; k < D * nc_ && !guessed; ++k) guessed = r[k] != 0;
     double aim = tolerance;
-    // what double precision takes for the tolerance may be a little above it
+    // an error that meets the tolerance in double precision may be a little above it
     for (int attempt = 0;; ++attempt) {
       const bool met = solve(aim, r);
       const double error = judge();
@@ -58,7 +58,7 @@ class SmallSolver {
     }
   }
 
-  /// Sweeps and Newton steps since the problem was taken.
+  /// Sweeps and Newton steps since it got the problem.
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
 
  private:
@@ -86,7 +86,7 @@ class SmallSolver {
   double scaled_scale_ = 1;  // ||rho q||
   bool solvable_ = true;     // no contact has failed alone
   std::int64_t iterations_ = 0;
-  // W by blocks, the diagonal ones apart
+  // W by blocks; the diagonal ones are apart
   std::vector<Mat> diagonal_, blocks_;
   std::vector<std::size_t> row_;  // where the blocks of each contact begin, and where they end
   std::vector<Index> column_;     // of each block
@@ -94,7 +94,7 @@ class SmallSolver {
   std::vector<double> rho_;
   // scratch
   std::vector<double> best_, last_, z_, system_;
-  std::vector<Index> place_;  // of the contacts that are not open in Newton's system
+  std::vector<Index> place_;  // place of each contact that is not open in Newton's system
   std::vector<std::size_t> entry_row_;
   struct Entry {
     Index col;

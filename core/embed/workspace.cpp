@@ -12,7 +12,7 @@ namespace fclib {
 
 namespace {
 
-/// Beyond, `auto` with its sparse factors is the better choice.
+/// For larger problems, `auto` with its sparse factors is the better choice.
 constexpr std::size_t most_contacts = 400;
 
 [[noreturn]] void refuse(const char* where, const std::string& what) {

@@ -30,8 +30,8 @@ struct LocalView {
         mu(problem.mu.data(), static_cast<std::size_t>(problem.mu.size())) {}
 };
 
-/// One solve after another, in one thread. Nothing is allocated once it has seen the largest
-/// problem, but where the solver auto is needed.
+/// Runs one solve after another, in one thread. Nothing is allocated once it has seen the largest
+/// problem, except if the solver auto is needed.
 class Workspace {
  public:
   struct Settings {
@@ -39,7 +39,7 @@ class Workspace {
     double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock of one solve [s]
   };
 
-  /// Of the workspace until its next solve.
+  /// The result. It belongs to the workspace until its next solve.
   struct Answer {
     Status status = Status::diverged;
     std::int64_t iterations = 0;
@@ -49,22 +49,22 @@ class Workspace {
     std::span<const double> u;  ///< (m)
   };
 
-  /// `contacts` (nc, or empty) are names that contacts keep from one problem to the next: the
-  /// reactions that those had are where this solve starts. Without names, a problem of as many
-  /// contacts starts from the last one's reactions.
+  /// `contacts` (nc, or empty) are names that contacts keep from one problem to the next. This
+  /// solve starts from the reactions that those names had. Without names, if the number of contacts
+  /// is that of the last problem, it starts from the last reactions.
   ///
-  /// Throws Error (problem) where the data is not valid.
+  /// Throws Error (problem) if the data is not valid.
   Answer solve(const LocalView& problem, std::span<const std::int64_t> contacts,
                const Settings& settings);
 
-  /// The reactions of the last solve for these contacts, zero where there is none, in `r` (spacedim
-  /// nc).
+  /// Writes the reactions of the last solve for these contacts to `r` (spacedim nc); zero for a
+  /// contact that had none.
   void guess(int spacedim, std::span<const std::int64_t> contacts, std::span<double> r) const;
 
-  /// Keeps reactions that something else has found.
+  /// Keeps reactions that another method has found.
   void keep(int spacedim, std::span<const std::int64_t> contacts, std::span<const double> r);
 
-  /// Starts from zero again; the memory stays.
+  /// Starts from zero again. The memory stays.
   void forget() { known_ = 0; }
 
  private:

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 [[noreturn]] void fail(const std::string& path, const std::string& message) {
   throw Error(ErrorKind::file, message, {}, path);
 }
-/// With what the system says of it.
+/// Throws with the reason that the system gives.
 [[noreturn]] void fail_in_system(const std::string& path, const char* message) {
   fail(path, std::string(message) + ": " + std::strerror(errno));
 }
@@ -50,7 +50,7 @@ class Descriptor {
   int id_;
 };
 
-/// What the system knows of the file that is there, which must be one that can be written.
+/// What the system knows of the file that is there. It must be writable.
 std::optional<struct stat> status_of(const std::string& path, const std::string& target) {
   struct stat status{};
   if (::stat(target.c_str(), &status) != 0) return std::nullopt;
@@ -60,8 +60,8 @@ std::optional<struct stat> status_of(const std::string& path, const std::string&
   return status;
 }
 
-/// Gives a new file the owner, the permissions and the extended attributes of the old one. False
-/// where one of these cannot be given.
+/// Gives a new file the owner, the permissions and the extended attributes of the old one. Returns
+/// false if one of these cannot be given.
 bool take_over(int file, const std::string& target, const struct stat& old) {
   struct stat fresh{};
   if (::fstat(file, &fresh) != 0) return false;
@@ -108,15 +108,15 @@ std::string read_all(int file, std::size_t size, const std::string& path) {
     const ssize_t count = ::read(file, bytes.data() + done, size - done);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) fail_in_system(path, "cannot be read");
-    if (count == 0) break;  // somebody made it shorter
+    if (count == 0) break;  // another program made it shorter
     done += static_cast<std::size_t>(count);
   }
   bytes.resize(done);
   return bytes;
 }
 
-/// A new file beside the target, to be renamed over it. The process may have other threads: its
-/// umask is for the system to apply.
+/// A new file beside the target, which will be renamed over it. The system applies the umask of the
+/// process: other threads may run, so it cannot be read here.
 class Temporary {
  public:
   Temporary(const std::string& path, const std::string& target, mode_t mode)
@@ -130,7 +130,7 @@ class Temporary {
   [[nodiscard]] bool ok() const { return file_.id() >= 0; }
   [[nodiscard]] int id() const { return file_.id(); }
 
-  /// `fresh`: the target was not there.
+  /// `fresh`: there was no target.
   void take_the_place(bool fresh) {
     if (!named_ && fresh && link_as(target_)) return;
     if (!named_) give_name();
@@ -139,7 +139,7 @@ class Temporary {
   }
 
  private:
-  /// Without a name, if that can be: such a file goes with its process.
+  /// Without a name, if the system can do that: such a file disappears with its process.
   Descriptor open(mode_t mode) {
 #ifdef O_TMPFILE
     const fs::path folder = fs::path(target_).parent_path();
@@ -161,7 +161,7 @@ class Temporary {
     if (!named_) fail_in_system(path_, "cannot be written");
   }
 
-  /// A name that no file has: take() replaces none.
+  /// A name that no file has, since take() replaces none.
   template <class Take>
   void take_a_name(const Take& take) {
     static std::atomic<unsigned> count{0};

@@ -15,22 +15,23 @@ namespace fclib {
 
 namespace {
 
-/// Of single precision, half its last digit.
+/// Half the last digit of single precision.
 constexpr double single_precision = 0x1p-24;
-/// What a problem may state; else it states nothing. Finer than this, the squares in R are
-/// rounding; coarser than half precision, any contradiction could hide.
+/// The range of a precision that a problem may state; outside it the statement is ignored. Below
+/// `finest`, the squares in R are rounding. Above `coarsest` (half precision), any contradiction
+/// could hide.
 constexpr double finest = 4e-9;
 constexpr double coarsest = 0x1p-11;
-/// Roundings of a row: its dozen of entries (two bodies of six velocities), their sum, and b.
+/// Roundings of a row: about twelve entries (two bodies with six velocities), their sum, and b.
 constexpr double roundings = 16;
-/// What is left of a combination, over the terms of b, is no contradiction up to this.
+/// A combination contradicts only if what is left of it, over the terms of b, is more than this.
 constexpr double agreement = 1e-9;
-/// Rows of a loop up to which eigenvalues are found.
+/// Eigenvalues are computed only for loops of at most so many rows.
 constexpr std::size_t most_rows = 2000;
-/// Bits of a number up to which it may be meant exactly, as 0.5 is: half of those of a float.
+/// A number of at most so many bits may be meant exactly, as 0.5 is: half of the bits of a float.
 constexpr int short_bits = 12;
 
-/// "precision": NUMBER of the description; 0 without it.
+/// "precision": NUMBER in the description. 0 if it is not there.
 double stated_precision(const std::string& description) {
   static const std::string key = "\"precision\":";
   const std::size_t at = description.find(key);
@@ -39,7 +40,7 @@ double stated_precision(const std::string& description) {
   return value >= finest && value <= coarsest ? value : 0;
 }
 
-/// Whether all entries are floats, and some have more digits than what is written by hand.
+/// Whether all entries are floats, and some have more digits than a person writes by hand.
 bool is_single(const Matrix& a) {
   bool all = true;
   bool long_one = false;
@@ -52,7 +53,7 @@ bool is_single(const Matrix& a) {
   return all && long_one;
 }
 
-/// The rows that are coupled in R, loop by loop.
+/// The groups of rows that are coupled in R: one group for each loop.
 std::vector<std::vector<Index>> loops(const SparseColumns& r) {
   std::vector<Index> above(static_cast<std::size_t>(r.cols()));
   std::iota(above.begin(), above.end(), Index{0});
@@ -78,7 +79,7 @@ std::vector<std::vector<Index>> loops(const SparseColumns& r) {
   return result;
 }
 
-/// The norm in M's metric, up to its diagonal, of what these rows feel of a velocity.
+/// The norm, in M's metric up to its diagonal, of the part of a velocity that these rows see.
 double felt(const SparseColumns& g, const std::vector<Index>& rows, const Vector& inertia,
             const Vector& velocity) {
   std::vector<char> feels(static_cast<std::size_t>(g.rows()), 0);
@@ -94,7 +95,7 @@ double felt(const SparseColumns& g, const std::vector<Index>& rows, const Vector
   return std::sqrt(squares);
 }
 
-/// Rows and columns of these numbers.
+/// The rows and columns with these numbers.
 Eigen::MatrixXd block(const SparseColumns& a, const std::vector<Index>& numbers) {
   std::vector<Index> place(static_cast<std::size_t>(a.rows()), -1);
   for (std::size_t k = 0; k < numbers.size(); ++k) {
@@ -143,7 +144,7 @@ std::optional<ConsistentJoints> consistent_joints(const GlobalProblem& problem) 
       length[k] = lengths[row];
       b[k] = problem.b[row];
     }
-    if (!(length.array() > 0).all()) continue;  // a row of nothing contradicts or says nothing
+    if (!(length.array() > 0).all()) continue;  // an empty row contradicts or says nothing
     const Vector scaled_b = b.cwiseQuotient(length);
     const Vector inverse = length.cwiseInverse();
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(

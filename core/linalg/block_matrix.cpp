@@ -6,9 +6,9 @@
 namespace fclib {
 
 namespace {
-// a dense column costs less than the gather over blocks while at least this share of them is there
+// with at least this share of the blocks, a dense column costs less than a gather over blocks
 constexpr double dense_share = 0.6;
-// ... and the dense matrix stays inside the first-level cache or nearly so
+// ... and the dense matrix stays about inside the first-level cache
 constexpr std::size_t dense_limit = 128;
 }  // namespace
 
@@ -50,7 +50,7 @@ void BlockMatrix::fill(const Matrix& a) {
     return;
   }
 
-  // the pattern of blocks, the diagonal one always included
+  // the pattern of blocks, always with the diagonal one
   std::vector<Index> last_seen(nc, -1);
   column_.reserve(nc + 1);
   column_.assign(1, 0);

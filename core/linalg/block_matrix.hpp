@@ -1,9 +1,9 @@
 // A square matrix of d x d blocks, one block row and column a contact: how solvers hold W.
 //
-// Stored by block columns, because Gauss-Seidel changes one reaction at a time and then adds
-// W(:, k) delta to the velocities: a contact whose reaction does not change costs nothing. The
-// blocks of a column stand one after another, each by columns. Where most blocks are there anyway
-// (small problems), the whole matrix is kept dense by columns, without an index.
+// It is stored by block columns, because Gauss-Seidel changes one reaction at a time and then adds
+// W(:, k) delta to the velocities. If the reaction of a contact does not change, it costs nothing.
+// The blocks of a column stand one after another, each by columns. If most blocks are there anyway
+// (small problems), the whole matrix is dense by columns and has no index.
 #pragma once
 
 #include <vector>
@@ -25,7 +25,7 @@ class BlockMatrix {
   /// Numbers stored.
   [[nodiscard]] std::size_t entries() const { return values_.size(); }
 
-  /// The diagonal block of a contact, D x D by columns. Zero where the matrix has none.
+  /// The diagonal block of a contact, D x D by columns. It is zero if the matrix has none.
   template <int D>
   [[nodiscard]] Eigen::Matrix<double, D, D> diagonal_block(Index contact) const {
     using Block = Eigen::Matrix<double, D, D>;
@@ -41,25 +41,25 @@ class BlockMatrix {
   template <int D>
   void add_column(Index contact, const double* delta, double* y) const;
 
-  /// y = W x + q, all of length d nc. Workers share the rows; each sum has its order.
+  /// y = W x + q, all of length d nc. Workers share the rows. The order of each sum is fixed.
   void multiply_add(const Vector& x, const Vector& q, Vector& y, Workers* workers = nullptr) const;
 
   /// Calls visit(row, col, block) for each stored block, a D x D matrix.
   template <int D, class Visitor>
   void for_each_block(Visitor&& visit) const;
 
-  /// Groups of contacts with no block between them: the number of each contact's group. Groups are
+  /// Groups of contacts that no block links: the number of the group of each contact. Groups are
   /// numbered by their first contact.
   [[nodiscard]] std::vector<Index> components() const;
 
-  /// The rows and columns of these contacts, which are a union of components.
+  /// The rows and columns of these contacts, which must be a union of whole groups.
   [[nodiscard]] BlockMatrix restricted(const std::vector<Index>& contacts) const;
 
  private:
   template <int D>
   void fill(const Matrix& a);
 
-  /// y += W(rows of these blocks of a column) x, y from its beginning.
+  /// y += W(rows of these blocks of a column) x. y starts at its own beginning.
   template <int D>
   void add_blocks(std::size_t first, std::size_t last, const double* x, double* y) const;
 

@@ -5,7 +5,7 @@
 
 namespace fclib {
 
-/// Of the calling thread [s]; where the system has no such clock, that of the wall.
+/// CPU time of the calling thread [s]. If the system has no such clock, it is wall clock time.
 inline double cpu_time() {
   timespec now{};
   if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) != 0) clock_gettime(CLOCK_MONOTONIC, &now);

@@ -10,7 +10,7 @@ namespace fclib {
 
 namespace {
 
-/// Entries and multiplications up to which a dense factorisation is the safe choice.
+/// Up to so many entries and multiplications, a dense factorisation is the safe choice.
 constexpr double dense_entries = 4e7;
 constexpr double dense_flops = 2e10;
 

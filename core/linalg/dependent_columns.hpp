@@ -1,4 +1,4 @@
-// Which columns of a matrix are combinations of others, to rounding.
+// Which columns of a matrix are combinations of others, up to rounding.
 #pragma once
 
 #include <vector>
@@ -7,28 +7,29 @@
 
 namespace fclib {
 
-/// The columns of a matrix, those that are left out being combinations of those that are kept.
+/// The columns that are kept. Each of the others, up to rounding, is a combination of them.
 struct ColumnChoice {
   std::vector<Index> kept;
   std::vector<Index> dropped;
 };
 
-/// By a QR factorisation with column pivots, dense where that is small enough, each column scaled
-/// to length one: a column is dropped where less than `tolerance` of it is left beside the kept.
+/// By a QR factorisation with column pivots, dense if the matrix is small enough. Each column is
+/// scaled to length one. A column is dropped if the part of it that the kept ones do not explain is
+/// shorter than `tolerance`.
 ColumnChoice independent_columns(const SparseColumns& a, double tolerance);
 
-/// The same with the factors: A E = Q [T1 T2], with E the scaling, columns in the order kept,
-/// dropped.
+/// The same with the factors: A E = Q [T1 T2]. E is the scaling; the kept columns come first, then
+/// the dropped ones.
 struct OrthonormalColumns {
   ColumnChoice columns;
-  std::vector<Index> rows;  ///< of A that are not empty: those of Q
+  std::vector<Index> rows;  ///< rows of A that are not empty: the rows of Q
   Eigen::MatrixXd Q;
   Eigen::MatrixXd T1;  ///< upper triangle
   Eigen::MatrixXd T2;
   Vector scale;  ///< E, in the order of A's columns
 };
 
-/// Whether A is small enough to be treated as dense.
+/// Whether A is small enough for a dense factorisation.
 bool small_enough_for_dense(const SparseColumns& a);
 OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance);
 
@@ -36,7 +37,7 @@ OrthonormalColumns orthonormal_columns(const SparseColumns& a, double tolerance)
 Eigen::MatrixXd kernel(const Eigen::MatrixXd& a);
 /// The least x with the least ||A x - b||.
 Vector least_solution(const Eigen::MatrixXd& a, const Vector& b);
-/// The nearest to x of what these columns span.
+/// The nearest point to x in what these columns span.
 Vector projected(const Eigen::MatrixXd& columns, const Vector& x);
 
 }  // namespace fclib

@@ -1,5 +1,5 @@
-// Numbers of twice the precision of double, as the sum of two: where long double is software, as in
-// WebAssembly, which has it in quadruple precision.
+// Numbers of twice the precision of double, as the sum of two doubles. They are used if long double
+// is made in software, as in WebAssembly, where it has quadruple precision.
 //
 //   T. J. Dekker, A floating-point technique for extending the available precision, 1971
 //   M. Joldes, J.-M. Muller, V. Popescu, Tight and rigorous error bounds for basic building blocks
@@ -13,8 +13,8 @@
 
 namespace fclib {
 
-/// high + low, low at most half a unit of the last digit of high. The range is that of double; what
-/// is infinite or no number stays so, and its low part is 0.
+/// high + low; low is at most half a unit of the last digit of high. The range is that of double.
+/// Infinity and NaN stay as they are, and their low part is 0.
 class DoubleDouble {
  public:
   constexpr DoubleDouble() = default;
@@ -80,7 +80,7 @@ class DoubleDouble {
   friend DoubleDouble copysign(DoubleDouble a, DoubleDouble sign) {
     return std::signbit(sign.high_) == std::signbit(a.high_) ? a : -a;
   }
-  /// A step of Newton from the root of the high part.
+  /// A Newton step from the root of the high part.
   friend DoubleDouble sqrt(DoubleDouble a) {
     const double root = std::sqrt(a.high_);
     if (!(root > 0) || !finite(root)) return {root, 0.0};
@@ -95,18 +95,18 @@ class DoubleDouble {
 
   static constexpr bool finite(double x) { return x - x == 0; }
 
-  /// What s = a + b has lost.
+  /// The rounding error of s = a + b.
   static constexpr double rest_of_sum(double a, double b, double s) {
     const double part = s - a;
     return (a - (s - part)) + (b - part);
   }
-  /// high + low; where that is no number or infinite it is `first`, which was before. One look at
+  /// high + low. If that is NaN or infinite, it is `first`, the plain sum. It is checked once, at
   /// the end, since sums of many terms take most of the time of a merit.
   static constexpr DoubleDouble checked(double high, double low, double first) {
     if (finite(low)) return {high, low};
     return {finite(first) ? high : first, 0.0};
   }
-  /// Where |a| is at least |b|, or a is 0.
+  /// Only if |a| >= |b|, or a is 0.
   static constexpr DoubleDouble quick_two_sum(double a, double b) {
     const double s = a + b;
     return {s, finite(s) ? b - (s - a) : 0.0};
@@ -117,7 +117,7 @@ class DoubleDouble {
     const DoubleDouble y = split(b);
     const double rest =
         ((x.high_ * y.high_ - p) + x.high_ * y.low_ + x.low_ * y.high_) + x.low_ * y.low_;
-    // what is too large to be split has no low part
+    // a number that is too large to be split has no low part
     return {p, finite(rest) ? rest : 0.0};
   }
   /// Veltkamp's halves, of 26 bits each.

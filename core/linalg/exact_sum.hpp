@@ -1,7 +1,7 @@
-// Sums of products of doubles without any rounding: the sign of what is left after terms have
-// cancelled is that of the numbers as they are given.
+// Sums of products of doubles without any rounding. After terms have cancelled, the sign of the sum
+// is still exact for the given numbers.
 //
-// A product is two doubles (by a fused multiply-add), a sum is kept as doubles that do not overlap
+// A product is two doubles (by a fused multiply-add). A sum is kept as doubles that do not overlap
 // (Shewchuk, "Adaptive precision floating-point arithmetic", 1997, theorem 10).
 #pragma once
 
@@ -32,7 +32,7 @@ class ExactSum {
   void add_product(double a, double b) {
     if (a == 0 || b == 0) return;
     const double product = a * b;
-    // the rounding of a product that is nearly too small or too large is no double
+    // if a product is nearly too small or too large, its rounding error is no double
     if (!(std::abs(product) > 1e-250 && std::abs(product) < 1e250)) {
       exact_ = false;
       return;
@@ -44,7 +44,7 @@ class ExactSum {
   /// Whether nothing has left the range of doubles.
   [[nodiscard]] bool exact() const { return exact_; }
   [[nodiscard]] bool zero() const { return exact_ && parts_.empty(); }
-  /// The sum to within two units of its last digit, of the right sign; nan where it is not exact.
+  /// The sum, within two units of its last digit and with the right sign. NaN if it is not exact.
   [[nodiscard]] double value() const {
     if (!exact_) return std::nan("");
     double sum = 0;

@@ -1,4 +1,4 @@
-// The precision of sums that judge a solution, or mend what rounding took from one.
+// The precision of sums that judge a solution, or that restore what rounding took from one.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,12 +15,12 @@
 
 namespace fclib {
 
-// A referee is more precise than what it judges: with r = 4e5 and q = 0.8, as in granular packings
-// under load, the rounding of W r alone is worth 1e-11 in double precision.
+// The judge must be more precise than what it judges: with r = 4e5 and q = 0.8, as in granular
+// packings under load, the rounding of W r alone is 1e-11 in double precision.
 #if FCLIB_HAS_EXTENDED
 using Real = long double;
 
-/// a b, which needs the precision of both.
+/// a b, which has the precision of both.
 inline Real full_product(double a, double b) { return Real(a) * Real(b); }
 #else
 using Real = DoubleDouble;

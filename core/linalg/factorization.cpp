@@ -17,13 +17,13 @@ namespace fclib {
 
 namespace {
 
-/// Supernodes are looked for only for what may be a mesh: this many rows, and entries in each.
+/// Supernodes are tried only for what may be a mesh: at least so many rows, and entries in each.
 constexpr Eigen::Index large = 1000;
 constexpr Eigen::Index mesh_entries = 20;
-/// ... and used where an LU factorisation would take so many multiplications.
+/// ... and they are used if an LU factorisation would take at least so many multiplications.
 constexpr double supernodal_flops = 1e8;
 
-/// After so many columns of a product one looks at the clock.
+/// The clock is read after so many columns of a product.
 constexpr Index columns_at_once = 64;
 
 const Deadline never(std::numeric_limits<double>::infinity());
@@ -41,7 +41,7 @@ SparseColumns mirrored(const SparseColumns& lower) {
   }
   std::partial_sum(first, first + n + 1, first);
   result.resizeNonZeros(first[n]);
-  // what is above the diagonal of a column comes from the columns before it
+  // the entries above the diagonal of a column come from the columns before it
   std::vector<Index> next(first, first + n);
   const auto put = [&](Index row, Index col, double value) {
     result.innerIndexPtr()[next[col]] = row;
@@ -56,7 +56,7 @@ SparseColumns mirrored(const SparseColumns& lower) {
   return result;
 }
 
-/// A B, column by column; nothing where the deadline passes.
+/// A B, column by column, or nothing if the deadline passes.
 std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns& b,
                                      const Deadline& deadline) {
   SparseColumns result(a.rows(), b.cols());
@@ -75,7 +75,7 @@ std::optional<SparseColumns> product(const SparseColumns& a, const SparseColumns
   return result;
 }
 
-/// The columns that an entry of A^T A's present column may be in, as bits of words.
+/// The possible columns of an entry in the present column of A^T A, as bits of words.
 class Bits {
  public:
   Bits(const SparseColumns& a, Index columns)
@@ -94,7 +94,7 @@ class Bits {
     for (Index word = col / size; word < words_; ++word) found_[word] |= own[word];
   }
 
-  /// Visits the columns that were added, this one and those after it in order, and forgets them.
+  /// Visits the columns that were added, from this one on in order, and forgets them.
   template <class Visitor>
   void take(Index col, const Visitor& visit) {
     const Index first = col / size;
@@ -114,17 +114,17 @@ class Bits {
   std::vector<std::uint64_t> found_;
 };
 
-/// A^T A, in which each sum is taken once: column by column what lies on and below the diagonal,
-/// and its mirror image. Nothing where the deadline passes.
+/// A^T A. Each sum is computed once: column by column the part on and below the diagonal, then its
+/// mirror image. Nothing if the deadline passes.
 std::optional<SparseColumns> square(const SparseColumns& a, const Deadline& deadline) {
   const SparseColumns rows = a.transpose();
   const auto m = static_cast<Index>(a.cols());
   // the entries of a row of A from the present column on
   std::vector<Index> next(rows.outerIndexPtr(), rows.outerIndexPtr() + rows.cols());
-  std::vector<double> sum(m, -0.0);  // what nothing is changed by, signed zeros included
+  std::vector<double> sum(m, -0.0);  // adding it changes nothing, not even a signed zero
   std::vector<Index> last(m, -1);
   std::vector<Index> found;
-  // words take less than entries where rows are dense
+  // if rows are dense, words take less than entries
   std::optional<Bits> bits;
   if (a.rows() * (m / 64 + 1) <= a.nonZeros()) bits.emplace(a, m);
   SparseColumns lower(m, m);
@@ -202,7 +202,7 @@ Factorization::Factorization(const SparseColumns& a, const std::string& name, bo
   if (a.rows() == 0) return;
   if (definite && is_symmetric(a)) {
     if (a.rows() >= large && a.nonZeros() >= mesh_entries * a.rows()) {
-      SparseColumns both = a;  // entries that are zero may be stored on one side alone
+      SparseColumns both = a;  // a zero may be stored on one side only
       both += SparseColumns(a.transpose());
       both *= 0.5;
       Fronts symbolic(MultifrontalCholesky::symmetric_pattern(both));
@@ -309,7 +309,7 @@ std::optional<SparseColumns> Factorization::half_solve(const SparseColumns& b,
     }
   }
 
-  // each column: its pattern is what the tree reaches from the right-hand side's (Gilbert &
+  // each column: its pattern is what the tree reaches from that of the right-hand side (Gilbert &
   // Peierls)
   std::vector<double> work(n, 0.0);
   std::vector<Index> visited(n, -1);

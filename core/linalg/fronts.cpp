@@ -20,12 +20,12 @@ namespace fclib {
 
 namespace {
 
-/// Fronts are merged with their parent where the zeros that this stores cost less than their
-/// bookkeeping: always below this many scalars, and while few of the entries are zeros.
+/// A front is merged with its parent if the zeros that this stores cost less than the bookkeeping:
+/// always below this many scalars, and as long as few of the entries are zeros.
 constexpr double small_front = 24;
 constexpr double zero_share = 0.15;
 
-/// Scalars up to which a system is one dense front without more ado.
+/// A system of at most so many scalars is one dense front.
 constexpr Index dense_size = 96;
 
 std::vector<Index> minimum_degree(const BlockPattern& pattern) {
@@ -42,12 +42,12 @@ std::vector<Index> minimum_degree(const BlockPattern& pattern) {
   return {order.indices().data(), order.indices().data() + n};
 }
 
-/// Multiplications of a factorisation from which another ordering is tried, which costs some tenths
-/// of them once. benchmarks/factorisation.py: packings and walls of 90 to 9,704 contacts; below it
-/// nothing is gained.
+/// A factorisation with at least so many multiplications tries another ordering, which costs once
+/// some tenths of them. benchmarks/factorisation.py tried packings and walls of 90 to 9,704
+/// contacts: for smaller factorisations nothing is gained.
 constexpr double worth_dissection = 1e8;
 
-/// By METIS; nothing where it is not there, or cannot.
+/// By METIS. Nothing if the build has none, or if METIS fails.
 std::optional<std::vector<Index>> nested_dissection([[maybe_unused]] const BlockPattern& pattern) {
 #ifdef FCLIB_METIS
   constexpr auto most = static_cast<std::size_t>(std::numeric_limits<idx_t>::max());
@@ -68,7 +68,7 @@ std::optional<std::vector<Index>> nested_dissection([[maybe_unused]] const Block
   std::array<idx_t, METIS_NOPTIONS> options{};
   METIS_SetDefaultOptions(options.data());
   options[METIS_OPTION_SEED] = 0;   // one result, wherever it is called
-  static std::mutex one_at_a_time;  // its random numbers are the process'
+  static std::mutex one_at_a_time;  // METIS has one random generator for the process
   const std::lock_guard lock(one_at_a_time);
   if (METIS_NodeND(&count, first.data(), row.data(), nullptr, options.data(), order.data(),
                    position.data()) != METIS_OK) {
@@ -80,7 +80,7 @@ std::optional<std::vector<Index>> nested_dissection([[maybe_unused]] const Block
 #endif
 }
 
-/// Parents in the elimination tree of the pattern under a numbering (Liu 1986).
+/// The parents in the elimination tree of the pattern with this numbering (Liu 1986).
 std::vector<Index> elimination_tree(const BlockPattern& pattern, const std::vector<Index>& order,
                                     const std::vector<Index>& position) {
   const auto n = order.size();
@@ -192,7 +192,7 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
     for (std::size_t k = 0; k < count; ++k) {
       if (parent[k] >= 0) children[parent[k]].push_back(static_cast<Index>(k));
     }
-    std::vector<Index> front_of(count, -1);  // of the column, where it is the last pivot
+    std::vector<Index> front_of(count, -1);  // of the column, if it is the last pivot
     std::vector<Index> mark(count, -1);
     std::vector<double> zeros;
     std::vector<char> merged;
@@ -288,7 +288,7 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
       const auto node = static_cast<std::size_t>(order[col]);
       for (auto e = pattern.first[node]; e < pattern.first[node + 1]; ++e) {
         const Index row = position[pattern.row[static_cast<std::size_t>(e)]];
-        // of this front are the entries whose lower index is one of its pivots
+        // this front has the entries whose lower index is one of its pivots
         if (node_front[std::min(row, col)] == static_cast<Index>(f)) {
           front.entries.push_back({e, where[row], where[col]});
         }
@@ -309,7 +309,7 @@ Fronts::Fronts(const BlockPattern& pattern, Ordering ordering) : d(pattern.d) {
 }
 
 std::shared_ptr<const Fronts> analysed(const BlockPattern& pattern) {
-  constexpr std::size_t kept = 4;  // a solve may have systems on contacts, on bodies, of an island
+  constexpr std::size_t kept = 4;  // a solve may have systems on contacts, bodies and islands
   if (pattern.d * pattern.nodes() <= dense_size) return std::make_shared<Fronts>(pattern);
   thread_local std::deque<std::pair<BlockPattern, std::shared_ptr<const Fronts>>> known;
   const auto at = std::find_if(known.begin(), known.end(),

@@ -2,8 +2,8 @@
 // Reid, "The multifrontal solution of indefinite sparse symmetric linear systems", 1983): an
 // ordering of the blocks, and supernodes with relaxed amalgamation. Nothing numeric.
 //
-// The ordering is by approximate minimum degree or, where that leaves many operations and the build
-// has METIS, by nested dissection (Karypis & Kumar 1998) where this takes fewer.
+// The ordering is by approximate minimum degree. If that leaves many operations and the build has
+// METIS, nested dissection (Karypis & Kumar 1998) is used if it takes fewer.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +29,12 @@ struct BlockPattern {
 };
 
 struct Front {
-  struct Entry {  // one block of A, and where it goes in its front
+  struct Entry {  // one block of A, and its place in its front
     std::int64_t block;
     Index row, col;  // scalar offsets
   };
   Index pivots = 0;          // scalar
-  Index size = 0;            // scalar: pivots and what they update
+  Index size = 0;            // scalar: the pivots and the rows that they update
   std::vector<Index> nodes;  // pivot nodes first (new numbering)
   std::vector<Entry> entries;
   std::vector<Index> children;
@@ -48,22 +48,22 @@ bool has_nested_dissection();
 
 struct Fronts {
   Fronts() = default;
-  /// The pattern is not kept. A small system is one front. Nested dissection is minimum degree
-  /// where the build has none.
+  /// The pattern is not kept. A small system is one front. If the build has no nested dissection,
+  /// minimum degree stands for it.
   explicit Fronts(const BlockPattern& pattern, Ordering ordering = Ordering::best);
 
   int d = 1;
   Index size = 0;                                ///< of the matrix, scalar
-  Index largest = 0;                             ///< front, scalar
+  Index largest = 0;                             ///< scalar size of the largest front
   double flops = 0;                              ///< multiplications of an LU factorisation
   double memory = 0;                             ///< numbers that it keeps
   std::vector<Index> position;                   ///< of each node in the new numbering
   std::vector<Front> fronts;                     ///< children before parents
-  Ordering ordering = Ordering::minimum_degree;  ///< that was taken
+  Ordering ordering = Ordering::minimum_degree;  ///< the ordering that was used
 };
 
-/// The symbolic factorisation of this pattern: the one made before, where this thread had the same
-/// pattern among its last few. Successive steps of a simulation often have.
+/// The symbolic factorisation of this pattern. If this thread had the same pattern among its last
+/// few, it is the one made then. Successive steps of a simulation often have the same pattern.
 std::shared_ptr<const Fronts> analysed(const BlockPattern& pattern);
 
 }  // namespace fclib

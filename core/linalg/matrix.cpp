@@ -133,7 +133,7 @@ bool is_canonical(const Matrix& a) {
 
 namespace {
 
-/// By rows what is canonical and by columns, or the reverse.
+/// Turns a canonical matrix by columns into one by rows, or the reverse.
 Matrix turned(const Matrix& a) {
   const bool by_columns = a.storage == Storage::csc;
   const Index majors = by_columns ? a.cols : a.rows;

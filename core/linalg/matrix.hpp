@@ -25,10 +25,10 @@ enum class Storage {
   dense,    ///< x by columns (rows * cols), no p, no i
 };
 
-/// What is known of a matrix and cannot be read off its entries at once.
+/// What is known of a matrix and cannot be seen from its entries at once.
 struct MatrixInfo {
   std::string comment;
-  double conditioning = 0;  ///< 0 where it is not known
+  double conditioning = 0;  ///< 0 if it is not known
   double determinant = 0;
   Index rank = 0;
 
@@ -38,11 +38,11 @@ struct MatrixInfo {
         Field<S, std::string>{.name = "comment", .member = &S::comment, .doc = "anything"},
         Field<S, double>{.name = "conditioning",
                          .member = &S::conditioning,
-                         .doc = "condition number, 0 where it is not known"},
+                         .doc = "condition number, 0 if it is not known"},
         Field<S, double>{.name = "determinant",
                          .member = &S::determinant,
-                         .doc = "determinant, 0 where it is not known"},
-        Field<S, Index>{.name = "rank", .member = &S::rank, .doc = "rank, 0 where it is not known"},
+                         .doc = "determinant, 0 if it is not known"},
+        Field<S, Index>{.name = "rank", .member = &S::rank, .doc = "rank, 0 if it is not known"},
     };
   }
 
@@ -68,8 +68,8 @@ struct Matrix {
   static Matrix from_eigen(const SparseColumns& a);
 };
 
-/// Throws Error (problem) where pointers, indices or sizes contradict each other, or where an entry
-/// is not finite; `where` names the matrix in the message.
+/// Throws Error (problem) if pointers, indices or sizes contradict each other, or if an entry is
+/// not finite. `where` names the matrix in the message.
 void validate(const Matrix& a, const std::string& where);
 
 /// Whether the indices are sorted and without duplicates in each column or row (true when dense).

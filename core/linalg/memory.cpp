@@ -12,14 +12,14 @@ namespace {
 
 constexpr double unknown = std::numeric_limits<double>::infinity();
 
-/// The number that a file holds; unknown where there is no such file, or no number in it.
+/// The number in a file. Unknown if there is no such file, or no number in it.
 double number_in(const char* path) {
   std::ifstream file(path);
   double value = 0;
   return file >> value ? value : unknown;
 }
 
-/// The number behind a word at the beginning of a line; a unit behind it is passed over.
+/// The number after a word at the beginning of a line. A unit after it is ignored.
 double number_behind(const char* path, std::string_view word) {
   std::ifstream file(path);
   for (std::string key; file >> key;) {
@@ -36,7 +36,7 @@ double available_memory() {
   const double available = kilobyte * number_behind("/proc/meminfo", "MemAvailable:");
   const double limit = number_in("/sys/fs/cgroup/memory.max");
   const double used = number_in("/sys/fs/cgroup/memory.current");
-  // pages of files that the kernel gives back first
+  // file pages that the kernel gives back first
   const double idle = number_behind("/sys/fs/cgroup/memory.stat", "inactive_file");
   if (!(limit < unknown && used < unknown)) return available;
   return std::min(available, limit - used + (idle < unknown ? idle : 0));

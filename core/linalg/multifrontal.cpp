@@ -9,16 +9,16 @@ namespace fclib {
 
 namespace {
 
-/// Threads are started where a factorisation takes this many multiplications.
+/// Threads are used for a factorisation of at least so many multiplications.
 constexpr double worth_threads = 3e7;
 
-/// Rows left of the pivots of a front that they share, a panel at a time.
+/// Threads share the rows below the pivots of a front; a panel has so many.
 constexpr Index few = 768;
 
-/// Operations that it takes to put together an entry of a front, about.
+/// Operations, roughly, to assemble one entry of a front.
 constexpr double moved = 10;
 
-/// Fronts for each thread that may be above the subtrees.
+/// At most so many fronts for each thread are above the subtrees.
 constexpr std::size_t cuts = 16;
 
 }  // namespace
@@ -37,8 +37,8 @@ Multifrontal::Multifrontal(std::shared_ptr<const Fronts> symbolic, int threads)
   local_.resize(work_.size(), Vector(symbolic_->largest));
 }
 
-/// Subtrees of fronts for each thread, and the fronts above them for all: cut where the time that
-/// this takes, by operations, is least.
+/// Gives each thread subtrees of fronts; all threads share the fronts above. The cut is where the
+/// time, counted in operations, is smallest.
 void Multifrontal::share_out(int threads) {
   const std::size_t count = factors_.size();
   top_.clear();
@@ -50,7 +50,7 @@ void Multifrontal::share_out(int threads) {
   }
   workers_ = std::make_unique<Workers>(threads);
   const auto own = static_cast<std::size_t>(workers_->count());
-  std::vector<double> alone(count);  // operations of the front
+  std::vector<double> alone(count);  // operations of each front
   std::vector<double> below(count);  // ... of its subtree
   std::vector<std::size_t> parent(count, count);
   for (std::size_t f = 0; f < count; ++f) {
@@ -70,8 +70,8 @@ void Multifrontal::share_out(int threads) {
     if (parent[f] == count) roots.push_back(f);
   }
   std::make_heap(roots.begin(), roots.end(), smaller);
-  std::vector<std::size_t> owner(count, own);  // own: nobody's
-  const auto dealt = [&] {  // the largest load, each subtree given to whom has least
+  std::vector<std::size_t> owner(count, own);  // the value `own`: of nobody
+  const auto dealt = [&] {  // largest load; each subtree goes to the thread with the least
     std::vector<std::size_t> sorted = roots;
     std::sort_heap(sorted.begin(), sorted.end(), smaller);
     std::vector<double> load(own, 0.0);
@@ -85,7 +85,7 @@ void Multifrontal::share_out(int threads) {
   std::vector<std::size_t> opened;
   double above = 0;
   double best = dealt();
-  std::size_t cut = 0;  // fronts opened of the best
+  std::size_t cut = 0;  // number of fronts opened in the best cut
   while (opened.size() < cuts * own && !roots.empty()) {
     std::pop_heap(roots.begin(), roots.end(), smaller);
     const std::size_t top = roots.back();
@@ -103,7 +103,7 @@ void Multifrontal::share_out(int threads) {
       cut = opened.size();
     }
   }
-  // back to the best
+  // back to the best cut
   std::vector<char> open(count, 0);
   for (std::size_t k = 0; k < cut; ++k) open[opened[k]] = 1;
   roots.clear();
@@ -126,8 +126,8 @@ void Multifrontal::share_out(int threads) {
 }
 
 /// Calls f(first, count) for the parts of 0..n on the threads. Parts begin at multiples of the
-/// tiles of Eigen's kernels, of 4 columns and up to 12 rows: each number is then summed up in the
-/// same order however many parts there are.
+/// tiles of Eigen's kernels, 4 columns and up to 12 rows. So each number is summed in the same
+/// order for any number of parts.
 template <class F>
 void Multifrontal::split(Index n, int threads, const F& f) {
   constexpr Index tile = 12;

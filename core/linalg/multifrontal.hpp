@@ -1,14 +1,14 @@
-// Direct solution of sparse systems A x = b whose pattern is symmetric and whose values need not
-// be: the systems of Newton and interior-point methods, factorised again and again on one pattern.
+// Direct solution of sparse systems A x = b with a symmetric pattern and any values: the systems of
+// Newton and interior-point methods, factorised again and again with one pattern.
 //
-// Multifrontal LU on the fronts of linalg/fronts.hpp, dense kernels by Eigen. Rows are exchanged
-// inside the pivot block of a front only, so that the pattern is fixed; pivots that vanish are
-// replaced by a small one, which iterative refinement by the caller makes good. A small system is
-// one front: a dense LU.
+// Multifrontal LU on the fronts of linalg/fronts.hpp, with dense kernels by Eigen. Rows are
+// exchanged only inside the pivot block of a front, so that the pattern is fixed. A pivot that
+// vanishes is replaced by a small one; the iterative refinement of the caller corrects that. A
+// small system is one front: a dense LU.
 //
-// Threads take subtrees of fronts, then parts of the products of the fronts above; solves the
-// subtrees alone. What a front adds to its parent is kept until the parent takes it, child by
-// child, so the result is the same to the last bit for any number of threads.
+// Threads take subtrees of fronts, then parts of the products in the fronts above. In solves they
+// take only the subtrees. What a front adds to its parent is kept until the parent takes it, child
+// by child. So the result is the same to the last bit for any number of threads.
 #pragma once
 
 #include <Eigen/Dense>
@@ -23,15 +23,15 @@ namespace fclib {
 class Multifrontal {
  public:
   Multifrontal() = default;
-  /// The symbolic factorisation alone, or that of a system with the same pattern that this thread
-  /// had shortly before.
+  /// The symbolic factorisation alone. If this thread had a system with the same pattern shortly
+  /// before, it is the one made then.
   explicit Multifrontal(const BlockPattern& pattern, int threads = 1);
   explicit Multifrontal(std::shared_ptr<const Fronts> symbolic, int threads = 1);
 
   /// Multiplications of one factorisation, and numbers that it keeps.
   [[nodiscard]] double flops() const { return symbolic_->flops; }
   [[nodiscard]] double memory() const { return symbolic_->memory; }
-  /// [bytes] What a factorisation takes at most beside its values, about: the last fronts at work
+  /// [bytes] About what a factorisation takes at most, besides its values: the last fronts at work
   /// are three matrices of the size of the largest.
   [[nodiscard]] double bytes() const {
     const double largest = symbolic_->largest;
@@ -39,16 +39,16 @@ class Multifrontal {
   }
   [[nodiscard]] Index size() const { return symbolic_->size; }
 
-  /// Factorises the matrix with these values (BlockPattern::values() of them). False where an entry
-  /// is not finite.
+  /// Factorises the matrix with these values (BlockPattern::values() of them). Returns false if an
+  /// entry is not finite.
   bool factorise(const std::vector<double>& values);
 
-  /// The threads that share its work; none where it is too small for them.
+  /// The threads that share its work, or none if it is too small for them.
   [[nodiscard]] Workers* workers() const { return workers_.get(); }
   /// CPU time of other threads than the caller's [s].
   [[nodiscard]] double others_cpu() const { return workers_ ? workers_->cpu_s() : 0; }
 
-  /// Of the determinant of the matrix factorised last: 1 or -1.
+  /// The sign of the determinant of the last factorised matrix: 1 or -1.
   [[nodiscard]] int determinant_sign() const;
 
   /// b <- A^-1 b, b of length size().
@@ -77,9 +77,9 @@ class Multifrontal {
 
   std::shared_ptr<const Fronts> symbolic_ = std::make_shared<Fronts>();
   std::vector<Factors> factors_;
-  std::unique_ptr<Workers> workers_;              // where there are several
+  std::unique_ptr<Workers> workers_;              // if there are several
   std::vector<std::vector<std::size_t>> shares_;  // fronts of each thread, children first
-  std::vector<std::size_t> top_;                  // those above them, which all threads work on
+  std::vector<std::size_t> top_;                  // fronts above them; all threads work on each
   std::vector<Dense> work_;                       // of each thread
   mutable Vector permuted_;
   mutable std::vector<Vector> local_;  // of each thread

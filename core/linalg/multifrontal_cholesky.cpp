@@ -7,10 +7,10 @@ namespace fclib {
 
 namespace {
 
-/// After so many columns of a product one looks at the clock.
+/// The clock is read after so many columns of a product.
 constexpr Eigen::Index columns_at_once = 256;
 
-/// sum += y^T y, the lower triangle; false where the deadline passes on the way.
+/// sum += y^T y, the lower triangle. Returns false if the deadline passes meanwhile.
 bool add_gram(Eigen::MatrixXd& sum, const Eigen::Ref<const Eigen::MatrixXd>& y,
               const Deadline& deadline) {
   const Eigen::Index size = y.cols();
@@ -150,14 +150,14 @@ std::vector<Index> MultifrontalCholesky::roots() const {
   return root;
 }
 
-/// Y = L^-1 P B, front by front: visit(front, columns, rows of Y at its pivots), where only the
-/// columns of B that reach the front are there, in ascending order. False where the visitor says so
-/// or where the deadline has passed, which is looked at for every front and every `columns_at_once`
-/// of its columns.
+/// Y = L^-1 P B, front by front. visit(front, columns, rows of Y at its pivots) gets only the
+/// columns of B that reach the front, in ascending order. Returns false if the visitor returns
+/// false or the deadline has passed; the deadline is checked at every front and every
+/// `columns_at_once` of its columns.
 template <class Visit>
 bool MultifrontalCholesky::forward(const SparseColumns& b, const Deadline& deadline,
                                    const Visit& visit) const {
-  struct Part {  // of B, updated, at the rows below a front's pivots
+  struct Part {  // rows of B, updated, below the pivots of a front
     std::vector<Index> columns;
     Dense values;
   };
@@ -218,7 +218,7 @@ bool MultifrontalCholesky::forward(const SparseColumns& b, const Deadline& deadl
 
 std::optional<SparseColumns> MultifrontalCholesky::gram(const SparseColumns& b,
                                                         const Deadline& deadline) const {
-  // Y^T Y of each tree of fronts, dense in the columns that reach it
+  // Y^T Y of each tree of fronts, dense in the columns that reach the tree
   const std::vector<Index> root = roots();
   std::vector<std::vector<Index>> reaching(factors_.size());
   std::vector<Index> front_of(static_cast<std::size_t>(symbolic_.size));
@@ -237,7 +237,7 @@ std::optional<SparseColumns> MultifrontalCholesky::gram(const SparseColumns& b,
   std::vector<Index> place(static_cast<std::size_t>(b.cols()));
   Dense tree;
   Dense part;
-  Index last = -1;  // the tree whose columns have their places
+  Index last = -1;  // the tree whose columns have places now
   const bool whole =
       forward(b, deadline, [&](std::size_t f, const std::vector<Index>& columns, const auto& y) {
         const std::vector<Index>& all = reaching[root[f]];

@@ -1,6 +1,6 @@
 // Cholesky factorisation of a large sparse matrix, symmetric positive definite, on the fronts of
-// linalg/fronts.hpp, dense kernels by Eigen: for mass and stiffness matrices of meshes, whose
-// factors are dense enough that working entry by entry takes ten times as long.
+// linalg/fronts.hpp with dense kernels by Eigen. It is for mass and stiffness matrices of meshes:
+// their factors are so dense that an algorithm entry by entry takes ten times as long.
 #pragma once
 
 #include <Eigen/Dense>
@@ -14,7 +14,7 @@ namespace fclib {
 
 class MultifrontalCholesky {
  public:
-  /// `symbolic` is of symmetric_pattern(a).
+  /// `symbolic` must be made from symmetric_pattern(a).
   MultifrontalCholesky(Fronts symbolic, const SparseColumns& a);
 
   /// The pattern of a symmetric matrix, 1 x 1 blocks.
@@ -29,7 +29,7 @@ class MultifrontalCholesky {
   /// |L| |L^T x|.
   [[nodiscard]] Vector terms(ConstVectorRef x) const;
 
-  /// B^T A^-1 B, symmetric to the last bit; nothing where the deadline passes on the way.
+  /// B^T A^-1 B, symmetric to the last bit, or nothing if the deadline passes meanwhile.
   [[nodiscard]] std::optional<SparseColumns> gram(const SparseColumns& b,
                                                   const Deadline& deadline) const;
   /// Its diagonal.

@@ -1,4 +1,4 @@
-// From the size of blocks to a constant of the compiler.
+// From the size of blocks to a constant at compile time.
 #pragma once
 
 #include <type_traits>

@@ -10,7 +10,7 @@ namespace fclib {
 
 namespace {
 
-// others are near: to sleep and to be woken takes longer than most waits
+// the other threads arrive soon: sleeping and waking takes longer than most waits
 constexpr int looks = 1000;
 constexpr int yields = 100;
 
@@ -21,7 +21,7 @@ Workers::Workers(int count) : cpu_(static_cast<std::size_t>(std::max(count, 1)),
   try {
     for (int k = 1; k < count; ++k) threads_.emplace_back([this, k] { serve(k); });
   } catch (const std::exception&) {
-    // the work is shared out among those that there are
+    // the work is shared among the threads that started
   }
   complete_.store(true, std::memory_order_release);
   complete_.notify_all();

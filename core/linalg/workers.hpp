@@ -1,5 +1,5 @@
-// Threads that do the same job at once, each its own share of it. The one mechanism for threads of
-// the core.
+// Threads that do the same job at once, each its own share of it. The core has no other mechanism
+// for threads.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,7 @@ namespace fclib {
 
 class Workers {
  public:
-  /// `count` of them, the calling thread being number 0. Fewer where the system gives no more.
+  /// `count` workers; the calling thread is number 0. There are fewer if the system gives no more.
   explicit Workers(int count);
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
@@ -21,12 +21,12 @@ class Workers {
 
   [[nodiscard]] int count() const { return static_cast<int>(threads_.size()) + 1; }
 
-  /// Calls job(k) as each worker k, and returns when all have ended. A job must not throw; it may
+  /// Calls job(k) as each worker k, and returns when all have ended. A job must not throw. It may
   /// `wait` for the others, the same number of times on each worker.
   void run(FunctionRef<void(int)> job);
 
   /// Calls task(k) for k < count, one after another on each worker: worker w has w, w + count(),
-  /// ... What the first of them throws is thrown here when all have ended.
+  /// ... The first exception of a task is thrown here when all have ended.
   void run_tasks(int count, FunctionRef<void(int)> task);
 
   /// Returns when all workers have come here.
@@ -46,7 +46,7 @@ class Workers {
   std::vector<std::thread> threads_;
 };
 
-/// Calls f(first, last) for parts of 0..n, one on each worker; for all of it where there are none.
+/// Calls f(first, last) for parts of 0..n, one on each worker. Without workers, there is one part.
 template <class F>
 void in_parts(Workers* workers, std::int64_t n, const F& f) {
   if (workers == nullptr) return f(std::int64_t{0}, n);

@@ -16,8 +16,8 @@ namespace {
 
 using std::abs, std::copysign, std::sqrt;  // or those of Real
 
-/// What rounding leaves of v, u and l, over the sizes of the terms they are found from: some more
-/// roundings than of q, since a solver has brought them through conversions.
+/// The rounding of v, u and l, over the sizes of the terms they come from. It is some more
+/// roundings than for q, since a solver has brought them through conversions.
 constexpr Real rounding_unit = 32 * Real(std::numeric_limits<double>::epsilon());
 
 template <class X>
@@ -36,7 +36,7 @@ RealVector product_transposed(const Matrix& a, const X& x) {
   return y;
 }
 
-/// |A| |x|: the sizes of what the product adds up.
+/// |A| |x|: the sizes of the terms that the product adds up.
 template <class X>
 RealVector sizes(const Matrix& a, const X& x) {
   RealVector y = RealVector::Zero(a.rows);
@@ -60,7 +60,7 @@ RealVector solved(const Factorization& mass, const RealVector& b) {
   return mass.solve(Vector(b.cast<double>())).cast<Real>();
 }
 
-/// M^-1 b, refined: the velocity that belongs to an impulse, not the one that rounding leaves.
+/// M^-1 b, refined: the exact velocity of an impulse, without the rounding of one solve.
 RealVector solved_precisely(const GlobalProblem& problem, const Factorization& mass,
                             const RealVector& b) {
   RealVector x = solved(mass, b);
@@ -68,8 +68,8 @@ RealVector solved_precisely(const GlobalProblem& problem, const Factorization& m
   return x;
 }
 
-/// Errors of these sizes with signs drawn at random (from the same seed every time), brought to
-/// velocities by M^-1: a few of them say how errors spread, where |M^-1| would be dense.
+/// Errors of these sizes with random signs (from the same seed every time), turned into velocities
+/// by M^-1. A few of them show how errors spread: |M^-1| would be dense.
 class Spread {
  public:
   Spread(const Factorization& mass, const RealVector& size) {
@@ -97,7 +97,7 @@ class Spread {
   std::array<RealVector, 4> velocities_;
 };
 
-/// The norm of each contact's part of x, at each of its components.
+/// The norm of each contact's part of x, repeated at each of its components.
 RealVector contact_norms(const RealVector& x, Index d) {
   RealVector result(x.size());
   for (Eigen::Index at = 0; at < x.size(); at += d) {
@@ -116,7 +116,7 @@ RealVector stopping(const RealVector& velocity, const RealVector& scale, Index d
   return result;
 }
 
-/// x over y by components, 0 where y is.
+/// x over y by components; 0 if y is 0.
 RealVector quotient(const RealVector& x, const RealVector& y) {
   RealVector result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
@@ -137,13 +137,13 @@ RealVector diagonal(const Matrix& a) {
   return result;
 }
 
-/// What M v adds up if v comes from the factors of M. In its own row |M| |v| may be next to
-/// nothing, as at the joints of a robot in free flight.
+/// The sizes of the terms of M v, if v comes from the factors of M. In its own row |M| |v| may be
+/// next to nothing, as at the joints of a robot in free flight.
 RealVector momentum_sizes(const Matrix& mass, const Factorization& factors, const RealVector& v) {
   return sizes(mass, v) + factors.terms(v.cast<double>()).cast<Real>();
 }
 
-/// Sizes of r and of lambda, by which the rounding of the equations is judged.
+/// Sizes of r and of lambda. The rounding of the equations is judged by them.
 struct Sizes {
   RealVector r;
   RealVector l;
@@ -159,7 +159,7 @@ SparseColumns beside(const Matrix& a, const Matrix& b) {
   return result;
 }
 
-/// Both at least as large as those that the data ask for.
+/// Both are at least as large as the data require.
 Sizes explained(const Vector& least, Eigen::Index m, const Sizes& own) {
   Sizes result = own;
   for (Eigen::Index k = 0; k < least.size(); ++k) {
@@ -169,8 +169,8 @@ Sizes explained(const Vector& least, Eigen::Index m, const Sizes& own) {
   return result;
 }
 
-/// What the least reactions are that give the solution's H r + G lambda, or its W r + V lambda and
-/// V^T r + R lambda.
+/// The sizes of the smallest reactions with the solution's H r + G lambda, or with its W r + V
+/// lambda and V^T r + R lambda.
 Sizes explained(const LocalProblem& problem, const Solution& solution, const Sizes& own) {
   const Eigen::Index m = problem.q.size();
   if (!is_mixed(problem)) {
@@ -203,7 +203,7 @@ Sizes explained(const GlobalProblem& problem, const Factorization& mass, const S
   SparseColumns columns = is_mixed(problem) ? beside(problem.H, problem.G) : to_eigen(problem.H);
   RealVector effect = product(problem.H, solution.r);
   if (is_mixed(problem)) effect += product(problem.G, solution.l);
-  // as velocities, in which a light body weighs as much as a heavy one
+  // as velocities, so that a light body counts as much as a heavy one
   SparseColumns impulse(effect.size(), 1);
   for (Eigen::Index k = 0; k < effect.size(); ++k) {
     impulse.insert(k, 0) = static_cast<double>(effect[k]);
@@ -221,7 +221,7 @@ bool exact(const std::vector<Mismatch>& mismatches) {
                      [](const Mismatch& one) { return one.error == 0; });
 }
 
-/// The mean of each d components.
+/// The mean of each group of d components.
 template <class X>
 RealVector mean_of_contacts(const X& x, Index d) {
   RealVector result = RealVector::Zero(x.size() / d);
@@ -229,7 +229,7 @@ RealVector mean_of_contacts(const X& x, Index d) {
   return result;
 }
 
-/// rho of each contact, of the diagonal of W.
+/// rho of each contact, from the diagonal of W.
 RealVector rho_of_contacts(const RealVector& diagonal, Index d) {
   RealVector result = mean_of_contacts(diagonal.cwiseAbs(), d);
   ContactScales<Real> scales;
@@ -238,17 +238,17 @@ RealVector rho_of_contacts(const RealVector& diagonal, Index d) {
   return result;
 }
 
-/// What is left of each component beyond its rounding.
+/// The part of each component beyond its rounding.
 RealVector beyond(const RealVector& x, const RealVector& rounding) {
   RealVector result(x.size());
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Real left = abs(x[k]) - rounding[k];
-    result[k] = left <= 0 ? Real(0) : copysign(left, x[k]);  // what is no number stays so
+    result[k] = left <= 0 ? Real(0) : copysign(left, x[k]);  // NaN stays NaN
   }
   return result;
 }
 
-/// The component where `difference` is worst: `left` of it beyond rounding, over `scale`.
+/// The component with the worst `difference`: `left` is its part beyond rounding, over `scale`.
 Mismatch worst(std::string_view part, const Vector& stored, const RealVector& difference,
                const RealVector& left, const RealVector& scale) {
   Mismatch result{.part = part};
@@ -327,7 +327,7 @@ Equations equations(const LocalProblem& problem, const Solution& solution, const
   const RealVector stop = stopping(own.q, own.scale, d);
   const RealVector s = mixed ? RealVector(problem.s.cast<Real>()) : RealVector();
 
-  // the mismatches beyond the rounding that reactions of these sizes leave
+  // the mismatches beyond the rounding of reactions of these sizes
   const auto judged = [&](const Sizes& known) {
     std::vector<Mismatch> found;
     if (mixed) {
@@ -387,7 +387,7 @@ Equations equations(const GlobalProblem& problem, const Solution& solution,
   const RealVector stop = stopping(own.q, own.scale, d);
   const RealVector of_bodies = f.cwiseAbs() + momentum_sizes(problem.M, mass, v);
 
-  // the mismatches beyond the rounding that reactions of these sizes leave
+  // the mismatches beyond the rounding of reactions of these sizes
   const auto judged = [&](const Sizes& known) {
     std::vector<Mismatch> found;
     RealVector terms = of_bodies + sizes(problem.H, known.r);

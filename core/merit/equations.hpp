@@ -1,11 +1,11 @@
 // The equations of a problem, judged component by component.
 //
-// The residual of an equation has two bounds, each of its own component. What rounding leaves of
-// its terms in double precision, however much of them cancels, is no mistake of a solution; the
-// terms are as large as the data explain, so that nothing hides behind reactions of a solution's
-// own. The rest is relative to a velocity: that of the body, the contact or the joint, with the
-// velocities that reactions of the problem's own size give it. Neither the size of a neighbour nor
-// a self-stress, which moves nothing, enters that velocity.
+// The residual of an equation has two bounds for each component. The first bound is rounding: what
+// double precision leaves of its terms, however much of them cancels, is no mistake of a solution.
+// The terms are as large as the data explain, so that a solution cannot hide an error behind large
+// reactions of its own. What is left is then relative to a velocity: that of the body, the contact
+// or the joint, with the velocities that reactions of the problem's own size give it. Neither the
+// size of a neighbour nor a self-stress, which moves nothing, enters that velocity.
 #pragma once
 
 #include <string_view>
@@ -18,12 +18,12 @@
 namespace fclib {
 
 /// A stored v, u or l beside the one that follows from the rest of the solution, at the component
-/// where they differ most.
+/// with the largest difference.
 struct Mismatch {
   std::string_view part;  ///< "v", "u" or "l"
   Index index = 0;        ///< of the component
   double stored = 0;
-  double difference = 0;  ///< of v and u; of l the velocity left at its joint [m/s]
+  double difference = 0;  ///< of v and u; for l, the velocity that is left at its joint [m/s]
   double error = 0;       ///< the difference beyond rounding, over the velocity of its component
 };
 
@@ -33,20 +33,20 @@ struct Equations {
   std::vector<Mismatch> mismatches;  ///< one of each part that is stored
 };
 
-/// What the equations are judged by that depends on the problem alone.
+/// What the judgement of the equations needs and depends on the problem alone.
 struct OwnSizes {
   RealVector free;      ///< M^-1 f of a global problem (n) [m/s]
   RealVector free_u;    ///< q, condensed (m) [m/s]
-  RealVector l;         ///< reactions that stop the joints, each alone (p)
+  RealVector l;         ///< reactions that stop the joints, each joint alone (p)
   RealVector q;         ///< of the terms of u without reactions (m) [m/s]
   RealVector rounding;  ///< what double precision leaves of the terms that q is made of (m)
-                        ///< [m/s]; empty where q is given
+                        ///< [m/s]; empty if q is given
   RealVector scale;     ///< tr(W_aa) / d of each contact (nc)
-  RealVector rho;       ///< of the scaled natural map, of each contact (nc) [1/W]
+  RealVector rho;       ///< of the scaled natural map, for each contact (nc) [1/W]
 };
 
 OwnSizes own_sizes(const LocalProblem& problem);
-/// `condensed` saves the diagonals of W and R, where it is there.
+/// `condensed`, if it is there, saves the work for the diagonals of W and R.
 OwnSizes own_sizes(const GlobalProblem& problem, const Factorization& mass,
                    const LocalProblem* condensed = nullptr);
 

@@ -8,13 +8,13 @@ namespace fclib {
 
 namespace {
 
-/// Multiplications of a dense factorisation that a merit may take: about a tenth of a second.
+/// Multiplications that a merit may spend on a dense factorisation: about a tenth of a second.
 constexpr double dense_flops = 1e8;
-/// What is left of a column beside the others is rounding up to this, as it is in the elimination
-/// of joints.
+/// If less than this share of a column is left beside the others, it is rounding, as in the
+/// elimination of joints.
 constexpr double dependent = 1e-12;
-/// Conjugate gradients from zero stay among the least solutions, and grow towards the one that is
-/// asked for: if they are cut, less is explained, and so less is allowed.
+/// Conjugate gradients from zero stay among the smallest solutions, and grow towards the right one.
+/// If they are stopped early, they explain less, and so less rounding is allowed.
 constexpr double accuracy = 0.01;
 constexpr int iterations = 300;
 

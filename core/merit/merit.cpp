@@ -19,8 +19,8 @@ using std::abs, std::sqrt;  // or those of Real
 
 void raise(double& largest, const Real& value) { largest = larger_error(largest, value); }
 
-/// What rounding leaves of the velocities that friction opposes, by slip_of_rounding: of the
-/// sliding ones the normal velocity is one too; those of rolling have units of their own.
+/// The rounding of the velocities that friction opposes, by slip_of_rounding. The normal velocity
+/// counts as one of the sliding ones. Rolling velocities have units of their own.
 template <class Cone>
 class SlipOfRounding {
  public:
@@ -53,7 +53,7 @@ class SlipOfRounding {
   typename Cone::Slack mean_;
 };
 
-/// The parts that depend on one contact at a time; but for the errors only if `each` is there.
+/// The parts that depend on one contact at a time. If `each` is null, only the errors.
 template <class Cone>
 void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& own,
                     const Equations& equations, Merit& result, ContactMerits* each) {
@@ -99,7 +99,7 @@ void judge_contacts(const Friction& friction, const Vector& r, const OwnSizes& o
   result.scaled_natural = sums.scaled_natural();
 }
 
-/// Without `each` the errors alone.
+/// Without `each`, only the errors.
 Merit judge(Index spacedim, const Friction& friction, const Solution& solution, const OwnSizes& own,
             const Equations& equations, ContactMerits* each) {
   Merit result;
@@ -165,7 +165,7 @@ Merit judge_valid(const P& problem, const Solution& solution) {
   return judge_valid(problem, solution, each);
 }
 
-/// The solution gets the u that follows.
+/// Sets the u of the solution to the one that follows.
 double judge_and_complete(Index spacedim, const Friction& friction, const OwnSizes& own,
                           const Equations& found, MeritKind kind, Solution& solution) {
   const double error = judge(spacedim, friction, solution, own, found, nullptr).error_by(kind);

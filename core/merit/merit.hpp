@@ -1,10 +1,10 @@
 // How good a solution is, judged from the data of the problem alone.
 //
-// The natural map (Acary, Bremond, Huber 2018): F^a = r^a - P_K(r^a - u^^a) for each contact a, and
-// error = ||F||_2 / ||q||_2; scaled, the same with rho u^, summed as impulses and as velocities,
-// which does not change with the units. u is recomputed: W r + V lambda + q, or H^T v + w, never
-// taken from the solution. All sums are made in extended precision. What rounding leaves of q, by
-// the sizes of its terms, is no error, and errors are not relative to less.
+// The natural map (Acary, Bremond, Huber 2018) is F^a = r^a - P_K(r^a - u^^a) for each contact a,
+// and error = ||F||_2 / ||q||_2. The scaled error is the same with rho u^, summed as impulses and
+// as velocities; it does not change with the units. u is recomputed as W r + V lambda + q, or H^T v
+// + w, and never taken from the solution. All sums are made in extended precision. The rounding of
+// q, from the sizes of its terms, is no error, and errors are never relative to less than it.
 //
 // The other equations are judged by components (merit/equations.hpp). docs/mathematics.md has the
 // definitions with their reasons.
@@ -36,7 +36,7 @@ struct Merit {
   Index stick = 0;
   Index slide = 0;
 
-  /// `error`, or the same without the scaled map.
+  /// `error`, or the error without the scaled map.
   [[nodiscard]] double error_by(MeritKind kind) const {
     return kind == MeritKind::both ? error_size(error)
                                    : larger_error(natural, dynamics, bilateral, kinematics);
@@ -102,31 +102,32 @@ struct Merit {
 struct ContactMerits {
   std::vector<ContactStatus> status;
   Vector u;                          ///< velocity, recomputed (m) [m/s]
-  Vector natural;                    ///< ||r - P_K(r - u^)|| (nc), not relative to anything
+  Vector natural;                    ///< ||r - P_K(r - u^)|| (nc), absolute
   Vector cone;                       ///< distance of r from K (nc) [N s]
   Vector dual_cone;                  ///< distance of u^ from K* (nc) [m/s]
-  std::vector<Mismatch> mismatches;  ///< of each of v, u and l that is stored: its worst component
+  std::vector<Mismatch> mismatches;  ///< the worst component of each of v, u and l that is stored
 };
 
-/// The merit of (solution, problem). r is required, and l where there are bilateral constraints;
-/// a missing v follows from them, a missing u is not judged.
+/// The merit of (solution, problem). r is required; l is required if there are bilateral
+/// constraints. If v is missing, it follows from them. If u is missing, it is not judged.
 ///
-/// Throws Error (problem) where problem or solution are not valid, (unsuitable) where M is
+/// Throws Error (problem) if the problem or the solution is not valid, (unsuitable) if M is
 /// singular.
 Merit merit(const LocalProblem& problem, const Solution& solution);
 Merit merit(const LocalRollingProblem& problem, const Solution& solution);
 Merit merit(const GlobalProblem& problem, const Solution& solution);
 Merit merit(const GlobalRollingProblem& problem, const Solution& solution);
 
-/// The error that a tolerance bounds, of a problem and a solution that are valid, in a loop: what
-/// depends on the problem alone is given. u is not judged: it becomes the one that follows.
+/// The error that a tolerance bounds, for a valid problem and a valid solution, in a loop: the
+/// caller gives what depends on the problem alone. u is not judged: it is replaced by the one that
+/// follows.
 double judge_and_complete(const LocalProblem& problem, const Friction& friction,
                           const OwnSizes& own, MeritKind kind, Solution& solution);
 double judge_and_complete(const GlobalProblem& problem, const Friction& friction,
                           const Factorization& mass, const OwnSizes& own, MeritKind kind,
                           Solution& solution);
 
-/// As merit(), and throws as it does.
+/// Like merit(); it throws the same errors.
 ContactMerits contact_merits(const LocalProblem& problem, const Solution& solution);
 ContactMerits contact_merits(const LocalRollingProblem& problem, const Solution& solution);
 ContactMerits contact_merits(const GlobalProblem& problem, const Solution& solution);

@@ -10,7 +10,7 @@ namespace fclib {
 
 namespace {
 
-/// ||F||, written as 3.1 has it: where r is large, the rounding is of its size.
+/// ||F||, in the form of 3.1: if r is large, its rounding has the size of r's.
 template <class Cone>
 double natural_norm(const Friction& friction, const Vector& u, const Vector& r) {
   using Vec = typename Cone::Vec;

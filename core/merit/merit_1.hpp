@@ -1,19 +1,19 @@
-// The merit of libfclib 3.1, MERIT_1, kept so that figures made with it compare.
+// The merit of libfclib 3.1, MERIT_1, kept so that published figures can be compared.
 //
 //   local    ||F|| / (1 + sqrt(||q||)) + ||V^T r + R lambda + s|| / (1 + ||s||)
 //   global   ||F|| / (1 + sqrt(||q||)) + ||G^T v + b|| / (1 + ||b||)
 //            + ||M v - H r - G lambda - f|| / (1 + ||f||),   q = H^T M^-1 f + w
 //
-// with F^a = r^a - P_K(r^a - u^^a) for each contact a, all in double precision; the square root of
-// a norm in the denominator is that library's. It has the merit for local problems with d = 3 and
-// matrices by columns alone. merit() is the one to judge with.
+// with F^a = r^a - P_K(r^a - u^^a) for each contact a, all in double precision. The square root of
+// a norm in the denominator comes from that library. The library itself computes it only for local
+// problems with d = 3 and matrices by columns. To judge a solution, use merit().
 #pragma once
 
 #include "problem.hpp"
 
 namespace fclib {
 
-/// MERIT_1 of (solution, problem), with what is required as for merit().
+/// MERIT_1 of (solution, problem). It requires the same as merit().
 double merit_1(const LocalProblem& problem, const Solution& solution);
 double merit_1(const LocalRollingProblem& problem, const Solution& solution);
 double merit_1(const GlobalProblem& problem, const Solution& solution);

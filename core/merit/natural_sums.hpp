@@ -1,5 +1,5 @@
-// The natural map of a whole solution, plain and scaled, summed up contact by contact: the part of
-// the merit that every formulation shares.
+// The natural map of a whole solution, plain and scaled, summed over the contacts. Every
+// formulation shares this part of the merit.
 #pragma once
 
 #include <cmath>
@@ -11,8 +11,8 @@
 
 namespace fclib {
 
-/// rho of each contact: 1 over its size, the mean |W_kk| of its block. A contact that has none
-/// takes part with the mean of the others, so that no units decide what it weighs beside them.
+/// rho of each contact is 1 over its size, the mean |W_kk| of its block. A contact without a size
+/// gets the mean of the others, so that units do not decide how much it counts beside them.
 template <class Real>
 class ContactScales {
  public:
@@ -29,26 +29,26 @@ class ContactScales {
   std::int64_t count_ = 0;
 };
 
-/// What rounding leaves of q, over the sizes of its terms: some roundings. Fewer than are left to
-/// v, u and l: what is allowed to q is hidden from the natural map.
+/// The rounding of q, over the sizes of its terms: some roundings. It is less than for v, u and l,
+/// since what is allowed to q is hidden from the natural map.
 constexpr double rounding_unit_of_q = 4 * std::numeric_limits<double>::epsilon();
 
-/// What the last digits of q are as a velocity: of a contact, ||q^a|| being `own`, beside others
-/// with the root mean square `mean`. So much sliding is none.
+/// The last digits of q as a velocity, for a contact with ||q^a|| = `own` among contacts with the
+/// root mean square `mean`. Sliding of that speed is no sliding.
 template <class Real>
 Real slip_of_rounding(Real own, Real mean) {
   return rounding_unit_of_q * (own < mean ? mean : own);
 }
 
-/// In the precision of Cone.
+/// Sums in the precision of Cone.
 template <class Cone>
 class NaturalSums {
  public:
   using Vec = typename Cone::Vec;
   using Real = typename Vec::Scalar;
 
-  /// Adds a contact with velocity u and reaction r, ||q^a||^2, what rounding leaves of q^a, rho as
-  /// ContactScales has it, and what rounding leaves of the velocities that friction opposes.
+  /// Adds a contact: its velocity u and reaction r, ||q^a||^2, the rounding of q^a, rho as in
+  /// ContactScales, and the rounding of the velocities that friction opposes.
   NaturalPoint<Vec> add(const Cone& cone, const Vec& u, const Vec& r, Real q_square, Real rounding,
                         Real rho, const typename Cone::Slack& slack) {
     const NaturalPoint<Vec> plain = cone.natural(u, r, Real(1), slack);
@@ -67,7 +67,7 @@ class NaturalSums {
   }
 
   [[nodiscard]] double natural() const { return relative(squares_, q_squares_, rounding_squares_); }
-  /// The larger of the scaled one summed as impulses and as velocities (contact/natural_squares).
+  /// The larger of its sums as impulses and as velocities (contact/natural_squares).
   [[nodiscard]] double scaled_natural() const {
     return larger_error(relative(scaled_squares_, scaled_q_, scaled_rounding_),
                         relative(velocity_squares_, q_squares_, rounding_squares_));
@@ -76,21 +76,20 @@ class NaturalSums {
   [[nodiscard]] double error() const { return larger_error(natural(), scaled_natural()); }
 
  private:
-  /// The larger one; a if it is no number.
+  /// The larger one; a if a is NaN.
   static Real larger(Real a, Real b) { return a < b ? b : a; }
 
-  /// The natural map of a contact beyond what the rounding of its q explains.
+  /// The natural map of a contact without the part that the rounding of its q explains.
   static Real square_beyond(Real norm, Real rounding) {
     const Real left = norm - rounding;
     return left < 0 ? Real(0) : left * left;
   }
 
-  /// ||F|| over ||q||, or over what rounding leaves of q if that is larger; absolute without
-  /// either.
+  /// ||F|| over ||q||, or over the rounding of q if that is larger. If both are 0, it is absolute.
   static double relative(Real squares, Real q_squares, Real rounding_squares) {
     using std::isfinite, std::sqrt;  // or those of Real
     const Real scale = sqrt(larger(q_squares, rounding_squares));
-    // what is relative to more than there are numbers for would be 0
+    // a quotient with an infinite denominator would be 0
     if (!isfinite(scale)) return std::numeric_limits<double>::infinity();
     const Real norm = sqrt(squares);
     return error_size(scale > 0 ? norm / scale : norm);

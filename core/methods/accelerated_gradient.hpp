@@ -5,9 +5,10 @@
 // in the metric of the contacts' weights:
 //
 //   x+ = P(y - t (W y + q + s) / weight),  t small enough for (x+ - y).W (x+ - y) <= |x+ - y|^2 / t
-//   y+ = x+ + beta (x+ - x),  started afresh where (W y + q + s).(x+ - x) > 0
+//   y+ = x+ + beta (x+ - x),  restarted if (W y + q + s).(x+ - x) > 0
 //
-// The test on t does not depend on s, which may change at each step. One product with W a step.
+// The test on t does not depend on s, so s may change at each step. One step takes one product with
+// W.
 //
 // Nesterov 1983; O'Donoghue & Candes, "Adaptive restart for accelerated gradient schemes" (2015);
 // Mazhar, Heyn, Negrut, Tasora, "Using Nesterov's method to accelerate multibody dynamics with
@@ -21,8 +22,8 @@ namespace fclib {
 
 struct AcceleratedGradientRules {
   double growth = 1.05;    ///< of t after an accepted step
-  double reduction = 0.7;  ///< of t at most, where it was too long
-  bool restart = true;     ///< start the momentum afresh where it goes uphill
+  double reduction = 0.7;  ///< largest factor on t after it was too long
+  bool restart = true;     ///< restart the momentum if the objective rises
 };
 
 template <class Cone>
@@ -39,7 +40,7 @@ class AcceleratedGradient {
 
   [[nodiscard]] const Vector& x() const { return x_; }
   [[nodiscard]] const Vector& u() const { return u_; }    ///< W x + q
-  [[nodiscard]] const Vector& uy() const { return uy_; }  ///< W y + q, where the gradient is taken
+  [[nodiscard]] const Vector& uy() const { return uy_; }  ///< W y + q: the gradient is taken at y
 
   template <class Set>
   void step(const Set& set, const Vector& shift);

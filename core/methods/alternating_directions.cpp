@@ -128,7 +128,7 @@ double AlternatingDirections<Cone>::squared_distance(const Vector& v, const Vect
 template <class Cone>
 void AlternatingDirections<Cone>::measure() {
   const double size = std::sqrt(std::max(squared(x_), squared(z_)));
-  // the velocities may well tend to zero: q is part of their size
+  // the velocities may tend to zero, so q is part of their size
   const double velocity = std::max(rho_ * std::sqrt(squared(w_)), size_q_);
   primal_ = std::sqrt(squared_distance(x_, z_)) / (size > 0 ? size : 1.0);
   dual_ = rho_ * std::sqrt(squared_distance(z_, old_z_)) / (velocity > 0 ? velocity : 1.0);

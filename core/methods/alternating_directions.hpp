@@ -7,8 +7,8 @@
 //   x = (W + rho weight)^-1 (rho weight (z - w) - q - s)
 //   z = P_C(alpha x + (1 - alpha) z + w),   w = w + alpha x + (1 - alpha) z - z+
 //
-// -rho weight w tends to the velocity u + s, so s may follow it. One factorisation for each rho, on
-// the contacts or on the bodies, whichever is cheaper (CoupledSystem with D = 1 / (rho weight)).
+// -rho weight w tends to the velocity u + s, so s may follow it. Each rho takes one factorisation,
+// on the contacts or on the bodies, whichever is cheaper (CoupledSystem with D = 1 / (rho weight)).
 //
 // Boyd, Parikh, Chu, Peleato, Eckstein, "Distributed optimization and statistical learning via the
 // alternating direction method of multipliers" (2011); Goldstein, O'Donoghue, Setzer, Baraniuk,
@@ -30,7 +30,7 @@ struct AlternatingDirectionsRules {
   double relaxation = 1.6;  ///< alpha
   PenaltyRule penalty = PenaltyRule::spectral;
   bool accelerate = false;
-  double eta = 0.999;         ///< share of the combined residual under which momentum is kept
+  double eta = 0.999;         ///< if the combined residual falls by this factor, momentum is kept
   std::int64_t interval = 5;  ///< iterations between changes of rho, at first
 };
 
@@ -43,7 +43,7 @@ class AlternatingDirections {
   AlternatingDirections(const ReducedProblem& problem, AlternatingDirectionsRules rules,
                         bool weighted = true);
 
-  /// From r, whose velocity with the shift is the multiplier. False where W is not finite.
+  /// From r. The multiplier is the velocity of r with the shift. Returns false if W is not finite.
   bool start(const Vector& r, const Vector& u, const Vector& shift);
 
   [[nodiscard]] const Vector& z() const { return z_; }
@@ -58,7 +58,7 @@ class AlternatingDirections {
 
   void w_update();
 
-  /// Changes rho where it is due and pays. False where the factorisation failed.
+  /// Changes rho if a change is due and worth its cost. Returns false if the factorisation failed.
   bool adapt();
 
  private:
@@ -71,14 +71,14 @@ class AlternatingDirections {
 
   void extrapolate();
 
-  /// The penalty at which both residuals, each relative to its size, would be the same.
+  /// The penalty for which both residuals, each relative to its size, would be equal.
   [[nodiscard]] double balanced() const;
 
-  /// rho weight^(1/2) w, and the gradient of the quadratic at x, in the metric where weights are 1.
+  /// rho weight^(1/2) w, and the gradient of the quadratic at x, in the metric with weights 1.
   void duals();
   void remember();
 
-  /// A curvature from the change of a variable and of its dual, and how far they agree.
+  /// A curvature from the changes of a variable and of its dual, and how well the two agree.
   [[nodiscard]] std::pair<double, double> curvature(const Vector& p, const Vector& p0,
                                                     const Vector& l, const Vector& l0) const;
 
@@ -97,7 +97,7 @@ class AlternatingDirections {
   std::int64_t since_ = 0;
   std::int64_t due_ = 5;
   Vector x_, z_, w_, relaxed_, zh_, wh_, old_z_, old_w_;
-  Vector dual_hat_, x0_, z0_, dual0_, dual_hat0_;  // of the spectral rule
+  Vector dual_hat_, x0_, z0_, dual0_, dual_hat0_;  // for the spectral rule
 };
 
 #define FCLIB_DECLARE(Cone) extern template class AlternatingDirections<Cone>;

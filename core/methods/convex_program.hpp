@@ -2,11 +2,11 @@
 //
 //   min 1/2 r.W r + (q + s e_N).r,   r in a product of convex sets (convex_sets.hpp)
 //
-// by Gauss-Seidel on the contacts, by accelerated projected gradients, or by ADMM, each from the
-// iterate of the last call and with the memory of it (steps, penalty, factors).
+// by Gauss-Seidel on the contacts, by accelerated projected gradients, or by ADMM. Each starts from
+// the iterate of the last call and with what it remembers (steps, penalty, factors).
 //
-// `follow(count, r, u)` is told of an iterate and its u = W r + q after `count` more iterations,
-// and ends the call by returning true; `due(count)` asks whether it wants to be told now.
+// `follow(count, r, u)` gets an iterate and its u = W r + q after `count` more iterations. If it
+// returns true, the call ends. `due(count)` tells whether it wants an iterate now.
 #pragma once
 
 #include <array>
@@ -22,7 +22,7 @@
 
 namespace fclib {
 
-/// Those that start from the last iterate.
+/// The methods that start from the last iterate.
 enum class ConvexMethod { gauss_seidel, projected_gradient, admm };
 inline constexpr std::array<std::string_view, 3> convex_methods{"gauss_seidel",
                                                                 "projected_gradient", "admm"};
@@ -38,17 +38,17 @@ class ConvexProgram {
 
   explicit ConvexProgram(const ReducedProblem& problem);
 
-  /// s: added to the normal velocities (nc).
+  /// Sets s, which is added to the normal velocities (nc).
   [[nodiscard]] Vector& shift() { return shift_; }
 
   /// ||r - P(r - u - s)||, relative to the problem's scale: zero at the solution.
   [[nodiscard]] double residual(const Set& set, const Vector& r, const Vector& u) const;
 
-  /// By a method; `steps` of Gauss-Seidel on a contact.
+  /// Runs a method; `steps` is the number of steps of Gauss-Seidel on a contact.
   void solve(ConvexMethod method, const Set& set, int steps, double accuracy, std::int64_t limit,
              Vector& r, Vector& u, Due due, Follow follow);
 
-  /// Sweeps over the contacts; u is kept up to date by columns of W.
+  /// Sweeps over the contacts. Columns of W keep u up to date.
   void gauss_seidel(const Set& set, int steps, double accuracy, std::int64_t limit, Vector& r,
                     Vector& u, Due due, Follow follow);
 

@@ -13,42 +13,43 @@ namespace fclib {
 
 namespace {
 
-// benchmarks/constants.py has other values of these
+// benchmarks/constants.py tries other values of these
 constexpr int round_patience = 5;  // rounds in which the error must get better
-constexpr double better = 0.5;     // share of the least error at which it did
+constexpr double better = 0.5;     // share of the least error below which it got better
 constexpr double most_moving =
-    0.65;                         // share of the contacts in 2; beyond, it must be solved at once
-constexpr double regular = 1e-9;  // eps of how fast a body is, over the traces of H H^T and M
-constexpr double rest_speed = 1e-6;        // [||q||_inf] A slower body rests.
-constexpr double creep_change = 3;         // factor on creep if 2 was solved and 1 got no better
-constexpr double stuck = 0.9;              // share of its last error at which 1 got no better
-constexpr double doubt = 1;                // [error of 2, ||q||] slip of a contact that sticks
+    0.65;                            // share of the contacts in 2; with more, one try must solve it
+constexpr double regular = 1e-9;     // eps for the speed of a body, over the traces of H H^T and M
+constexpr double rest_speed = 1e-6;  // [||q||_inf] a slower body rests
+constexpr double creep_change = 3;   // factor on creep if 2 was solved and 1 got no better
+constexpr double stuck = 0.9;        // share of its last error above which 1 got no better
+constexpr double doubt = 1;          // [error of 2, ||q||] slip of a contact that sticks
 constexpr double convex_accuracy = 1e-14;  // complementarity and residual of the convex problem
 constexpr int convex_limit = 100;          // iterations on a convex problem
 constexpr double inner = 0.1;              // tolerance of 2, over that of the whole
 
-// 2 from far away, as the first stages of `auto`: sweeps, an interior point from what they have, a
-// proximal point; then both again, from r = 0
-constexpr double interior_above = 1e-3;   // error of 1 over which it is far away
+// 2 from far away, like the first stages of `auto`: sweeps, then an interior point from their
+// result, then a proximal point. If that fails, the last two again from r = 0.
+constexpr double interior_above = 1e-3;   // above this error of 1, it is far away
 constexpr int first_sweeps = 40;          // sweeps of Gauss-Seidel
 constexpr double follow = 4;              // tau of the first interior point, over the error
-constexpr double least_tau = 0.03;        // ... the least
-constexpr double most_tau = 1;            // ... and the most
-constexpr double second_tau = 10;         // ... and that of the second
+constexpr double least_tau = 0.03;        // the least such tau
+constexpr double most_tau = 1;            // the largest such tau
+constexpr double second_tau = 10;         // tau of the second interior point
 constexpr double second_cap = 0.8;        // step_cap of the second
 constexpr double second_delta = 1e-3;     // delta of the second
 constexpr int interior_limit = 60;        // iterations of each
-constexpr double short_kappa = 10;        // of the proximal points at first
+constexpr double short_kappa = 10;        // kappa of the proximal points at first
 constexpr std::int64_t short_limit = 80;  // factorisations of each
 
-// 2 from nearby: a proximal point with long steps at first
+// 2 from nearby: a proximal point, with long steps at first
 constexpr double long_kappa = 1000;
 constexpr double long_easy = 10;         // factor on kappa after few Newton steps
 constexpr double long_hard = 0.2;        // ... and after a failure
 constexpr std::int64_t long_limit = 40;  // factorisations
 
-/// The number of the body that each coordinate is of: coordinates that M links, and near ones of
-/// which one feels no other contact than the other does. M of a sphere links nothing.
+/// The number of the body of each coordinate. Coordinates that M links belong to one body. So do
+/// near ones if one of them feels only contacts that the other feels too: M of a sphere links
+/// nothing.
 std::vector<Index> bodies(const Primal& primal, int d) {
   const auto count = static_cast<std::size_t>(primal.M.rows());
   std::vector<Index> parent(count);
@@ -72,7 +73,7 @@ std::vector<Index> bodies(const Primal& primal, int d) {
       }
     }
   }
-  constexpr Index reach = 5;  // coordinates of a rigid body but one
+  constexpr Index reach = 5;  // number of coordinates of a rigid body, less one
   const auto within = [](const std::vector<Index>& some, const std::vector<Index>& all) {
     return !some.empty() && std::includes(all.begin(), all.end(), some.begin(), some.end());
   };
@@ -86,7 +87,7 @@ std::vector<Index> bodies(const Primal& primal, int d) {
   return body;
 }
 
-/// Some coordinates, whose numbers `place` has (-1: left out), and some contacts.
+/// Some coordinates and some contacts. `place` has the new number of each coordinate; -1: left out.
 Primal selected(const Primal& primal, std::span<const Index> place, Index count,
                 std::span<const Index> contacts, int d) {
   Primal part;
@@ -114,7 +115,7 @@ Primal selected(const Primal& primal, std::span<const Index> place, Index count,
   return part;
 }
 
-/// H H^T + eps M, whose eps is small beside H H^T and large beside its rounding.
+/// H H^T + eps M. eps is small beside H H^T and large beside its rounding.
 SparseColumns squares(const Primal& primal, double eps) {
   SparseColumns product = primal.H * SparseColumns(primal.H.transpose());
   const double share = eps * product.diagonal().sum() / primal.M.diagonal().sum();
@@ -141,7 +142,7 @@ Primal restricted(const Primal& primal, std::span<const Index> contacts, int d) 
   for (std::size_t k = 0; k < linked.size(); ++k) {
     for (SparseColumns::InnerIterator entry(primal.M, linked[k]); entry; ++entry) take(entry.row());
   }
-  // in their order: coordinates of a body are near each other
+  // in their order: coordinates of one body are near each other
   std::sort(linked.begin(), linked.end());
   for (std::size_t k = 0; k < linked.size(); ++k) place[linked[k]] = static_cast<Index>(k);
   return selected(primal, place, static_cast<Index>(linked.size()), contacts, d);
@@ -184,7 +185,7 @@ void HeldBodies<D>::solve(const HeldBodiesRules& rules, double tolerance, Report
     if (!solve_part(part, error > interior_above, enough, r, left, count)) {
       return;
     }
-    // too many were held, or too few
+    // too many bodies were held, or too few
     const bool solved = left <= enough;
     if (!solved && static_cast<double>(part.contacts.size()) > most_moving * problem_.nc()) return;
     if (!solved) {
@@ -293,7 +294,7 @@ bool HeldBodies<D>::release(double slow, Part& part) {
   const SparseColumns& H = primal_.H;
   const Vector v = squares_->solve(Vector(H * u_));
   part.contacts.clear();
-  std::vector<char> moves(body_.size(), 0);  // of the coordinate that names each body
+  std::vector<char> moves(body_.size(), 0);  // at the coordinate that names each body
   const auto each_body = [&](Index a, auto&& f) {
     Index last = -1;
     for (int k = 0; k < D; ++k) {

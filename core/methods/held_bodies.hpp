@@ -1,8 +1,9 @@
-// Coulomb's law where few bodies move and all others rest, held by reactions that are far from
-// unique: a convex problem on the whole and Newton's method on the bodies that move, in turn.
+// Coulomb's law for problems in which few bodies move and all others rest, held by reactions that
+// are far from unique. A convex problem on the whole and Newton's method on the bodies that move
+// take turns.
 //
-// With s = mu ||u_T|| given, u + (s, 0, 0) in K*, r in K, orthogonal, is convex (methods/
-// relaxation.hpp). Its velocity is unique and depends continuously on s, and Coulomb's law is
+// If s = mu ||u_T|| is given, the law u + (s, 0, 0) in K*, r in K, both orthogonal, is convex
+// (methods/relaxation.hpp). Its velocity is unique and depends continuously on s. Coulomb's law is
 // s = mu ||u_T(s)|| (Acary, Cadoux, Lemarechal & Malick 2011). That fixed point is sought on few
 // bodies only:
 //
@@ -11,15 +12,15 @@
 //   2. bodies that hardly move are held at rest. Coulomb's law for the others, from the reactions
 //      of 1, gives s; s = 0 at contacts that hardly slide, and at those of held bodies alone.
 //
-// Where 2 is solved and 1 moves no other body, 1 has that velocity again, and is a solution. What
-// "hardly" is goes to zero with the errors: bodies that creep while the others are not yet right
-// may rest in the end, and 2 is far harder with them than without.
+// If 2 is solved and 1 then moves no other body, 1 has the velocity of 2 again, and is a solution.
+// What counts as "hardly" goes to zero with the errors: bodies that creep while the others are not
+// yet right may rest in the end, and 2 is far harder with them than without.
 //
-// Let W = H^T M^-1 H, and B what is not held. The problem of 2 is u = W_B r + q_B on the contacts
-// of B, with W_B = H_B^T M_BB^-1 H_B and q_B such that the reactions of 1 give the velocity of 1,
-// but for what the held bodies add to it. A body is a set of coordinates that M links. How fast one
-// is follows from u alone: v is that of least squares in H^T v = u, by one factorisation of H H^T +
-// eps M.
+// Let W = H^T M^-1 H, and let B be the coordinates that are not held. The problem of 2 is u = W_B r
+// + q_B on the contacts of B, with W_B = H_B^T M_BB^-1 H_B. q_B is such that the reactions of 1
+// give the velocity of 1, except for what the held bodies add to it. A body is a set of coordinates
+// that M links. How fast it is follows from u alone: v is the least-squares solution of H^T v = u,
+// by one factorisation of H H^T + eps M.
 #pragma once
 
 #include <optional>
@@ -52,7 +53,7 @@ struct HeldBodiesRules {
 /// The coordinates of some contacts, with all that M links to them, and these contacts.
 Primal restricted(const Primal& primal, std::span<const Index> contacts, int d);
 
-/// Problems known by their bodies, without bilateral constraints.
+/// For problems that are known by their bodies, without bilateral constraints.
 template <int D>
 class HeldBodies {
  public:
@@ -62,12 +63,12 @@ class HeldBodies {
   /// Keeps references. W is H^T M^-1 H of `primal`.
   HeldBodies(const ReducedProblem& problem, const Primal& primal, CoupledSystem& system);
 
-  /// `report(error, r)` is told of each solution of 1, `count()` of each iteration; both end it by
-  /// returning true.
+  /// `report(error, r)` gets each solution of 1, `count()` is called at each iteration. If one of
+  /// them returns true, the solve ends.
   void solve(const HeldBodiesRules& rules, double tolerance, Report report,
              FunctionRef<bool()> count);
 
-  /// On the bodies that move.
+  /// Factorisations on the bodies that move.
   [[nodiscard]] std::int64_t factorisations() const { return factorisations_; }
 
  private:
@@ -78,13 +79,14 @@ class HeldBodies {
     ReducedProblem problem;
   };
 
-  /// r_ and u_ of the convex problem with s = shift_. False where it was ended.
+  /// r_ and u_ of the convex problem with s = shift_. Returns false if it was ended.
   bool convex(FunctionRef<bool()> count);
 
-  /// The bodies that are faster than `slow`, at one of their contacts. False where none is.
+  /// The bodies that are faster than `slow` at one of their contacts. Returns false if there is
+  /// none.
   bool release(double slow, Part& part);
 
-  /// Improves r, of the part; its error. False where it was ended.
+  /// Improves r of the part and sets its error. Returns false if it was ended.
   bool solve_part(const Part& part, bool far, double tolerance, Vector& r, double& error,
                   FunctionRef<bool()> count);
 

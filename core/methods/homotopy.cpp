@@ -29,14 +29,14 @@ void Homotopy<Cone>::solve(const HomotopyRules& rules, Report report) {
       next_ = r_ + step * tangent_;
       next_lambda_ = lambda_ + step * tangent_lambda_;
       corrections = correct(step);
-      // det J and zeta change their signs together; where the angle says otherwise, the step
-      // skipped a turn
+      // det J and zeta change their signs together; if the angle says otherwise, the step skipped a
+      // turn
       if (corrections > 0 && cosine() * sign_ * sign_at_start_ > rules_.cosine) break;
     }
     r_.swap(next_);
     lambda_ = next_lambda_;
     orient(false);
-    if (lambda_ > 0.5) return;  // only by a step that left the path
+    if (lambda_ > 0.5) return;  // only a step that left the path does this
     if (corrections == 1) {
       step *= 2;
     } else if (corrections == 2) {
@@ -241,7 +241,7 @@ void Homotopy<Cone>::orient(bool first) {
 template <class Cone>
 int Homotopy<Cone>::correct(double step) {
   constexpr int most = 5;
-  // a step of this length may be off by a good part of itself, and no more
+  // a step of this length may be wrong by a good part of itself, but no more
   const double reach = 0.7 * step * std::max(longest(r_, tangent_), 1.0);
   double last = 0;
   for (int k = 1; k <= most; ++k) {

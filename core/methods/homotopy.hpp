@@ -1,5 +1,5 @@
-// A path from the one solution of a convex problem to a solution of Coulomb's law, followed by its
-// arclength, since it folds.
+// A path from the unique solution of a convex problem to a solution of Coulomb's law. It is
+// followed by its arclength, since it folds.
 //
 // With t from 1 to 0, s = 1 - t, and for each disc (mu, r_T) of a contact (one of sliding, another
 // of rolling) x = mu r_N, D = x^2 - ||r_T||^2, w = D / x:
@@ -7,11 +7,11 @@
 //   F(r, t) = W r + q - t (g(r, t) + c) = 0
 //   g_N = sum mu (x - s n) / D,   g_T = -r_T / D,   n = sqrt(||r_T||^2 + e^2 w^2) - e w
 //
-// t g is what the velocity is on the central path, u^ = t x^-1 in the Lorentz cone, less the share
-// s of de Saxce's term, mu ||u_T||, its kink smoothed over the width e t / x, which vanishes with
-// t. A contact without discs has g_N = 1 / r_N. c makes the start a solution, at t = 1, where F is
-// monotone, hence has no other: the path cannot come back to t = 1, and unless it goes to infinity
-// it ends at t = 0, in a solution.
+// t g is the velocity on the central path, u^ = t x^-1 in the Lorentz cone, less the share s of de
+// Saxce's term mu ||u_T||. The kink of that term is smoothed over the width e t / x, which vanishes
+// with t. A contact without discs has g_N = 1 / r_N. c makes the start a solution, at t = 1. There
+// F is monotone, so it has no other solution, and the path cannot come back to t = 1. Unless it
+// goes to infinity, it ends at t = 0, in a solution.
 //
 // The tangent (z, zeta) of the path in (r, log t) and Newton's corrector across it both come from
 // one CoupledSystem with D = -(t g')^-1. Lengths are measured in the metric of the barrier, the
@@ -19,7 +19,7 @@
 //
 // H. B. Keller, "Numerical solution of bifurcation and nonlinear eigenvalue problems" (1977), for
 // the arclength; S. N. Chow, J. Mallet-Paret, J. A. Yorke, "Finding zeroes of maps: homotopy
-// methods that are constructive with probability one" (1978), for why the path arrives.
+// methods that are constructive with probability one" (1978), which shows why the path arrives.
 //
 // All is done in the units of the contacts (reduced/own_units.hpp).
 #pragma once
@@ -37,9 +37,9 @@ namespace fclib {
 struct HomotopyRules {
   double smoothing = 0.3;  ///< e
   double stride = 0.9;     ///< longest step of a contact, in the metric of its barrier
-  double accuracy = 0.02;  ///< of a point of the path, likewise
-  double cosine = 0.6;     ///< least, between the tangents at two points
-  double end = 1e-11;      ///< of t
+  double accuracy = 0.02;  ///< accuracy of a point of the path, in the same metric
+  double cosine = 0.6;     ///< least cosine between the tangents at two points
+  double end = 1e-11;      ///< t at which the path ends
   std::int64_t max_factorisations = 4000;
 };
 
@@ -54,11 +54,11 @@ class Homotopy {
 
   Homotopy(const ReducedProblem& problem, CoupledSystem& system);
 
-  /// Of the last iterate.
+  /// The results for the last iterate.
   [[nodiscard]] double t() const { return std::exp(lambda_); }
   [[nodiscard]] int folds() const { return folds_; }
 
-  /// Follows the path; `report(error, r)` is told of each point, and ends it by returning true.
+  /// Follows the path. `report(error, r)` gets each point; if it returns true, the path ends.
   void solve(const HomotopyRules& rules, Report report);
 
  private:
@@ -77,19 +77,20 @@ class Homotopy {
   /// across <- -J^-1 F, along <- -J^-1 dF/dlambda, at a point.
   bool linearise(const Vector& r, double lambda);
 
-  /// <x, y> of contact a at a base point, the metric of the barrier.
+  /// <x, y> of contact a in the metric of the barrier at a base point.
   [[nodiscard]] double product(const Vector& base, Index a, const Vector& x, const Vector& y) const;
   /// The mean over the contacts.
   [[nodiscard]] double product(const Vector& x, const Vector& y) const;
   [[nodiscard]] double longest(const Vector& base, const Vector& x) const;
 
-  /// Between the tangent and the next one at next_, taken with falling t.
+  /// The cosine between the tangent and the next one at next_, taken with falling t.
   [[nodiscard]] double cosine() const;
 
-  /// The unit tangent from `along`, in the direction of travel.
+  /// The unit tangent from `along`, in the direction in which the path is followed.
   void orient(bool first);
 
-  /// Newton across the tangent from next_; the number of corrections, 0 on failure.
+  /// Newton's method across the tangent, from next_. Returns the number of corrections; 0 if it
+  /// failed.
   int correct(double step);
 
   const ReducedProblem& problem_;

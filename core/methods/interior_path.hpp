@@ -1,7 +1,8 @@
-// The loop of the interior point, for any cone: Mehrotra's predictor and corrector along a path on
-// which x o y = tau e, with a regularisation delta of the system that falls as the steps get long.
+// The loop of the interior point, for any cone: Mehrotra's predictor and corrector along a path
+// with x o y = tau e. The system has a regularisation delta, which falls as the steps get longer.
 //
-// A Cones has what depends on the cone (methods/interior_point.hpp and rolling_interior_point.hpp):
+// A Cones class has all that depends on the cone (methods/interior_point.hpp and
+// rolling_interior_point.hpp):
 //
 //   void evaluate(rules)              residual and gap at the iterate
 //   double tau(), residual()          mean complementarity, ||R||_inf
@@ -42,9 +43,9 @@ constexpr double long_step = 0.5;   // and falls as much after a longer one
 // the centring sigma = (gap after the predictor / gap)^3
 constexpr double least_sigma = 1e-6;
 constexpr double nearly_held =
-    0.1;  // share of `balance` from which sigma is at least guarded_sigma
+    0.1;  // share of `balance` above which sigma is at least guarded_sigma
 constexpr double guarded_sigma = 0.3;
-// a corrector whose step is short is tried again with more centring
+// if the step of a corrector is short, it is tried again with more centring
 constexpr double good_step = 0.3;
 constexpr double last_sigma = 0.9;
 constexpr int attempts = 3;
@@ -52,8 +53,8 @@ constexpr double least_cap = 0.9;  // the cap is 1 - tau, between this and step_
 
 }  // namespace interior
 
-/// Follows the path from where `cones` is. `report(k)` is told of each iterate, and returns its
-/// error, or nothing to end the path. The number of iterations.
+/// Follows the path from the iterate of `cones`. `report(k)` gets each iterate and returns its
+/// error; if it returns nothing, the path ends. Returns the number of iterations.
 template <class Cones>
 int follow_path(Cones& cones, const InteriorPointRules& rules,
                 FunctionRef<std::optional<double>(int iteration)> report) {

@@ -235,7 +235,7 @@ bool InteriorPoint<D>::direction(double delta) {
 
 template <int D>
 double InteriorPoint<D>::longest() const {
-  // of the steps at each contact the least
+  // the smallest of the steps at the contacts
   return -largest([&](Index a) {
     double step = std::numeric_limits<double>::infinity();
     if (problem_.friction.mu[a] > 0) {

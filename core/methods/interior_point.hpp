@@ -9,17 +9,17 @@
 //   (I + D W) dr = (I + delta D0)^-1 (S N g - D0 R),   D = (I + delta D0)^-1 D0
 //
 // Mehrotra's predictor and corrector choose g. Without the term (`associated`) this is the convex
-// problem of an associated flow rule. Where a packing is jammed, the velocities that the path has
-// on its way to zero are of the size of tau, and the term's kink makes the path fold; `smoothing`
-// leaves velocities of that size to the associated rule: sqrt(||y_T||^2 + w^2) - w, w = smoothing
-// tau.
+// problem of an associated flow rule. If a packing is jammed, the velocities go to zero along the
+// path and have the size of tau. Then the kink of the term makes the path fold. `smoothing`
+// replaces ||y_T|| by sqrt(||y_T||^2 + w^2) - w with w = smoothing tau: velocities of that size
+// follow the associated rule.
 //
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
-// mechanics using interior point algorithm" (2023), for the convex part, to
-// which the shift in the Newton system is added.
+// mechanics using interior point algorithm" (2023), for the convex part. The shift in the Newton
+// system is added here.
 //
-// All is done in the units of the contacts (reduced/own_units.hpp): the start and delta fit to
-// light bodies beside heavy ones.
+// All is done in the units of the contacts (reduced/own_units.hpp), so that the start and delta
+// suit light bodies beside heavy ones.
 #pragma once
 
 #include <algorithm>
@@ -53,8 +53,8 @@ class InteriorPoint {
   [[nodiscard]] double speed() const { return velocity_.norm() / problem_.q.norm(); }
   [[nodiscard]] int iterations() const { return iterations_; }
 
-  /// Iterates from near a guess; `report(error, r)` is told of each iterate, and ends it by
-  /// returning true.
+  /// Iterates from near a guess. `report(error, r)` gets each iterate; if it returns true, the
+  /// solve ends.
   void solve(const InteriorPointRules& rules, const Vector& guess,
              FunctionRef<bool(double error, const Vector& r)> report);
 
@@ -66,7 +66,7 @@ class InteriorPoint {
   void keep_predictor();
   /// lambda \ g for the corrector: g <- -lambda + lambda \ (sigma tau e - second order).
   void correct(double sigma, bool second_order);
-  /// The shift mu ||y_T|| is convex: what the linearisation misses over the predictor's step is
+  /// The shift mu ||y_T|| is convex. What its linearisation misses over the predictor's step is
   /// added to R.
   void correct_shift(double step);
   bool direction(double delta);
@@ -75,14 +75,14 @@ class InteriorPoint {
   void advance(double step);
 
  private:
-  /// x - y as the guess has it, and x o y = tau e: centred, and the nearer to the guess, the
-  /// smaller tau is.
+  /// The start: x - y as the guess has it, and x o y = tau e. It is centred. The smaller tau is,
+  /// the nearer it is to the guess.
   void start(const InteriorPointRules& rules, const Vector& guess);
 
   /// ||y_T||, smoothed at its kink.
   [[nodiscard]] double sliding(double norm) const { return std::hypot(norm, width_) - width_; }
 
-  /// f(a) for each contact, on all threads; it writes what is the contact's alone.
+  /// Calls f(a) for each contact, on all threads. f writes only what belongs to contact a.
   template <class F>
   void each(const F& f) const {
     in_parts(system_.workers(), problem_.nc(), [&](std::int64_t first, std::int64_t last) {

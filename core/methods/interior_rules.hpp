@@ -1,4 +1,4 @@
-// What an interior point is told, whatever its cone.
+// The options of an interior point, for any cone.
 #pragma once
 
 #include <tuple>

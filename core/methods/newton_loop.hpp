@@ -1,5 +1,5 @@
 // What the semismooth Newton solvers share: their options, a run under a Monitor, and the entry of
-// all of them in the registry.
+// each of them in the registry.
 #pragma once
 
 #include <array>
@@ -25,7 +25,7 @@ struct NewtonOptions : NewtonRules {
                "of W_aa. split_spectral: that of its normal and of its tangential part; the first "
                "alone if the function takes one rho. adaptive: such that a step moves rho u^ about "
                "as much as r."),
-        option("rho", &O::rho, "1/[W] where the rule is constant, else 1", {1e-12, 1e12},
+        option("rho", &O::rho, "1/[W] if the rule is constant, else 1", {1e-12, 1e12},
                "rho itself, or a factor on what the rule gives."),
         choice("line_search", &O::line_search, line_searches,
                "armijo and goldstein_price search on 1/2 ||F||^2. fischer_burmeister is armijo on "
@@ -42,8 +42,8 @@ struct NewtonOptions : NewtonRules {
   }
 };
 
-/// The entry of the solver with this function. An iteration is a step of Newton, or the sweeps in
-/// the place of one.
+/// The entry of the solver with this function. An iteration is a Newton step, or the sweeps that
+/// replace one.
 Solver newton_entry(std::string name, std::string title, std::string citation,
                     std::vector<int> rolling_dimensions, ContactFunctionKind function);
 

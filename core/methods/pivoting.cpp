@@ -14,7 +14,8 @@ namespace fclib {
 
 namespace {
 
-/// What is smaller in a column of the tableau, relative to its largest entry, is rounding.
+/// An entry of a column of the tableau that is smaller than this, relative to the largest, is
+/// rounding.
 constexpr double rounding = 1e-12;
 /// Ratios that differ by less are equal.
 constexpr double tie = 1e-13;
@@ -31,7 +32,7 @@ Pivoting<Cone>::Pivoting(const ReducedProblem& problem, int edges) : problem_(pr
   const Eigen::Index reactions = nc + sliding * corners;
   const Eigen::Index all = reactions + sliding;
 
-  // the cones stay what they are where each contact has a unit of its own
+  // if each contact has a unit of its own, the cones do not change
   const Vector unit = contact_weights(problem).cwiseSqrt().cwiseInverse();
   B_ = Eigen::MatrixXd::Zero(m, reactions);
   M_ = Eigen::MatrixXd::Zero(all, all);
@@ -99,7 +100,7 @@ int Pivoting<Cone>::solve(const Vector& cover, int most, Vector& r) const {
     if (leaving == artificial) break;
     entering = leaving < n ? leaving + n : leaving - n;
 
-    // the ratio test; of equal ratios that of z0, else the largest pivot
+    // the ratio test; of equal ratios, that of z0 or else the one with the largest pivot
     column = tableau.col(entering);
     const double least = rounding * column.template lpNorm<Eigen::Infinity>();
     double smallest = std::numeric_limits<double>::infinity();

@@ -1,8 +1,7 @@
-// Lemke's method on the linear complementarity problem that Coulomb's law is where each disk of
-// tangential reactions is a polygon (Stewart & Trinkle 1996, "An implicit time-stepping scheme for
+// Lemke's method. If each disk of tangential reactions is replaced by a polygon, Coulomb's law is a
+// linear complementarity problem (Stewart & Trinkle 1996, "An implicit time-stepping scheme for
 // rigid body dynamics with inelastic collisions and Coulomb friction"; Anitescu & Potra 1997). In
-// the plane, and with rolling in the plane, it is the law itself. Reactions are
-//
+// the plane, also with rolling, it is the law itself. Reactions are
 //   r = B x,   x >= 0,   B the normals and the edges of the polygons
 //
 // and with the slip velocities lambda of each polygon
@@ -11,9 +10,9 @@
 //   0 <= x_T     _|_  B_T^T u + lambda                   >= 0
 //   0 <= lambda  _|_  mu x_N - sum of the polygon's x_T  >= 0
 //
-// Its matrix is copositive: Lemke's method ends at a solution wherever Slater's condition holds
-// (Cottle, Pang & Stone 1992, theorem 4.4.12). Elsewhere it may end at a ray, and with another
-// covering vector at a solution. Dense: for few contacts.
+// Its matrix is copositive. If Slater's condition holds, Lemke's method ends at a solution (Cottle,
+// Pang & Stone 1992, theorem 4.4.12). If not, it may end at a ray, and with another covering vector
+// at a solution. The matrix is dense, so this is for few contacts.
 #pragma once
 
 #include "contact/cones.hpp"
@@ -26,14 +25,14 @@ class Pivoting {
  public:
   static constexpr int D = Cone::dim;
 
-  /// Polygons of this many edges.
+  /// Uses polygons with this many edges.
   Pivoting(const ReducedProblem& problem, int edges);
 
-  /// Unknowns of the complementarity problem.
+  /// The number of unknowns of the complementarity problem.
   [[nodiscard]] Eigen::Index size() const { return M_.rows(); }
 
-  /// Reactions (m) where Lemke's method from a covering vector (size, positive) ends, at a solution
-  /// or at a ray. Pivots made; it goes no further than `most` of them.
+  /// Runs Lemke's method from a covering vector (size, positive), at most `most` pivots. r (m)
+  /// becomes its end: a solution or a point of a ray. Returns the number of pivots.
   int solve(const Vector& cover, int most, Vector& r) const;
 
  private:

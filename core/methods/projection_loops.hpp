@@ -1,12 +1,12 @@
-// What the projection methods share: the loops of those with a self-adaptive step, which differ in
-// their step rule alone, their options, and the entry of all of them in the registry.
+// What the projection methods share: the loops of those with a self-adaptive step, which differ
+// only in their step rule; their options; and the entry of each of them in the registry.
 //
 // Algorithms 1, 2 and 3 of Acary, Bremond, Huber, "On solving contact problems with Coulomb
 // friction: formulations and numerical comparisons" (2018).
 //
 // Differs from the paper in: each contact may have a step of its own, rho over the mean diagonal of
 // W_aa (`metric`); F of the last point is kept for the next iteration and for the error; the step
-// grows whether or not the error fell.
+// may grow even if the error did not fall.
 #pragma once
 
 #include <functional>
@@ -19,7 +19,7 @@
 
 namespace fclib {
 
-/// The fields of StepOptions, as members of what is derived from it.
+/// The fields of StepOptions, as members of a struct derived from it.
 template <class O>
 constexpr auto step_fields() {
   return std::tuple{
@@ -65,18 +65,18 @@ struct ExtragradientOptions : StepOptions {
 
 /// repeat  z <- P_K(z_k - rho F(z_k))  until rho is accepted;  z_k+1 = z
 ///
-/// One product with W an iteration, and one more where rho shrinks.
+/// One product with W in each iteration, and one more each time rho shrinks.
 Outcome fixed_point(StepRatio ratio, const ReducedProblem& problem, const StepOptions& options,
                     Iterates& iterates, const Vector& start);
 
 /// repeat  z <- P_K(z_k - rho F(z_k))  until rho is accepted;  z_k+1 = P_K(z_k - rho F(z)), or,
 /// with `second` = trial, P_K(z - rho F(z))
 ///
-/// Two products with W an iteration, and one more where rho shrinks.
+/// Two products with W in each iteration, and one more each time rho shrinks.
 Outcome extragradient(StepRatio ratio, const ReducedProblem& problem,
                       const ExtragradientOptions& options, Iterates& iterates, const Vector& start);
 
-/// The entry of a method whose loop is `loop(problem, options, iterates, start)`.
+/// The entry of a method with the loop `loop(problem, options, iterates, start)`.
 template <class Options>
 Solver projection_entry(
     std::string name, std::string title, std::string citation,

@@ -44,7 +44,7 @@ double ProximalPoint<Cone>::solve(const ProximalRules& rules, double tolerance, 
   problem_.velocity(r_, u_);
   error_ = relative_error<Cone>(problem_, u_, r_);
   double best = error_;
-  double share = 1;  // of what the law says, after failures
+  double share = 1;  // factor on what the law says, after failures
   while (best > tolerance && system_.factorisations() < stop_at && !problem_.out_of_time()) {
     if (rules.law == ProximalRules::Law::by_error) {
       kappa = std::min(share / (rules.sigma * std::pow(error_, rules.nu)), rules.kappa_max);
@@ -148,7 +148,7 @@ int ProximalPoint<Cone>::inner(double kappa, std::int64_t stop_at) {
     p_ = trial_;
     up_ = trial_u_;
     norm = trial_norm;
-    // or as small as rounding, which rho multiplies, lets it be
+    // or as small as the rounding, multiplied by rho, allows
     const double rounding = 10 * std::numeric_limits<double>::epsilon() * kappa * p_.norm();
     if (norm > std::max(1e-2 * first, rounding)) continue;
     put_into_cones(kappa, p_, up_, next_);

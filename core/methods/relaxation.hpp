@@ -1,5 +1,5 @@
-// The share of the new value in the next one of a fixed point whose steps are not solved exactly:
-// where it goes around in circles, a smaller share ends that.
+// The relaxation of a fixed point whose steps are not solved exactly: the share of the new value in
+// the next one. If the iterates go around in circles, a smaller share ends that.
 #pragma once
 
 #include <algorithm>
@@ -11,7 +11,8 @@ class Relaxation {
  public:
   explicit Relaxation(double share) : share_(share), smallest_(share / 8) {}
 
-  /// After a step with this error: halved where none of the last `patience` steps had a new least.
+  /// After a step with this error. It is halved if none of the last `patience` steps had a new
+  /// least error.
   double next(double error) {
     if (error < least_) {
       least_ = error;

@@ -122,7 +122,7 @@ void RollingInteriorPoint<D>::start(const InteriorPointRules& rules, const Vecto
       inside.template segment<T>(1 + T * g) = 0.5 * (high - low) * along;
       group.y.template tail<T>() = 0.5 * rules.tau * (1 / high - 1 / low) * along;
     }
-    inside[0] = normal;  // the larger: within both cones
+    inside[0] = normal;  // the larger normal is within both cones
     r = inside;
     for (int g = 0; g < 2; ++g) groups[g].x = lift(groups[g], g, inside);
   }
@@ -144,7 +144,7 @@ void RollingInteriorPoint<D>::evaluate(const InteriorPointRules& /*rules*/) {
         residual[0] += group.coefficient * group.y.template tail<T>().norm();
         tail -= group.y.template tail<T>();
       } else {
-        tail.setZero();  // nothing holds it
+        tail.setZero();  // nothing holds this part
       }
       gap += group.x.dot(group.y);
     }
@@ -160,8 +160,8 @@ bool RollingInteriorPoint<D>::assemble(double delta, const InteriorPointRules& /
   for (Index a = 0; a < problem_.nc(); ++a) {
     Contact& contact = contacts_[static_cast<std::size_t>(a)];
     contact.P.setIdentity();
-    // A is two blocks bordered by the normal part, whose complement is the sum of c^2 / (beta^2 k),
-    // k = 1 + 2 ||w_T||^2: so its inverse has no cancellation
+    // A is two blocks bordered by the normal part. Its complement is the sum of c^2 / (beta^2 k), k
+    // = 1 + 2 ||w_T||^2, so its inverse has no cancellation
     contact.A.setZero();
     Vec border = Vec::Zero();
     border[0] = 1;
@@ -256,7 +256,7 @@ bool RollingInteriorPoint<D>::direction(double delta) {
       if (!(group.coefficient > 0)) continue;
       group.dx = lift(group, g, dr);
       if (group.tail) group.dy.template tail<T>() = du.template segment<T>(1 + T * g);
-      // its normal part by the scaled equation, which loses fewer digits than N^-2 dx
+      // the normal part comes from the scaled equation, which loses fewer digits than N^-2 dx
       group.dy[0] = ((group.g - group.scaling.inverse * group.dx)[0] -
                      group.scaling.N.template block<1, T>(0, 1).dot(group.dy.template tail<T>())) /
                     group.scaling.N(0, 0);

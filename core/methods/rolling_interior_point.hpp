@@ -1,14 +1,14 @@
-// The interior point of methods/interior_point.hpp for sliding and rolling friction. The cone
-// { ||r_T|| <= mu r_N, ||r_R|| <= mu_r r_N } is two Lorentz cones that share r_N, and its dual the
-// sum of theirs:
+// The interior point of methods/interior_point.hpp for sliding and rolling friction. The cone {
+// ||r_T|| <= mu r_N, ||r_R|| <= mu_r r_N } is two Lorentz cones that share r_N. Its dual is the sum
+// of their duals:
 //
 //   x1 = (mu r_N, r_T),  x2 = (mu_r r_N, r_R);  y1 = (a, u_T),  y2 = (b, u_R)
 //   x1 o y1 = tau e,  x2 o y2 = tau e,  u^ = (mu a + mu_r b, u_T, u_R)
 //   R = u + (mu ||u_T|| + mu_r ||u_R||) e_N - u^ = 0,  u = W r + q
 //
 // With x_i = E_i r and scalings N_i, the split of u^_N into a and b leaves Newton's system contact
-// by contact: with A = sum E_i^T N_i^-2 E_i and D0 = A^-1 P it is that of the Coulomb cone. A
-// coefficient that is zero has no cone; where both are, x1 = r_N.
+// by contact. With A = sum E_i^T N_i^-2 E_i and D0 = A^-1 P it is the system of the Coulomb cone. A
+// coefficient that is zero has no cone. If both are zero, x1 = r_N.
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ class RollingInteriorPoint {
 
   RollingInteriorPoint(const ReducedProblem& problem, CoupledSystem& system);
 
-  /// As InteriorPoint::solve; `associated` and `smoothing` are not for it.
+  /// Like InteriorPoint::solve, without `associated` and `smoothing`.
   void solve(const InteriorPointRules& rules, const Vector& guess,
              FunctionRef<bool(double error, const Vector& r)> report);
 
@@ -59,13 +59,13 @@ class RollingInteriorPoint {
 
   struct Group {  // of a contact
     double coefficient = 0;
-    bool tail = false;  // whether it has tangential components; else it is a half-line, or nothing
+    bool tail = false;  // whether it has tangential components; else a half-line, or nothing
     Part x, y, dx, dy, affine_x, affine_y, g, lambda;
     Scaling scaling;
   };
   struct Contact {
     std::array<Group, 2> groups;
-    Mat P, A, D0, regular;  // A: the inverse of that above
+    Mat P, A, D0, regular;  // A: the inverse of the one above
   };
 
   [[nodiscard]] static Part lift(const Group& group, int k, const Vec& r);

@@ -1,8 +1,8 @@
-// The self-adaptive step of projection methods: rho shrinks until a trial is accepted, and grows
-// where the trial was accepted with room to spare.
+// The self-adaptive step of projection methods. rho shrinks until a trial is accepted, and grows if
+// the trial was accepted with room to spare.
 //
 //   while rho ratio(trial(rho)) > L:  rho <- tau rho
-//   after it, where rho ratio < L_min:  rho <- rho / tau
+//   after it, if rho ratio < L_min:  rho <- rho / tau
 //
 // The ratio is Khobotov's (UPK), ||F(z) - F(z_k)|| / ||z - z_k||, or Solodov & Tseng's (UPTS),
 // (z - z_k) . (F(z) - F(z_k)) / ||z - z_k||^2.

@@ -2,13 +2,13 @@
 //
 //   (B + A W) dr = -F,   A = dF/du, B = dF/dr,   r <- r + t dr
 //
-// with t = 1, or from a line search on theta = 1/2 ||F||^2 or that of Fischer & Burmeister's
-// function. There, where Newton's step is no descent, or no t is found, minus the gradient is
-// searched instead; where the error stands still, sweeps of Gauss-Seidel from the best iterate
-// start it anew.
+// with t = 1, or from a line search on theta = 1/2 ||F||^2 or on that of Fischer & Burmeister's
+// function. In a line search, if Newton's step is no descent, or no t is found, the search goes
+// along minus the gradient instead. If the error does not fall any more, sweeps of Gauss-Seidel
+// from the best iterate give a new start.
 //
-// Without enough coordinates for its contacts W is singular, and B + A W with it: W + delta I
-// stands in its place, with delta going to zero as the error does.
+// If there are too few coordinates for the contacts, W is singular, and so is B + A W. W + delta I
+// then replaces W, and delta goes to zero with the error.
 #pragma once
 
 #include <cstdint>
@@ -21,10 +21,10 @@
 namespace fclib {
 
 enum class RhoRule {
-  constant,        ///< one for all
+  constant,        ///< one for all contacts
   spectral,        ///< 1 / the spectral norm of W_aa
   split_spectral,  ///< 1 / W_NN, and 1 / the spectral norm of each tangential block
-  adaptive,        ///< spectral, then such that a step moves rho u^ about as much as r
+  adaptive,        ///< spectral, then changed until a step moves rho u^ about as much as r
 };
 
 enum class LineSearch {
@@ -36,10 +36,10 @@ enum class LineSearch {
 
 struct NewtonRules {
   RhoRule rho_rule = RhoRule::spectral;
-  double rho = 1;  ///< 1/[W] where constant, else a factor
+  double rho = 1;  ///< 1/[W] if constant, else a factor
   LineSearch line_search = LineSearch::none;
   double regularisation = 1;   ///< delta over the mean of tr(W_aa) / d and the error
-  std::int64_t sweeps = 10;    ///< of Gauss-Seidel where Newton stands still, then twice as many
+  std::int64_t sweeps = 10;    ///< of Gauss-Seidel if Newton stands still, then twice as many
   std::int64_t patience = 20;  ///< steps in which the error must halve
 };
 
@@ -52,14 +52,14 @@ class SemismoothNewton {
   using Vec = typename Cone::Vec;
   using Mat = ContactMatrix<D>;
 
-  /// Keeps a reference to the problem. Throws Error (unsuitable) where the cone has no function of
+  /// Keeps a reference to the problem. Throws Error (unsuitable) if the cone has no function of
   /// this kind.
   SemismoothNewton(const ReducedProblem& problem, ContactFunctionKind kind, int threads = 1);
 
   [[nodiscard]] const CoupledSystem& system() const { return system_; }
   [[nodiscard]] std::int64_t factorisations() const { return system_.factorisations(); }
 
-  /// Improves r. `report(error)` is told of each iterate, and ends it by returning true. r ends as
+  /// Improves r. `report(error)` gets each iterate; if it returns true, the solve ends. r ends as
   /// the iterate with the least error.
   NewtonEnd solve(const NewtonRules& rules, Vector& r, FunctionRef<bool(double)> report);
 
@@ -83,7 +83,7 @@ class SemismoothNewton {
   /// F at (u, r), and the blocks of the system.
   void assemble(double delta);
 
-  /// Of contact a in f, the function that is solved or another whose merit is searched.
+  /// For contact a in f: the function that is solved, or another one whose merit is searched.
   Vec rho_of(const Function& f, Index a) const;
 
   /// theta = 1/2 ||F||^2.
@@ -92,7 +92,8 @@ class SemismoothNewton {
   /// The slope of theta along dr_, du_ = W dr_.
   double slope(const Function& f) const;
 
-  /// dr_ <- minus the gradient of theta, for symmetric W, as long as Newton's model asks for.
+  /// dr_ <- minus the gradient of theta, for symmetric W, with the length that Newton's model asks
+  /// for.
   void descend(const Function& f);
 
   /// du_ = W dr_.
@@ -100,13 +101,13 @@ class SemismoothNewton {
 
   double merit_at(const Function& f, double length);
 
-  /// Halvings from 1; 0 where none will do.
+  /// Halves t from 1. Returns 0 if no t is good enough.
   double armijo(const Function& f, double start, double slope);
 
-  /// low_share <= (theta(t) - theta) / (t slope) <= high_share; 0 where no t is found.
+  /// low_share <= (theta(t) - theta) / (t slope) <= high_share. Returns 0 if no t is found.
   double goldstein_price(const Function& f, double start, double slope);
 
-  /// The length of the step along dr_, which may become another direction; 0 where there is none.
+  /// The length of the step along dr_, which may become another direction. 0 if there is none.
   double search(LineSearch rule);
 
   double search_by(const Function& f, LineSearch rule);

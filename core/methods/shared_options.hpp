@@ -1,5 +1,5 @@
-// Options that several solvers have. O, the struct of a solver's options, has the members, mostly
-// from a base.
+// Options that several solvers have. O is the struct of a solver's options. It has these members,
+// mostly from a base.
 #pragma once
 
 #include "contact/local_solver.hpp"
@@ -7,7 +7,7 @@
 
 namespace fclib {
 
-/// Of sweeps over the contacts: reduced/sweeps.hpp, contact/local_solver.hpp.
+/// For sweeps over the contacts: reduced/sweeps.hpp, contact/local_solver.hpp.
 struct SweepOptions {
   LocalSolver local_solver = LocalSolver::exact;
   std::int64_t local_iterations = 10;
@@ -42,7 +42,7 @@ constexpr auto sweep_fields() {
   };
 }
 
-/// Of projected gradients: whether de Saxce's shift follows the iterates.
+/// For projected gradients: whether de Saxce's shift follows the iterates.
 enum class Shift { iterated, none };
 inline constexpr std::array<std::string_view, 2> shifts{"iterated", "none"};
 
@@ -53,7 +53,7 @@ constexpr auto shift_field() {
                 "if contacts slide.");
 }
 
-/// Of a fixed point over convex problems.
+/// For a fixed point over convex problems.
 struct FixedPointOptions {
   double inner_accuracy = 0.1;
   std::int64_t inner_iterations = 1000;

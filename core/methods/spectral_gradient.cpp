@@ -39,7 +39,7 @@ void spectral_gradient(const ReducedProblem& problem, const SpectralRules& rules
   Vector wd(problem.m());
   const Vector zero = Vector::Zero(problem.m());
   std::vector<double> values(static_cast<std::size_t>(rules.memory), -1e300);
-  double value = 0;  // of the objective, but for a constant
+  double value = 0;  // the objective, up to a constant
   values[0] = value;
   double alpha = 1;
   for (std::int64_t k = 1;; ++k) {
@@ -47,7 +47,7 @@ void spectral_gradient(const ReducedProblem& problem, const SpectralRules& rules
       last_shift.swap(shift);
       de_saxce_shift<Cone>(u, problem.friction, shift);
       if (k == 1) last_shift = shift;
-      // the objective of before, with the new shift
+      // the earlier objective, with the new shift
       double moved = 0;
       for (Index a = 0; a < nc; ++a) moved += (shift[a] - last_shift[a]) * r[D * a];
       for (double& past : values) past += moved;

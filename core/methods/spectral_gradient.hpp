@@ -6,8 +6,8 @@
 //   alpha = <dr, dr> / <dr, W dr> and <dr, W dr> / <W dr, W dr>, in turn
 //
 // Birgin, Martinez, Raydan, "Nonmonotone spectral projected gradient methods on convex sets"
-// (2000); Barzilai & Borwein, "Two-point step size gradient methods" (1988). solvers/bb.cpp says in
-// what it differs from them.
+// (2000); Barzilai & Borwein, "Two-point step size gradient methods" (1988). solvers/bb.cpp lists
+// the differences.
 #pragma once
 
 #include <array>
@@ -26,13 +26,13 @@ inline constexpr std::array<std::string_view, 3> spectral_steps{"long", "short",
 struct SpectralRules {
   bool shifted = true;  ///< whether the shift follows the iterates
   SpectralStep step = SpectralStep::alternating;
-  std::int64_t memory = 10;  ///< iterations whose objective the line search may rise to
-  double decrease = 1e-4;    ///< share of the predicted decrease that is asked for
-  bool weights = true;       ///< a metric for each contact by its block of W
+  std::int64_t memory = 10;  ///< the objective may rise to the largest of so many iterations
+  double decrease = 1e-4;    ///< share of the predicted decrease that a step must reach
+  bool weights = true;       ///< each contact has a metric from its block of W
 };
 
-/// From r, with u = W r + q. After each iteration r and u have the new iterate, and `stop` is
-/// called with the shift (nc) that it was made with; it ends where `stop` is true.
+/// Starts from r, with u = W r + q. After each iteration r and u are the new iterate. `stop` is
+/// called with the shift (nc) that the iterate was made with. If it returns true, the method ends.
 template <class Cone>
 void spectral_gradient(const ReducedProblem& problem, const SpectralRules& rules, Vector& r,
                        Vector& u, FunctionRef<bool(const Vector&)> stop);

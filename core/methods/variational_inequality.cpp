@@ -97,7 +97,7 @@ double VariationalInequality<Cone>::largest_eigenvalue() const {
   const Vector zero = Vector::Zero(m);
   Vector x(m);
   Vector y(m);
-  // any start with a part along the first eigenvector: no two entries alike
+  // any start with a part along the first eigenvector: here no two entries are equal
   for (Eigen::Index k = 0; k < m; ++k) x[k] = 1 + 0.5 * std::sin(static_cast<double>(k + 1));
   double value = 0;
   for (int k = 0; k < max_products; ++k) {

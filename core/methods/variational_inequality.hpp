@@ -5,9 +5,9 @@
 // Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and
 // numerical comparisons" (2018), section 3.
 //
-// Distances are measured in a metric of one weight w^a > 0 a contact, ||s||^2 = sum |s^a|^2 / w^a,
-// in which the projection on K stays what it is: P_K(r - rho w F). Weights equal to 1 / W_aa make
-// the methods blind to the scale of each contact.
+// Distances are measured in a metric with one weight w^a > 0 for each contact, ||s||^2 = sum
+// |s^a|^2 / w^a. In this metric the projection on K does not change: P_K(r - rho w F). With weights
+// 1 / W_aa the methods do not depend on the scale of each contact.
 #pragma once
 
 #include <array>
@@ -18,14 +18,14 @@
 
 namespace fclib {
 
-/// r, and what belongs to it.
+/// r, and what follows from it.
 struct VelocityPoint {
   Vector r;
   Vector u;    ///< W r + q
   Vector hat;  ///< F(r) = u^
 };
 
-/// What tells whether a step is too long, in the metric.
+/// The ratio that tells whether a step is too long, in the metric.
 enum class StepRatio {
   khobotov,       ///< ||F(a) - F(b)|| / ||a - b||
   solodov_tseng,  ///< (a - b) . (F(a) - F(b)) / ||a - b||^2
@@ -45,10 +45,10 @@ class VariationalInequality {
 
   VariationalInequality(const ReducedProblem& problem, Metric metric);
 
-  /// A point to work on, r in its place and all else unset.
+  /// A point with r; all the rest is unset.
   [[nodiscard]] VelocityPoint point(const Vector& r) const;
 
-  /// F(r) from r, the one product with W.
+  /// F(r) from r, by one product with W.
   void evaluate(VelocityPoint& at) const;
 
   /// F(r) from r and u.
@@ -57,11 +57,11 @@ class VariationalInequality {
   /// to.r = P_K(from - rho w direction).
   void project(const Vector& from, double rho, const Vector& direction, VelocityPoint& to) const;
 
-  /// The natural map at the point, relative as every tolerance; at least what W r rounds, where
-  /// reactions have grown so large that this is what is left of u.
+  /// The natural map at the point, relative as for every tolerance. If reactions have grown so
+  /// large that only the rounding of W r is left of u, it is at least that rounding.
   [[nodiscard]] double error(const VelocityPoint& at) const;
 
-  /// Of the two points; 0 where they are the same.
+  /// The ratio of the two points. 0 if they are equal.
   [[nodiscard]] double ratio(StepRatio which, const VelocityPoint& a, const VelocityPoint& b) const;
 
   /// ||a - b||^2 in the metric.
@@ -70,7 +70,7 @@ class VariationalInequality {
   /// ||f||^2 of a velocity, in the dual metric.
   [[nodiscard]] double velocity_squared(const Vector& f) const;
 
-  /// The largest eigenvalue of W in the metric, from below, by the power method; 1 where W = 0.
+  /// A lower bound of the largest eigenvalue of W in the metric, by the power method. 1 if W = 0.
   [[nodiscard]] double largest_eigenvalue() const;
 
  private:
@@ -81,7 +81,7 @@ class VariationalInequality {
 
   const ReducedProblem& problem_;
   Vector weight_;                // w (nc)
-  double largest_diagonal_ = 0;  // of the mean diagonals of the W_aa
+  double largest_diagonal_ = 0;  // the largest of the mean diagonals of the W_aa
 };
 
 #define FCLIB_DECLARE(Cone) extern template class VariationalInequality<Cone>;

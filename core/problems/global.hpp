@@ -27,7 +27,7 @@ struct GlobalProblem {
   static constexpr const char* doc =
       "The global problem: M v = H r + f (+ G lambda), u = H^T v + w, Coulomb's law.";
   static constexpr std::string_view prefix = "G";  // of the formulation's name
-  static constexpr bool triplets_on_disk = true;   // the one storage that Siconos reads
+  static constexpr bool triplets_on_disk = true;   // the only storage that Siconos reads
 
   static constexpr bool rolling = false;
   static constexpr std::array<Index, 2> dimensions{2, 3};  // the spacedims there are
@@ -43,7 +43,7 @@ struct GlobalProblem {
   ProblemInfo info;
   GeometryPointer geometry;
 
-  /// `P` is this struct, or one that adds to it.
+  /// `P` is this struct, or one derived from it.
   template <class P = GlobalProblem>
   static constexpr auto fields() {
     return std::tuple{

@@ -44,7 +44,7 @@ struct LocalProblem {
   ProblemInfo info;
   GeometryPointer geometry;
 
-  /// `P` is this struct, or one that adds to it.
+  /// `P` is this struct, or one derived from it.
   template <class P = LocalProblem>
   static constexpr auto fields() {
     return std::tuple{

@@ -18,15 +18,15 @@ namespace {
 using Dense = Eigen::MatrixXd;
 
 constexpr double unit = 0x1p-53;
-/// Of the last digits of W, how many times their rounding may be left.
+/// The rest of a sum in W may be so many times the rounding of its last digits.
 constexpr double last_digits = 8;
 /// A gain below this part of its terms is rounding.
 constexpr double least_gain = 1e-8;
-/// Of the least part of a proof, how far the exact one may be: a reader's tolerance.
+/// An exact proof must be this near, over the least part of the proof: a reader's tolerance.
 constexpr double nearest = 1e-10;
-/// Its unknowns, which a reader must be able to bring to rational numbers.
+/// A proof may have so many unknowns: a reader must be able to turn them into rational numbers.
 constexpr Index most_rational = 60;
-/// Beyond, what is found is not brought to where it is exact.
+/// If there are more, the candidate is not changed to make the sums exact.
 constexpr Index most_unknowns = 96;
 constexpr Index most_rows = 4096;
 constexpr int most_rays = 200;
@@ -70,10 +70,10 @@ Index cone_rows(const GlobalProblem& /*problem*/) { return 0; }
 Index zero_rows(const LocalProblem& problem) { return problem.size(Dim::p); }
 Index zero_rows(const GlobalProblem& problem) { return problem.size(Dim::n); }
 
-/// From above, of the part of a contact: its distance from K*; 0 only where it is inside.
+/// An upper bound for the part of a contact: its distance from K*. It is 0 only inside K*.
 double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const Vector& image,
                           Index a) {
-  // the parts are off by two units at most, the norms and products by some more
+  // each part is off by at most two units, the norms and products by some more
   constexpr double more = 1 + 64 * unit;
   const Index d = problem.spacedim;
   const double normal = image[d * a];
@@ -86,7 +86,7 @@ double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const
                  (*mu_r)[a] * image.segment(d * a + half, d - half).norm();
   }
   if (tangential == 0 && normal >= 0) {
-    // a product that underflows is no zero
+    // a product that underflows is not zero
     const bool moves = (image.segment(d * a + 1, d - 1).array() != 0).any();
     const bool resists = problem.mu[a] > 0 || (mu_r != nullptr && (*mu_r)[a] > 0);
     if (!(moves && resists)) return 0;
@@ -97,12 +97,12 @@ double distance_from_dual(const LocalProblem& problem, const Vector* mu_r, const
   return more * std::max(std::min(size, more * outside), 1e-300);
 }
 
-/// The parts of y that have no sum in common, the one that gains most first; none that gains
-/// nothing. Where rows of bodies are squeezed side by side, each row is a proof of its own.
+/// The parts of y that share no sum. The one with the largest gain comes first; those without a
+/// gain are left out. If rows of bodies are squeezed side by side, each row is a proof of its own.
 template <class P>
 std::vector<Vector> separate_parts(const P& problem, const Vector& y) {
   const auto nc = static_cast<Index>(y.size());
-  std::vector<Index> above(static_cast<std::size_t>(nc));  // of a tree for each part
+  std::vector<Index> above(static_cast<std::size_t>(nc));  // the trees, one for each part
   std::iota(above.begin(), above.end(), 0);
   const auto root = [&](Index a) {
     while (above[static_cast<std::size_t>(a)] != a) a = above[static_cast<std::size_t>(a)];
@@ -114,7 +114,7 @@ std::vector<Vector> separate_parts(const P& problem, const Vector& y) {
     if (a >= nc || value == 0 || !(y[a] > 0)) return;
     Index& other = first[static_cast<std::size_t>(row)];
     if (other < 0) other = a;
-    // the smaller one above, which keeps the trees low
+    // the smaller number is the root, which keeps the trees low
     const auto [low, high] = std::minmax({root(a), root(other)});
     above[static_cast<std::size_t>(high)] = low;
     above[static_cast<std::size_t>(a)] = low;
@@ -145,8 +145,8 @@ std::vector<Vector> separate_parts(const P& problem, const Vector& y) {
   return found;
 }
 
-/// The columns of those unknowns, dense; rows without an entry are left out. False where entries
-/// were added up, which rounds.
+/// The columns of those unknowns, dense. Rows without an entry are left out. Returns false if
+/// entries were added up, since that rounds.
 template <class P>
 bool columns(const P& problem, const std::vector<Index>& place, Index count, Dense& all,
              Dense& zeros) {
@@ -183,8 +183,8 @@ bool columns(const P& problem, const std::vector<Index>& place, Index count, Den
   return single;
 }
 
-/// The least denominator of a fraction that is x but for rounding, by its continued fraction; 0
-/// where there is none below `most`.
+/// The smallest denominator of a fraction that equals x up to rounding, by the continued fraction
+/// of x. 0 if there is none below `most`.
 double denominator(double x, double most) {
   const double rounding = 1e-11 * std::max(1.0, std::abs(x));
   double rest = x;
@@ -198,7 +198,7 @@ double denominator(double x, double most) {
   return 0;
 }
 
-/// Whole numbers in the same ratios, or nothing.
+/// Whole numbers with the same ratios, or nothing.
 Vector whole_numbers(const Vector& x) {
   constexpr double most = 1e7;
   const double largest = x.cwiseAbs().maxCoeff();
@@ -211,7 +211,7 @@ Vector whole_numbers(const Vector& x) {
   return (x * (common / largest)).array().round();
 }
 
-/// How a candidate is judged: as it is, or also where what it proves has an exact neighbour.
+/// How a candidate is judged: as it is, or also if an exact proof is next to it.
 enum class Exactness { itself, neighbour };
 
 template <class P>
@@ -246,7 +246,7 @@ class Search {
     Vector x = Vector::Zero(unknowns_);
     for (Eigen::Index k = 0; k < count; ++k) x[k] = y_[contacts_[static_cast<std::size_t>(k)]];
     if (p > 0) {
-      // y as it is, with the z that keeps the constraints
+      // y as it is, with the z that satisfies the constraints
       const Vector rest = -zeros_.leftCols(count) * x.head(count);
       x.tail(p) = least_solution(zeros_.rightCols(p), rest);
       if (tried(x)) return best_;
@@ -278,7 +278,7 @@ class Search {
     return best_.exact();
   }
 
-  /// From x in the kernel to its rays on the fewest contacts, until one is a proof.
+  /// From x in the kernel to its rays with the fewest contacts, until one is a proof.
   bool reduce(const Vector& from, const std::vector<Index>& active) {
     const double cost = static_cast<double>(all_.rows()) * static_cast<double>(unknowns_) *
                         static_cast<double>(unknowns_);
@@ -303,7 +303,7 @@ class Search {
       return result;
     };
     if (tried(whole(x))) return true;
-    // along the kernel, where y changes the most, until a contact is left
+    // move along the kernel in the direction that changes y most, until a contact drops out
     Eigen::Index way = -1;
     double most = 1e-9;
     for (Eigen::Index k = 0; k < basis.cols(); ++k) {
@@ -354,7 +354,7 @@ class Search {
 template <class P>
 NoSolution search(const P& problem, const Vector& y, Exactness exactness = Exactness::itself) {
   NoSolution best = Search<P>(problem, y, exactness).run();
-  // bilateral constraints may link all of them
+  // bilateral constraints may link all the parts
   if (best.proven() || problem.size(Dim::p) > 0) return best;
   int tries = 0;
   for (const Vector& part : separate_parts(problem, y)) {
@@ -364,7 +364,8 @@ NoSolution search(const P& problem, const Vector& y, Exactness exactness = Exact
   return best;
 }
 
-/// The sums of a proof and its gain, exactly; whether y, z have the right form and a gain.
+/// The sums of a proof and its gain, exactly. Returns whether y and z have the right form and a
+/// gain.
 template <class P>
 bool sums(const P& problem, const Vector& y, const Vector& z, std::vector<ExactSum>& cone,
           std::vector<ExactSum>& zero, double& gain) {
@@ -404,9 +405,9 @@ bool vanish(const std::vector<ExactSum>& sums) {
   return std::all_of(sums.begin(), sums.end(), [](const ExactSum& sum) { return sum.zero(); });
 }
 
-/// From above, by how much an entry of some x* with A x* = 0 exactly differs from that of x;
-/// infinite where none is sure. A B is the identity but for less than a half, so that it has an
-/// inverse, and x* = x - B (A B)^-1 A x. Sums of products are off by the bounds of Higham,
+/// An upper bound of the difference, in any entry, between x and some x* with A x* = 0 exactly. It
+/// is infinite if no such x* is certain. A B differs from the identity by less than a half, so it
+/// has an inverse, and x* = x - B (A B)^-1 A x. The bounds on sums of products are those of Higham,
 /// "Accuracy and stability of numerical algorithms", 2002, section 3.1.
 double distance_from_kernel(const Dense& A, const Vector& x) {
   const double infinity = std::numeric_limits<double>::infinity();
@@ -431,8 +432,8 @@ double distance_from_kernel(const Dense& A, const Vector& x) {
   return largest_sum(B) * residual / (1 - rest) * (1 + rounding);
 }
 
-/// Whether a proof whose sums vanish exactly is near y and z, on the same contacts. Doubles are too
-/// coarse for one where normals are at any angle.
+/// Whether there is a proof near y and z, on the same contacts, whose sums vanish exactly. If
+/// normals are at any angle, doubles are too coarse to write it down.
 bool has_exact_neighbour(const GlobalProblem& problem, const Vector& y, const Vector& z,
                          double gain) {
   const auto nc = static_cast<Index>(y.size());
@@ -482,7 +483,7 @@ NoSolution check_local(const LocalProblem& problem, const Vector* mu_r, const Ve
   const double infinity = std::numeric_limits<double>::infinity();
   if ((distance.array() == 0).all()) return {y, z, gain, 0, infinity};
   if (z.size() > 0) return {};
-  // what is left must be the last digits of W, and show that W is a rounded one
+  // the rest must be the last digits of W, and must show that W is a rounded matrix
   Vector size = Vector::Zero(nc);
   for_each_term(
       problem, [&](Index row, Index k, double value) { size[row / d] += std::abs(value) * y[k]; },

@@ -1,4 +1,4 @@
-// W of solvers that want it by rows, and the error that they are told.
+// W by rows, for solvers that need it so, and the error that solvers report.
 #pragma once
 
 #include "linalg/matrix.hpp"
@@ -6,12 +6,12 @@
 
 namespace fclib {
 
-/// All d x d blocks, by rows (Storage::csr), the columns of a row in their order; what is zero in a
-/// block is stored.
+/// All d x d blocks, by rows (Storage::csr). The columns of a row are in order. Zeros inside a
+/// block are stored.
 Matrix by_rows(const BlockMatrix& blocks);
 
-/// The error of r (m) that a tolerance bounds, relative to the problem's scale; infinite where r is
-/// not finite.
+/// The error of r (m) that a tolerance bounds, relative to the problem's scale. It is infinite if r
+/// is not finite.
 double error_of(const ReducedProblem& problem, const Vector& r);
 
 }  // namespace fclib

@@ -67,7 +67,7 @@ void ColouredSweeps<Cone>::velocity(const Vector& r, Vector& u) {
 
 template <class Cone>
 auto ColouredSweeps<Cone>::velocity_at(std::size_t at, const Vector& r) const -> Vec {
-  // one sum for each entry of a block: additions that need not wait for each other
+  // one sum for each entry of a block: the additions need not wait for each other
   double sums[D * D] = {};
   const double* block = values_.data() + std::size_t{D * D} * row_[at];
   for (std::size_t k = row_[at]; k < row_[at + 1]; ++k, block += D * D) {

@@ -1,4 +1,4 @@
-// How far r is from the solution of the convex problem of a fixed shift.
+// How far r is from the solution of the convex problem with a fixed shift.
 #pragma once
 
 #include "contact/cones.hpp"

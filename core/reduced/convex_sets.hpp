@@ -1,11 +1,12 @@
-// The convex sets of the subproblems that a fixed shift, or a fixed threshold, leaves:
+// The convex sets of the subproblems with a fixed shift, or with a fixed threshold:
 //
 //   Cones       r in K
 //   Cylinders   r_N >= 0, ||r_T|| <= g (and ||r_R|| <= g_R); the normal or the tangential part may
 //               be held fixed
 //
-// A set offers the Euclidean projection for contact a, `project(a, x, now)`, where `now` has what
-// is held fixed, and `minimise`, an improvement of r^a for 1/2 r.A r + b.r over the set.
+// A set offers the Euclidean projection for contact a, `project(a, x, now)`: `now` has the parts
+// that are held fixed. It also offers `minimise`, which improves r^a for 1/2 r.A r + b.r over the
+// set.
 #pragma once
 
 #include <algorithm>
@@ -18,11 +19,12 @@
 
 namespace fclib {
 
-/// The largest row sum of the symmetric part: at least the largest eigenvalue. For N = 1, 2, 3, 5.
+/// The largest row sum of the symmetric part. It is at least the largest eigenvalue. N = 1, 2, 3,
+/// 5.
 template <int N>
 double curvature_bound(const ContactMatrix<N>& a);
 
-/// What `minimise` needs of a diagonal block: bounds of its curvature.
+/// What `minimise` needs of a diagonal block: upper bounds of its curvature.
 template <class Cone>
 struct ContactCurvature {
   ContactMatrix<Cone::dim> block;
@@ -87,7 +89,7 @@ class Cylinders {
   explicit Cylinders(const Friction& friction)
       : friction_(friction), radius_(Vector::Zero(Cone::groups * friction.mu.size())) {}
 
-  /// The thresholds of friction under r, or a step towards them.
+  /// Sets the thresholds of friction from r, or makes a step towards them.
   void set_thresholds(const Vector& r, double relaxation = 1) {
     for (Eigen::Index a = 0; a < friction_.mu.size(); ++a) {
       const Cone cone(friction_, a);

@@ -1,4 +1,4 @@
-// De Saxce's shift: what the modified velocity has beyond the velocity.
+// De Saxce's shift: the modified velocity less the velocity.
 #pragma once
 
 #include "contact/cones.hpp"
@@ -6,7 +6,7 @@
 
 namespace fclib {
 
-/// u^ - u of each contact, in the normal direction, mu ||u_T|| (nc). `shift` has its length.
+/// u^ - u of each contact, mu ||u_T|| (nc), in the normal direction. `shift` must have this length.
 template <class Cone>
 void de_saxce_shift(const Vector& u, const Friction& friction, Vector& shift);
 

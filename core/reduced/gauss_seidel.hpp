@@ -1,5 +1,5 @@
-// A sweep of nonsmooth Gauss-Seidel over the contacts. The velocities are kept up to date by
-// columns of W, so that a contact whose reaction does not change costs nothing.
+// A sweep of nonsmooth Gauss-Seidel over the contacts. Columns of W keep the velocities up to date.
+// If the reaction of a contact does not change, it costs nothing.
 #pragma once
 
 #include <vector>
@@ -16,13 +16,13 @@ class GaussSeidel {
   using Vec = typename Cone::Vec;
   using Contact = ContactProblem<Cone>;
 
-  /// With omega, the contacts' problems are those of W_aa / omega: projected over-relaxation.
+  /// With omega, the problems have W_aa / omega in place of W_aa: projected over-relaxation.
   explicit GaussSeidel(const ReducedProblem& problem, double omega = 1);
 
-  /// Solves the problem of contact a and keeps u up to date. The change of r^a.
+  /// Solves the problem of contact a and keeps u up to date. Returns the change of r^a.
   Vec update(Index a, Vector& r, Vector& u, const LocalStep<Cone>& step);
 
-  /// One sweep in the order of the contacts, each solved exactly or by 10 projections at most.
+  /// One sweep in the order of the contacts. Each is solved exactly, or by at most 10 projections.
   void sweep(Vector& r, Vector& u);
 
  private:

@@ -9,7 +9,8 @@ namespace fclib {
 
 namespace {
 
-/// Of the largest mean: what joints leave of a contact that they hold is rounding.
+/// Share of the largest mean. If joints hold a contact, what they leave of it is rounding below
+/// this.
 constexpr double nothing = 1e-14;
 
 }  // namespace
@@ -29,7 +30,7 @@ OwnUnits::OwnUnits(const ReducedProblem& problem)
       if (moved < d) visit(1, unit_.segment(Eigen::Index{d} * a + moved, d - moved));
     }
   };
-  // the mean of each part; where it is nothing beside the others, their mean
+  // the mean of each part; a part that is nothing beside the others gets the mean of those
   double largest[2] = {0, 0};
   each_part([&](int part, auto values) {
     values.setConstant(values.mean());

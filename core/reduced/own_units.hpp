@@ -1,12 +1,12 @@
-// A problem in the units of its own contacts, for methods whose path from far away depends on
-// units.
+// A problem in the units of its own contacts, for methods whose path from a distant start depends
+// on units.
 //
 //   r~ = S r / size,  u~ = S^-1 u / size,  W~ = S^-1 W S^-1,  q~ = S^-1 q / size
 //
-// S is diagonal, the root of the mean diagonal of W_aa over the normal and the tangential part, and
-// over the rolling part: masses, and lengths beside angles, may differ from contact to contact. A
-// cone stays one of its kind, with mu_r~ = mu_r s_R / s_N, and r~ . u~ is r . u / size^2.
-// ||q~||_inf is 1.
+// S is diagonal. Its entries are the root of the mean diagonal of W_aa over the normal and the
+// tangential part, and of that over the rolling part. So masses may differ from contact to contact,
+// and lengths may stand beside angles. A cone stays one of its kind, with mu_r~ = mu_r s_R / s_N,
+// and r~ . u~ is r . u / size^2. ||q~||_inf is 1.
 #pragma once
 
 #include "reduced/reduced_problem.hpp"
@@ -17,7 +17,7 @@ class OwnUnits {
  public:
   explicit OwnUnits(const ReducedProblem& problem);
 
-  /// With mu_r~ in the place of mu_r.
+  /// The friction, with mu_r~ in place of mu_r.
   [[nodiscard]] const Friction& friction() const { return friction_; }
   /// q~ (m).
   [[nodiscard]] const Vector& q() const { return q_; }
@@ -31,8 +31,8 @@ class OwnUnits {
   /// y = W~ r + b.
   void product(const Vector& r, const Vector& b, Vector& y, Workers* workers = nullptr) const;
 
-  /// A block D_a (d x d) of a system (I + D W~) x~ = b~, as it is in the one for r, (I + D W) x =
-  /// b.
+  /// Turns a block D_a (d x d) of a system for r~, (I + D W~) x~ = b~, into the block of the system
+  /// for r, (I + D W) x = b.
   template <int d>
   [[nodiscard]] Eigen::Matrix<double, d, d> block(Index a,
                                                   const Eigen::Matrix<double, d, d>& own) const {

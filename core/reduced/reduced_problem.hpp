@@ -9,7 +9,7 @@
 
 namespace fclib {
 
-/// The factors of W = H^T M^-1 H, for solvers that work on the bodies where that is cheaper.
+/// The factors of W = H^T M^-1 H, for solvers that work on the bodies if that is cheaper.
 struct Primal {
   SparseColumns M;  ///< (n x n)
   SparseColumns H;  ///< (n x m)
@@ -20,16 +20,16 @@ struct ReducedProblem {
   BlockMatrix W;
   Vector q;
   Friction friction;
-  double scale = 1;  ///< errors are relative to this: ||q||, before bilateral constraints left it
-  Vector rho;        ///< of the scaled natural map (nc); empty: errors are by the plain one alone
-  double scaled_scale = 1;  ///< errors by the scaled map are relative to this: ||rho q||
-  /// Where u is known better than W r + q rounds, if anywhere: with reactions that are large beside
-  /// q, what W adds to it from there rounds less (m each).
+  double scale = 1;  ///< errors are relative to ||q|| before bilateral constraints were eliminated
+  Vector rho;        ///< of the scaled natural map (nc); empty: errors use only the plain one
+  double scaled_scale = 1;  ///< errors of the scaled map are relative to this: ||rho q||
+  /// A point r at which u is known with less rounding than W r + q, if there is one. If reactions
+  /// are large beside q, the change of u by W from that point rounds less (m each).
   Vector known_r, known_u;
-  const Primal* primal = nullptr;      ///< where the problem is known by its bodies
+  const Primal* primal = nullptr;      ///< if the problem is known by its bodies
   const Deadline* deadline = nullptr;  ///< of the solve, if it has one
-  /// Whether something near y (nc) proves that the problem as it was given has no solution: what
-  /// solvers find here may be the rounding of conversions. Without it nothing is proven.
+  /// Whether something near y (nc) proves that the problem as given has no solution: what solvers
+  /// find here may be the rounding of conversions. Null: nothing is proven.
   const std::function<bool(const Vector& y)>* proves_no_solution = nullptr;
 
   [[nodiscard]] int d() const { return W.block_size(); }
@@ -37,7 +37,7 @@ struct ReducedProblem {
   [[nodiscard]] Eigen::Index m() const { return q.size(); }
   [[nodiscard]] bool rolling() const { return friction.mu_r.size() > 0; }
 
-  /// No more factorisations then: they fail.
+  /// If this is true, factorisations fail: there is no time for them.
   [[nodiscard]] bool out_of_time() const { return deadline != nullptr && deadline->passed(); }
 
   /// u = W r + q.

@@ -1,4 +1,4 @@
-// The error that solvers measure themselves by: the natural map on the reduced form.
+// The error by which solvers measure themselves: the natural map on the reduced form.
 #pragma once
 
 #include "contact/cones.hpp"
@@ -10,8 +10,8 @@ namespace fclib {
 template <class Cone>
 double natural_map_squared(const Vector& u, const Vector& r, const Friction& friction);
 
-/// ||r - P_K(r - u^)|| over the scale of the problem, of r and u = W r + q; with rho the largest of
-/// that and of both sums of r - P_K(r - rho u^) (contact/natural_squares.hpp) over their scales.
+/// ||r - P_K(r - u^)|| over the scale of the problem, for r and u = W r + q. With rho, the largest
+/// of that and of both sums of r - P_K(r - rho u^) (contact/natural_squares.hpp) over their scales.
 template <class Cone>
 double relative_error(const ReducedProblem& problem, const Vector& u, const Vector& r);
 

@@ -1,6 +1,6 @@
-// Sweeps of Gauss-Seidel over the contacts in an order that may change: one after another with the
-// velocities kept up to date by columns of W (reduced/gauss_seidel.hpp), or on several threads,
-// colour by colour, by rows of W (reduced/coloured_sweeps.hpp).
+// Sweeps of Gauss-Seidel over the contacts in an order that may change. With one thread, contacts
+// follow one another and columns of W keep the velocities up to date (reduced/gauss_seidel.hpp).
+// With several threads, colours follow one another, by rows of W (reduced/coloured_sweeps.hpp).
 #pragma once
 
 #include <algorithm>
@@ -20,25 +20,26 @@ class Sweeps {
   static constexpr int D = Cone::dim;
   using Vec = typename Cone::Vec;
 
-  /// With omega, the contacts' problems are those of W_aa / omega: projected over-relaxation.
+  /// With omega, the problems have W_aa / omega in place of W_aa: projected over-relaxation.
   Sweeps(const ReducedProblem& problem, std::int64_t threads, double omega = 1);
 
-  /// Of the contacts; of the colours where there are several threads.
+  /// The order of the contacts. With several threads, the order of the colours.
   void shuffle(std::mt19937_64& random);
 
   void reverse() { coloured_ ? coloured_->reverse() : std::reverse(order_.begin(), order_.end()); }
 
-  /// Calls visit(a) for each contact, on several threads for contacts that are not coupled.
+  /// Calls visit(a) for each contact. Several threads work on contacts that are not coupled.
   void sweep(FunctionRef<void(Index)> visit);
 
-  /// Solves the problem of contact a in a sweep, as GaussSeidel does; u is not kept up to date
-  /// where there are several threads. The change of r^a.
+  /// Solves the problem of contact a in a sweep, like GaussSeidel. With several threads, u is not
+  /// kept up to date. Returns the change of r^a.
   Vec update(Index a, Vector& r, Vector& u, const LocalStep<Cone>& step);
 
-  /// u = W r + q after a sweep; of one thread it is there, but for the rounding of the updates.
+  /// u = W r + q after a sweep. With one thread it is there already, up to the rounding of the
+  /// updates.
   void velocity(const Vector& r, Vector& u);
 
-  /// CPU time of all threads until now, where there are several [s].
+  /// CPU time of all threads until now, if there are several [s].
   [[nodiscard]] std::optional<double> cpu_s() const;
 
  private:

@@ -1,5 +1,5 @@
-// What iterative solvers have in common: the error of each iterate is told to the Monitor, the best
-// iterate is kept, and it is what the solver returns.
+// What iterative solvers share: the Monitor gets the error of each iterate, the best iterate is
+// kept, and the solver returns it.
 #pragma once
 
 #include <cstdint>
@@ -15,15 +15,15 @@ class BestIterate {
  public:
   BestIterate(const ReducedProblem& problem, const Settings& settings, const Vector& r);
 
-  /// Tells of r, u = W r + q, after `count` more iterations. Whether to stop.
+  /// Reports r and u = W r + q after `count` more iterations. Returns whether to stop.
   bool report(std::int64_t count, const Vector& r, const Vector& u);
   bool report(std::int64_t count, const Vector& r, double error);
 
-  /// Tells of r between the iterates that a schedule has reported, because one is `due`. Whether to
-  /// stop. As the clock says when, the error counts only where a limit ends the solver here.
+  /// Reports r between the iterates that a schedule reports, because one is `due`. Returns whether
+  /// to stop. Since the clock decides when, the error counts only if a limit ends the solver here.
   bool glance(std::int64_t count, const Vector& r);
 
-  /// Whether a report is wanted after `count` iterations since the last.
+  /// Whether a report is wanted `count` iterations after the last one.
   [[nodiscard]] bool due(std::int64_t count) const;
 
   [[nodiscard]] double tolerance() const { return monitor_.tolerance(); }
@@ -32,8 +32,8 @@ class BestIterate {
   [[nodiscard]] bool stopped() const { return stopped_.has_value(); }
   [[nodiscard]] std::int64_t iterations() const { return iterations_; }
 
-  /// Leaves the best iterate in r. Stalled where nothing else ended the solver. `cpu_s` is that of
-  /// a solver with threads of its own.
+  /// Leaves the best iterate in r. The status is stalled if nothing else ended the solver. `cpu_s`
+  /// is for a solver with threads of its own.
   Outcome outcome(Vector& r, std::optional<double> cpu_s = {}) const;
 
  private:

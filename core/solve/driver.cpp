@@ -17,16 +17,16 @@ namespace fclib {
 
 namespace {
 
-/// How often the solver is sent back to work where its own error met the tolerance and the merit
-/// of the original problem did not (conversions round).
+/// How often the solver is called again if its own error met the tolerance but the merit of the
+/// original problem did not, because conversions round.
 constexpr int max_corrections = 4;
 
-/// Rounding is in the way of a solve where it leaves more of the velocities than this part of the
-/// tolerance, and may be all that is in the way up to an error of so many times as much.
+/// Rounding hinders a solve if what it leaves of the velocities is more than this part of the
+/// tolerance. It may be the only hindrance if the error is at most so many times the rounding.
 constexpr double rounding_in_tolerance = 0.1;
 constexpr double rounding_in_error = 1e3;
 
-/// || |A| |x| || eps: what rounding leaves of A x.
+/// || |A| |x| || eps: the rounding of A x.
 double rounding_of_product(const Matrix& a, const Vector& x) {
   Vector sizes = Vector::Zero(a.rows);
   for_each_entry(a, [&](Index row, Index col, double value) {
@@ -35,8 +35,8 @@ double rounding_of_product(const Matrix& a, const Vector& x) {
   return std::numeric_limits<double>::epsilon() * sizes.stableNorm();
 }
 
-/// By how much the last digit of r may change the natural map, over this scale: that of r itself,
-/// and that of W r, given || |W| |r| || eps.
+/// How much the last digit of r may change the natural map, over this scale: the digit of r itself,
+/// and that of W r. `product` is || |W| |r| || eps.
 double last_digit(const Vector& r, double product, double scale) {
   const double eps = std::numeric_limits<double>::epsilon();
   return (eps * r.stableNorm() + 0.5 * product) / scale;
@@ -55,19 +55,20 @@ struct Request {
   const Solver& solver;
   const Settings& settings;
   const OptionValues& options;
-  const Deadline& deadline;  ///< of all, conversions included
-  CpuWatch& watch;           ///< ... the same
+  const Deadline& deadline;  ///< of the whole solve, conversions included
+  CpuWatch& watch;           ///< of the whole solve, conversions included
 };
 
 /// What the merit is relative to.
 struct Measure {
   double q = 0;         ///< ||q||
-  double rounding = 0;  ///< ... and what rounding leaves of it
-  Vector rho;           ///< of the scaled map, for the merit that bounds both
+  double rounding = 0;  ///< the rounding of q
+  Vector rho;           ///< of the scaled map, if the merit bounds both
   double scaled_q = 0;  ///< ||rho q||
   double scaled_rounding = 0;
 
-  /// Of a problem without conversion or condensed, before bilateral constraints left it.
+  /// For a problem without conversion, or a condensed one, before bilateral constraints are
+  /// eliminated.
   Measure(const LocalProblem& problem, const OwnSizes& own, MeritKind kind)
       : q(problem.q.stableNorm()), rounding(static_cast<double>(own.rounding.norm())) {
     if (kind == MeritKind::natural) return;
@@ -81,15 +82,15 @@ struct Measure {
     if (own.rounding.size() > 0) scaled_rounding = scaled(own.rounding.cast<double>());
   }
 
-  /// That of a solver. It aims below what rounding leaves, as far as it gets; the merit of what it
-  /// reached leaves rounding out.
+  /// The scale of a solver. The solver aims at an error below the rounding, as far as it can. The
+  /// merit of its result leaves the rounding out.
   static double scale(double q, double rounding) {
     const double largest = std::max(q, rounding);
     return largest > 0 ? largest : 1.0;
   }
 };
 
-/// Of each contact, whether its reaction moves anything.
+/// For each contact, whether its reaction moves anything.
 std::vector<bool> moving(const Matrix& W, int d) {
   std::vector<bool> moves(static_cast<std::size_t>(W.cols / d), false);
   for_each_entry(W, [&](Index, Index col, double value) {
@@ -98,16 +99,15 @@ std::vector<bool> moving(const Matrix& W, int d) {
   return moves;
 }
 
-/// Sets r to zero at the contacts whose reactions move nothing: no solver would change a guess
-/// there, beside a large one the reactions of the others round, and none is better than zero.
+/// Sets r to zero at the contacts whose reactions move nothing. No solver would change a guess
+/// there, a large one makes the reactions of the others round, and no value is better than zero.
 void clear_without_effect(const std::vector<bool>& moves, int d, Vector& r) {
   for (std::size_t a = 0; a < moves.size(); ++a) {
     if (!moves[a]) r.segment(static_cast<Eigen::Index>(a) * d, d).setZero();
   }
 }
 
-/// Puts r, and l if there is no elimination to find it, in the place of the result's, if they are
-/// better.
+/// Puts r in the place of the result's if it is better, and l too if no elimination finds it.
 template <class Judge>
 void take_if_better(const Vector& r, const Vector& l, const Judge& judge, Result& result) {
   Solution other{.v = {}, .u = {}, .r = r, .l = l};
@@ -117,8 +117,8 @@ void take_if_better(const Vector& r, const Vector& l, const Judge& judge, Result
   result.solution = std::move(other);
 }
 
-/// The contacts that no reaction moves and that close all the same, where that is no proof: joints
-/// hold them, up to rounding. A solver would raise their reactions for ever.
+/// The contacts that no reaction moves but that close, if this is no proof: joints hold them, up to
+/// rounding. A solver would raise their reactions for ever.
 std::vector<Index> held_contacts(const LocalProblem& plain, const std::vector<bool>& moves,
                                  const std::function<bool(const Vector&)>& proves) {
   std::vector<Index> result;
@@ -132,8 +132,8 @@ std::vector<Index> held_contacts(const LocalProblem& plain, const std::vector<bo
   return result;
 }
 
-/// Runs the solver on the reduced form and judges by `judge(r)`, which completes the solution.
-/// `prove` looks for a proof near y that the problem as it was given has no solution.
+/// Runs the solver on the reduced form and judges it by `judge(r)`, which completes the solution.
+/// `prove` looks for a proof near y that the problem as given has no solution.
 template <class Judge>
 Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
            const Request& request, const Solution& guess, const Judge& judge,
@@ -147,7 +147,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   };
   result.solver = request.solver.name;
   if (measure.q <= measure.rounding) {
-    // what is left of q is rounding: no reaction is one where that suffices
+    // only rounding is left of q: if r = 0 is good enough, it is the solution
     result.solution.r = Vector::Zero(plain.q.size());
     result.error = judge(result.solution);
     if (result.error <= request.settings.tolerance) {
@@ -170,7 +170,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   const std::vector<bool> moves = moving(plain.W, plain.spacedim);
   const std::vector<Index> held = held_contacts(plain, moves, proves);
   result.certificate = {};
-  const auto leave_held = [&] {  // the merit judges their velocities, which are not for solvers
+  const auto leave_held = [&] {  // only the merit judges the velocities of these contacts
     for (const Index a : held) reduced.q.segment(a * plain.spacedim, plain.spacedim).setZero();
   };
   leave_held();
@@ -182,7 +182,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   settings.time_limit = std::max(0.0, request.deadline.left());
   if (settings.history) result.history.emplace();
   if (settings.history || settings.callback) {
-    // counted over all calls of the solver
+    // the counts run over all calls of the solver
     settings.callback = [&, start = now(settings.clock)](Progress progress) {
       progress.iteration += result.iterations;
       progress.time = now(settings.clock) - start;
@@ -205,10 +205,10 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     result.status = outcome.status;
     result.stages = std::move(outcome.stages);
     result.message = std::move(outcome.message);
-    // a word that nothing stands behind is not passed on
+    // a claim without a proof is not passed on
     if (result.status == Status::infeasible && !result.certificate.proven())
       result.status = Status::stalled;
-    // factorisations fail where the time is over, and solvers have nothing left to try
+    // if the time is over, factorisations fail, and solvers have nothing left to try
     if ((result.status == Status::stalled || result.status == Status::diverged) &&
         request.deadline.passed()) {
       result.status = Status::time_limit;
@@ -225,7 +225,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
       return result;
     }
     const double product = rounding_of_product(plain.W, r);
-    // a correction may end worse than what it was to better
+    // the last correction may be worse than an earlier attempt, so the best one is kept
     const bool better = result.error < 0.5 * least;
     if (correction == 0 || result.error < least) {
       least = result.error;
@@ -256,7 +256,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
     const bool hidden = result.status == Status::stalled && rounded && better &&
                         result.error < rounding_in_error * rounding;
     if (result.status != Status::converged && !hidden) return end();
-    // the limits hold for all the attempts together
+    // the limits are for all attempts together
     settings.max_iterations = max_iterations - result.iterations;
     settings.time_limit = request.deadline.left();
     result.status = settings.max_iterations <= 0 ? Status::iteration_limit
@@ -267,7 +267,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
       return end();
     }
     if (!hidden) settings.tolerance *= 0.5 * request.settings.tolerance / result.error;
-    // the velocity is that of the problem as it was given: what conversions lost of it goes into q
+    // what conversions lost of the velocity of the problem as given is added to q
     Vector u;
     reduced.velocity(r, u);
     reduced.q += result.solution.u - u;
@@ -279,7 +279,7 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   }
 }
 
-/// What there is where the time is over before the solver starts: the guess.
+/// The result if the time is over before the solver starts: the guess.
 template <class Judge>
 Result out_of_time(Eigen::Index m, Eigen::Index p, const Request& request, const Solution& guess,
                    const Judge& judge) {
@@ -295,8 +295,8 @@ Result out_of_time(Eigen::Index m, Eigen::Index p, const Request& request, const
   return result;
 }
 
-/// The same before the condensation has ended. Its merit is left infinite: what judges it takes as
-/// long as what there was no time for.
+/// The same if the time is over before the condensation has ended. Its merit stays infinite: to
+/// judge it takes as long as the condensation, and there is no time.
 Result out_of_time(const GlobalProblem& problem, const Condensation& condensation,
                    const Request& request, const Solution& guess) {
   Result result;
@@ -326,7 +326,7 @@ void require_solvable(const P& problem, const Solver& solver, const Solution& gu
   }
 }
 
-/// What is left of the bilateral constraints, over their terms, at most; no rounding is taken off.
+/// The largest residual of the bilateral constraints, over their terms. No rounding is taken off.
 double broken(const LocalProblem& problem, const Solution& solution) {
   const SparseColumns V = to_eigen(problem.V);
   const SparseColumns R = to_eigen(problem.R);
@@ -343,8 +343,8 @@ double broken(const GlobalProblem& problem, const Solution& solution) {
   return (left.array().abs() / terms.array().max(std::numeric_limits<double>::min())).maxCoeff();
 }
 
-/// Bilateral constraints that contradict each other are refused, unless by less than the tolerance:
-/// the merit takes off what the rounding of large multipliers may be, which says nothing of them.
+/// Refuses bilateral constraints that contradict each other by more than the tolerance. The merit
+/// takes off the possible rounding of large multipliers, so it does not show the contradiction.
 template <class P>
 Result agreeing(const P& problem, Result result, const Elimination& elimination, double tolerance) {
   const std::optional<Error>& contradiction = elimination.contradiction();
@@ -390,7 +390,7 @@ Result solve_local(const P& problem, const Request& request, const Solution& gue
       elimination, request.settings.tolerance);
 }
 
-/// `given` is the problem as it was given, which proofs are of.
+/// `given` is the problem as given; proofs are about it.
 template <class P>
 Result solve_global(const P& problem, const P& given, const Request& request,
                     const Solution& guess) {
@@ -426,7 +426,7 @@ Result solve_global(const P& problem, const P& given, const Request& request,
     const bool held = elimination.hold(problem, condensation, solution);
     const double error = judge_complete(solution);
     if (!held || error <= request.settings.tolerance) return error;
-    // what puts velocities back may be more than the rounding of multipliers explains
+    // the correction of the velocities may be more than the rounding of multipliers explains
     const double other = judge_complete(expanded);
     if (!(other <= request.settings.tolerance)) return error;
     solution = std::move(expanded);
@@ -438,7 +438,7 @@ Result solve_global(const P& problem, const P& given, const Request& request,
       elimination, request.settings.tolerance);
 }
 
-/// With joints that agree, if only rounding keeps them from it.
+/// Makes the joints agree if they contradict each other only by rounding, then solves.
 template <class P>
 Result solve_consistent(const P& given, const Request& request, const Solution& guess) {
   const std::optional<ConsistentJoints> joints = consistent_joints(given);
@@ -448,7 +448,7 @@ Result solve_consistent(const P& given, const Request& request, const Solution& 
   return result;
 }
 
-/// What every solve does: checks, times.
+/// What every solve does: checks and times.
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
@@ -457,7 +457,7 @@ Result solve_any(const P& problem, const Solver& solver, const Settings& setting
   const Request request{solver, settings, options, deadline, watch};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
-  result.setup_s += watch.read();  // what the thread spent in the solver is taken off already
+  result.setup_s += watch.read();  // the time of the thread in the solver is already taken off
   return result;
 }
 

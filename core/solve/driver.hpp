@@ -1,5 +1,5 @@
-// The driver: any problem, any solver. It validates, converts, solves, takes the solution back to
-// the formulation of the problem, and has the merit judge it.
+// The driver: any problem, any solver. It validates, converts and solves. It takes the solution
+// back to the formulation of the problem, and the merit judges it.
 #pragma once
 
 #include <optional>
@@ -13,7 +13,7 @@
 
 namespace fclib {
 
-/// A report of a solver, kept.
+/// A report of a solver.
 struct HistoryPoint {
   std::int64_t iteration = 0;
   double error = 0;
@@ -28,19 +28,19 @@ struct Result {
   double error = 0;  ///< Merit::error_by(Settings::merit) of the solution, on the problem as given
   double cpu_s = 0;  ///< CPU time of the solver alone [s]
   double setup_s = 0;         ///< CPU time of conversions, validation and merit [s]
-  NoSolution certificate;     ///< the proof on the problem as it was given, where infeasible
-  std::vector<Stage> stages;  ///< of solvers that chain others; the last attempt's
+  NoSolution certificate;     ///< the proof on the problem as given, if infeasible
+  std::vector<Stage> stages;  ///< of solvers that chain others, in the last attempt
   std::string solver;
-  std::string message;  ///< what a user should know, in words; mostly nothing
-  std::optional<std::vector<HistoryPoint>> history;  ///< where the settings ask for it
+  std::string message;  ///< what a user should know, in words; mostly empty
+  std::optional<std::vector<HistoryPoint>> history;  ///< if the settings ask for it
 
   [[nodiscard]] bool converged() const { return status == Status::converged; }
 };
 
-/// Solves a problem of any formulation. `guess` may be empty; of it only r is used.
+/// Solves a problem of any formulation. `guess` may be empty; only its r is used.
 ///
-/// Throws Error: (problem) for invalid data, (option) for an unknown solver or option,
-/// (unsuitable) where the problem cannot be brought to the form that the solver takes.
+/// Throws Error: (problem) for invalid data, (option) for an unknown solver or option, (unsuitable)
+/// if the problem cannot be brought to the form that the solver takes.
 Result solve(const LocalProblem& problem, const Solver& solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {});
 Result solve(const LocalRollingProblem& problem, const Solver& solver,
@@ -52,7 +52,7 @@ Result solve(const GlobalRollingProblem& problem, const Solver& solver,
              const Settings& settings = {}, const OptionValues& options = {},
              const Solution& guess = {});
 
-/// The same by the name of a solver of the registry.
+/// The same with the name of a solver in the registry.
 template <class P>
 Result solve(const P& problem, std::string_view solver, const Settings& settings = {},
              const OptionValues& options = {}, const Solution& guess = {}) {

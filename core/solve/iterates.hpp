@@ -1,5 +1,5 @@
-// Follows the iterates of a solver that need not get better each time: keeps the best one, and
-// asks the monitor whether to stop.
+// Follows the iterates of a solver that need not improve each time: keeps the best one, and asks
+// the monitor whether to stop.
 #pragma once
 
 #include <algorithm>
@@ -14,12 +14,12 @@ namespace fclib {
 
 class Iterates {
  public:
-  /// `r` is where the best iterate is kept.
+  /// The best iterate is kept in `r`.
   Iterates(const Settings& settings, Vector& r) : monitor_(settings), best_(r) {}
 
-  /// Takes note of an iterate, `error()` being its error, which is asked for every `most`-th
-  /// iterate, more often at first. What the solver returns, if it is to stop. The monitor is told
-  /// of every `most`-th iterate, of the last one, and of large problems whenever it wants to know.
+  /// Gets an iterate. `error()` computes its error; it is called for every `most`-th iterate, and
+  /// more often at first. Returns the outcome of the solver if it must stop. The monitor gets every
+  /// `most`-th iterate and the last one. For large problems it gets one whenever it wants to know.
   std::optional<Outcome> visit(std::int64_t iteration, const Vector& r,
                                FunctionRef<double()> error) {
     const bool asked = r.size() > large && monitor_.due();
@@ -41,12 +41,12 @@ class Iterates {
 
  private:
   static constexpr std::int64_t most = 8;
-  static constexpr Eigen::Index large = 1000;  // its iterations take longer than to read a clock
+  static constexpr Eigen::Index large = 1000;  // iterations take longer than to read a clock
 
   Monitor monitor_;
   Vector& best_;
-  std::int64_t next_ = 0;       // iteration whose error is wanted
-  std::int64_t last_told_ = 0;  // ... that the monitor knows
+  std::int64_t next_ = 0;       // the next iteration whose error is wanted
+  std::int64_t last_told_ = 0;  // the last iteration that the monitor knows
   double error_ = std::numeric_limits<double>::infinity();
 };
 

@@ -1,7 +1,7 @@
 // Options of a solver: a plain struct with defaults in place, listed once in fields().
 //
-// From that list come the checks (in options.cpp), the Python keywords, the CLI's --option and the
-// documentation.
+// The checks (in options.cpp), the Python keywords, the CLI's --option and the documentation all
+// come from that list.
 #pragma once
 
 #include <array>
@@ -18,11 +18,12 @@
 
 namespace fclib {
 
-/// A value as a caller gives it; text is accepted for every type (the command line has no other).
+/// A value as a caller gives it. Text is accepted for every type: the command line has nothing
+/// else.
 using OptionValue = std::variant<bool, std::int64_t, double, std::string>;
 using OptionValues = std::map<std::string, OptionValue, std::less<>>;
 
-/// An option as it is shown to a user.
+/// An option as a user sees it.
 struct OptionInfo {
   std::string name;
   std::string type;  ///< "bool", "int", "float", "choice" or "text"
@@ -32,14 +33,14 @@ struct OptionInfo {
   std::vector<std::string> choices;
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
-  void (*check)(std::string_view) = nullptr;  ///< of a text: throws Error (option) at what is wrong
+  void (*check)(std::string_view) = nullptr;  ///< for a text: throws Error (option) if it is wrong
 
   /// The place of a choice in `choices`.
   [[nodiscard]] std::size_t place_of(const OptionValue& choice) const;
 };
 
-/// All of these options, with the given values in place of the defaults, each of its own type.
-/// Throws Error (option) for an unknown name, a value of the wrong type or out of range.
+/// All of these options, each of its own type: the given values, and defaults for the rest. Throws
+/// Error (option) for an unknown name, or a value of the wrong type or out of range.
 OptionValues parse_options(const std::vector<OptionInfo>& infos, const OptionValues& values);
 
 /// A numeric (double, int64 or bool) option, a text, or an enumeration with the names of its
@@ -56,7 +57,7 @@ struct OptionField {
   void (*check)(std::string_view) = nullptr;
 };
 
-/// What a number may be, ends included.
+/// The range of a number, ends included.
 struct Bounds {
   double lowest = -std::numeric_limits<double>::infinity();
   double highest = std::numeric_limits<double>::infinity();
@@ -87,7 +88,7 @@ constexpr OptionField<Options, Value> choice(std::string_view name, Value Option
                                              std::string_view doc) {
   return {.name = name, .member = member, .doc = doc, .choices = choices};
 }
-/// ... or a text. `check` throws Error (option) at what is wrong.
+/// ... or a text. `check` throws Error (option) if the text is wrong.
 template <class Options>
 constexpr OptionField<Options, std::string> text(std::string_view name,
                                                  std::string Options::* member,
@@ -102,7 +103,7 @@ OptionInfo describe_option(std::string_view name, std::string_view unit, std::st
                            std::span<const std::string_view> choices, double lowest,
                            double highest);
 
-/// `Struct` may be derived from what has the member.
+/// `Struct` may be derived from the struct that has the member.
 template <class Options, class Value, class Struct>
 OptionInfo describe_option(const OptionField<Options, Value>& field, const Struct& defaults) {
   OptionInfo info = describe_option(field.name, field.unit, field.doc, field.choices, field.lowest,
@@ -154,8 +155,8 @@ std::vector<OptionInfo> describe_options() {
   return result;
 }
 
-/// The options of a solver with the given values in place of the defaults. Throws as the function
-/// above does.
+/// The options of a solver: the given values, and defaults for the rest. Throws like the function
+/// above.
 template <class Options>
 Options parse_options(const OptionValues& values) {
   Options options;

@@ -31,7 +31,7 @@ namespace {
 using Function = decltype(&fclib_plugin_solve);
 using Describe = decltype(&fclib_plugin_describe);
 
-constexpr std::int64_t endless = 1'000'000;  // iterations, where the caller sets none
+constexpr std::int64_t endless = 1'000'000;  // iterations, if the caller sets no limit
 
 Error plugin_error(std::string_view name, const std::string& message) {
   return {ErrorKind::option, message, "solver '" + std::string(name) + "'"};
@@ -43,7 +43,7 @@ Error plugin_error(std::string_view name, const std::string& message) {
 
 std::string text_of(const char* text) { return text != nullptr ? text : ""; }
 
-/// What a function of a plugin returns; where it throws, refusal(word) is thrown in its place.
+/// What a function of a plugin returns. If it throws, refusal(word) is thrown instead.
 template <class Called, class Refusal>
 auto unthrown(Called&& called, Refusal&& refusal) {
   std::string word = "something that is no exception";
@@ -51,19 +51,19 @@ auto unthrown(Called&& called, Refusal&& refusal) {
     return called();
   } catch (const std::exception& error) {
     word = error.what();
-  } catch (...) {  // the word says so
+  } catch (...) {  // the word tells it
   }
   throw refusal(word);
 }
 
-/// A call of a plugin: what its functions look at. Nothing is thrown through the plugin.
+/// A call of a plugin: what its functions see. No exception passes through the plugin.
 struct Call {
   const ReducedProblem& problem;
   const OptionValues& options;
   const std::vector<OptionInfo>& infos;
   Monitor monitor;
   Vector r = {};
-  std::int64_t iterations = -1;  // the first is the starting point
+  std::int64_t iterations = -1;  // the first report is the starting point
   std::optional<Status> reason = {};
   std::exception_ptr thrown = {};
 
@@ -148,7 +148,7 @@ Outcome run(Function function, const std::string& name, const std::vector<Option
           .iterations = std::max<std::int64_t>(call.iterations, 0)};
 }
 
-/// An option as the plugin tells of it. Throws Error (option) where it does not hold together.
+/// An option as the plugin describes it. Throws Error (option) if it contradicts itself.
 OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
   OptionInfo info{.name = told.name,
                   .type = text_of(told.type),
@@ -179,13 +179,14 @@ OptionInfo option_of(const fclib_plugin_option& told, std::string_view plugin) {
 
 #ifdef FCLIB_LOADS_PLUGINS
 
-/// What a shared object exports under this name, of this type.
+/// What a shared object exports under this name, with this type.
 template <class Exported>
 Exported exported(void* handle, const char* name) {
   return reinterpret_cast<Exported>(dlsym(handle, name));
 }
 
-/// Whether a shared object has less than it says, half a copy: what loads it would end the process.
+/// Whether a shared object is shorter than it says, as half a copy is: to load it would end the
+/// process.
 bool is_cut_short(const std::filesystem::path& path) {
 #ifdef __linux__
   std::ifstream file(path, std::ios::binary);
@@ -264,14 +265,14 @@ Solver entry_of(void* handle, std::string_view name) {
 
 const Solver& load_plugin(std::string_view name) {
 #ifdef FCLIB_LOADS_PLUGINS
-  // by what was loaded: the same path may be another file by then
+  // the solver of what was loaded: by then, another file may be at this path
   static std::mutex guard;
   static std::map<std::pair<void*, std::string>, std::unique_ptr<const Solver>> loaded;
   const std::lock_guard lock(guard);
   void* handle = opened(name);
   std::unique_ptr<const Solver>& entry = loaded[{handle, std::string(name)}];
   if (entry) {
-    dlclose(handle);  // the first time keeps it
+    dlclose(handle);  // the handle of the first load stays
   } else {
     entry = std::make_unique<const Solver>(entry_of(handle, name));
   }

@@ -1,4 +1,4 @@
-// Solvers of other people in shared objects, by include/fclib_plugin.h.
+// Solvers of other people in shared objects, through include/fclib_plugin.h.
 #pragma once
 
 #include <string>
@@ -19,8 +19,8 @@ class SolverError : public Error {
       : Error(ErrorKind::unsuitable, std::move(message), std::move(where)) {}
 };
 
-/// The solver of the shared object `plugin:PATH`, which stays loaded until the process ends. It is
-/// called in the thread of the caller. Throws Error (option) where it cannot be loaded, or is none.
+/// The solver of the shared object `plugin:PATH`, which stays loaded until the process ends. The
+/// caller's thread calls it. Throws Error (option) if it cannot be loaded, or is not a solver.
 const Solver& load_plugin(std::string_view name);
 
 }  // namespace fclib

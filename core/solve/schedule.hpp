@@ -7,8 +7,8 @@
 
 namespace fclib {
 
-/// Every `interval` sweeps. With 0: soon at first, then where the last two values say that the
-/// tolerance will be met, and never after more than a quarter of the sweeps done so far.
+/// Every `interval` sweeps. With 0: soon at first, then when the last two values predict that the
+/// tolerance is met, and at the latest after a quarter as many sweeps as were done so far.
 class Schedule {
  public:
   Schedule(std::int64_t interval, double tolerance) : interval_(interval), tolerance_(tolerance) {}

@@ -1,10 +1,10 @@
-// The contract between a solver and the rest: what it is given, what it returns, when it stops.
+// The contract between a solver and the rest: what it gets, what it returns, when it stops.
 //
 // A solver is one file in solvers/. It defines, in a namespace of the file's name,
 //
 //   const Solver& solver();
 //
-// and is found by the build. It knows no file and no format, and it is not believed: the driver
+// The build finds it. It knows no file and no format. Nobody trusts its error: the driver
 // recomputes the merit of what it returns.
 #pragma once
 
@@ -27,10 +27,10 @@ enum class Status {
   iteration_limit,  ///< stopped at max_iterations
   time_limit,       ///< stopped at time_limit
   diverged,         ///< an iterate was not finite
-  inaccurate,       ///< the solver was content, the merit of the original problem is not
+  inaccurate,       ///< the solver was content, but the merit of the problem as given is too large
   stalled,          ///< the solver has nothing left to try; its best iterate is returned
-  interrupted,      ///< the callback asked to stop
-  infeasible,       ///< there is no solution: ReducedProblem::proves_no_solution has said so
+  interrupted,      ///< the callback stopped it
+  infeasible,       ///< there is no solution: ReducedProblem::proves_no_solution has confirmed it
 };
 
 constexpr std::string_view name_of(Status status) {
@@ -60,25 +60,25 @@ struct Progress {
   std::int64_t iteration = 0;
   double error = 0;           ///< the solver's own, relative to ReducedProblem::scale
   double time = 0;            ///< wall clock since the solver started [s]
-  std::string_view stage;     ///< of a solver that chains others; empty for a plain one
+  std::string_view stage;     ///< for a solver that chains others; empty for a plain one
   const Vector* r = nullptr;  ///< the iterate, or the best one so far
 };
 
 /// What a caller asks of any solver.
 struct Settings {
   double tolerance = 1e-8;                                      ///< on Merit::error
-  MeritKind merit = MeritKind::both;                            ///< ... by this
+  MeritKind merit = MeritKind::both;                            ///< ... this one
   std::int64_t max_iterations = 0;                              ///< 0: the solver's own default
   double time_limit = std::numeric_limits<double>::infinity();  ///< wall clock [s], conversions
                                                                 ///< included
-  std::function<bool(const Progress&)> callback;  ///< at each report; false stops the solver
-  std::function<bool()> poll;                     ///< now and then, at least every 16 sweeps or
+  std::function<bool(const Progress&)> callback;  ///< called at each report; false stops the solver
+  std::function<bool()> poll;                     ///< called at least every 16 sweeps or
                                                   ///< iterations; false stops the solver
   Clock clock;                                    ///< another than the steady one, for tests
   bool history = false;                           ///< whether the result keeps all reports
 };
 
-/// Watches over a solver: it reports its iterates, and learns whether to stop.
+/// Watches over a solver: the solver reports its iterates, and learns whether to stop.
 class Monitor {
  public:
   explicit Monitor(const Settings& settings)
@@ -87,16 +87,16 @@ class Monitor {
   [[nodiscard]] double tolerance() const { return settings_.tolerance; }
   [[nodiscard]] std::int64_t max_iterations() const { return settings_.max_iterations; }
 
-  /// Whether somebody looks on, for whom the iterate is to be put together.
+  /// Whether a callback wants the iterate, so that the solver must put it together.
   [[nodiscard]] bool watched() const { return static_cast<bool>(settings_.callback); }
 
   /// Wall clock since the solver started [s].
   [[nodiscard]] double elapsed() const { return now(settings_.clock) - start_; }
 
-  /// Names the stage of the reports to come.
+  /// Names the stage of the next reports.
   void enter(std::string_view stage) { stage_ = stage; }
 
-  /// The reason to stop at this iterate, if there is one. `r` is the iterate, for who looks on.
+  /// The reason to stop at this iterate, if there is one. `r` is the iterate, for the callback.
   std::optional<Status> report(std::int64_t iteration, double error, const Vector* r = nullptr) {
     if (!(error < std::numeric_limits<double>::infinity())) return Status::diverged;
     if (settings_.callback && !settings_.callback({iteration, error, elapsed(), stage_, r})) {
@@ -115,8 +115,8 @@ class Monitor {
     return std::nullopt;
   }
 
-  /// Whether a report is wanted now, between those that the solver makes of its own accord. To be
-  /// asked every few iterations by solvers that report seldom.
+  /// Whether a report is wanted now, between those that the solver makes anyway. A solver that
+  /// reports seldom must ask every few iterations.
   [[nodiscard]] bool due() const {
     const double time = now(settings_.clock);
     return time - last_poll_ > poll_interval || time - start_ > settings_.time_limit;
@@ -134,26 +134,26 @@ class Monitor {
 /// A method that is a stage of solvers that chain others.
 struct StageKind {
   std::string name;
-  std::string families;  ///< of solvers whose methods it uses, separated by ", "
+  std::string families;  ///< families of the solvers whose methods it uses, separated by ", "
 };
 
-/// A part of a solve, by a method of its own.
+/// A part of a solve by one method.
 struct Stage {
   StageKind kind;
   std::int64_t calls = 0;   ///< how often it was entered: once for each island that needed it
-  std::int64_t solved = 0;  ///< ... and brought it to the tolerance
+  std::int64_t solved = 0;  ///< ... how often it reached the tolerance
   std::int64_t iterations = 0;
   std::int64_t factorisations = 0;
   double time = 0;  ///< wall clock [s]
 };
 
-/// What a solver returns beside r.
+/// What a solver returns besides r.
 struct Outcome {
   Status status = Status::diverged;
   std::int64_t iterations = 0;
   std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
-  std::optional<double> cpu_s = {};  ///< [s] where it is not that of the calling thread
-  std::string message = {};          ///< what a user should know, in words; mostly nothing
+  std::optional<double> cpu_s = {};  ///< [s] if it is not that of the calling thread
+  std::string message = {};          ///< what a user should know, in words; mostly empty
 };
 
 /// The entry of a solver in the registry.
@@ -162,10 +162,10 @@ struct Solver {
   std::string family;
   std::string title;
   std::string citation;
-  std::vector<int> dimensions;          ///< the spacedims it takes
+  std::vector<int> dimensions;          ///< the spacedims that it takes
   std::vector<int> rolling_dimensions;  ///< ... of rolling problems
   std::vector<OptionInfo> options;
-  std::int64_t max_iterations = 0;  ///< where the caller sets none
+  std::int64_t max_iterations = 0;  ///< if the caller sets none
   /// Solves from the guess in r (length m), and leaves its best iterate there.
   std::function<Outcome(const ReducedProblem& problem, const OptionValues& options,
                         const Settings& settings, Vector& r)>
@@ -179,7 +179,7 @@ struct Solver {
 /// All solvers, by name; generated from the files in solvers/.
 const std::vector<const Solver*>& solvers();
 
-/// Throws Error (option) with the known names where there is none of this name.
+/// Throws Error (option) with the known names if none has this name.
 const Solver& find_solver(std::string_view name);
 
 }  // namespace fclib

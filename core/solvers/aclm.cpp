@@ -9,10 +9,10 @@
 // Coulomb friction: formulations and numerical comparisons" (2018): ACLMFP.
 //
 // Differs from the papers in:
-// - the inner problem is solved to a share of the current error of Coulomb's law, from the last
-//   solution where the inner solver can start from one (the interior point cannot); what the
-//   interior point returns is finished by a few projected gradients;
-// - where 50 steps bring no lower error, the relaxation is halved, to an eighth at least;
+// - the inner problem is solved to a share of the current error of Coulomb's law. It starts from
+//   the last solution if the inner solver can do that (the interior point cannot). A few projected
+//   gradients finish what the interior point returns;
+// - if 50 steps bring no lower error, the relaxation is halved, down to an eighth;
 // - rolling friction adds its term to the shift.
 
 #include <array>
@@ -57,7 +57,7 @@ class ShiftedInteriorPoint {
   explicit ShiftedInteriorPoint(const ReducedProblem& problem)
       : problem_(problem), shifted_(problem), system_(shifted_) {}
 
-  /// `follow(r, u)` ends it by returning true.
+  /// If `follow(r, u)` returns true, it ends.
   template <class Follow>
   void solve(const Vector& shift, int limit, Vector& r, Vector& u, const Follow& follow) {
     for (Index a = 0; a < problem_.nc(); ++a) shifted_.q[D * a] = problem_.q[D * a] + shift[a];
@@ -117,7 +117,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
                               return best.report(1, reaction, velocity) ||
                                      program.residual(cones, reaction, velocity) <= accuracy;
                             });
-      if (!best.stopped()) {  // its iterates keep a distance from the boundary of the cones
+      if (!best.stopped()) {  // its iterates stay inside the cones, away from the boundary
         program.projected_gradient(cones, accuracy, finishing, r, u, due, follow);
       }
     }

@@ -11,13 +11,13 @@
 // (2014) for acceleration; Xu, Figueiredo, Goldstein (2017) for the spectral penalty.
 //
 // Differs from the papers in:
-// - the shift makes the problem Coulomb's law instead of its convex relaxation, and takes away the
-//   proof of convergence;
+// - with the shift, the problem is Coulomb's law and not its convex relaxation, and there is no
+//   proof of convergence any more;
 // - the penalty is relative to tr(W_aa) / d of each contact, so that masses may differ;
-// - the penalty changes only by factors above 3, because each change is a factorisation, and the
+// - the penalty changes only by factors above 3, because each change takes a factorisation, and the
 //   changes become rarer and rarer;
-// - where the problem is known by its bodies, (M + H H^T / rho) is factorised instead of
-//   (W + rho I) if that takes fewer operations;
+// - if the problem is known by its bodies, (M + H H^T / rho) is factorised in place of (W + rho I),
+//   if that takes fewer operations;
 // - the best iterate by the natural map of Coulomb's law is returned.
 
 #include <algorithm>
@@ -71,7 +71,8 @@ struct Options {
   }
 };
 
-/// The error costs a product with W: iterations to the next one.
+/// The error costs a product with W, so it is computed only now and then: iterations to the next
+/// time.
 std::int64_t next_check(std::int64_t k) { return k + std::clamp<std::int64_t>(k / 4, 1, 10); }
 
 template <class Cone>

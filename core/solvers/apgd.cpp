@@ -3,16 +3,16 @@
 //
 //   s  = mu ||(W y + q)_T||                      (0 with shift = none)
 //   x+ = P_K(y - t (W y + q + s) / weight),      t by backtracking
-//   y  = x+ + beta (x+ - x),                     beta = 0 where the slope says uphill
+//   y  = x+ + beta (x+ - x),                     beta = 0 if the objective rises
 //
 // Mazhar, Heyn, Negrut, Tasora, "Using Nesterov's method to accelerate multibody dynamics with
 // friction and contact" (2015); Nesterov (1983); O'Donoghue & Candes (2015) for the restart.
 //
 // Differs from the papers in:
-// - the shift follows the iterates, so that Coulomb's law is solved; the papers' problem is the
-//   convex relaxation, an associated flow rule where sliding contacts separate. shift = none is
-//   that problem: its solution is not one of Coulomb's law where anything slides, the error says
-//   so, and the solver ends as stalled when it has it;
+// - the shift follows the iterates, so that Coulomb's law is solved. The papers' problem is the
+//   convex relaxation, an associated flow rule in which sliding contacts separate. shift = none is
+//   that problem. If anything slides, its solution is not one of Coulomb's law: the error shows
+//   that, and the solver ends as stalled when it has the solution;
 // - steps are measured by tr(W_aa) / d of each contact, so that masses may differ;
 // - W x is kept with x, so that a step costs one product with W.
 
@@ -73,7 +73,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
     if (best.report(1, gradient.x(), gradient.u())) return best.outcome(r);
     if (options.shift == Shift::none &&
         convex_residual(problem, cones, shift, gradient.x(), gradient.u()) <= best.tolerance()) {
-      return best.outcome(r);  // solved, and not Coulomb's law
+      return best.outcome(r);  // the relaxation is solved, which is not Coulomb's law
     }
   }
 }

@@ -1,11 +1,11 @@
-// Associated: the convex relaxation, where u itself lies in the dual cone. NOT Coulomb's law.
+// Associated: the convex relaxation, in which u itself lies in the dual cone. NOT Coulomb's law.
 //
 //   K* contains u,  u . r = 0,  r in K,  u = W r + q
 //
-// A contact that slides by u_T also opens by mu ||u_T||. The problem is convex, and the interior
-// point method (methods/interior_point.hpp) solves it wherever it has a Slater point. Its reactions
-// obey Coulomb's law only where nothing slides: the error, which is that of Coulomb's law, shows
-// what the relaxation costs.
+// A contact that slides by u_T also opens by mu ||u_T||. The problem is convex. If it has a Slater
+// point, the interior point method (methods/interior_point.hpp) solves it. Its reactions obey
+// Coulomb's law only if nothing slides. The error is that of Coulomb's law, so it shows what the
+// relaxation costs.
 //
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
 // mechanics using interior point algorithm" (2023).
@@ -13,8 +13,8 @@
 // Differs from the paper in: the system is regularised, and condensed to the contacts or the
 // bodies. It starts near the guess, well inside the cones.
 //
-// Ends `inaccurate` with the solution of the relaxation, to the tolerance, which is returned even
-// where an iterate before it was nearer to Coulomb's law.
+// Ends `inaccurate` with the solution of the relaxation, to the tolerance. That solution is
+// returned even if an earlier iterate was nearer to Coulomb's law.
 
 #include "methods/interior_point.hpp"
 #include "methods/shared_options.hpp"
@@ -27,7 +27,7 @@ namespace {
 
 using Options = InteriorPointRules;
 
-/// Of the tolerance, for complementarity and residual.
+/// The complementarity and the residual at the end, over the tolerance.
 constexpr double share = 0.1;
 
 template <int D>
@@ -43,7 +43,7 @@ Outcome iterate(const ReducedProblem& problem, InteriorPointRules rules, const S
   InteriorPoint<D> method(problem, system);
   rules.associated = true;
   rules.max_iterations = std::numeric_limits<int>::max();
-  rules.patience = std::numeric_limits<int>::max();  // of an error that it does not reduce
+  rules.patience = std::numeric_limits<int>::max();  // its error need not fall
   std::optional<Status> stopped;
   bool solved = false;
   method.solve(rules, Vector(r), [&](double error, const Vector& at) {

@@ -1,11 +1,11 @@
-// auto: the default. A chain of methods, each cheap to leave. The first ones are fast and solve
-// most problems, the last ones are slow and solve nearly all. The table below is all of it: a stage
-// a line, in their order, first those for the whole problem, then those for each island of contacts
-// (linked through W) that is left. chain/table.hpp says what each word of it means, chain/chain.cpp
-// walks through it.
+// auto: the default. It is a chain of methods, and each is cheap to leave. The first ones are fast
+// and solve most problems. The last ones are slow and solve nearly all. The table below is the
+// whole chain: one stage in each line, in their order. First come the stages for the whole problem,
+// then those for each island of contacts (linked through W) that is not solved yet. chain/table.hpp
+// explains each word of the table; chain/chain.cpp runs it.
 //
-// Before the chain, r = 0 where nothing approaches. After it, the chain again from r = 0, where it
-// did not solve the problem from a guess.
+// Before the chain, r = 0 is taken if nothing approaches. After the chain, if it did not solve the
+// problem from a guess, it runs again from r = 0.
 
 #include "chain/chain.hpp"
 

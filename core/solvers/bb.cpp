@@ -12,10 +12,10 @@
 // in many-body contact dynamics simulation" (2013).
 //
 // Differs from the papers in:
-// - the shift follows the iterates, so that Coulomb's law is solved instead of the convex
-//   relaxation. The objective moves with it: the remembered values are corrected by s.r at the
-//   current iterate. shift = none is the convex relaxation, which is not Coulomb's law where
-//   anything slides: the error says so, and the solver ends as stalled when it has it;
+// - the shift follows the iterates, so that Coulomb's law is solved and not the convex relaxation.
+//   The objective changes with the shift: the remembered values are corrected by s.r at the current
+//   iterate. shift = none is the convex relaxation. If anything slides, that is not Coulomb's law:
+//   the error shows it, and the solver ends as stalled when it has the solution;
 // - inner products have the weights tr(W_aa) / d, so that masses may differ;
 // - W d is known from the line search: an iteration costs one product with W.
 
@@ -73,7 +73,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
        .decrease = options.decrease,
        .weights = options.weights},
       r, u, [&](const Vector& shift) {
-        // a relaxation that is solved is not Coulomb's law
+        // the relaxation is solved, which is not Coulomb's law
         return best.report(1, r, u) ||
                (relaxed && convex_residual(problem, cones, shift, r, u) <= best.tolerance());
       });

@@ -3,11 +3,11 @@
 //
 //   repeat  z <- P_K(z_k - rho F(z_k)),  F(r) = u^, u = W r + q
 //   until   rho (z - z_k) . (F(z) - F(z_k)) <= L ||z - z_k||^2, else rho <- tau rho
-//   z_k+1 = P_K(z - rho F(z));  rho <- rho / tau where it holds with L_min for L
+//   z_k+1 = P_K(z - rho F(z));  rho <- rho / tau if it holds with L_min for L
 //
-// The second projection sets out at the trial point z, which makes an iteration two gradient steps
-// of the same length. Korpelevich's and the paper's, P_K(z_k - rho F(z)), is the option `second` =
-// start: proved for more problems, and slower on nearly all.
+// The second projection starts at the trial point z, so an iteration is two gradient steps of the
+// same length. Korpelevich and the paper have P_K(z_k - rho F(z)): this is the option `second` =
+// start. It is proved for more problems, and slower on nearly all.
 //
 // Korpelevich, "The extragradient method for finding saddle points and other problems" (1976);
 // Solodov & Tseng, "Modified projection-type methods for monotone variational inequalities" (1996);

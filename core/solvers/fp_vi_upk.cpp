@@ -2,7 +2,7 @@
 //
 //   repeat  z <- P_K(z_k - rho F(z_k)),  F(r) = u^, u = W r + q
 //   until   rho ||F(z) - F(z_k)|| <= L ||z - z_k||, else rho <- tau rho
-//   z_k+1 = z;  rho <- rho / tau where it holds with L_min for L
+//   z_k+1 = z;  rho <- rho / tau if it holds with L_min for L
 //
 // Khobotov, "Modification of the extra-gradient method for solving variational inequalities and
 // certain optimization problems" (1987), as Marcotte (1991) and He & Liao (2002) use it;

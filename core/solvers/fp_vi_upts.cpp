@@ -3,7 +3,7 @@
 //
 //   repeat  z <- P_K(z_k - rho F(z_k)),  F(r) = u^, u = W r + q
 //   until   rho (z - z_k) . (F(z) - F(z_k)) <= L ||z - z_k||^2, else rho <- tau rho
-//   z_k+1 = z;  rho <- rho / tau where it holds with L_min for L
+//   z_k+1 = z;  rho <- rho / tau if it holds with L_min for L
 //
 // Solodov & Tseng, "Modified projection-type methods for monotone variational inequalities" (1996);
 // algorithms 1 and 3 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:

@@ -1,7 +1,8 @@
 // Homotopy: the central path of Coulomb's law, from a convex problem, by its arclength.
 //
-// methods/homotopy.hpp has the path and its sources. Slow, and sure: where an interior point stops
-// at a fold of its path, this goes around it. The last digits come from the proximal Newton method.
+// methods/homotopy.hpp has the path and its sources. It is slow and reliable: if an interior point
+// stops at a fold of its path, this method goes around the fold. The proximal Newton method gives
+// the last digits.
 
 #include "methods/homotopy.hpp"
 

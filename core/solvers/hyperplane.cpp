@@ -11,13 +11,13 @@
 // HP of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction: formulations and
 // numerical comparisons" (2018).
 //
-// Differs from the paper in: rho follows the line search, as Solodov & Svaiter advise: it is
-// multiplied by alpha after one that had to go back, and grows after one that had not; velocities
-// are interpolated between z_k and y, so that the line search costs no product with W and an
-// iteration costs two; each contact may have a step of its own (`metric`); where no hyperplane is
-// found (F need not be monotone), or none can be found for rounding, y is the next iterate. The
-// last projection is that of Solodov & Svaiter; with `intersection` off it is Konnov's and the
-// paper's, P_K of the projection on H, whose steps are too short where contacts are open.
+// Differs from the paper in: rho follows the line search, as Solodov & Svaiter advise: if the line
+// search had to go back, rho is multiplied by alpha; if not, it grows. Velocities are interpolated
+// between z_k and y, so that the line search costs no product with W and an iteration costs two.
+// Each contact may have a step of its own (`metric`). If no hyperplane is found (F need not be
+// monotone, and rounding may hide it), y is the next iterate. The last projection is that of
+// Solodov & Svaiter. With `intersection` off it is that of Konnov and the paper, P_K of the
+// projection on H; its steps are too short if contacts are open.
 
 #include <utility>
 
@@ -53,9 +53,9 @@ struct Options {
   }
 };
 
-/// to.r = P_{K and H}(from), H = { s : f . (s - x) <= 0 }: the root of the falling function
-/// f . (P_K(from - lambda w f) - x), by false position (Illinois). `from_gap` = f . (from - x) > 0,
-/// and `lambda` the root where there is no cone. Leaves the root it found in to.r.
+/// to.r = P_{K and H}(from), H = { s : f . (s - x) <= 0 }. It finds the root of the falling
+/// function f . (P_K(from - lambda w f) - x) by false position (Illinois). `from_gap` = f . (from -
+/// x) > 0. `lambda` is the root without a cone on entry. The root it found stays in to.r.
 template <class Cone>
 void project_on_both(const VariationalInequality<Cone>& vi, const Vector& from, const Vector& f,
                      const Vector& x, double from_gap, double lambda, VelocityPoint& to) {
@@ -104,15 +104,14 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, Iterates&
     vi.evaluate(y);
     const double enough = options.sigma / rho * vi.distance_squared(z.r, y.r);
 
-    // near the solution the products below are all rounding: the plain projection goes on from
-    // there
+    // near the solution the products below are only rounding: the plain projection continues
     if (enough <= rounding * z.hat.norm() * z.r.norm()) {
       std::swap(z, y);
       if (const auto end = iterates.visit(k, z.r, [&] { return vi.error(z); })) return *end;
       continue;
     }
 
-    // F(x) . (z_k - y) for ever smaller alpha
+    // F(x) . (z_k - y) for smaller and smaller alpha
     double alpha = 1;
     double separation = 0;
     for (std::int64_t halving = 0; halving <= options.line_search; ++halving) {

@@ -8,11 +8,12 @@
 // (1998); algorithm 4 of Acary, Bremond, Huber, "On solving contact problems with Coulomb friction:
 // formulations and numerical comparisons" (2018).
 //
-// Differs from the papers in: the velocities are kept up to date by columns, so that contacts whose
-// reaction does not change cost nothing, and the natural map costs no product with W; settled
-// contacts may be left alone for some sweeps (`freeze`), as in the paper's implementation, but for
-// a fixed number of sweeps and not at random. With `threads` above 1 it sweeps colour by colour
-// (linalg/colouring.hpp), u^a by the row of W: another order of the contacts than the given one.
+// Differs from the papers in: columns of W keep the velocities up to date. So a contact whose
+// reaction does not change costs nothing, and the natural map costs no product with W. Settled
+// contacts may be left alone for some sweeps (`freeze`). The paper's implementation does that at
+// random; here it is a fixed number of sweeps. With `threads` above 1 it sweeps colour by colour
+// (linalg/colouring.hpp), with u^a from the row of W, and the order of the contacts is not the
+// given one.
 
 #include <array>
 #include <cstdint>
@@ -57,7 +58,7 @@ struct Options : SweepOptions {
   }
 };
 
-/// The rounding of the updates of u is taken out by u = W r + q at least this often [sweeps].
+/// u = W r + q removes the rounding of the updates of u at least this often [sweeps].
 constexpr std::int64_t refresh_interval = 1000;
 
 template <class Cone>
@@ -73,7 +74,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
   step.relaxation = options.relaxation;
   std::mt19937_64 random(static_cast<std::uint64_t>(options.seed));
   if (options.shuffle == Shuffle::once) contacts.shuffle(random);
-  // contacts that are settled sleep for a while: the sweep at which each wakes
+  // settled contacts sleep for a while: the sweep at which each wakes
   std::vector<std::int64_t> wakes(options.freeze > 0 ? problem.nc() : 0, 0);
 
   Schedule schedule(options.error_interval, best.tolerance());

@@ -1,5 +1,5 @@
-// NSIP: a nonsmooth interior point method for Coulomb's law, the shift mu ||u_T|| inside Newton's
-// system.
+// NSIP: a nonsmooth interior point method for Coulomb's law, with the shift mu ||u_T|| inside
+// Newton's system.
 //
 //   x = (mu r_N, r_T),  y = (u^_N / mu, u_T),  x o y = tau e,  tau -> 0
 //   u = W r + q,  u^ = u + [mu ||u_T||, 0, 0]
@@ -9,12 +9,12 @@
 // Acary, Armand, Nguyen, Shpakovych, "Second order cone programming for frictional contact
 // mechanics using interior point algorithm" (2023).
 //
-// Differs from the paper in: the paper's problem is the convex one, here the shift is linearised
-// with the rest; the system is regularised, and condensed to the contacts or the bodies. It starts
-// near the guess, well inside the cones. Where its steps end, sweeps
-// of Gauss-Seidel follow (`sweeps`): the scaling has the gap mu r_N - ||r_T|| of sliding contacts
-// in it, which falls under the rounding of r, and a direction of sliding that is wrong by e changes
-// the gap by e^2 / 2 only. So it is known to 1e-6 or 1e-7, and the interior point cannot better it.
+// Differs from the paper in: the paper's problem is the convex one; here the shift is linearised
+// with the rest. The system is regularised, and condensed to the contacts or the bodies. It starts
+// near the guess, well inside the cones. When its steps end, sweeps of Gauss-Seidel follow
+// (`sweeps`). The reason: the scaling contains the gap mu r_N - ||r_T|| of sliding contacts, which
+// falls below the rounding of r. If a direction of sliding is wrong by e, the gap changes only by
+// e^2 / 2. So the direction is known to 1e-6 or 1e-7, and the interior point cannot improve it.
 //
 // The problem is not convex: the path may fold, and the method then ends `stalled`.
 
@@ -31,7 +31,7 @@ namespace {
 struct Options : InteriorPointRules {
   std::int64_t sweeps = 100;
 
-  Options() { tau = 10; }  // from nothing it passes a few more than with 1
+  Options() { tau = 10; }  // from r = 0 it solves a few more than with 1
 
   static constexpr auto fields() {
     using O = Options;

@@ -10,14 +10,15 @@
 // solution methods" (1991); section 5.1 of Acary, Bremond, Huber, "On solving contact problems with
 // Coulomb friction: formulations and numerical comparisons" (2018).
 //
-// Differs from the papers in: the element of the generalised Jacobian at kinks is that of the side
-// where a contact is open or sticks; W + delta I stands for W in the system, with delta going to
-// zero as the error does, without which a singular W has Newton wander; with a line search, minus
-// the gradient (W symmetric) is searched where Newton's step is no descent; where the error stands
-// still, Newton starts anew after sweeps of nonsmooth Gauss-Seidel (sweeps = 0: it ends).
+// Differs from the papers in: at kinks, the element of the generalised Jacobian is that of the side
+// on which a contact is open or sticks. W + delta I replaces W in the system, and delta goes to
+// zero with the error: with a singular W alone, Newton's method wanders. In a line search, if
+// Newton's step is no descent, the search goes along minus the gradient (W symmetric). If the error
+// does not fall any more, Newton starts again after sweeps of nonsmooth Gauss-Seidel (sweeps = 0:
+// it ends).
 //
-// Nothing makes it converge from afar: expect `stalled` or a limit on some packings. The system is
-// factorised on the contacts, however few the bodies are.
+// Nothing makes it converge from far away: expect `stalled` or a limit on some packings. The system
+// is factorised on the contacts, however few the bodies are.
 
 #include "methods/newton_loop.hpp"
 

@@ -9,8 +9,8 @@
 // comparisons" (2018): PFP.
 //
 // Differs from the papers in:
-// - both convex problems are solved to a share of the current error of Coulomb's law, from the last
-//   solution;
+// - both convex problems are solved to a share of the current error of Coulomb's law. They start
+//   from the last solution;
 // - rolling friction is part of the tangential problem.
 
 #include <algorithm>

@@ -7,12 +7,12 @@
 // formulations and numerical comparisons" (2018); Rockafellar, "Monotone operators and the proximal
 // point algorithm" (1976).
 //
-// Differs from the papers in: alpha is relative to the mean of tr(W_aa) / d; an inner problem is
-// solved until its error is a fraction of the error at r_k, or for a number of sweeps; where these
-// end farther away than they began, r_k is taken again with four times the alpha, which comes back
-// afterwards: Gauss-Seidel may leave a solution of a problem whose alpha is small; W is not
-// changed, alpha enters the one-contact problems. Slower than nsgs alone where that converges: it
-// is there for problems whose W is singular.
+// Differs from the papers in: alpha is relative to the mean of tr(W_aa) / d. An inner problem is
+// solved until its error is a fraction of the error at r_k, or for a number of sweeps. If these end
+// farther away than they began, r_k is taken again with four times the alpha, which falls back
+// afterwards: with a small alpha, Gauss-Seidel may move away from a solution. W is not changed;
+// alpha enters the one-contact problems. If nsgs alone converges, it is faster: this solver is for
+// problems whose W is singular.
 
 #include <algorithm>
 #include <array>
@@ -71,19 +71,19 @@ class Iteration {
   [[nodiscard]] double size() const { return size_; }
   [[nodiscard]] const Vector& r() const { return r_; }
 
-  /// Of r.
+  /// The error of r.
   [[nodiscard]] double error() const { return relative_error<Cone>(problem_, u_, r_); }
 
-  /// Of r in the inner problem.
+  /// The error of r in the inner problem.
   double inner_error() {
     shifted_ = u_ + alpha_ * (r_ - anchor_);
     return relative_error<Cone>(problem_, shifted_, r_);
   }
 
-  /// Gives the inner iterates up: r is r_k again.
+  /// Drops the inner iterates: r is r_k again.
   void go_back() { r_ = anchor_; }
 
-  /// r_k is the r of now, and u as it should be.
+  /// r_k becomes the present r, and u is recomputed.
   void start_inner(double alpha) {
     problem_.velocity(r_, u_);
     anchor_ = r_;
@@ -102,7 +102,7 @@ class Iteration {
       ContactProblem<Cone>& contact = contacts_[static_cast<std::size_t>(a)];
       const Vec old = r_.template segment<D>(D * a);
       const Vec anchor = anchor_.template segment<D>(D * a);
-      // u + alpha (r - r_k) less the part of the contact's own reaction
+      // u + alpha (r - r_k) without the part of the contact's own reaction
       const Vec b =
           u_.template segment<D>(D * a) + alpha_ * (old - anchor) - contact.projected.block() * old;
       Vec next = old;
@@ -122,7 +122,7 @@ class Iteration {
   Vector r_, u_, anchor_, shifted_;
 };
 
-/// Sweeps between evaluations of the errors.
+/// The number of sweeps between two evaluations of the errors.
 constexpr std::int64_t interval = 5;
 
 template <class Cone>

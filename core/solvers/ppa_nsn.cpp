@@ -7,11 +7,11 @@
 // formulations and numerical comparisons" (2018); Rockafellar, "Monotone operators and the proximal
 // point algorithm" (1976).
 //
-// Differs from the papers in: alpha is relative to tr(W_aa) / d of each contact; it doubles where
-// Newton fails and comes back afterwards; inner problems are solved by Newton's method on the
-// function of Alart & Curnier in the variable r - rho u (methods/proximal_point.hpp), until their
-// residual is a fraction of the error; and, by default, alpha follows the steps that Newton takes
-// rather than the error. It is not a monotone operator: no step is proved to approach the solution.
+// Differs from the papers in: alpha is relative to tr(W_aa) / d of each contact. It doubles if
+// Newton's method fails, and falls back afterwards. Inner problems are solved by Newton's method on
+// the function of Alart & Curnier in the variable r - rho u (methods/proximal_point.hpp), until
+// their residual is a fraction of the error. By default, alpha follows the number of Newton steps
+// and not the error. The operator is not monotone: no step is proved to approach the solution.
 
 #include <array>
 

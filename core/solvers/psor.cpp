@@ -10,10 +10,12 @@
 // formulations and numerical comparisons" (2018), with the splitting of its section on relaxation.
 //
 // Differs from the papers in: the relaxation is inside the one-contact problem, so that every
-// iterate is in the cone without a projection after it (nsgs has the average of old and new);
-// velocities are kept up to date by columns; `threads` above 1 sweep colour by colour, as in nsgs.
+// iterate is in the cone without a projection after it (nsgs has the average of old and new).
+// Columns of W keep the velocities up to date. With `threads` above 1 it sweeps colour by colour,
+// as in nsgs.
 //
-// Over-relaxed sweeps converge without friction; with it they may cycle where omega = 1 converges.
+// Without friction, over-relaxed sweeps converge. With friction, they may cycle even if those with
+// omega = 1 converge.
 
 #include <cstdint>
 
@@ -59,7 +61,7 @@ Outcome iterate(const ReducedProblem& problem, const Options& options, const Set
       if (best.due(count) && best.glance(count, r)) return best.outcome(r, contacts.cpu_s());
       continue;
     }
-    problem.velocity(r, u);  // takes out the rounding of the updates
+    problem.velocity(r, u);  // removes the rounding of the updates
     if (best.report(count, r, u)) return best.outcome(r, contacts.cpu_s());
     schedule.evaluated(sweep, best.last_error());
   }

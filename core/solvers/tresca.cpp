@@ -8,9 +8,9 @@
 // Coulomb friction: formulations and numerical comparisons" (2018): TFP.
 //
 // Differs from the papers in:
-// - the inner problem is solved to a share of the current error of Coulomb's law, from the last
-//   solution, and never to more than that;
-// - where 50 steps bring no lower error, the relaxation is halved, to an eighth at least;
+// - the inner problem is solved to a share of the current error of Coulomb's law, but no further.
+//   It starts from the last solution;
+// - if 50 steps bring no lower error, the relaxation is halved, down to an eighth;
 // - rolling friction has a threshold of its own.
 
 #include <cstdint>

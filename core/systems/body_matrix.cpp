@@ -10,7 +10,7 @@ namespace fclib {
 
 namespace {
 
-/// The bodies are tried only where a contact touches few of their coordinates.
+/// The bodies are tried only if a contact touches few of their coordinates.
 constexpr std::int64_t most_rows = 64;
 
 template <int D>
@@ -88,7 +88,7 @@ std::optional<BlockPattern> BodyMatrix::analyse(const Primal& primal, int d) {
   }
   place_.resize(static_cast<std::size_t>(place_first_.back()));
   std::vector<Index> seen(count, -1);               // the last column that has the row
-  std::vector<std::int64_t> where(count);           // of the row in that column
+  std::vector<std::int64_t> where(count);           // place of the row in that column
   std::vector<Index> placed(row_first_.size(), 0);  // columns of each contact
   for (Index col = 0; col < size_; ++col) {
     const auto begin = static_cast<std::ptrdiff_t>(pattern.row.size());
@@ -123,7 +123,7 @@ std::optional<BlockPattern> BodyMatrix::analyse(const Primal& primal, int d) {
 }
 
 void BodyMatrix::share_out(int threads) {
-  // cut where each has as many entries of the products
+  // cut so that each has the same number of entries of the products
   std::vector<std::int64_t> entries(static_cast<std::size_t>(size_) + 1, 0);
   for (Index a = 0; a < contacts(); ++a) {
     for (auto k = row_first_[a]; k < row_first_[a + 1]; ++k)

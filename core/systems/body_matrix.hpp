@@ -1,9 +1,9 @@
 // M + H D H^T, the matrix of a CoupledSystem on the bodies, and the products with H beside it.
 //
-// M is n x n, H n x d nc, and D has nc blocks, d x d. A contact touches few coordinates: its
-// columns of H are kept dense in these. Each thread has a range of coordinates, and the contacts
-// that reach into it; every number is summed up in the order of the contacts, however many threads
-// there are.
+// M is n x n, H is n x d nc, and D has nc blocks, d x d. A contact touches few coordinates: its
+// columns of H are dense in these. Each thread has a range of coordinates, and the contacts that
+// reach into it. Every number is summed in the order of the contacts, whatever the number of
+// threads.
 #pragma once
 
 #include <cstdint>
@@ -18,11 +18,11 @@ namespace fclib {
 
 class BodyMatrix {
  public:
-  /// Takes M and H in. The pattern of the matrix, n x n; nothing where a contact touches so many
-  /// coordinates that it would not be sparse.
+  /// Takes M and H in. Returns the pattern of the matrix, n x n, or nothing if a contact touches so
+  /// many coordinates that it would not be sparse.
   [[nodiscard]] std::optional<BlockPattern> analyse(const Primal& primal, int d);
 
-  /// Shares the coordinates out among so many threads; one has them all at first.
+  /// Shares the coordinates out among so many threads. At first one thread has them all.
   void share_out(int threads);
 
   /// values <- M + H D H^T in the pattern; the blocks of D are d x d, by columns.
@@ -37,8 +37,8 @@ class BodyMatrix {
 
  private:
   [[nodiscard]] Index contacts() const { return static_cast<Index>(row_first_.size()) - 1; }
-  /// f(contact, first coordinate, last + 1) for the contacts that reach into the coordinates of a
-  /// thread.
+  /// Calls f(contact, first coordinate, last + 1) for the contacts that reach into the coordinates
+  /// of a thread.
   template <class F>
   void each_of_part(int part, const F& f) const;
   void collect_rows(const SparseColumns& H);
@@ -54,7 +54,7 @@ class BodyMatrix {
   std::vector<std::int64_t> column_first_;  // of each coordinate, in the values
   std::vector<double> fixed_;               // M in the pattern
   std::vector<Index> bounds_;               // of the coordinates of each thread
-  std::vector<std::vector<Index>> reach_;   // contacts of each thread; empty where it has all
+  std::vector<std::vector<Index>> reach_;   // contacts of each thread; empty if it has all
 };
 
 }  // namespace fclib

@@ -9,7 +9,7 @@ namespace fclib {
 
 namespace {
 
-/// The pattern of d x d blocks whose columns have these rows, in any order, and their diagonal.
+/// The pattern of d x d blocks whose columns have these rows, in any order, and the diagonal.
 BlockPattern pattern_of(std::vector<std::vector<Index>>& columns, int d) {
   BlockPattern pattern;
   pattern.d = d;

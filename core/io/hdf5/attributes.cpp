@@ -22,7 +22,7 @@ std::string group_with_attributes(const Group& root, std::string_view name) {
               "group");
 }
 
-/// Whether a path of one or two names is there.
+/// Whether a path of one or two names exists.
 bool has_group(const Group& root, const std::string& path) {
   return root.has(path.substr(0, path.find('/'))) && root.has(path);
 }
@@ -31,7 +31,7 @@ std::string path_of(const Group& group, const std::string& attribute) {
   return group.path + ", attribute " + attribute;
 }
 
-/// Where the attribute is there already, it goes, or that is an error.
+/// Removes an attribute that is there already, or throws.
 void make_room_for(const Group& group, const std::string& attribute, bool replace) {
   if (H5Aexists(group.id, attribute.c_str()) <= 0) return;
   const std::string where = path_of(group, attribute);
@@ -58,7 +58,7 @@ std::optional<std::variant<double, std::string>> read_attribute(hid_t group,
     if (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0) return std::nullopt;
     return value;
   }
-  // attributes lie in the header of their group, which ends at 64 kB
+  // attributes lie in the header of their group, which has at most 64 kB
   constexpr std::size_t longest = std::size_t{1} << 16;
   const std::size_t size = H5Tget_size(type.id());
   if (kind != H5T_STRING || H5Tis_variable_str(type.id()) > 0 || size > longest) {
@@ -127,7 +127,7 @@ void write_int_attribute(const std::string& path, const std::string& name, Index
         group.has("info") ? open_group(group, "info") : create_group(group, "info");
     const Group info{handle.id(), group.child("info")};
     make_room_for(info, name, options.replace);
-    // an array of one, as libfclib 3.1 writes it
+    // an array of one number, as libfclib 3.1 writes it
     const hsize_t extent = 1;
     const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
     write_number_attribute(info, name, H5T_STD_I32LE, H5T_NATIVE_INT32, space, &value);

@@ -41,7 +41,7 @@ constexpr bool little_endian = std::endian::native == std::endian::little;
 /// As many numbers are shuffled at once as a word has bytes.
 constexpr std::size_t word = sizeof(std::uint64_t);
 
-/// The compressor of a level, made once: it takes longer to make than a small array to pack.
+/// The compressor of a level. It is kept, since it takes longer to make than a small array to pack.
 libdeflate_compressor* compressor_of(int level) {
   struct Free {
     void operator()(libdeflate_compressor* compressor) const {
@@ -77,7 +77,7 @@ void transpose(std::array<std::uint64_t, word>& rows) {
   }
 }
 
-/// The first bytes of all numbers, then the second ones, and so on: HDF5's shuffle.
+/// The first bytes of all numbers, then the second ones, and so on: the shuffle of HDF5.
 template <std::size_t width>
 void shuffle(const char* in, char* out, std::size_t size) {
   std::size_t k = 0;
@@ -116,7 +116,7 @@ std::unique_ptr<char[]> room(std::size_t bytes) {
   return std::make_unique_for_overwrite<char[]>(bytes);
 }
 
-/// The mask of a chunk that deflate does not shrink, and which goes without it.
+/// The mask of a chunk that deflate does not shrink: the chunk is stored without it.
 constexpr std::uint32_t without_deflate(bool shuffled) { return shuffled ? 2 : 1; }
 
 }  // namespace
@@ -131,7 +131,7 @@ bool pack(const Bytes& numbers, const Packing& packing, int level, const TakeChu
   const auto deflated = room(bytes);
   for (std::size_t at = 0; at < size; at += packing.chunk) {
     const char* chunk = data + at * width;
-    if (size - at < packing.chunk) {  // HDF5 has whole chunks alone
+    if (size - at < packing.chunk) {  // HDF5 has only whole chunks
       std::memcpy(edge.get(), chunk, (size - at) * width);
       std::memset(edge.get() + (size - at) * width, 0, bytes - (size - at) * width);
       chunk = edge.get();

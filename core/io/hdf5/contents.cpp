@@ -29,7 +29,7 @@ Index count_of(const Group& root, const Numbered& list) {
 
 namespace {
 
-/// What `read` returns, or this where it fails.
+/// What `read` returns, or this if it fails.
 template <class Value, class Read>
 Value value_or(Value otherwise, const Read& read) {
   try {

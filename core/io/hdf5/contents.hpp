@@ -22,13 +22,13 @@ struct Numbered {
 constexpr Numbered guesses_list{"guesses", "number_of_guesses"};
 constexpr Numbered solutions_list{"solutions", "number_of_solutions"};
 
-/// Whether there is a solution: a group whose reactions were never written is none.
+/// Whether there is a solution. A group whose reactions were never written is not one.
 bool has_solution(const Group& root);
 
-/// How many a list has; 0 where it is not there.
+/// How many entries a list has; 0 if there is no list.
 Index count_of(const Group& root, const Numbered& list);
 
-/// A solution or a list that cannot be read does not keep its problem from being read.
+/// If a solution or a list cannot be read, its problem can still be read.
 Contents contents_of(const Group& root);
 
 /// The kind of the problem that a solution of the file belongs to.
@@ -37,8 +37,8 @@ std::string owner_of(const std::vector<std::string>& kinds, std::string_view pre
 /// The sizes of that problem.
 Problem outline_of(const Group& root);
 
-/// Calls visit(field, place) for each field that the group of a formulation has, with the group in
-/// which it lies.
+/// Calls visit(field, place) for each field that the group of a formulation has. `place` has the
+/// group in which the field lies.
 template <class P, class Visitor>
 void for_each_stored_field(const Group& group, const Visitor& visit) {
   const Handle vectors_handle = open_group(group, "vectors");
@@ -62,7 +62,7 @@ A read_matrix_sizes(const Group& group) {
   return a;
 }
 
-/// Makes mu as long as the matrices say, where that is how long it is in the file.
+/// Makes mu as long as the matrices say, if it has that length in the file.
 template <class P>
 void require_contacts(P& outline, std::size_t stored) {
   if (static_cast<std::size_t>(contact_count(outline)) != stored) {

@@ -8,7 +8,7 @@ namespace fclib::hdf5 {
 
 namespace {
 
-/// The attribute by which our groups are known: others may use such names too.
+/// The attribute that marks our groups: other programs may use such names too.
 constexpr const char* mark = "layout";
 constexpr const char* layout = "FCLIB geometry 1";
 

@@ -6,14 +6,14 @@
 
 namespace fclib::hdf5 {
 
-/// The geometry of a file, null where it has none. Groups of these names that do not say that they
-/// are ours are passed over.
+/// The geometry of a file, or null if it has none. A group of such a name is ours only if it says
+/// so; others are ignored.
 GeometryPointer read_geometry(const Group& root);
 
-/// Takes the geometry out of a file.
+/// Removes the geometry from a file.
 void remove_geometry(const Group& root);
 
-/// Puts a geometry into a file that has none.
+/// Writes a geometry into a file that has none.
 void write_geometry(const Target& root, const Geometry& geometry);
 
 }  // namespace fclib::hdf5

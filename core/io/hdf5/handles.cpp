@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// HDF5 ends the process where another version is loaded than it was compiled with.
+/// HDF5 ends the process if another version is loaded than that of the build.
 void require_same_version() {
   static const bool same = hdf5_loaded_version() == hdf5_compiled_version() ||
                            std::getenv("HDF5_DISABLE_VERSION_CHECK") != nullptr;
@@ -37,12 +37,12 @@ std::mutex& library_mutex() {
   return instance;
 }
 
-/// Where HDF5 looks for the file of an external link.
+/// The folder in which HDF5 looks for the file of an external link.
 std::array<fs::path, 2> places_of(const char* from, const char* to) {
   return {fs::path(to), fs::path(from).parent_path() / to};
 }
 
-/// No external link is followed: a file from elsewhere could name any file of its reader's.
+/// No external link is followed: a file from elsewhere could name any file of its reader.
 herr_t follow_none(const char*, const char*, const char*, const char*, unsigned*, hid_t, void*) {
   return -1;
 }
@@ -81,9 +81,9 @@ std::string words_of_link(hid_t group, const std::string& name) {
          ": copy what it links to into this file";
 }
 
-Session* current = nullptr;  // under the lock
+Session* current = nullptr;  // protected by the lock
 
-/// Whether a program has a file open to write it: HDF5 locks it meanwhile.
+/// Whether a program has a file open to write it. HDF5 locks the file meanwhile.
 bool is_being_written(const std::string& path) {
   const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) return false;
@@ -92,7 +92,7 @@ bool is_being_written(const std::string& path) {
   return locked;
 }
 
-/// The bytes of a file from a place on, as many as there are.
+/// The bytes of a file from an offset on, as many as there are.
 std::string bytes_of(const std::string& path, std::size_t from, std::size_t count) {
   std::ifstream file(path, std::ios::binary);
   file.seekg(static_cast<std::streamoff>(from));
@@ -102,8 +102,8 @@ std::string bytes_of(const std::string& path, std::size_t from, std::size_t coun
   return bytes;
 }
 
-/// Why an HDF5 file cannot be opened. A program that opens one to write it in a newer format says
-/// so in byte 11 of its superblock, and takes that back at the end.
+/// Why an HDF5 file cannot be opened. A program that writes a file in a newer format says so in
+/// byte 11 of its superblock, and takes that back at the end.
 std::string what_is_wrong_with(const std::string& path) {
   constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
   constexpr std::size_t version = 8;
@@ -121,7 +121,7 @@ std::string what_is_wrong_with(const std::string& path) {
   return "cannot be opened by HDF5 (the file is damaged or cut short)";
 }
 
-/// What a file is that is no HDF5 file.
+/// What kind of file a file is that is not HDF5.
 std::string what_else_is(const std::string& path) {
   constexpr std::size_t enough = 256;
   const std::string start = bytes_of(path, 0, enough);
@@ -129,7 +129,8 @@ std::string what_else_is(const std::string& path) {
   if (start.starts_with("version https://git-lfs.github.com/spec/")) {
     return "is a pointer of Git LFS, not the file itself: run 'git lfs pull'";
   }
-  // that of Siconos begins with the components of a contact, the contacts, and a storage
+  // a file of Siconos begins with the components of a contact, the number of contacts, and a
+  // storage
   int numbers[3] = {};
   std::istringstream text(start);
   for (int& number : numbers) text >> number;
@@ -177,7 +178,7 @@ std::string Group::child(std::string_view name) const {
 
 bool Group::has(const std::string& name) const {
   if (H5Oexists_by_name(id, name.c_str(), Session::link_access()) > 0) return true;
-  // what cannot be looked up is not what is not there, nor is a link to nothing
+  // an object that cannot be looked up is not a missing one, nor is a link to nothing
   const htri_t found = H5Lexists(id, name.c_str(), H5P_DEFAULT);
   if (found < 0) fail(child(name), "cannot be looked up by HDF5 (the file is damaged)");
   if (found > 0) fail(child(name), words_of_link(id, name));

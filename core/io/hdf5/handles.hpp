@@ -1,8 +1,8 @@
 // What every use of HDF5 goes through: the lock, identifiers that close themselves, groups that
 // know their paths, and errors.
 //
-// Internal to io/hdf5/, as is all of namespace fclib::hdf5: the headers that others include have
-// no hdf5.h.
+// Internal to io/hdf5/, like all of namespace fclib::hdf5: the headers that others include do not
+// include hdf5.h.
 #pragma once
 
 #include <hdf5.h>
@@ -22,7 +22,7 @@ namespace fclib::hdf5 {
 /// Throws Error (file).
 [[noreturn]] void fail(const std::string& where, const std::string& message);
 
-/// Fails where HDF5 could not write.
+/// Throws if HDF5 could not write.
 void check(herr_t status, const std::string& where);
 
 /// An HDF5 identifier that closes itself.
@@ -46,7 +46,7 @@ class Handle {
 };
 
 /// Holds the library's lock, and keeps HDF5 from printing its error stack to the host's stderr.
-/// Fails where another version of HDF5 is loaded than this was compiled with.
+/// Throws if the HDF5 that is loaded has another version than the one at compile time.
 class Session {
  public:
   Session();
@@ -59,7 +59,7 @@ class Session {
 
  private:
   std::lock_guard<std::mutex> lock_;
-  std::optional<Handle> link_access_;  // made at its first use: to make one takes long
+  std::optional<Handle> link_access_;  // made at its first use, since it takes long
   H5E_auto2_t function_ = nullptr;
   void* data_ = nullptr;
 };
@@ -70,16 +70,16 @@ struct Group {
   std::string path;
 
   [[nodiscard]] std::string child(std::string_view name) const;
-  /// Whether there is an object of this name. Fails where the name is a link to nothing.
+  /// Whether there is an object of this name. Throws if the name is a link to nothing.
   [[nodiscard]] bool has(const std::string& name) const;
 };
 
 Handle open_group(const Group& parent, const std::string& name);
 
-/// Opens a file to read it. Says best what is wrong with it.
+/// Opens a file to read it. Its errors say most precisely what is wrong with the file.
 Handle open_file(const std::string& path);
 
-/// Runs body(), and says of any error in which file it was.
+/// Runs body(), and adds to any error in which file it was.
 template <class Body>
 auto in_file(const std::string& path, const Body& body) {
   try {

@@ -5,12 +5,12 @@
 //   /fclib_local_rolling, /fclib_global_rolling: the same, and vectors/mu_r
 //   /solution/{v,u,r,l}
 //   /guesses/{number_of_guesses, 1/{v,u,r,l}, 2/, ...}
-//   /solutions/{number_of_solutions, error, 1/{v,u,r,l}, 2/, ...}: all that are known
+//   /solutions/{number_of_solutions, error, 1/{v,u,r,l}, 2/, ...}: all known solutions
 //   matrix group: nzmax, m, n, nz, p, i, x; nz >= 0 triplet, -1 CSC, -2 CSR, -3 dense
 //
 // Every function throws Error (file) that names the file and the dataset. Writes are atomic: the
-// new file is made beside the old one and renamed over it; writers that add to one file take turns.
-// HDF5 is not thread-safe; a lock of the library's own makes these functions so.
+// new file is made beside the old one and renamed over it. Writers that add to one file take turns.
+// HDF5 is not thread-safe; a lock of the library makes these functions so.
 #pragma once
 
 #include "io/hdf5/attributes.hpp"

@@ -17,15 +17,15 @@ namespace fclib::hdf5 {
 namespace {
 
 constexpr std::uint64_t page_size = std::uint64_t{1} << 16;
-/// Less than this is copied sooner than referred to.
+/// Fewer bytes are copied: that is faster than a reference to them.
 constexpr std::size_t least_loan = std::size_t{1} << 14;
-/// Of a file: more zeros that nobody wrote are those of a damaged file.
+/// A damaged file: more zeros in it were never written.
 constexpr std::uint64_t most_unwritten = std::uint64_t{1} << 26;
 
 constexpr std::array<char, page_size> zeros{};
 
-/// Entries under a node of an index, halved: few datasets have more than one chunk. With 1 an index
-/// gets a level for each entry, and HDF5 fails, or ends its process, beyond 255.
+/// Half the entries under a node of an index. Few datasets have more than one chunk. With 1, an
+/// index gets a level for each entry, and HDF5 fails, or ends its process, beyond 255.
 constexpr unsigned index_rank = 2;
 
 }  // namespace
@@ -130,7 +130,7 @@ namespace {
 
 /// A file as the driver has it open.
 struct OpenFile {
-  H5FD_t known_to_hdf5;  // first, since HDF5 knows the file by it
+  H5FD_t known_to_hdf5;  // first: HDF5 knows the file by it
   MemoryFile::Contents* contents;
 };
 
@@ -138,7 +138,7 @@ MemoryFile::Contents& contents_of(const H5FD_t* file) {
   return *reinterpret_cast<const OpenFile*>(file)->contents;
 }
 
-/// What fails for want of memory fails in HDF5.
+/// Without memory, it fails in HDF5.
 template <class Body>
 herr_t guarded(const Body& body) {
   try {
@@ -155,7 +155,7 @@ H5FD_t* open_contents(const char*, unsigned, hid_t access, haddr_t) {
   auto* file = new (std::nothrow) OpenFile{};
   if (file == nullptr) return nullptr;
   file->contents = *given;
-  file->contents->size = 0;  // HDF5 says how large it is
+  file->contents->size = 0;  // HDF5 sets the size
   return &file->known_to_hdf5;
 }
 
@@ -163,7 +163,7 @@ H5FD_class_t driver_class() {
   H5FD_class_t driver{};
 #if H5_VERSION_GE(1, 14, 0)
   driver.version = H5FD_CLASS_VERSION;
-  driver.value = 511;  // of those that nobody is given
+  driver.value = 511;  // a number that is assigned to nobody
 #endif
   driver.name = "fclib_memory";
   driver.maxaddr = std::numeric_limits<haddr_t>::max() / 2;
@@ -174,7 +174,7 @@ H5FD_class_t driver_class() {
     delete reinterpret_cast<OpenFile*>(file);
     return 0;
   };
-  // as HDF5's own driver of files in memory has it
+  // as in HDF5's own driver of files in memory
   driver.query = [](const H5FD_t*, unsigned long* flags) -> herr_t {
     *flags = H5FD_FEAT_AGGREGATE_METADATA | H5FD_FEAT_ACCUMULATE_METADATA | H5FD_FEAT_DATA_SIEVE |
              H5FD_FEAT_AGGREGATE_SMALLDATA;
@@ -201,7 +201,7 @@ H5FD_class_t driver_class() {
   return driver;
 }
 
-/// Anew for each file: a host may close all of HDF5 in between.
+/// Registered again for each file: a host may close all of HDF5 in between.
 Handle registered_driver() {
   const H5FD_class_t driver = driver_class();
   Handle result(H5FDregister(&driver), H5FDunregister);
@@ -209,8 +209,8 @@ Handle registered_driver() {
   return result;
 }
 
-/// From here on the headers of HDF5 1.8, which take less than the older ones. A file created with
-/// them would carry the time of its making.
+/// Headers of HDF5 1.8 from here on: they are smaller than the older ones. If the file itself were
+/// created with them, it would contain the time of its creation.
 void use_small_headers(hid_t file) {
   check(H5Fset_libver_bounds(file, H5F_LIBVER_V18, H5F_LIBVER_LATEST), "");
 }
@@ -239,7 +239,7 @@ Handle MemoryFile::access() const {
   Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   Contents* const contents = contents_.get();
   check(H5Pset_driver(access.id(), driver_.id(), static_cast<const void*>(&contents)), "");
-  // no room kept for what never comes
+  // keep no room for later members
   check(H5Pset_meta_block_size(access.id(), 0), "");
   check(H5Pset_small_data_block_size(access.id(), 0), "");
   return access;

@@ -1,4 +1,4 @@
-// An HDF5 file in memory, in pieces, some of which are memory of others.
+// An HDF5 file in memory, in pieces. Some of the pieces are memory of others.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 
 namespace fclib::hdf5 {
 
-/// The bytes of a file that is being made. Those that were lent are referred to, not copied.
+/// The bytes of a file that is being made. Bytes that were lent are referred to, not copied.
 class Pieces {
  public:
   Pieces() = default;
@@ -24,13 +24,14 @@ class Pieces {
   Pieces(const Pieces&) = delete;
   Pieces& operator=(const Pieces&) = delete;
 
-  /// This memory stays as it is until the pieces are used: what is written from it is not copied.
+  /// Lends memory that stays as it is until the pieces are used. What is written from it is not
+  /// copied.
   void lend(const void* data, std::size_t size);
 
   void write(std::uint64_t at, const char* data, std::size_t size);
   void read(std::uint64_t at, char* data, std::size_t size) const;
 
-  /// Where what was written ends.
+  /// The end of what was written.
   [[nodiscard]] std::uint64_t end() const { return end_; }
   /// The first `size` bytes; those that were never written are zero.
   [[nodiscard]] std::vector<std::string_view> all(std::uint64_t size) const;
@@ -52,8 +53,8 @@ class Pieces {
   std::uint64_t end_ = 0;
 };
 
-/// An open HDF5 file that lies in memory. HDF5 never writes to a disk itself: what fails there (a
-/// full disk) it does not survive in good order.
+/// An open HDF5 file that lies in memory. HDF5 itself never writes to a disk: after an error of the
+/// disk (when it is full) HDF5 is no longer in good order.
 class MemoryFile {
  public:
   /// An empty file.
@@ -66,13 +67,14 @@ class MemoryFile {
   /// See Pieces::lend().
   void lend(const void* data, std::size_t size) { contents_->pieces.lend(data, size); }
 
-  /// Closes the file: what it has become. It is there as long as this and what was lent.
+  /// Closes the file and returns its bytes. They are valid as long as this object and what was
+  /// lent.
   [[nodiscard]] std::vector<std::string_view> finish();
 
-  /// What HDF5's driver of the file works on.
+  /// What the driver of HDF5 for this file works on.
   struct Contents {
     Pieces pieces;
-    std::uint64_t size = 0;  // of the file, as HDF5 has it
+    std::uint64_t size = 0;  // of the file, as HDF5 knows it
   };
 
  private:

@@ -1,4 +1,4 @@
-// Problems as files have them, without validation and without copies: for the C interface.
+// Problems as files have them, without validation and without copies. The C interface uses them.
 #pragma once
 
 #include <algorithm>
@@ -19,24 +19,24 @@
 
 namespace fclib {
 
-/// The value of a text that a file does not have, where it is read raw; writing it without
-/// validation leaves it out. No text of a file can hold a NUL.
+/// The value of a text that a file does not have, if it is read raw. A write without validation
+/// leaves such a text out. No text of a file can hold a NUL.
 inline const std::string absent_text(1, '\0');
-/// The same where not even the group of the texts is there.
+/// The same if not even the group of the texts is there.
 inline const std::string absent_group(2, '\0');
 
-/// The storages of a matrix as files and C structs number them in `nz`; from 0 on it is the number
-/// of triplets.
+/// The storages of a matrix as files and C structs number them in `nz`. A number from 0 on is the
+/// number of triplets.
 constexpr Index nz_csc = -1;
 constexpr Index nz_csr = -2;
 constexpr Index nz_dense = -3;
 
-/// Numbers in memory from malloc, which C code takes over as it is.
+/// Numbers in memory from malloc. C code takes them over as they are.
 template <class Number>
 class MallocArray {
  public:
   MallocArray() = default;
-  /// Not set to zero. There is memory even for no number.
+  /// Not set to zero. There is memory even for zero numbers.
   explicit MallocArray(std::size_t size)
       : data_(static_cast<Number*>(std::malloc(std::max<std::size_t>(size, 1) * sizeof(Number)))),
         size_(size) {
@@ -45,9 +45,9 @@ class MallocArray {
   [[nodiscard]] Number* data() { return data_.get(); }
   [[nodiscard]] std::size_t size() const { return size_; }
   Number& operator[](std::size_t k) { return data_.get()[k]; }
-  /// Forgets what is beyond `size`, which is no more than there is.
+  /// Drops what is beyond `size`, which is at most the present size.
   void shorten(std::size_t size) { size_ = size; }
-  /// The memory is the caller's, to be freed.
+  /// Gives the memory to the caller, who frees it.
   Number* release() { return data_.release(); }
 
  private:
@@ -58,8 +58,8 @@ class MallocArray {
   std::size_t size_ = 0;
 };
 
-/// A matrix as a file has it: as Matrix, but i and x may go on after the last entry, since nzmax
-/// leaves room there.
+/// A matrix as a file has it. It is like Matrix, but i and x may be longer than the entries, since
+/// nzmax leaves room there.
 struct RawMatrix {
   Storage storage = Storage::csr;
   Index rows = 0;
@@ -78,7 +78,7 @@ auto malloc_copy(const Numbers& values) {
   return copy;
 }
 
-/// A matrix of the core's as one of a file.
+/// A matrix of the core as a matrix of a file.
 inline RawMatrix raw_copy(const Matrix& a) {
   RawMatrix raw{.storage = a.storage,
                 .rows = a.rows,
@@ -94,7 +94,7 @@ inline RawMatrix raw_copy(const Matrix& a) {
   return raw;
 }
 
-/// A problem as a file has it: its arrays have the lengths that the matrices declare, nothing else
+/// A problem as a file has it. Its arrays have the lengths that the matrices declare; nothing else
 /// is checked.
 struct RawProblem {
   struct Member {
@@ -102,10 +102,10 @@ struct RawProblem {
     std::variant<Index, RawMatrix, MallocArray<double>> value;
   };
   std::vector<Member> members;  ///< those that the file has
-  ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
+  ProblemInfo info;             ///< its texts may be absent_text, or all absent_group
 };
 
-/// A matrix in memory of others, as it is to be written.
+/// A matrix in memory of others, as it will be written.
 struct RawMatrixView {
   Storage storage = Storage::csr;
   Index rows = 0;
@@ -119,7 +119,7 @@ struct RawMatrixView {
   [[nodiscard]] bool absent() const { return rows == 0 && cols == 0 && x.empty() && p.empty(); }
 };
 
-/// A problem in memory of others, as it is to be written.
+/// A problem in memory of others, as it will be written.
 struct ProblemView {
   struct Member {
     std::string_view name;  ///< of the field
@@ -127,11 +127,11 @@ struct ProblemView {
   };
   std::string kind;
   std::vector<Member> members;  ///< those that are written, in the order of the fields
-  ProblemInfo info;             ///< of texts that may be absent_text, or all absent_group
+  ProblemInfo info;             ///< its texts may be absent_text, or all absent_group
   GeometryPointer geometry;
 };
 
-/// The problem of this kind, without validation, and without a copy of its arrays.
+/// The problem of this kind, without validation and without a copy of its arrays.
 RawProblem read_raw_problem(const std::string& path, std::string_view kind);
 
 }  // namespace fclib

@@ -17,7 +17,7 @@ using namespace hdf5;
 
 namespace {
 
-/// Lines of what was left out, each with its place.
+/// Lines about what was left out, each with its place.
 using LeftOut = std::vector<std::string>;
 
 template <class Values>
@@ -33,8 +33,8 @@ void shorten(Values& values, std::size_t length, const std::string& where) {
   }
 }
 
-/// The matrix of which a file may have one triangle: the attribute of the public contact-scene-v1
-/// packages says so.
+/// The matrix of which a file may have one triangle. The attribute of the public contact-scene-v1
+/// packages tells.
 constexpr const char* packed_mark = "symmetric_packed";
 
 bool is_packed(const Group& group) {
@@ -53,7 +53,7 @@ bool is_packed(const Group& group) {
   return value == 1;
 }
 
-/// Runs the read of a thing that a problem can do without. What cannot be read is left out.
+/// Runs a read that a problem can do without. If it fails, the thing is left out.
 template <class Read>
 void read_if_possible(LeftOut* left_out, const Read& read) {
   try {
@@ -87,7 +87,8 @@ std::span<const double> span_of(Values& values) {
   return {values.data(), values.size()};
 }
 
-/// Notes entries that no pointer and no count names. CSparse has such room, with anything in it.
+/// Notes entries that no pointer and no count refers to. CSparse has such room, with anything in
+/// it.
 void note_uncounted(const std::vector<double>& x, std::size_t counted, const Group& group,
                     LeftOut* left_out) {
   if (left_out == nullptr || counted >= x.size()) return;
@@ -129,7 +130,7 @@ A read_matrix(const Group& parent, const std::string& name, LeftOut* left_out) {
     auto entries = static_cast<std::size_t>(std::max(nz, 0));
     if (nz >= 0) {
       a.storage = Storage::triplet;
-      // CSparse has room in x alone: 3.1 writes as many places as are counted
+      // CSparse has such room in x only: 3.1 writes as many indices as are counted
       if (a.p.size() > 0) require_counted(span_of(a.x), entries, group.child("nz"));
       shorten(a.p, entries, group.child("p"));
     } else {
@@ -161,7 +162,7 @@ A read_matrix(const Group& parent, const std::string& name, LeftOut* left_out) {
   return a;
 }
 
-/// `otherwise` is the value of a text that is not there, `groupless` that of all without the group.
+/// `otherwise` is the value of a missing text, `groupless` that of all texts if there is no group.
 ProblemInfo read_info(const Group& parent, const std::string& otherwise,
                       const std::string& groupless, LeftOut* left_out) {
   ProblemInfo info{groupless, groupless, groupless};
@@ -227,7 +228,7 @@ RawProblem read_raw_fields(const Group& root) {
                            });
   raw.info = read_info(group, absent_text, absent_group, nullptr);
 
-  // vectors have the lengths that the matrices give them
+  // the matrices give the lengths of the vectors
   require_contacts(outline, contacts);
   for_each_field<P>([&]<class Member>(const Field<P, Member>& field) {
     if constexpr (std::is_same_v<Member, Vector>) {
@@ -256,7 +257,7 @@ Solution read_solution_group(const Group& parent, const std::string& name) {
   return solution;
 }
 
-/// The kind of problem to read: the one asked for, or the only one there is.
+/// The kind of problem to read: the one that was asked for, or the only one in the file.
 std::string kind_to_read(const Group& root, std::string_view asked) {
   const std::string name(asked);
   bool found = false;
@@ -293,7 +294,7 @@ std::vector<std::string> read_left_out(const std::string& path) {
     for (const Numbered& list : {guesses_list, solutions_list}) {
       read_if_possible(&left_out, [&] { static_cast<void>(count_of(root, list)); });
     }
-    // several problems have one geometry
+    // several problems share one geometry
     std::vector<std::string> once;
     for (std::string& words : left_out) {
       if (std::find(once.begin(), once.end(), words) == once.end())

@@ -15,32 +15,34 @@ struct Contents {
   std::vector<std::string> kinds;  ///< "local", "global", ...
   bool solution = false;
   Index guesses = 0;    ///< how many
-  Index solutions = 0;  ///< known ones, beside the one in /solution
+  Index solutions = 0;  ///< known solutions, besides the one in /solution
 };
 
 Contents read_contents(const std::string& path);
 
-/// What a file has beside its problems that cannot be read, such as a title of another type, and
-/// why. The reads below leave it out. Throws where a problem cannot be read.
+/// What a file has besides its problems that cannot be read, such as a title of another type, and
+/// why. The reads below leave it out. Throws if a problem cannot be read.
 std::vector<std::string> read_left_out(const std::string& path);
 
-/// The problem in the file, validated. What it can do without is left out where it cannot be read.
-/// `kind` chooses where there are several.
+/// The problem in the file, validated. If something that is not essential cannot be read, it is
+/// left out. `kind` chooses if there are several problems.
 Problem read_problem(const std::string& path, std::string_view kind = {});
 
-/// The problem that the solution and the guesses of the file belong to, its sizes alone: matrices
-/// have no entries, mu is zero. It is the global one where there are several, as in libfclib 3.1.
+/// The problem that the solution and the guesses of the file belong to, but only its sizes:
+/// matrices have no entries, mu is zero. If there are several problems it is the global one, as in
+/// libfclib 3.1.
 Problem read_outline(const std::string& path);
 
-/// The stored solution, or nothing where the file has none. Its sizes are not checked against a
-/// problem: merit() and solve() do. Where there is one, `outline` (or null) becomes that of its
-/// problem, as read_outline() has it, of the file as it was then: others may replace it.
+/// The stored solution, or nothing if the file has none. Its sizes are not checked against a
+/// problem; merit() and solve() do that. If there is a solution and `outline` is not null, it
+/// becomes the outline of its problem, as read_outline() would give it, from the same state of the
+/// file: another program may replace the file meanwhile.
 std::optional<Solution> read_solution(const std::string& path, Problem* outline = nullptr);
 
-/// The stored guesses, as read_solution.
+/// The stored guesses, read like read_solution.
 std::vector<Solution> read_guesses(const std::string& path, Problem* outline = nullptr);
 
-/// All solutions that are known of the problem, where it has several.
+/// All known solutions of the problem, if the file has several.
 std::vector<Solution> read_solutions(const std::string& path);
 
 }  // namespace fclib

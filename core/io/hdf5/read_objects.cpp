@@ -22,7 +22,7 @@ hsize_t size_of_file_with(hid_t object) {
   return size;
 }
 
-/// What a dataset takes in its file, in bytes.
+/// The bytes that a dataset takes in its file.
 double stored_bytes(hid_t dataset) {
   return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
 }
@@ -46,8 +46,9 @@ Handle properties_of(hid_t dataset, const std::string& path) {
   return properties;
 }
 
-/// Throws where HDF5 would ask for much more memory than the file has data, for chunks that are too
-/// many or too large; and where it would unpack data by filters that trust what they read.
+/// Throws if HDF5 would ask for much more memory than the file has data, because there are too many
+/// chunks or too large ones. Also throws if HDF5 would unpack data by filters that trust what they
+/// read.
 void require_chunks(const Handle& properties, hid_t dataset, double entries, double entry_size,
                     const std::string& path) {
   if (!properties.ok() || H5Pget_layout(properties.id()) != H5D_CHUNKED) return;
@@ -72,7 +73,7 @@ void require_chunks(const Handle& properties, hid_t dataset, double entries, dou
   }
 }
 
-/// How many chunks a dataset needs for all its entries.
+/// The number of chunks that a dataset needs for all its entries.
 double chunks_needed(const Handle& properties, const Handle& space) {
   hsize_t chunk[H5S_MAX_RANK] = {};
   hsize_t extent[H5S_MAX_RANK] = {};
@@ -85,7 +86,7 @@ double chunks_needed(const Handle& properties, const Handle& space) {
   return count;
 }
 
-/// Whether the file has no room for a dataset that has entries, and properties.
+/// Whether a dataset has entries and properties but no room in the file.
 bool is_unwritten(const Handle& dataset, const Handle& properties, std::size_t size) {
   H5D_space_status_t status = H5D_SPACE_STATUS_ERROR;
   return size > 0 && H5Pget_layout(properties.id()) != H5D_COMPACT &&
@@ -93,7 +94,7 @@ bool is_unwritten(const Handle& dataset, const Handle& properties, std::size_t s
          status == H5D_SPACE_STATUS_NOT_ALLOCATED;
 }
 
-/// Throws where entries were declared and never written: HDF5 would read its fill value for them.
+/// Throws if entries were declared and never written: HDF5 would read its fill value for them.
 void require_written(const Handle& dataset, const Handle& properties, const Handle& space,
                      std::size_t size, const std::string& path) {
   if (size == 0 || !properties.ok()) return;
@@ -110,7 +111,7 @@ void require_written(const Handle& dataset, const Handle& properties, const Hand
 #endif
 }
 
-/// How many entries a dataset has.
+/// The number of entries of a dataset.
 std::size_t size_of(const Handle& space, const std::string& path) {
   const hssize_t points = H5Sget_simple_extent_npoints(space.id());
   if (points < 0) fail(path, "has no size");
@@ -201,7 +202,7 @@ void read_into(const Numbers& dataset, std::int32_t* values) {
     read_as(dataset, H5T_NATIVE_INT32, values);
     return;
   }
-  // HDF5 would clip what does not fit, and cut what is no integer
+  // HDF5 would clip numbers that do not fit, and cut numbers that are not integers
   if (dataset.real) {
     std::vector<double> wide(dataset.size);
     read_into(dataset, wide.data());

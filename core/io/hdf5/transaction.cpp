@@ -17,7 +17,7 @@ MemoryFile copy_of(const std::string& path) {
   try {
     return MemoryFile(read_file(path));
   } catch (const Error&) {
-    const Handle file = open_file(path);  // says best what is wrong with it
+    const Handle file = open_file(path);  // its errors are the most precise
     throw;
   }
 }

@@ -1,4 +1,4 @@
-// A change of a whole file: all of it comes to the disk, or none.
+// A change of a whole file: either all of it reaches the disk, or nothing.
 #pragma once
 
 #include <functional>
@@ -12,9 +12,9 @@ namespace fclib::hdf5 {
 enum class Start { existing, empty, existing_or_empty };
 
 /// Changes a file: change(root) writes into a copy, which then takes the place of the file. Changes
-/// of one file take turns. `compression` is the level of deflate; see replace_file() for `sync`.
-/// Where all_goes(root) holds of what is there, the copy is an empty file: HDF5 would leave a hole
-/// for what is deleted.
+/// of one file take turns. `compression` is the level of deflate; see replace_file() for `sync`. If
+/// all_goes(root) is true for the old file, the copy starts empty: HDF5 would leave a hole for what
+/// is deleted.
 void change_file(const std::string& path, Start start, int compression,
                  const std::function<void(const Target& root)>& change,
                  const std::function<bool(const Group& root)>& all_goes = {}, bool sync = true);

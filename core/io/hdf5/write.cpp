@@ -18,7 +18,7 @@ using namespace hdf5;
 
 namespace {
 
-/// A text that its file did not have stays away.
+/// A text that its file did not have is not written.
 void write_text_if_there(const Target& group, const std::string& name, const std::string& text) {
   if (text != absent_text && text != absent_group) write_text(group, name, text);
 }
@@ -67,7 +67,7 @@ void write_matrix(const Target& parent, const std::string& name, const RawMatrix
   }
 }
 
-/// The problem as it is written; `kept` has the matrices that were converted for that.
+/// The problem as it is written. `kept` holds the matrices that were converted for that.
 template <class P>
 ProblemView view_of(const P& problem, const WriteOptions& options, std::list<Matrix>& kept) {
   const bool as_given = !options.validate;
@@ -135,15 +135,14 @@ void write_solution_group(const Target& parent, const std::string& name, const S
   });
 }
 
-/// Makes room for what is to be written: where something is there already, it goes, or that is an
-/// error.
+/// Makes room for a new object: one that is there already is removed, or that is an error.
 void make_room(const Group& root, const std::string& name, bool replace) {
   if (!root.has(name)) return;
   if (!replace) fail(root.child(name), "is in the file already, and is not to be replaced");
   check(H5Ldelete(root.id, name.c_str(), H5P_DEFAULT), root.child(name));
 }
 
-/// Numbers `first` and the following ones of a list.
+/// `first` and the following numbers of a list.
 void write_from(const Target& group, const Numbered& list, std::size_t first,
                 const std::vector<Solution>& values) {
   for (std::size_t k = 0; k < values.size(); ++k) {
@@ -152,8 +151,8 @@ void write_from(const Target& group, const Numbered& list, std::size_t first,
   write_number(group, list.count, static_cast<Index>(first - 1 + values.size()));
 }
 
-/// Throws where a problem that was added is the one that a solution or a guess now belongs to,
-/// though it was written for another; or where it is not, though they are its own.
+/// Throws if an added problem takes over a solution or a guess that was written for another one, or
+/// if it loses its own to another.
 void require_owner(const Group& root, const std::string& kind, bool owned_before, bool brings) {
   const bool others = root.has("solution") || root.has("guesses") || root.has("solutions");
   const bool owner = owner_of(kinds_of(root)) == kind;
@@ -172,7 +171,7 @@ herr_t stop_at_foreign(hid_t, const char* name, const H5A_info_t*, void*) {
   return known == "format" || known == "generator" ? 0 : 1;
 }
 
-/// Whether a file has nothing but a problem of this kind and what goes with it.
+/// Whether a file has nothing but a problem of this kind and what belongs to it.
 bool has_nothing_but(const Group& root, const std::string& kind) {
   hsize_t known = 0;
   for (const std::string& name : {"fclib_" + kind, std::string("solution"), std::string("guesses"),
@@ -194,7 +193,7 @@ void write_view(const std::string& path, const ProblemView& problem, const Solut
     const bool owned = before.empty() || owner_of(before) == kind;
     if (root.has(group)) {
       make_room(root, group, options.replace);
-      // those of another problem stay
+      // the solution and guesses of another problem stay
       if (owned) make_room(root, "solution", options.replace);
       if (owned) make_room(root, "guesses", options.replace);
       if (owned) make_room(root, "solutions", options.replace);
@@ -290,7 +289,7 @@ void write_guesses(const std::string& path, const std::vector<Solution>& guesses
       write_from(target, guesses_list, static_cast<std::size_t>(there) + 1, guesses);
       return;
     }
-    // an empty group is no reason to refuse
+    // an empty group is not in the way
     make_room(root, "guesses", options.replace || options.append);
     write_from(NewGroup(root, "guesses").target(), guesses_list, 1, guesses);
   });

@@ -16,17 +16,17 @@ namespace fclib::hdf5 {
 
 namespace {
 
-/// Smaller datasets are not worth a chunk and a filter.
+/// For a smaller dataset, a chunk and a filter do not pay.
 constexpr std::size_t chunked_from = 64;
-/// What a reader's cache of one dataset holds, by HDF5's default.
+/// The size of a reader's cache for one dataset, by HDF5's default.
 constexpr std::size_t chunk_bytes = std::size_t{1} << 20;
-/// What the index of a dataset in chunks takes, in bytes.
+/// The bytes that the index of a dataset in chunks takes.
 constexpr std::size_t index_bytes = 254;
-/// What the filter of an array is found by.
+/// The number of entries from which the filter of an array is chosen.
 constexpr std::size_t sample_entries = std::size_t{1} << 12;
-/// Datasets up to this many bytes lie in their own header.
+/// Datasets up to this many bytes are in their own header.
 constexpr std::size_t compact_bytes = 4096;
-/// Groups of up to this many members keep them in their own header: all of ours do.
+/// Groups of up to this many members keep them in their own header. All of ours do.
 constexpr unsigned compact_links = 32;
 
 /// The ways to store an array.
@@ -67,9 +67,10 @@ void write_all(const Handle& dataset, const Array& array, const std::string& pat
   check(H5Dwrite(dataset.id(), array.memory, H5S_ALL, H5S_ALL, H5P_DEFAULT, array.data), path);
 }
 
-/// How many of these doubles differ from all others.
+/// How many different values these doubles have.
 std::size_t distinct(const double* values, std::size_t size) {
-  // a table with a place for each, at most half full; 0 stands for nothing, and is counted apart
+  // a table with a place for each value, at most half full; 0 marks an empty place and is counted
+  // apart
   std::vector<std::uint64_t> table(2 * std::bit_ceil(size));
   std::size_t count = 0;
   bool zero = false;
@@ -89,8 +90,8 @@ std::size_t distinct(const double* values, std::size_t size) {
   return count + (zero ? 1 : 0);
 }
 
-/// The bytes that doubles take byte by byte, each in the bits that its frequency among those of its
-/// place asks for.
+/// The bytes that doubles take byte by byte: each byte takes the bits that follow from its
+/// frequency among the bytes at its place.
 double bytes_by_planes(const double* values, std::size_t size) {
   std::array<std::array<std::uint32_t, 256>, sizeof(double)> counts{};
   const auto* bytes = reinterpret_cast<const unsigned char*>(values);
@@ -109,10 +110,10 @@ double bytes_by_planes(const double* values, std::size_t size) {
   return bits / 8;
 }
 
-/// The filter that makes an array small, by the part that deflate is likely to leave of doubles,
-/// told from their beginning. Shuffling gathers the bytes that numbers of one size share, but hides
-/// numbers that come again: these deflate finds, at one to two bytes each. Indices are shuffled.
-/// (Against a trial of both: 0.7 % more bytes in the collection.)
+/// The filter that makes an array small. For doubles, it predicts what deflate will leave, from
+/// their first entries. Shuffling gathers the bytes that numbers of one size share, but it hides
+/// repeated numbers. Without shuffling, deflate finds those, at one to two bytes each. Indices are
+/// always shuffled. (A trial of both would save 0.7 % of the bytes of the collection.)
 Filter likely_filter(const Array& array) {
   if (H5Tget_size(array.stored) != sizeof(double)) return Filter::shuffle_and_deflate;
   const auto* values = static_cast<const double*>(array.data);
@@ -127,7 +128,7 @@ Filter likely_filter(const Array& array) {
   return plain < shuffled ? Filter::deflate : Filter::shuffle_and_deflate;
 }
 
-/// How an array is packed, and what that makes of it.
+/// How an array is packed, and the packed bytes.
 struct Packed {
   struct Chunk {
     std::string bytes;
@@ -137,7 +138,7 @@ struct Packed {
   std::vector<Chunk> chunks;  // none: HDF5 makes them, or there is no filter
 };
 
-/// The numbers of a chunk of an array.
+/// How many numbers of an array are in a chunk.
 hsize_t chunk_of(const Array& array) { return std::min(array.size, chunk_bytes / array.width()); }
 
 bool pack_array(const Array& array, Filter filter, int level, const TakeChunk& take) {
@@ -145,14 +146,14 @@ bool pack_array(const Array& array, Filter filter, int level, const TakeChunk& t
               {chunk_of(array), filter == Filter::shuffle_and_deflate}, level, take);
 }
 
-/// What arrays were packed to lately. The files of a sequence have many in common, the shapes of
-/// bodies and the patterns of matrices; the two forms of a problem all that is of its contacts.
+/// The last packed arrays. The files of a sequence share many of them: the shapes of bodies and the
+/// patterns of matrices. The two forms of a problem share all that describes its contacts.
 class Recent {
  public:
   static constexpr std::size_t most_bytes = std::size_t{1} << 23;
-  static constexpr std::size_t largest = most_bytes / 4;  // of an array
+  static constexpr std::size_t largest = most_bytes / 4;  // bytes of an array that is kept
 
-  /// It stays until the next call.
+  /// The result stays until the next call.
   const Packed& of(const Array& array, int level) {
     const std::size_t bytes = array.bytes();
     const auto* data = static_cast<const char*>(array.data);
@@ -186,7 +187,7 @@ class Recent {
   };
   static constexpr std::size_t most_arrays = 128;
 
-  /// A hash of some of the bytes, which tells most arrays apart.
+  /// A hash of some of the bytes. It distinguishes most arrays.
   static std::size_t sampled(const char* data, std::size_t bytes) {
     constexpr std::size_t samples = 64;
     const std::size_t words = bytes / sizeof(std::uint64_t);
@@ -205,13 +206,13 @@ class Recent {
   std::size_t bytes_ = 0;   // of the arrays
 };
 
-/// Under the library's lock, as all of this is.
+/// Used under the library's lock, like everything here.
 Recent& recent() {
   static Recent made;
   return made;
 }
 
-/// A new dataset in chunks; `fill` writes them by its function, or says that HDF5 is to.
+/// A new dataset in chunks. `fill` writes them by its function, or returns that HDF5 must.
 template <class Fill>
 void write_packed(const Target& group, const std::string& name, const Array& array, Filter filter,
                   const Fill& fill) {
@@ -229,7 +230,7 @@ void write_packed(const Target& group, const std::string& name, const Array& arr
   if (!fill(write)) write_all(dataset, array, group.child(name));
 }
 
-/// Whether an array was written in chunks: one that filters make smaller.
+/// Writes an array in chunks if filters make it smaller. Returns whether it did.
 bool write_smaller(const Target& group, const std::string& name, const Array& array) {
   const int level = group.style->compression;
   if (array.size < chunked_from || level == 0) return false;

@@ -1,4 +1,5 @@
-// Groups, datasets and attributes, written as small as HDF5 can, and to the same bytes each time.
+// Groups, datasets and attributes, as small as HDF5 can write them, and with the same bytes each
+// time.
 #pragma once
 
 #include <cstdint>
@@ -9,10 +10,10 @@
 
 namespace fclib::hdf5 {
 
-/// How a whole file is written. The properties are made once: HDF5 takes longer to make them than
+/// How a whole file is written. The properties are made once: HDF5 needs longer to make them than
 /// to write a number.
 struct Style {
-  /// `lend` is told of numbers that stay where they are until the file is written.
+  /// `lend` gets numbers that stay where they are until the file is written.
   Style(int compression, std::function<void(const void* data, std::size_t size)> lend);
 
   int compression;
@@ -21,20 +22,20 @@ struct Style {
   Handle plain;     ///< a dataset in one piece
   Handle compact;   ///< a dataset in its own header
   Handle deflated;  ///< a dataset in chunks, whose size is set for each
-  Handle shuffled;  ///< the same, shuffled before
+  Handle shuffled;  ///< the same, shuffled first
 };
 
-/// A group to write into, and how.
+/// A group to write into, and how to write.
 struct Target : Group {
   const Style* style = nullptr;
 };
 
-/// What makes small groups small, for the properties of a group or of a file.
+/// What makes small groups small; for the properties of a group or of a file.
 void keep_small(hid_t properties);
 
 Handle create_group(const Target& parent, const std::string& name);
 
-/// A new group inside another, written alike.
+/// A new group inside another one, written in the same way.
 class NewGroup {
  public:
   NewGroup(const Target& parent, const std::string& name)
@@ -52,13 +53,13 @@ void write_numbers(const Target& group, const std::string& name, const double* v
 void write_numbers(const Target& group, const std::string& name, const std::int32_t* values,
                    std::size_t size);
 
-/// Values is any vector of doubles or of integers of 32 bits.
+/// Values is any vector of doubles or of 32-bit integers.
 template <class Values>
 void write_numbers(const Target& group, const std::string& name, const Values& values) {
   write_numbers(group, name, values.data(), static_cast<std::size_t>(values.size()));
 }
 
-/// The same of values that stay where they are until the file is written: they are not copied.
+/// The same for values that stay where they are until the file is written. They are not copied.
 template <class Values>
 void write_lasting(const Target& group, const std::string& name, const Values& values) {
   group.style->lend(values.data(), static_cast<std::size_t>(values.size()) * sizeof *values.data());

@@ -40,7 +40,7 @@ std::vector<Layout> layouts();
 
 bool has_dimension(const Layout& layout, Index d);
 
-/// The layout of a kind; nothing where the kind is not given.
+/// The layout of a kind, or nothing if the kind is not given.
 std::optional<Layout> layout_of(std::string_view kind);
 
 }  // namespace fclib::siconos

@@ -15,7 +15,7 @@ namespace {
 
 void read_numbers(Words& in, Count count, What what, std::vector<double>& values) {
   in.require_room(count, 2, what);
-  // an exact reserve for each of many blocks would copy all that is there each time
+  // if each of many blocks reserved exactly, it would copy all the earlier ones each time
   if (values.empty()) values.reserve(static_cast<std::size_t>(count));
   for (Count k = 0; k < count; ++k) values.push_back(in.number(what));
 }
@@ -35,7 +35,7 @@ Matrix read_dense(Words& in, Index rows, Index cols, What what) {
   return a;
 }
 
-/// Where the blocks of one side start: 0, then the cumulated sizes of the file.
+/// The start of each block of one side: 0, then the cumulated sizes of the file.
 std::vector<Index> read_block_starts(Words& in, Index blocks, Index size, What what) {
   in.require_room(blocks, 2, what);
   std::vector<Index> starts{0};
@@ -54,7 +54,7 @@ Matrix read_blocks(Words& in, Index rows, Index cols, What what) {
   const std::vector<Index> row_starts = read_block_starts(in, block_rows, rows, what);
   const std::vector<Index> col_starts = read_block_starts(in, block_cols, cols, what);
 
-  // rows of blocks after the last one that is not empty have no pointer
+  // rows of blocks after the last non-empty one have no pointer
   const Index pointer_count = in.integer(what, count > 0 ? 2 : 0, Count{block_rows} + 1);
   const Index listed = in.integer(what, count, count);
   in.require_room(Count{pointer_count} + listed, 2, what);
@@ -147,7 +147,7 @@ Matrix read_sparse(Words& in, Index rows, Index cols, What what) {
     return a;
   }
 
-  // by rows, "col" numbers a row
+  // if it is by rows, "col" numbers a row
   a.storage = origin == origin_csc ? Storage::csc : Storage::csr;
   const Index outer = origin == origin_csc ? cols : rows;
   const Index inner = origin == origin_csc ? rows : cols;
@@ -175,11 +175,11 @@ Matrix read_sparse(Words& in, Index rows, Index cols, What what) {
   return a;
 }
 
-/// A matrix; `rows` and `cols` are its expected sizes, or -1. Blocks are left as triplets.
+/// A matrix. `rows` and `cols` are its expected sizes, or -1. Blocks become triplets.
 struct ReadMatrix {
   Matrix matrix;
   bool blocks = false;
-  Count line = 1;  // of its sizes
+  Count line = 1;  // the line of its sizes
 };
 
 ReadMatrix read_matrix(Words& in, What what, Index expected_rows, Index expected_cols) {
@@ -196,7 +196,7 @@ ReadMatrix read_matrix(Words& in, What what, Index expected_rows, Index expected
   const Index cols = in.integer(sizes, 0, largest_index);
   require(cols, expected_cols, "columns");
   const Count line = in.line();
-  // a vector of each of these lengths follows: a file cannot announce more than it has room for
+  // a vector of each of these lengths follows, so a file cannot announce more than it has room for
   in.require_room(rows, 2, what);
   in.require_room(cols, 2, what);
   ReadMatrix result{.matrix = {}, .blocks = storage == text_blocks, .line = line};
@@ -206,7 +206,7 @@ ReadMatrix read_matrix(Words& in, What what, Index expected_rows, Index expected
   return result;
 }
 
-/// Whether a matrix may start here: three integers, the first a storage.
+/// Whether a matrix may start here: three integers, the first of which is a storage.
 bool may_be_matrix(Words in) {
   try {
     in.integer("", text_dense, text_sparse);
@@ -221,13 +221,13 @@ bool may_be_matrix(Words in) {
 /// The integer at the end of old files.
 bool is_flag(std::string_view word) { return word == "0" || word == "1"; }
 
-/// What a text may be at the sight of its first matrix, and, where d = 3 leaves open whether it
-/// rolls, of how many words follow what both have.
+/// What kinds a text may be, judged by its first matrix. If d = 3 does not tell whether it rolls,
+/// also how many words follow the part that both kinds have.
 Layout detect(const Words& in, Index d, Index nc, const ReadMatrix& first) {
   const Count m = Count{d} * nc;
   const Matrix& a = first.matrix;
   const bool fits = a.rows == m && a.cols == m;
-  // the vectors of a local problem, two coefficients a contact at most, and the flag
+  // the vectors of a local problem, at most two coefficients for each contact, and the flag
   const Count longest_local = m + 2 * Count{nc} + 1;
   const bool global =
       may_be_matrix(in) && (!fits || in.words_left(longest_local + 1) > longest_local);
@@ -298,7 +298,7 @@ P read_fields(Words& in, Index d, Index nc, ReadMatrix first) {
       }
     }
   });
-  // now the file is known to hold as many numbers as its sizes say
+  // from here on the file is known to hold as many numbers as its sizes say
   for (auto& [member, read] : matrices) {
     problem.*member = read.blocks ? converted(read.matrix, Storage::csr) : std::move(read.matrix);
   }

@@ -13,9 +13,9 @@
 //                 "row col : x" lines, or for each column "col J : locations A to B" and its
 //                 "row : x" lines
 //
-// The format does not say which formulation it holds: the sizes do. Old files end with one more
-// integer, 0 or 1 (whether A is symmetric), which is passed over. Siconos prints sparse entries
-// with six digits; here every number is written with as many as it takes to read it back equal.
+// The format does not say which formulation it holds, but its sizes tell. Old files end with one
+// more integer, 0 or 1 (whether A is symmetric), which is ignored. Siconos prints sparse entries
+// with six digits. Here every number has as many digits as it needs to be read back equal.
 #pragma once
 
 #include <string>
@@ -25,21 +25,21 @@
 
 namespace fclib {
 
-/// The problem in a text file, validated; its title is the name of the file. Dense and sparse
-/// matrices keep their storage, blocks are read by rows (CSR). `kind` ("local", "global_rolling")
-/// says what the file holds where its sizes should not decide.
-/// Throws Error (file) that names the file and the line, or Error (problem) as validate() does.
+/// The problem in a text file, validated. Its title is the name of the file. Dense and sparse
+/// matrices keep their storage; blocks are read by rows (CSR). `kind` ("local", "global_rolling")
+/// says what the file holds; without it the sizes decide. Throws Error (file) that names the file
+/// and the line, or Error (problem) like validate().
 Problem read_siconos(const std::string& path, std::string_view kind = {});
 
-/// The same of a text in memory, without a title and a file's name in messages.
+/// The same for a text in memory. It has no title, and messages name no file.
 Problem parse_siconos(std::string_view text, std::string_view kind = {});
 
-/// Writes a text file, or replaces the old one whole, atomically. Each matrix keeps its storage;
-/// one by rows, which Siconos has no sparse text for, is written in blocks of d x d where its sides
-/// are those of the contacts (W), by columns elsewhere. Duplicates are added up, and blocks on the
-/// diagonal are written even where they are zero: Siconos looks for them.
-/// Throws Error (unsuitable) where the problem has bilateral constraints, Error (problem) where it
-/// is not valid, Error (file).
+/// Writes a text file, or replaces the old one whole, atomically. Each matrix keeps its storage,
+/// except one by rows, since Siconos has no sparse text for it. If both its sides are those of the
+/// contacts (W), it is written in blocks of d x d, else by columns. Duplicates are added up. Blocks
+/// on the diagonal are written even if they are zero, because Siconos looks for them. Throws Error
+/// (unsuitable) if the problem has bilateral constraints, Error (problem) if it is not valid, and
+/// Error (file).
 void write_siconos(const std::string& path, ProblemPointer problem);
 
 }  // namespace fclib

@@ -11,10 +11,10 @@ namespace fclib::siconos {
 
 using Count = std::int64_t;
 
-/// "W", "the first matrix": what is being read, for messages.
+/// "W", "the first matrix": what is being read now, for messages.
 using What = std::string_view;
 
-/// A text and a place in it. All that is read says in which line it failed.
+/// A text and a position in it. Every error says in which line it was.
 class Words {
  public:
   explicit Words(std::string_view text) : rest_(text) {}
@@ -24,12 +24,12 @@ class Words {
   [[noreturn]] static void fail_at(Count line, const std::string& message);
   [[noreturn]] void fail(const std::string& message) const { fail_at(line_, message); }
 
-  /// Whether nothing follows but white space.
+  /// Whether only white space follows.
   bool at_end();
 
   std::string_view token(What what);
 
-  /// What is left of the line, its end passed over.
+  /// The rest of the line. The position moves past its end.
   std::string_view rest_of_line();
 
   void literal(std::string_view expected, What what);
@@ -42,12 +42,12 @@ class Words {
 
   double number(What what);
 
-  /// Fails where the file is too short for what it announces, before memory is asked for: each
-  /// thing takes `bytes` characters at least. A small number is not worth it: reading on says
-  /// better what is missing.
+  /// Throws if the file is too short for what it announces, before memory is asked for. Each thing
+  /// takes at least `bytes` characters. A small number is not checked: the error of the read itself
+  /// says better what is missing.
   void require_room(Count count, Count bytes, What what) const;
 
-  /// White-space separated words up to the end, at most `most` of them.
+  /// The words up to the end, separated by white space, at most `most` of them.
   [[nodiscard]] Count words_left(Count most) const;
 
  private:

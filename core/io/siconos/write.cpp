@@ -13,7 +13,7 @@ using namespace siconos;
 
 namespace {
 
-/// Puts together a text.
+/// Builds a text.
 class Writer {
  public:
   Writer& operator<<(std::string_view text) {
@@ -21,7 +21,7 @@ class Writer {
     return *this;
   }
   Writer& operator<<(Index value) { return *this << std::to_string(value); }
-  /// As few digits as it takes to read the number back equal.
+  /// The fewest digits that read back as the same number.
   Writer& operator<<(double value) { return *this << shortest(value); }
 
   void line(const double* values, std::size_t size) {
@@ -59,7 +59,7 @@ void write_blocks(Writer& out, const Matrix& a, Index d) {
   std::vector<Index> pointers{0};
   std::vector<Index> block_cols;
   std::vector<double> blocks;
-  std::vector<Index> place(static_cast<std::size_t>(count), -1);  // of a block in its row
+  std::vector<Index> place(static_cast<std::size_t>(count), -1);  // place of a block in its row
   for (Index row = 0; row < count; ++row) {
     const auto first = block_cols.size();
     const Index begin = a.p[static_cast<std::size_t>(row * d)];
@@ -126,7 +126,7 @@ void write_sparse(Writer& out, const Matrix& a) {
   }
 }
 
-/// `block` is the size of a contact where both sides are those of the contacts, 0 elsewhere.
+/// `block` is the size of a contact if both sides are those of the contacts, else 0.
 void write_matrix(Writer& out, const Matrix& a, Index block) {
   const bool blocks = a.storage == Storage::csr && block > 0 && a.rows > 0;
   const bool dense = a.storage == Storage::dense;

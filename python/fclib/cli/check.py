@@ -45,7 +45,7 @@ def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, 
 
 
 def told_of(mismatch: dict[str, Any]) -> str:
-    """The stored number that disagrees with the rest of the solution: which, where, how much."""
+    """The stored number that disagrees with the rest of the solution: name, place, difference."""
     name = f"{mismatch['part']}[{mismatch['index']}] = {mismatch['stored']:.6g}"
     size = f"{abs(mismatch['difference']):.2g}"
     if mismatch["part"] == "l":

@@ -1,4 +1,4 @@
-"""The network of contacts of a problem: bodies, contact points, normals, where they are in space.
+"""The network of contacts of a problem: bodies, contact points, normals, their places in space.
 
 The groups /bodies and /contacts of a file have these. Without them, H gives more than it seems to,
 if bodies are free and rigid: its block of a contact and a body is

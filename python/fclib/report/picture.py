@@ -262,7 +262,7 @@ def eye(solids: Solids) -> Array:
 
 
 def triangles_in(solids: Solids) -> tuple[Array, Any, Any, Any, Any]:
-    """Vertices (v, 3), triangles (t, 3); of each its body, whether it is fixed, and a plane."""
+    """Vertices (v, 3), triangles (t, 3); of each its body, and whether it is fixed or a plane."""
     vertices, triangles, tint, fixed, flat = [], [], [], [], []
     count = 0
     plane = unit(PLANE, 2, 4)[0]

@@ -1,4 +1,4 @@
-"""Pages at an address of this machine: a browser loads modules from there, not from a folder."""
+"""Pages at an address of this machine: from a folder a browser loads no modules."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ class Humanoid:
         return 0.0
 
     def _drive(self, hips: float, places: Sequence[Triple]) -> list[str]:
-        """Motors and a start; hips at a height [m], and where the other free bodies are."""
+        """Motors and a start; hips at a height [m], and the places of the other free bodies."""
         return []
 
     def _bar(self, place: Triple) -> str:

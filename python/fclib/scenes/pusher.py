@@ -127,7 +127,7 @@ class Pusher:
         return 2 * self.arm * (NEAR + (FAR - NEAR) * share)
 
     def _plan(self) -> list[tuple[float, float]]:
-        """Times [s], and the share of its way where the blade is."""
+        """Times [s], and the place of the blade as a share of its way."""
         ahead = [
             (REST + (PUSHED - REST) * k / KEYS, 0.5 - 0.5 * math.cos(math.pi * k / KEYS))
             for k in range(KEYS + 1)

@@ -20,7 +20,7 @@ COUPLER = 1.64
 ROCKER = 1.45
 FOOT = (1.04, -3.74)
 STRIDE = 1.4  # middle of the foot's way, ahead of the crank's pivot
-LIFTED = math.radians(80)  # angle of the crank where the foot is highest
+LIFTED = math.radians(80)  # angle of the crank at which the foot is highest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,7 @@ class Quadruped:
         """The scene; the seed draws the heights of the ground."""
         random = np.random.Generator(np.random.PCG64(seed))
         a = self.crank
-        # where a foot is lowest, over a turn
+        # lowest place of a foot, over a turn
         lowest = min(self._foot(angle)[1] for angle in np.linspace(-math.pi, math.pi, 361).tolist())
         height = self.roughness + self._radius - lowest + 2e-3
         axles, legs, loops, motors = "", "", [], []

@@ -53,15 +53,15 @@ class Scene:
     friction: str = ""  # the law of friction, in words
     # what a picture shows: centre and radius [m]; None: all that moves
     focus: tuple[float, float, float, float] | None = None
-    # where it is seen from: azimuth and elevation [deg]; None: as all others
+    # direction of view: azimuth and elevation [deg]; None: as all others
     view: tuple[float, float] | None = None
-    keyframe: str | None = None  # of the MJCF, where it starts; None: start, home or stand
+    keyframe: str | None = None  # of the MJCF, its start; None: start, home or stand
     ground: float | None = None  # mu of a plane below all at the start; None: there is none
     planar: bool = False  # moves in a plane y = const, contacts have two components
     ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
     # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
     period: tuple[float, float] | None = None
-    path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
+    path: Path | None = None  # path of the MJCF file, if it refers to meshes beside it
     includes: Mapping[str, str] = field(default_factory=dict)  # texts of MJCF files in it, by path
 
     @classmethod
@@ -103,7 +103,7 @@ class Scene:
         floating: bool = False,
         ground: float | None = None,
     ) -> Scene:
-        """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
+        """The scene of an MJCF file, or of a URDF file. OSError if it cannot be read.
 
         Its parameters hold the SHA-256 of the file and of all that it refers to.
 
@@ -113,7 +113,8 @@ class Scene:
             restitution: Newton's coefficient e.
             law: the unilateral law.
             planar: whether it moves in the plane x, z.
-            keyframe: where it starts, by name; None: start, home or stand where there is one.
+            keyframe: name of the keyframe of its start; None: start, home or stand, if there is
+                one.
             packages: folders of the names in package://NAME/... of a URDF file.
             ignore: features that are left out.
             activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
@@ -150,7 +151,7 @@ class Scene:
             ignore=tuple(ignore),
             activation=activation,
             ground=ground,
-            # the text tells all where packages were resolved
+            # if packages were resolved, the text tells all
             path=path if resolved == xml else None,
             includes=includes,
         )
@@ -186,7 +187,7 @@ def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]
 def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) -> str:
     """A URDF text with the folders of its package://NAME/... in their places.
 
-    ValueError where one is not known: by the argument, or as a folder of ROS_PACKAGE_PATH.
+    ValueError if one is known neither from the argument nor as a folder of ROS_PACKAGE_PATH.
     """
     asked = sorted(set(re.findall(r"package://([^/\"'<>]+)", xml)))
     if not asked:
@@ -260,7 +261,7 @@ class Assembled:
         return asdict(self.family)
 
     def problem(self, number: int) -> Any:
-        """Problem 0, 1, ...; the last line of its description is JSON and says where it is from.
+        """Problem 0, 1, ...; the last line of its description is JSON and tells its origin.
 
         Raises:
             ValueError: the number is negative, or there are not so many problems.
@@ -332,11 +333,11 @@ class Assembly(Described, Protocol):
 class Family(Described, Protocol):
     """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
 
-    Where it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
+    If it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
     A published family sets `allowance` to False, since its states were simulated without.
 
-    Where the default scene takes long, `small` holds parameters of a quick one of the kind.
+    If the default scene takes long, `small` holds parameters of a quick one of the kind.
     """
 
     restitution: float
@@ -348,5 +349,5 @@ class Family(Described, Protocol):
 
 
 def parameter(default: Any, unit: str, doc: str) -> Any:
-    """A dataclass field that carries its unit ("1" where it has none) and its meaning."""
+    """A dataclass field that carries its unit ("1" if it has none) and its meaning."""
     return field(default=default, metadata={"unit": unit, "doc": doc})

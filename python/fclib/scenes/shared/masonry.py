@@ -102,7 +102,7 @@ class Masonry:
             corners = [mjcf.numbers(a, side * reach, b) for side in (-1, 1) for a, b in shape]
             mesh = f"{name}.{i}" if i else name
             self.assets.append(f'<mesh name="{mesh}" vertex="{"  ".join(corners)}"/>')
-            # the mesh is drawn where its vertices say
+            # the mesh is drawn at the places of its vertices
             shapes += (
                 f'<geom type="mesh" mesh="{mesh}" condim="3" density="{self.density!r}"'
                 f' friction="{self.mu!r}" material="solid" rgba="{colour}"/>'
@@ -222,7 +222,7 @@ class Arcade:
         for i, (one, other) in enumerate(zip(left, right, strict=True)):
 
             def edge(j: int, one: float | None = one, other: float | None = other) -> Point:
-                """From where to where the masonry goes at the height of corner j."""
+                """The two ends of the masonry at the height of corner j."""
                 return (
                     -self.end if one is None else one + corners[j][0],
                     self.end if other is None else other - corners[j][0],
@@ -263,11 +263,11 @@ class Arcade:
         return [[(-a, b) for a, b in reversed(piece)] for piece in pieces]
 
     def pier(self, i: int) -> tuple[float, float]:
-        """From where to where the pier between arches i and i + 1 goes, x [m]."""
+        """The two ends of the pier between arches i and i + 1, x [m]."""
         return self.centres[i] + self.inner, self.centres[i + 1] - self.inner
 
 
-BACKED = math.radians(50)  # where the backing of a ring ends, above the horizontal
+BACKED = math.radians(50)  # angle above the horizontal at which the backing of a ring ends
 
 
 def on_circle(radius: float, angle: float, centre: Point = (0, 0)) -> Point:
@@ -276,7 +276,7 @@ def on_circle(radius: float, angle: float, centre: Point = (0, 0)) -> Point:
 
 
 def area(outline: Sequence[Point]) -> float:
-    """The area [m^2] of an outline, positive where it runs counterclockwise."""
+    """The area [m^2] of an outline, positive if it runs counterclockwise."""
     total = 0.0
     for (a, b), (c, d) in zip(outline, [*outline[1:], outline[0]], strict=True):
         total += 0.5 * (a * d - b * c)

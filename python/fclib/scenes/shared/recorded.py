@@ -2,7 +2,7 @@
 
 The file is an .npz. `about` is JSON: engine, law, notes, of each field whether it is the engine's
 or follows from a formula, and the problems' digests. `half` has the half edges of the boxes. Of any
-other array the steps come one after another, and `NAME_ends` says where each ends.
+other array the steps come one after another, and `NAME_ends` has the end of each.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Step:
     mu: Vector  # (nc)
     reaction: Vector  # (3 nc) the engine's own [N s]
     velocity: Vector  # (n) the engine's own, after the step
-    # where contacts and boxes are, of engines that tell it
+    # places of contacts and boxes, if the engine gives them
     body: Any = None  # (nc x 2) N points to the second; 0 is the ground
     point: Any = None  # (nc x 3) [m]
     normal: Any = None  # (nc x 3)

@@ -1,7 +1,7 @@
 """Stones laid without mortar, as MJCF: prisms of any convex outline, and supports that move.
 
 Every stone is a mesh: two flat faces touch in the corners of their overlap, also when the joint
-opens about an edge, where the box primitive would change its points.
+opens about an edge. The box primitive would then change its points.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Masonry:
 
         It does not collide with the floor, nor with another support.
 
-        To be set after the stones, whose weight says how strong the drive must be.
+        Set it after the stones: their weight decides the strength of the drive.
         """
         joint = ""
         if speed:

@@ -119,7 +119,7 @@ class FourBar:
 
     @property
     def _radius(self) -> float:
-        """Of all rods [m]."""
+        """The radius of all rods [m]."""
         return 0.1 * self.crank
 
     @property

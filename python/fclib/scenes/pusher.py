@@ -119,11 +119,11 @@ class Pusher:
 
     @property
     def _thickness(self) -> float:
-        """Of the blade [m]."""
+        """The thickness of the blade [m]."""
         return 0.4 * self.edge
 
     def _reach(self, share: float) -> float:
-        """Of the blade from the shoulder [m], a share of its way out."""
+        """The reach of the blade from the shoulder [m], at a share of its way out."""
         return 2 * self.arm * (NEAR + (FAR - NEAR) * share)
 
     def _plan(self) -> list[tuple[float, float]]:
@@ -141,7 +141,7 @@ class Pusher:
         return [(time * self.period, share) for time, share in shares]
 
     def _angles(self, reach: float) -> tuple[float, float, float]:
-        """Of shoulder, elbow and wrist [rad]; the blade is at (reach, 0) and looks along x."""
+        """The angles of shoulder, elbow, wrist [rad]; the blade is at (reach, 0), along x."""
         elbow = math.acos(0.5 * (reach / self.arm) ** 2 - 1)
         return -0.5 * elbow, elbow, -0.5 * elbow
 

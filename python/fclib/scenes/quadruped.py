@@ -130,7 +130,7 @@ class Quadruped:
 
     @property
     def _radius(self) -> float:
-        """Of a foot [m]."""
+        """The radius of a foot [m]."""
         return 0.3 * self.crank
 
     def _angles(self, angle: float) -> tuple[Pair, float, float]:
@@ -146,7 +146,7 @@ class Quadruped:
         return end, slope - inner, slope + math.pi + outer
 
     def _foot(self, angle: float) -> Pair:
-        """Where the foot is, from the crank's pivot (x, z) [m]."""
+        """The place of the foot, from the crank's pivot (x, z) [m]."""
         (x, z), coupler, _ = self._angles(angle)
         along, across = self.crank * FOOT[0], self.crank * FOOT[1]
         return (

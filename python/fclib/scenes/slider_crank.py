@@ -120,12 +120,12 @@ class SliderCrank:
 
     @property
     def _height(self) -> float:
-        """Of the shaft above the floor [m]."""
+        """The height of the shaft above the floor [m]."""
         return 2 * self.crank + 5 * self.pin
 
     @property
     def _reach(self) -> float:
-        """Of a pin from the shaft, at most [m]."""
+        """The largest distance of a pin from the shaft [m]."""
         return self.crank + self.rod + 4 * self.pin
 
     @property

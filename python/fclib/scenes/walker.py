@@ -150,7 +150,7 @@ class Walker(Humanoid):
         ]
 
     def _controls(self, time: float) -> list[float]:
-        """Of all servos, left leg first."""
+        """The controls of all servos, left leg first."""
         return [*self.angles(1, time), *self.angles(-1, time)]
 
     def _held(self, limb: Limb, rest: float) -> str:

@@ -215,7 +215,7 @@ def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) ->
 
 
 def floated(name: str, xml: str) -> str:
-    """A URDF text whose root moves freely. ValueError if it has none, or that is the world."""
+    """A URDF text whose root moves freely. ValueError: it is not URDF, or its root is the world."""
     try:
         robot = ElementTree.fromstring(xml.encode())
     except ElementTree.ParseError as error:

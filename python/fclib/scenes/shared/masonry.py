@@ -188,12 +188,12 @@ class Arcade:
 
     @property
     def centres(self) -> list[float]:
-        """Of the rings, along x [m]."""
+        """The centres of the rings, along x [m]."""
         return [self.pitch * (i - 0.5 * (self.spans - 1)) for i in range(self.spans)]
 
     @property
     def end(self) -> float:
-        """Where the right wall begins, x [m]; the left one is its mirror."""
+        """The place at which the right wall begins, x [m]; the left one is its mirror."""
         return 0.5 * self.pitch * self.spans
 
     def stones(self) -> list[tuple[str, list[Point]]]:

@@ -54,7 +54,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class File:
-    """What a file holds."""
+    """The content of a file."""
 
     about: dict[str, Any]
     half: Vector  # (nb x 3) [m]
@@ -86,7 +86,7 @@ def write(path: Path, file: File) -> None:
 
 @functools.cache
 def read(path: Path) -> File:
-    """What `write` stored."""
+    """The content of a file that `write` stored."""
     with np.load(path) as stored:
         arrays = {name: stored[name] for name in stored.files}
     about = json.loads(str(arrays.pop("about")))
@@ -187,7 +187,7 @@ class Recorded:
 
     @classmethod
     def digests(cls) -> tuple[str, ...]:
-        """Of the problems as they were stored."""
+        """The digests of the problems as they were stored."""
         return cls.file().digests
 
     @classmethod

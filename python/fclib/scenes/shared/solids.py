@@ -47,7 +47,7 @@ class Load:
     speed: float = 0.0  # [m/s]
 
     def share(self, time: float) -> float:
-        """Of the full traction."""
+        """The share of the full traction at a time [s]."""
         if time <= self.begin:
             return 0.0
         return 1.0 if time >= self.begin + self.rise else (time - self.begin) / self.rise

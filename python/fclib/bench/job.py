@@ -235,7 +235,7 @@ class Record:
     warm: bool = False  # whether the solver had been called before in this process
     pinned: bool = False  # whether the run had cores for itself
     machine: Mapping[str, Any] | None = None
-    load: float | None = None  # mean load of the last minute, at the start
+    load: float | None = None  # [1] mean load of the last minute, at the start
     frequency: float | None = None  # [MHz] at the start
     started: float = 0.0  # [s] since 1970
 

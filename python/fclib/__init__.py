@@ -1,4 +1,4 @@
-"""FCLIB: discrete frictional contact problems, and a test bench for the algorithms that solve them.
+"""FCLIB: discrete frictional contact problems, and a test bench for algorithms.
 
 >>> import fclib
 >>> problem = fclib.read("stack.hdf5")
@@ -67,11 +67,12 @@ if typing.TYPE_CHECKING:
 
 
 def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Collection":
-    """The problems of a set or a family, a lazy sequence; built when they are first asked for.
+    """The problems of a set or a family, as a lazy sequence; each is built on demand.
 
     Args:
-        name: a set or a family, as ``fclib collection list`` has them.
-        folder: where they lie; by default the user's cache, or what FCLIB_COLLECTION names.
+        name: a set or a family, as ``fclib collection list`` prints them.
+        folder: folder of the problems; by default the user's cache, or the folder in
+            FCLIB_COLLECTION.
 
     Raises:
         KeyError: there is no such set or family.
@@ -82,19 +83,19 @@ def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Coll
 
 
 def load(name: str, form: str | None = None, folder: "str | Path | None" = None) -> Problem:
-    """One problem of the collection, as ``fclib.load("rt444/KaplasTower/0100")``.
+    """One problem of the collection, for example ``fclib.load("rt444/KaplasTower/0100")``.
 
-    It is read from the user's folder; a family that is not there is built, in a minute or so, or
-    fetched from FCLIB_COLLECTION_URL. Those of the set ``tiny`` come with the package.
+    It is read from the user's folder; a missing family is built, in about a minute, or fetched from
+    FCLIB_COLLECTION_URL. Those of the set ``tiny`` come with the package.
 
     Args:
         name: SET/FAMILY/NUMBER.
         form: "global" or "local"; by default the global one of a problem that has both.
-        folder: as ``collection`` has it.
+        folder: as in ``collection``.
 
     Raises:
         KeyError: there is no such problem.
-        ValueError: a form that is neither.
+        ValueError: the form is neither.
     """
     from fclib import collections
 
@@ -110,13 +111,13 @@ def sequence(
     ...     result = fclib.solve(step.problem, guess=step.guess())
 
     Args:
-        name: a family, as ``fclib collection list`` has them.
-        folder: as ``collection`` has it.
+        name: a family, as ``fclib collection list`` prints them.
+        folder: as in ``collection``.
         form: "global" or "local"; by default the global one of problems that have both.
 
     Raises:
         KeyError: there is no such family.
-        ValueError: the name is of a set of several families.
+        ValueError: the name is a set of several families.
     """
     from fclib import collections
 

@@ -18,17 +18,18 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class BatchResult(Same):
-    """What ``fclib.solve_batch`` returns: arrays over the problems. Equal where they are.
+    """What ``fclib.solve_batch`` returns: arrays over the problems. Equal if the arrays are.
 
     Attributes:
-        r: reactions [N s], of the shape of q.
-        u: velocities W r + q [m/s], of the shape of q.
+        r: reactions [N s], in the shape of q.
+        u: velocities W r + q [m/s], in the shape of q.
         status: (count,) places in ``BatchResult.statuses``; 0 is converged.
         error: (count,) Merit.error of each.
-        iterations: (count,) sweeps and Newton steps; those of ``auto`` where it was asked.
-        offsets: (count + 1,) where the parts of r and u begin, where contacts vary; else None.
-        by_auto: number of problems that were given to the solver auto, because the fast method did
-            not solve them.
+        iterations: (count,) sweeps and Newton steps; those of ``auto`` if it solved the problem.
+        offsets: (count + 1,) start of each problem's part of r and u, if the numbers of contacts
+            vary; else None.
+        by_auto: number of problems that the solver ``auto`` got, because the fast method did not
+            solve them.
     """
 
     r: Floats
@@ -71,25 +72,26 @@ def solve_batch(
 ) -> BatchResult:
     """Solve many local problems, u = W r + q with Coulomb's law, without Python between them.
 
-    Small problems have a method of their own, which allocates no memory for each. What it does not
-    solve is given to the solver ``auto``. The lock of Python is released.
+    Small problems have their own method, which allocates no memory for each. Problems that it does
+    not solve go to the solver ``auto``. Python's lock is released.
 
     Args:
-        W: (count, m, m) matrices, m = spacedim * nc. Where ``contacts`` is given all entries one
-            behind another, matrix by matrix, each by rows. Or a list of matrices of any sizes.
-        q: (count, m) velocities without reactions; flat, or a list, as W is.
-        mu: (count, nc) coefficients of friction, or what NumPy makes of that shape: (nc,), a
-            number. Flat, or a list, as W is.
+        W: (count, m, m) matrices, m = spacedim * nc. If ``contacts`` is given: all entries one
+            after another, matrix by matrix, each by rows. Or a list of matrices of any sizes.
+        q: (count, m) velocities without reactions; flat, or a list, as W.
+        mu: (count, nc) coefficients of friction, or anything that NumPy broadcasts to it: (nc,), a
+            number. Flat, or a list, as W.
         spacedim: 3, or 2 for planar problems.
-        contacts: (count,) numbers of contacts, where the problems differ in them.
-        guess: reactions to start from, of the shape of q.
+        contacts: (count,) numbers of contacts, if they differ between problems.
+        guess: reactions to start from, in the shape of q.
         tol: bound on Merit.error of each.
-        threads: that share the batch; 0 for all the machine has. The result is the same.
+        threads: number of threads that share the batch; 0: all of the machine. The result is the
+            same.
         time_limit: [s] for all of them; problems left undone have the status time_limit.
 
     Returns:
-        Arrays over the problems. ``converged`` is what the merit, recomputed in extended
-        precision, confirms.
+        Arrays over the problems. A problem is ``converged`` only if the merit, recomputed in
+        extended precision, confirms it.
 
     Raises:
         ProblemError: sizes that do not agree, entries that are not finite, a negative mu; it names
@@ -165,7 +167,7 @@ def solve_batch(
 
 
 def _floats(name: str, values: Any) -> Floats:
-    """A contiguous array of numbers; no copy where it is one."""
+    """A contiguous array of numbers; no copy if it is one already."""
     try:
         array = np.asarray(values)
     except ValueError:

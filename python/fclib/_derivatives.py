@@ -6,10 +6,10 @@ With the equations of the problem, Coulomb's law at each contact is, near a solu
     stick   du = 0
     slide   du_N = 0,   dr_T = -mu t dr_N - r_N t dmu - mu r_N (I - t t^T) / ||u_T|| du_T
 
-with t = u_T / ||u_T||. The status is read off z = r - rho u, which Alart & Curnier's map projects:
-where z lies on a border between two statuses (grazing, at the limit of friction) the solution has
-no derivative; one of the two is taken, an element of the generalised Jacobian of the map, and the
-contact is flagged. Where redundant contacts leave r undetermined, the least change of r is given.
+with t = u_T / ||u_T||. The status follows from z = r - rho u, which Alart & Curnier's map projects.
+If z lies on a border between two statuses (grazing, at the limit of friction), the solution has no
+derivative. One of the two is taken, an element of the generalised Jacobian of the map, and the
+contact is flagged. If redundant contacts leave r undetermined, the least change of r is given.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fclib._same import Same
 Array: TypeAlias = npt.NDArray[np.float64]
 Smooth: TypeAlias = _core.LocalProblem | _core.GlobalProblem
 
-# relative to the largest z: nearer to a border than this is on it
+# relative to the largest z: a z nearer to a border than this counts as on it
 BORDER = 1e-6
 # singular values below this, relative to the largest, are zero
 RANK = 1e-10
@@ -34,14 +34,15 @@ RANK = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Tangent(Same):
-    """What ``fclib.jvp`` returns: how the solution changes. Equal where the arrays are.
+    """What ``fclib.jvp`` returns: the change of the solution. Equal if the arrays are.
 
     Attributes:
         r, u: (m,) reactions and velocities of the contacts.
-        v: (n,) of a global problem, else None.
-        l: (p,) where there are bilateral constraints, else None.
+        v: (n,) velocities of a global problem, else None.
+        l: (p,) multipliers, if there are bilateral constraints, else None.
         degenerate: (nc,) contacts on a border between two statuses.
-        unique: whether the changes are determined; else those of r and l are the least ones.
+        unique: whether the changes are determined; if not, the changes of r and l are the least
+            ones.
         error: ``Merit.error`` of the solution; if it is large, the numbers here mean nothing.
     """
 
@@ -56,10 +57,10 @@ class Tangent(Same):
 
 @dataclass(frozen=True, eq=False)
 class Gradient(Same):
-    """What ``fclib.vjp`` returns: the derivative by each datum, of its shape.
+    """What ``fclib.vjp`` returns: the derivative by each datum, in its shape.
 
-    Those of another formulation are None. The entries of a matrix are taken as independent of each
-    other; of a sparse matrix those that are stored have a derivative.
+    Derivatives by data of the other formulation are None. The entries of a matrix are treated as
+    independent. In a sparse matrix only stored entries have a derivative.
 
     Attributes:
         mu: (nc,)
@@ -98,12 +99,12 @@ def jvp(
     H: Any = None,
     b: npt.ArrayLike | None = None,
 ) -> Tangent:
-    """How a solution changes when the data do: forward mode.
+    """The change of a solution if the data change: forward mode.
 
     Args:
-        problem: without rolling.
-        solution: of it; a Solution, a Result, or the reactions alone where there are no bilateral
-            constraints.
+        problem: a problem without rolling.
+        solution: its solution: a Solution, a Result, or only the reactions if there are no
+            bilateral constraints.
         mu: change of mu.
         q: change of q.
         W: change of W.
@@ -115,7 +116,8 @@ def jvp(
         b: change of b.
 
     Raises:
-        ProblemError: a datum that the problem does not have, a wrong shape, or what is no number.
+        ProblemError: a datum that the problem does not have, a wrong shape, or values that are not
+            numbers.
         UnsuitableError: the problem has rolling friction, or its M is not positive definite.
     """
     point = _Point(problem, solution)
@@ -142,15 +144,15 @@ def vjp(
     r*, u*, v* and l* are the solution, r, u, v and l weights.
 
     Args:
-        problem: without rolling.
+        problem: a problem without rolling.
         solution: as for ``jvp``.
-        r: weights, say the derivatives of a loss by r; zero where left out.
-        u: the same of u.
-        v: the same of v, of a global problem.
-        l: the same of l, where there are bilateral constraints.
+        r: weights, for example the derivatives of a loss by r; zero if left out.
+        u: the same for u.
+        v: the same for v, of a global problem.
+        l: the same for l, if there are bilateral constraints.
 
     Raises:
-        ProblemError: weights of a wrong shape, or of what the problem does not have, or no numbers.
+        ProblemError: weights of a wrong shape, for unknowns that the problem lacks, or not numbers.
         UnsuitableError: the problem has rolling friction, or its M is not positive definite.
     """
     return _Point(problem, solution).gradient({"r": r, "u": u, "v": v, "l": l})
@@ -167,7 +169,7 @@ def _of_shape(name: str, value: Any, like: Any) -> Array | None:
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
-    """What a caller gives, as finite numbers of this shape."""
+    """The caller's values, as finite numbers in this shape."""
     value = value.toarray() if hasattr(value, "toarray") else value
     try:
         array = np.asarray(value)
@@ -185,7 +187,7 @@ def _numbers(name: str, value: Any, shape: tuple[int, ...]) -> Array:
 
 
 def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
-    """Left right^T, where a matrix has entries."""
+    """Left right^T, only at the entries of a matrix."""
     if not hasattr(matrix, "tocoo"):
         return np.outer(left, right)
     import scipy.sparse as sp
@@ -198,7 +200,7 @@ def _on_pattern(matrix: Any, left: Array, right: Array) -> Any:
 class _Point:
     """A solution of a problem, and the linear system that its derivatives solve.
 
-    The unknowns are r, l of a local problem and v, r, l of a global one.
+    The unknowns of a local problem are r, l; those of a global one are v, r, l.
     """
 
     def __init__(self, problem: Smooth, solution: Any) -> None:
@@ -211,7 +213,7 @@ class _Point:
         self.d, self.nc, self.m, self.p = problem.spacedim, problem.nc, problem.m, problem.p
         if self.p and solution.l is None:
             raise _core.ProblemError("l: is missing, and the problem has bilateral constraints")
-        # which looks at the data of both
+        # this checks the data of both
         self.error = _core.merit(problem, solution).error
         self.r = solution.r
         self.l = solution.l if self.p else np.zeros(0)
@@ -260,7 +262,7 @@ class _Point:
         """by_u du + by_r dr = by_mu dmu, contact by contact."""
         d, nc = self.d, self.nc
         size = diagonal.reshape(nc, d).mean(axis=1)
-        # a contact that moves nothing has no scale of its own
+        # a contact that moves nothing has no own scale
         size[size <= 0] = size.max(initial=0.0) or 1.0
         rho = 1 / size
         mu = self.problem.mu
@@ -286,7 +288,7 @@ class _Point:
                 continue
             normal, tangent = d * a, slice(d * a + 1, d * a + d)
             speed = np.linalg.norm(u[a, 1:])
-            # on the border to stick the reaction says where it would slide
+            # on the border to stick the reaction gives the direction of sliding
             t = u[a, 1:] / speed if speed > 0 else -z[a, 1:] / (sliding[a] or 1.0)
             self.by_u[normal, normal] = rho[a]
             self.by_r[tangent, tangent] = eye
@@ -296,7 +298,7 @@ class _Point:
             self.by_mu[a, 1:] = -r[a, 0] * t
 
     def _solve(self, transposed: bool, right: Array) -> tuple[Array, bool]:
-        """By singular values; rows and columns brought to the same size before."""
+        """Solve by singular values, after rows and columns are scaled to the same size."""
         system = self.system.T if transposed else self.system
         if system.size == 0:
             return np.zeros(len(right)), True

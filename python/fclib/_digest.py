@@ -1,4 +1,4 @@
-"""One name for a problem's data, whatever file, storage or library version it came from."""
+"""One name for a problem's data, whatever its file, storage or library version."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy.typing as npt
 
 Numbers: TypeAlias = npt.NDArray[np.float64]
 
-# what Coulomb's law is asked of: matrices, vectors and coefficients, in this order
+# the data of Coulomb's law: matrices, vectors and coefficients, in this order
 FIELDS = ("M", "H", "G", "W", "V", "R", "f", "w", "b", "q", "s", "mu", "mu_r")
-ROUNDING = 1e-12  # of a matrix's largest entry: what is smaller may be 0 on another machine
+# relative to a matrix's largest entry: a smaller entry may be 0 on another machine
+ROUNDING = 1e-12
 
 
 def digest(problem: Any) -> str:
@@ -20,7 +21,7 @@ def digest(problem: Any) -> str:
 
     Equal problems have equal digests: matrices count by their entries, so neither their storage
     nor explicit zeros matter, and duplicates of a triplet are summed; titles and descriptions do
-    not count. -0 and 0 are one.
+    not count. -0 and 0 are equal.
 
     Args:
         problem: any formulation.
@@ -41,7 +42,7 @@ def digest(problem: Any) -> str:
 
 
 def structure(problem: Any) -> str:
-    """SHA-256 of a problem's sizes and of where its matrices have entries.
+    """SHA-256 of a problem's sizes and of the places of its matrices' entries.
 
     Entries below ROUNDING of the largest do not count: a zero on one machine is 1e-17 on another.
     """
@@ -58,10 +59,10 @@ def structure(problem: Any) -> str:
 
 
 def sketch(problem: Any) -> Numbers:
-    """Two sums with signs of the entries of each matrix and vector (13 x 2), NaN where it has none.
+    """Two sums with signs of the entries of each matrix and vector (13 x 2), NaN if it has none.
 
-    The signs are those of a hash of the entry's place. Of two problems of one structure the root
-    mean square of a matrix's two differences estimates the Frobenius norm of its difference.
+    The signs are those of a hash of the entry's place. If two problems have the same structure, the
+    root mean square of a matrix's two differences estimates the Frobenius norm of its difference.
     """
     sums = np.full((len(FIELDS), 2), np.nan)
     for name, part in parts(problem).items():
@@ -71,10 +72,10 @@ def sketch(problem: Any) -> Numbers:
 
 
 def distance(problem: Any, known: Numbers) -> dict[str, float]:
-    """How far a problem is from that of a sketch: ||A - A'|| / ||A||, where it is not 0.
+    """The distance of a problem from that of a sketch: ||A - A'|| / ||A||, if it is not 0.
 
-    Estimated from two sums with signs: of many entries that differ one in 64 estimates is more than
-    eight times too small, and where few do, they may cancel. The sizes must be equal.
+    It is estimated from two sums with signs. If many entries differ, one in 64 estimates is more
+    than eight times too small; if few differ, they may cancel. The sizes must be equal.
     """
     own = sketch(problem)
     found = {}
@@ -89,10 +90,10 @@ def distance(problem: Any, known: Numbers) -> dict[str, float]:
 
 
 def difference(first: Any, second: Any) -> dict[str, float]:
-    """The largest difference of two entries, relative to the largest entry, where it is not 0.
+    """The largest difference of two entries, relative to the largest entry, if it is not 0.
 
     Returns:
-        For each matrix and vector that differs; infinite where its size does.
+        For each matrix and vector that differs; infinite if its size differs.
     """
     one, two = parts(first), parts(second)
     found = {}
@@ -110,7 +111,7 @@ def difference(first: Any, second: Any) -> dict[str, float]:
 
 def parts(problem: Any) -> dict[str, Any]:
     """A problem's matrices, by columns without explicit zeros, and its vectors, by name."""
-    import scipy.sparse as sp  # takes a while, and not everyone needs it
+    import scipy.sparse as sp  # the import takes a while, and not everyone needs it
 
     found: dict[str, Any] = {}
     for name in FIELDS:

@@ -1,4 +1,4 @@
-"""What notebooks show of problems, solutions, merits and results: a small table."""
+"""The display of problems, solutions, merits and results in notebooks: a small table."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def merit_rows(merit: _core.Merit) -> list[tuple[str, str]]:
 
 
 def result_rows(result: _core.Result) -> list[tuple[str, str]]:
-    """What was said, how good it is, and what it took."""
+    """The status, the error and the cost of a result."""
     rows = [
         ("solver", result.solver),
         ("status", result.status),

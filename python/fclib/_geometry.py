@@ -1,6 +1,6 @@
-"""Where the contacts of a problem are, and what touches there: the groups /contacts and /bodies.
+"""The places of contacts and the bodies that touch: the groups /contacts and /bodies.
 
-    problem.contacts, problem.bodies        None where a file has none
+    problem.contacts, problem.bodies        None if a file has none
     problem.replace(contacts=..., bodies=...)
 
 Each column is a dataset of the group, row after row; `docs/format.md` lists them. Lengths are in
@@ -26,12 +26,12 @@ KINDS: Final = ("plane", "sphere", "capsule", "ellipsoid", "cylinder", "box", "m
 def column(
     count: str, width: int, kind: Any, doc: str, *, optional: bool = False
 ) -> dict[str, Any]:
-    """What a field is, of `count` rows of `width` numbers each; kind: int, float or str."""
+    """The description of a field: `count` rows of `width` numbers each; kind: int, float or str."""
     return {"count": count, "width": width, "kind": kind, "doc": doc, "optional": optional}
 
 
 def nothing(kind: Any, width: int = 1) -> Callable[[], Any]:
-    """What makes an absent column."""
+    """The default factory of an absent column."""
     return lambda: np.zeros((0, width) if width > 1 else 0, _type(kind))
 
 
@@ -40,11 +40,11 @@ def _type(kind: Any) -> Any:
 
 
 class _Table:
-    """What both tables have: columns of a file, checked when they are made."""
+    """The common part of both tables: columns of a file, checked when they are made."""
 
     @classmethod
     def _made(cls, columns: Mapping[str, Any], group: str) -> Any:
-        """Of the columns of a file. ValueError names the one that is wrong; others are ignored."""
+        """Make it from the columns of a file. ValueError names a wrong one; others are ignored."""
         values = {}
         for own in fields(cls):  # type: ignore[arg-type]
             known = own.metadata
@@ -69,13 +69,13 @@ class _Table:
         return cls(**values)
 
     def columns(self) -> dict[str, Any]:
-        """The columns as a file has them: one dimension, empty ones left out."""
+        """The columns in a file's form: one dimension, without empty ones."""
         found = {}
         for own in fields(self):  # type: ignore[arg-type]
             value = getattr(self, own.name)
             if own.metadata["kind"] is not str:
                 value = np.ascontiguousarray(value, dtype=_type(own.metadata["kind"])).ravel()
-                # /contacts/gap of no contact is there, what is optional is not
+                # without contacts /contacts/gap is still written, but optional columns are not
                 if own.metadata.get("optional") and not value.size:
                     continue
             elif own.metadata.get("optional") and not value:
@@ -100,7 +100,7 @@ class _Table:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Contacts(_Table):
-    """Where nc contacts are, in the order of the problem.
+    """The places of nc contacts, in the order of the problem.
 
     Bodies, shapes and feature of a contact are its identity: the same in the next step.
     """
@@ -120,12 +120,12 @@ class Contacts(_Table):
     gap: Numbers = field(metadata=column("nc", 1, float, "signed distance, < 0 where they overlap"))
 
     def __post_init__(self) -> None:
-        """ValueError where the columns contradict each other."""
+        """Raises ValueError if the columns contradict each other."""
         self._check("contacts", {"nc": len(self.gap)})
 
     @classmethod
     def of(cls, columns: Mapping[str, Any], count: int | None = None) -> Contacts:
-        """Of the columns of a file, for so many contacts. ValueError."""
+        """Make it from the columns of a file, for so many contacts. Raises ValueError."""
         made: Contacts = cls._made(columns, "contacts")
         if count is not None and len(made) != count:
             raise ValueError(f"/contacts: has {len(made)} rows, and the problem {count} contacts")
@@ -141,14 +141,14 @@ class Contacts(_Table):
 
     @property
     def identity(self) -> list[tuple[int, ...]]:
-        """(nc) what names each contact in all steps: bodies, shapes, feature."""
+        """(nc) the name of each contact in all steps: bodies, shapes, feature."""
         rows = np.column_stack((self.body, self.shape, self.feature))
         return [tuple(row) for row in rows.tolist()]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bodies(_Table):
-    """Bodies, their shapes, and where they are.
+    """Bodies, their shapes, and their places.
 
     A shape lies at `shape_place`, turned by `shape_turn`, in its body, which lies at `place`,
     turned by `turn`, in the world. Turns are quaternions w, x, y, z.
@@ -222,7 +222,7 @@ class Bodies(_Table):
     )
 
     def __post_init__(self) -> None:
-        """ValueError where the columns contradict each other."""
+        """Raises ValueError if the columns contradict each other."""
         counts = {"nb": len(self.moves), "ns": len(self.shape_kind), "1": 1, "2": 2}
         self._check("bodies", counts)
         if len(self.names) != counts["nb"]:
@@ -237,7 +237,7 @@ class Bodies(_Table):
 
     @classmethod
     def of(cls, columns: Mapping[str, Any]) -> Bodies:
-        """Of the columns of a file. ValueError."""
+        """Make it from the columns of a file. Raises ValueError."""
         made: Bodies = cls._made(columns, "bodies")
         return made
 
@@ -246,7 +246,7 @@ class Bodies(_Table):
 
     @property
     def names(self) -> list[str]:
-        """(nb) of the bodies."""
+        """(nb) the names of the bodies."""
         return self.name.split("\n")
 
     @property
@@ -255,7 +255,7 @@ class Bodies(_Table):
         return bool(len(self.planar) and self.planar[0])
 
     def mesh(self, shape: int) -> tuple[Numbers, Integers] | None:
-        """Vertices (k x 3) in the shape and faces (f x 4) of a shape; None where it has no mesh."""
+        """Vertices (k x 3) in the shape and faces (f x 4) of a shape; None if it has no mesh."""
         which = self.shape_mesh[shape]
         if which < 0:
             return None
@@ -263,7 +263,7 @@ class Bodies(_Table):
         return self.vertex[vertex:end], self.face[face:last]
 
     def poses(self) -> tuple[Numbers, Numbers]:
-        """Where the shapes are in the world: places (ns x 3) and rotations (ns x 3 x 3)."""
+        """The poses of the shapes in the world: places (ns x 3) and rotations (ns x 3 x 3)."""
         body = rotations(self.turn)[self.shape_body]
         place = self.place[self.shape_body] + np.einsum("sij,sj->si", body, self.shape_place)
         return place, body @ rotations(self.shape_turn)
@@ -285,15 +285,15 @@ def carried(
 ) -> Numbers:
     """A guess of reactions (d nc): those that the same contacts had in another step.
 
-    They are turned by way of the world into the new frames, forces and moments alike. A contact
-    whose feature is new takes the nearest one that is left of its two shapes; one of two shapes
-    that did not touch gets none.
+    They are rotated through the world into the new frames, forces and moments alike. A contact
+    whose feature is new takes the nearest remaining one of its two shapes. If its two shapes did
+    not touch before, it gets none.
 
     Args:
         before: the contacts of the other step.
         now: those of this one.
         r: the reactions of the other step (d nc).
-        d: components of a contact.
+        d: number of components of a contact.
         planar: whether all moves in the plane x, z.
 
     Raises:
@@ -309,7 +309,7 @@ def carried(
     names = now.identity
     for i, name in enumerate(names):
         source[i] = known.pop(name, -1)
-    # of each pair those that are left
+    # the remaining contacts of each pair
     left: dict[tuple[int, ...], list[int]] = {}
     for name, i in known.items():
         left.setdefault(name[:-1], []).append(i)
@@ -337,11 +337,11 @@ def turned(
 
     Args:
         r: those of the other step, a row for each contact of it.
-        source: (nc) which of these each contact was, -1 for none: it gets no reaction.
+        source: (nc) which of these each contact was, -1 for none: then it gets no reaction.
         before: (... x 3 x 3) frames of the other step, N, T1, T2 in rows.
         now: (nc x 3 x 3) those of this one.
-        parts: components of a vector, and the axes of the frame that they are along.
-        limits: (nc) contacts without a frame, whose components go as they are.
+        parts: components of a vector, and their axes in the frame.
+        limits: (nc) contacts without a frame, whose components are not rotated.
     """
     found = (source >= 0).nonzero()[0]
     source = source.take(found)
@@ -363,7 +363,7 @@ def rotated(
     parts: Sequence[tuple[slice, slice]],
     limits: npt.NDArray[np.bool_],
 ) -> Numbers:
-    """The same row by row (k x d), where each contact was there."""
+    """The same row by row (k x d), if each contact existed before."""
     carried = np.zeros_like(r)
     for part, axes in parts:
         if part.start >= r.shape[1]:  # no rolling

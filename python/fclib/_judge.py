@@ -1,4 +1,4 @@
-"""Whether a solution is one: the one question of check, of the collection and of its verify."""
+"""Whether a vector is a solution: the same test for check, the collection and its verify."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from typing import Any
 from fclib import _core
 from fclib._solve import MeritKind
 
-# of the error: what `solve` and `check` ask by default, and what a stored solution must hold
+# bound of the error: the default of `solve` and `check`, and required of a stored solution
 TOLERANCE = 1e-8
-MARK = "solution"  # attribute of /fclib_*/info of a file without one: why there is none
+MARK = "solution"  # attribute of /fclib_*/info in a file without a solution: the reason
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the data of a problem say of a solution."""
+    """The verdict on a solution from the data of its problem."""
 
     merit: _core.Merit
-    kind: MeritKind  # both maps, or the natural one alone
+    kind: MeritKind  # both maps, or only the natural one
     tol: float
 
     @property
     def error(self) -> float:
-        """What the tolerance bounds."""
+        """The error that the tolerance bounds."""
         return self.merit.error_by(self.kind)
 
     @property
     def ok(self) -> bool:
-        """Whether it is a solution; an error that is no number says no."""
+        """Whether it is a solution; if the error is NaN, it is not."""
         return self.error <= self.tol
 
 
@@ -38,6 +38,6 @@ def judge(
     """Judge a solution from the data of its problem alone.
 
     Raises:
-        fclib.Error: the solution is not of the size of its problem, or M is singular.
+        fclib.Error: the solution does not fit the size of its problem, or M is singular.
     """
     return Judgement(_core.merit(problem, solution), kind, tol)

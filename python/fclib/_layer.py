@@ -1,6 +1,6 @@
 """Solving as a layer of a network: batches of local problems, and the gradient of a loss.
 
-In plain arrays; ``fclib.torch`` and ``fclib.jax`` hand it to their automatic differentiation.
+It uses plain arrays; ``fclib.torch`` and ``fclib.jax`` connect it to their differentiation.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Floats: TypeAlias = npt.NDArray[np.float64]
 def check_shapes(
     W: tuple[int, ...], q: tuple[int, ...], mu: tuple[int, ...], spacedim: int
 ) -> tuple[int, ...]:
-    """The shape of the batch, () for one problem. ProblemError where shapes do not agree."""
+    """The shape of the batch, () for one problem. ProblemError if shapes do not agree."""
     if spacedim not in (2, 3):
         raise _core.ProblemError(f"spacedim: is {spacedim}, expected 2 or 3")
     if not q or q[-1] % spacedim:

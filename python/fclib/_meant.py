@@ -1,4 +1,4 @@
-"""What may have been meant by a name that there is not."""
+"""Suggestions for an unknown name."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Iterable
 
 
 def meant(name: str, known: Iterable[str]) -> str:
-    """A question with the nearest of the known names, to put before a list; "" where none is near.
+    """A question with the nearest of the known names, to put before a list; "" if none is near.
 
-    Capitals do not count.
+    Upper and lower case are equal.
     """
     names = {one.lower(): one for one in known}
     close = difflib.get_close_matches(name.lower(), names, 1)

@@ -1,7 +1,7 @@
 """All solvers by their names: those of the core, users' own, and those of other packages.
 
 A user's solver is a function with the decorator ``solver``. It is found once its module is
-imported, or at any time where an installed package names it in the entry point group
+imported, or at any time if an installed package names it in the entry point group
 ``fclib.solvers``; ``fclib.external`` is such an entry point itself. The driver of the core runs it
 like any other: conversions, limits, history and the judgement are the same.
 """
@@ -42,11 +42,11 @@ OPTION_TYPES = {bool: "bool", int: "int", float: "float"}
 
 @dataclass(frozen=True)
 class Option:
-    """What is to be said of an option of a solver: ``Annotated[float, Option("step", unit="1")]``.
+    """The description of a solver's option: ``Annotated[float, Option("step", unit="1")]``.
 
     Args:
         doc: its meaning.
-        unit: 1 where it has none.
+        unit: 1 if it has none.
         lowest: values below are refused.
         highest: values above are refused.
     """
@@ -58,13 +58,13 @@ class Option:
 
 
 class Provider(Protocol):
-    """What an entry point may be beside a decorated function or its module: many solvers."""
+    """An entry point that offers many solvers, instead of a decorated function or its module."""
 
     def solvers(self) -> Sequence[_core.SolverInfo]:
-        """Those that can be used."""
+        """The solvers that can be used."""
 
     def find(self, name: str) -> _core.SolverInfo | None:
-        """The solver of this name, where it is one of the provider's; also unlisted ones."""
+        """The solver of this name, if it is one of the provider's; also unlisted ones."""
 
 
 _registered: dict[str, _core.SolverInfo] = {}
@@ -85,19 +85,19 @@ def solver(
     The function is called as ``function(problem, r, monitor, **options)``. The problem is a
     ``LocalProblem`` (or a ``LocalRollingProblem``) without bilateral constraints, whatever the
     user's is; r the starting point, its own copy. It calls ``monitor.stop(r)`` in every iteration,
-    which is true when it is time to stop, and returns r, or None where it has changed r in place.
+    which is true once it is time to stop. It returns r, or None if it has changed r in place.
 
     The options are its keyword-only parameters, of type bool, int, float or ``Literal`` of texts,
     with a default; ``Annotated[float, fclib.Option(...)]`` gives meaning, unit and bounds.
 
     Args:
-        name: by which it is called.
-        family: of algorithms.
-        title: the first line of the function's docstring where it is empty.
-        citation: where the algorithm is from.
+        name: its name for callers.
+        family: family of algorithms.
+        title: if empty, the first line of the function's docstring.
+        citation: the source of the algorithm.
         dimensions: the spacedims it takes, of 2 and 3.
         rolling_dimensions: the spacedims of rolling problems it takes, of 3 and 5.
-        max_iterations: where the caller sets none.
+        max_iterations: limit if the caller sets none.
 
     Raises:
         OptionError: the name is that of a solver of the core.
@@ -135,7 +135,7 @@ def make_solver(
     rolling_dimensions: Sequence[int],
     max_iterations: int,
 ) -> _core.SolverInfo:
-    """The entry of a function, which is not registered by that."""
+    """The entry of a function; this does not register it."""
 
     @functools.wraps(function)
     def guarded(
@@ -148,7 +148,7 @@ def make_solver(
             answer = function(problem, r, monitor, **options)
             result = np.asarray(r if answer is None else answer, dtype=float)
         except Exception as error:
-            # what the caller's own callback raises is not the solver's, nor is a refusal
+            # errors of the caller's callback are not the solver's, nor is a refusal
             if error is monitor.failure or isinstance(error, (_core.UnsuitableError, SolverError)):
                 raise
             raise SolverError(f"solver {name}: {type(error).__name__}: {error}") from error
@@ -220,7 +220,7 @@ def _options_of(function: Callable[..., Any]) -> list[_core.OptionInfo]:
 
 
 def register(info: _core.SolverInfo) -> None:
-    """Put a solver beside those of the core, in place of an own one of the same name."""
+    """Put a solver beside those of the core, in place of a user's solver of the same name."""
     if any(info.name == built_in.name for built_in in _core.solvers()):
         raise _core.OptionError(f"solver '{info.name}': there is one of this name in fclib")
     _registered[info.name] = info
@@ -236,7 +236,7 @@ def entry_points_there() -> tuple[Any, ...]:
 
 @functools.cache
 def _providers() -> tuple[Provider, ...]:
-    """Load the entry points, once. One that cannot be loaded is said, and left out."""
+    """Load the entry points, once. One that cannot be loaded is reported, and left out."""
     providers = []
     for point in entry_points_there():
         try:
@@ -266,7 +266,7 @@ def find_solver(name: str) -> _core.SolverInfo:
     """The solver of this name: of fclib, registered, or external.
 
     Raises:
-        OptionError: there is none, with the known names, or with what is missing.
+        OptionError: there is none; the message has the known names, or the missing package.
     """
     own = _of_the_core.get(name)
     if own is not None:
@@ -282,7 +282,7 @@ def find_solver(name: str) -> _core.SolverInfo:
         found = provider.find(name)
         if found is not None:
             return found
-    if name in _registered:  # by an entry point
+    if name in _registered:  # an entry point registered it
         return _registered[name]
     known = [info.name for info in solvers()]
     raise _core.OptionError(

@@ -1,4 +1,4 @@
-"""Equality of what is made of arrays."""
+"""Equality of objects that hold arrays."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 
 class Same:
-    """A dataclass whose fields may be arrays: equal where they are, entry by entry."""
+    """A dataclass whose fields may be arrays: equal if these are, entry by entry."""
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):

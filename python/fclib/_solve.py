@@ -22,7 +22,7 @@ Problem: TypeAlias = (
     | _core.GlobalRollingProblem
 )
 
-# what is taken where a solution or a guess is
+# the types accepted as a solution or a guess
 Given: TypeAlias = _core.Solution | _core.Result | npt.ArrayLike
 MeritKind: TypeAlias = Literal["both", "natural"]
 # the numbers of a Merit: its errors, and how many contacts are open, stick and slide
@@ -60,13 +60,13 @@ def solve(
         problem: a local or a global problem, with or without bilateral constraints.
         solver: a name of ``fclib.solvers()``.
         tol: bound on ``Merit.error``.
-        max_iterations: limit of the solver's iterations, its own default where None.
+        max_iterations: limit of the solver's iterations, None: its own default.
         time_limit: [s] limit of wall-clock time.
-        guess: a starting point: reactions (m,), or a Solution or Result, of which ``r`` is used.
-        callback: called as ``callback(iteration, error, seconds, stage)`` where the solver
-            evaluates its error; returning False stops it. ``stage`` is empty but for solvers that
-            chain others, as ``auto`` does.
-        history: whether ``Result.history`` keeps all that a callback is told.
+        guess: a starting point: reactions (m,), or a Solution or Result, whose ``r`` is used.
+        callback: called as ``callback(iteration, error, seconds, stage)`` each time the solver
+            evaluates its error; returning False stops it. ``stage`` is empty, except for solvers
+            that chain others, for example ``auto``.
+        history: whether ``Result.history`` keeps all calls of a callback.
         merit: what ``tol`` bounds: ``both`` the natural map and the scaled one, which is the same
             in any units, or ``natural`` alone, to compare with the literature.
         **options: the solver's own options, see ``fclib solvers``. A text may be given by the path
@@ -74,14 +74,14 @@ def solve(
 
     Returns:
         The solution with its status: ``converged`` means that the merit, recomputed on the problem
-        as it was given, is at most ``tol``.
+        as given, is at most ``tol``.
 
     Raises:
         ProblemError: the data of the problem or of the guess is not valid.
         OptionError: unknown solver or option, or a value out of range.
         UnsuitableError: the problem cannot be brought to the form that the solver takes, or its
             bilateral constraints contradict each other by more than ``tol``.
-        SolverError: a solver that is not of fclib failed.
+        SolverError: a solver outside of fclib failed.
     """
     try:
         if not tol >= 0:
@@ -111,7 +111,7 @@ def solve(
         )
     except TypeError:
         _check_types(problem, tol, max_iterations, time_limit, callback, history)
-        raise  # the callback's own
+        raise  # the callback raised it
 
 
 def _check_types(

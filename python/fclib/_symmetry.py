@@ -1,4 +1,4 @@
-"""How far W, R and M of a problem are from being symmetric."""
+"""The asymmetry of W, R and M of a problem."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import Any, Final
 
 import scipy.sparse as sp
 
-SYMMETRIC: Final = 1e-12  # max |A - A^T| / max |A| up to which a matrix counts as symmetric
+# max |A - A^T| / max |A| largest value for which a matrix counts as symmetric
+SYMMETRIC: Final = 1e-12
 
 
 def columns(a: Any) -> Any:
@@ -29,13 +30,13 @@ def asymmetry(a: Any) -> float:
 
 
 def asymmetries(problem: Any) -> dict[str, float]:
-    """Of W, R and M, those that a problem has."""
+    """The asymmetry of those of W, R and M that a problem has."""
     matrices = {name: getattr(problem, name, None) for name in ("W", "R", "M")}
     return {name: asymmetry(columns(a)) for name, a in matrices.items() if a is not None}
 
 
 def not_symmetric(problem: Any) -> list[str]:
-    """A line for each of W, R and M that is not symmetric: how much, and what may be the cause."""
+    """A line for each of W, R and M that is not symmetric: the amount, and a possible cause."""
     lines = []
     for name, skewness in asymmetries(problem).items():
         if skewness <= SYMMETRIC:

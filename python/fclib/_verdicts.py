@@ -1,17 +1,17 @@
-"""What solved means, once: for campaigns, profiles, the site and the classes of problems."""
+"""The meaning of "solved" for campaigns, profiles, the site and the classes of problems."""
 
 from __future__ import annotations
 
 from typing import Final
 
-# a run ends as solved in these alone: the error was recomputed, or the proof was checked
+# only these statuses count as solved: the error was recomputed, or the proof was checked
 SOLVED: Final = ("converged", "infeasible")
 UNSUITABLE: Final = "unsuitable"  # the solver does not take such problems
 CLASSES: Final = ("easy", "hard", "open")
 
 
 def is_solved(status: str | None) -> bool:
-    """Whether a run that ended so counts as solved.
+    """Whether a run with this status counts as solved.
 
     Its recomputed error is at most the tolerance, or the bench has checked its proof that there is
     no solution; both within the limits.
@@ -20,7 +20,7 @@ def is_solved(status: str | None) -> bool:
 
 
 def rating(solved: int, voters: int) -> str:
-    """The class of a problem that so many solve, of the solvers that take it; "" without any."""
+    """The class of a problem, by how many of the solvers that take it solve it; "" without any."""
     if not voters:
         return ""
     return "open" if not solved else "easy" if 2 * solved > voters else "hard"

@@ -1,4 +1,4 @@
-"""One solve after another, as a simulation has them."""
+"""A series of solves, as in a simulation."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fclib._solve import Problem, solve
 
 
 class Workspace:
-    """What a simulation keeps between its solves: memory, and the reactions of its contacts.
+    """The state that a simulation keeps between solves: memory, and reactions of contacts.
 
     Local problems of Coulomb's law are solved without allocating memory, once the workspace has
     seen the largest of them. Problems of other formulations are solved by ``fclib.solve``, from the
@@ -37,7 +37,7 @@ class Workspace:
         self._core = _core.Workspace()
 
     def solve(self, problem: Problem, contacts: npt.ArrayLike | None = None) -> _core.Result:
-        """Solve a problem from what its contacts had before.
+        """Solve a problem, starting from the last reactions of its contacts.
 
         Args:
             problem: of any formulation.
@@ -45,7 +45,7 @@ class Workspace:
                 Without them a problem of as many contacts starts from the last one's reactions.
 
         Returns:
-            As ``fclib.solve`` does; ``Result.solver`` is "workspace" where nothing else was needed.
+            As ``fclib.solve`` does; ``Result.solver`` is "workspace" if nothing else was needed.
 
         Raises:
             ProblemError: the data of the problem is not valid, or there are not nc names.

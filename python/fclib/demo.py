@@ -34,11 +34,11 @@ class Stored:
 def simulate(folder: Path, boxes: int, steps: int, picture: Path | None) -> Iterator[Stored]:
     """Drop a stack of boxes, and store the global and the local form of every step.
 
-    The global file holds the solution that carried the simulation on. After the last step the
-    scene is drawn to `picture`, where that is not None.
+    The global file holds the solution that gave the next state. After the last step the scene is
+    drawn to `picture`, if that is not None.
 
     Raises:
-        ImportError: MuJoCo is not there in the pinned version.
+        ImportError: MuJoCo is missing in the pinned version.
         fclib.simulate.NoRenderer: all is stored, but nothing can draw the picture.
         fclib.FileError: a file cannot be written.
     """
@@ -82,7 +82,7 @@ def campaign(store: Path, jobs: int, show: Callable[[bench.Progress], None]) -> 
 
 
 def write_csv(path: Path, runs: Sequence[bench.Run]) -> None:
-    """All runs, a row each."""
+    """All runs, one row each."""
     with path.open("w", newline="") as file:
         writer = csv.DictWriter(file, bench.COLUMNS)
         writer.writeheader()

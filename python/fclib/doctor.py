@@ -1,6 +1,6 @@
-"""What fclib stands on here: versions, what works, which optional parts there are.
+"""The installation of fclib: versions, tests of its parts, optional packages.
 
-Every package is imported in a process of its own: one that crashes is a finding. The list of the
+Every package is imported in its own process, so that a crash is only a finding. The list of the
 optional ones is that of the extras in fclib's own metadata.
 """
 
@@ -30,7 +30,7 @@ from fclib import _core, external
 
 State: TypeAlias = Literal["ok", "absent", "broken"]
 LIMIT: Final = 120.0  # [s] of one import
-# what an extra is for; extras that only those who work on fclib need are not looked at
+# the purpose of an extra; extras for developers of fclib are not checked
 PURPOSE: Final = {
     "analysis": "existence and certified solutions",
     "collection": "catalogues, pictures, fetching",
@@ -41,7 +41,7 @@ PURPOSE: Final = {
     "torch": "solving as a layer of PyTorch",
     "jax": "solving as a layer of JAX",
 }
-# a package whose module bears another name
+# packages whose module has another name
 MODULE: Final = {
     "dask-jobqueue": "dask_jobqueue",
     "scikit-fem": "skfem",
@@ -52,33 +52,33 @@ MODULE: Final = {
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """The result of one check."""
 
     part: str  # core, packages, solvers, ...
     name: str
     state: State
-    found: str = ""  # a version, or what there is
+    found: str = ""  # a version, or the thing found
     purpose: str = ""
-    problem: str = ""  # what is wrong, where the state is broken
-    remedy: str = ""  # what to do, where the state is not ok
+    problem: str = ""  # the fault, if the state is broken
+    remedy: str = ""  # the remedy, if the state is not ok
 
 
 @dataclass(frozen=True)
 class Requirement:
-    """A line of fclib's metadata: a package, the versions that will do, its extras."""
+    """A line of fclib's metadata: a package, its accepted versions, its extras."""
 
     package: str
     versions: str  # ">=14"
     extras: tuple[str, ...]
-    applies: bool  # to this Python
+    applies: bool  # whether it applies to this Python
 
     @property
     def words(self) -> str:
-        """As pip takes it."""
+        """The requirement in pip's form."""
         return f'pip install "{self.package}{self.versions}"'
 
     def allows(self, version: str) -> bool:
-        """Whether a version will do: one bound, == or >=."""
+        """Whether a version is accepted: one bound, == or >=."""
         known = re.fullmatch(r"(==|>=)([\d.]+)", self.versions)
         if known is None:
             return True
@@ -91,7 +91,7 @@ class Requirement:
 
 
 def requirements() -> list[Requirement]:
-    """What fclib's metadata asks for, a package once."""
+    """The requirements in fclib's metadata, each package once."""
     merged: dict[str, Requirement] = {}
     for line in importlib.metadata.requires("fclib") or ():
         named = re.match(r"([\w.-]+)\s*([^;]*)", line)
@@ -112,7 +112,7 @@ def requirements() -> list[Requirement]:
 
 
 def run(code: str) -> tuple[str, str]:
-    """What a line of Python prints, in a process of its own; or what went wrong."""
+    """The output of a line of Python in its own process, or the error."""
     try:
         done = subprocess.run(
             [sys.executable, "-c", code],
@@ -133,7 +133,7 @@ def run(code: str) -> tuple[str, str]:
 
 
 def check_package(requirement: Requirement) -> Finding:
-    """Whether a package is there, in a version that will do, and can be imported."""
+    """Whether a package is there, in an accepted version, and can be imported."""
     name, extras = requirement.package, requirement.extras
     part = "solvers" if "solvers" in extras else "packages"
     purpose = next((PURPOSE[extra] for extra in extras if extra in PURPOSE), "")
@@ -210,7 +210,7 @@ def check_work() -> Finding:
 
 
 def check_adapter(adapter: external.Adapter, known: Sequence[str]) -> Finding | None:
-    """Solvers of others that are no package of the extras."""
+    """Solvers of others that are not packages of the extras."""
     name = adapter.PREFIX.rstrip(":")
     if name in known or name in ("cmd", "plugin"):
         return None
@@ -246,7 +246,7 @@ def check_rendering() -> Finding:
 
 
 def check_h5py() -> Finding | None:
-    """Whether h5py, where it is, and fclib read each other's files in one process."""
+    """Whether h5py, if it is installed, and fclib read each other's files in one process."""
     if importlib.util.find_spec("h5py") is None:
         return None
     code = (
@@ -271,7 +271,7 @@ def check_h5py() -> Finding | None:
 def examine() -> list[Finding]:
     """All findings, by part."""
     packages = [one for one in requirements() if not one.extras or set(one.extras) & set(PURPOSE)]
-    # what makes up for an older Python is no business of a newer one
+    # a newer Python does not need the packages for an older one
     packages = [one for one in packages if one.applies or one.package == "mujoco"]
     known = [one.package for one in packages]
     asked: list[Callable[[], Finding | None]] = [

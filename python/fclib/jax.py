@@ -24,9 +24,9 @@ def solve(
 ) -> tuple[Any, Any]:
     """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
-    A callback of the host, with the derivative of ``fclib.vjp`` in reverse mode. Inside all is
-    computed in double precision; the result is of the common type of W, q and mu, single where
-    ``jax_enable_x64`` is not set.
+    It is a callback of the host, with the derivative of ``fclib.vjp`` in reverse mode. Inside all
+    is computed in double precision. The result has the common type of W, q and mu, which is single
+    if ``jax_enable_x64`` is not set.
 
     W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
     arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
@@ -35,8 +35,8 @@ def solve(
         r and u, (..., m).
 
     Raises:
-        ProblemError: shapes that do not agree. What is found inside the callback, wrong entries and
-            problems that are not solved, JAX makes errors of its own.
+        ProblemError: shapes do not agree. For errors inside the callback (wrong entries, problems
+            that are not solved) JAX raises its own errors.
     """
     W, q, mu = (jnp.asarray(one) for one in (W, q, mu))
     batch = _layer.check_shapes(W.shape, q.shape, mu.shape, spacedim)

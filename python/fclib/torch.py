@@ -1,4 +1,4 @@
-"""Contact problems in PyTorch: r and u as tensors that know their gradients.
+"""Contact problems in PyTorch: r and u are tensors with gradients.
 
 >>> import fclib.torch
 >>> r, u = fclib.torch.solve(W, q, mu)
@@ -18,7 +18,7 @@ __all__ = ["solve"]
 
 
 class _Solve(torch.autograd.Function):  # type: ignore[misc]
-    """Of tensors whose leading sizes are equal."""
+    """The function for tensors whose leading sizes are equal."""
 
     @staticmethod
     def forward(
@@ -65,7 +65,7 @@ def solve(
     """Reactions and velocities of local problems, as ``fclib.solve_batch`` finds them.
 
     The gradient is that of ``fclib.vjp``; there is no second one. All is computed in double
-    precision on the CPU, and comes back as q is.
+    precision on the CPU, and returned in the type and on the device of q.
 
     W is (..., m, m), q (..., m) and mu (..., nc); their leading sizes are broadcast. The other
     arguments are those of ``fclib.solve_batch``; gradients need a tol far below 1e-6.
@@ -74,7 +74,7 @@ def solve(
         r and u, (..., m).
 
     Raises:
-        ProblemError: as there, and shapes that do not agree.
+        ProblemError: as there; or shapes do not agree.
         SolverError: a problem was not solved to the tolerance, or has no solution.
     """
     batch = _layer.check_shapes(tuple(W.shape), tuple(q.shape), tuple(mu.shape), spacedim)

@@ -1,31 +1,31 @@
-"""What a problem is: ranks, conditioning, existence with its proof, and certified solutions.
+"""Analysis of a problem: ranks, conditioning, existence with proof, and certified solutions.
 
 >>> from fclib import analysis
 >>> found = analysis.analyze(fclib.read("stack.hdf5"))
 >>> found.existence.verdict, found.spectra["W"].rank, found.hyperstaticity
 
-Existence is decided by conic programs, for which Clarabel is needed: ``pip install
+Conic programs decide existence; they need Clarabel: ``pip install
 "fclib[analysis]"``.
 
-_analyze.py     all that `analyze` finds, in one record. Needs _spectrum.py and _self_stress.py
-_brief.py       what of that is cheap, for every file that is built. Needs _analyze.py
+_analyze.py     the result of `analyze`, in one record. Needs _spectrum.py and _self_stress.py
+_brief.py       the cheap part of it, for every file that is built. Needs _analyze.py
 _reactions.py   whether reactions are unique, by the contacts of a solution. Needs _enumerate.py
 _existence.py   whether there is a solution. Needs _enumerate.py, _conic.py, _joints.py and
                 _certificate.py
-_self_stress.py whether reactions can grow without moving anything. Needs _existence.py
+_self_stress.py whether reactions can grow while nothing moves. Needs _existence.py
 _enumerate.py   all solutions of a small problem. Needs _rational.py and _spatial.py
 _spatial.py     all solutions of one spatial contact, by the roots of polynomials
 _rational.py    linear systems and linear programs in exact arithmetic
-_certificate.py a proof that there is none, checked in exact arithmetic
+_certificate.py a proof that there is no solution, checked in exact arithmetic
 _reference.py   certified solutions, by two unrelated algorithms. Needs _least_norm.py
-_least_norm.py  of all reactions of a velocity the least. Needs _conic.py and _contacts.py
-_conventions.py whether the normal seems not to be first
+_least_norm.py  the least of all reactions of a velocity. Needs _conic.py and _contacts.py
+_conventions.py whether the normal component seems not to be first
 _contacts.py    statuses and energies, contact by contact
 _spectrum.py    ranks, singular values, definiteness
 _joints.py      whether joints agree. Needs _rational.py and _bounds.py
-_bounds.py      sums and singular values, with bounds that hold
+_bounds.py      sums and singular values, with guaranteed bounds
 _conic.py       conic programs, solved by Clarabel
-_data.py        a problem's matrices and its local form, which all others start from
+_data.py        a problem's matrices and its local form; all others use it
 """
 
 from fclib.analysis._analyze import Analysis, Definiteness, Uniqueness, Units, analyze

@@ -1,4 +1,4 @@
-"""All that is known of a problem before it is solved, and whether it can be."""
+"""Facts on a problem before it is solved, and whether it can be solved."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ from fclib.analysis._spectrum import Spectrum, lowest_eigenvalue, spectrum
 
 DEFINITE = ("positive definite", "positive semidefinite", "indefinite")
 UNKNOWN = "not known"
-ENUMERATION = 5.0  # [s] for the states of all contacts, at most
-FAR = 1e4  # a size this many times above or below 1 is said to be far from the units
-SPREAD = 1e6  # the same of a ratio inside the problem
+ENUMERATION = 5.0  # [s] time limit for trying the states of all contacts
+FAR = 1e4  # a size this many times above or below 1 is reported as far from the units
+SPREAD = 1e6  # the same for a ratio inside the problem
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Definiteness:
     Attributes:
         word: positive definite, positive semidefinite, indefinite or not known.
         lowest, highest: its extreme eigenvalues.
-        method: how they were found.
-        threshold: up to which an eigenvalue counts as zero, absolute.
+        method: the method that found them.
+        threshold: absolute bound up to which an eigenvalue counts as zero.
     """
 
     word: str
@@ -65,8 +65,8 @@ class Uniqueness:
         reason: in words.
         contraction: Lipschitz constant of the map s -> mu ||u_T||, u the velocity of the convex
             problem with q + [s, 0, 0], in the norm of s: below 1 its fixed point is unique. nan
-            where W is not symmetric positive definite.
-        reactions: whether they follow from the velocity: W is nonsingular.
+            if W is not symmetric positive definite.
+        reactions: whether they follow from the velocity, as W is nonsingular.
     """
 
     verdict: str
@@ -77,15 +77,15 @@ class Uniqueness:
 
 @dataclass(frozen=True)
 class Units:
-    """The sizes of a problem in its own units, and what may give trouble.
+    """The sizes of a problem in its own units, and possible sources of trouble.
 
     Attributes:
         mass: [kg] 1 / the mean of the diagonal of W.
-        velocity: [m/s] the mean of |q_k|, as a root of squares.
-        mass_ratio: the largest of the contacts' tr(W_aa) over the smallest.
-        prestress: ||r|| mean(W_kk) / ||q|| of the solution at hand; nan without one.
-        guess: in words.
-        trouble: in words, one for each.
+        velocity: [m/s] the root mean square of q_k.
+        mass_ratio: the largest tr(W_aa) of a contact over the smallest.
+        prestress: ||r|| mean(W_kk) / ||q|| of the known solution; nan without one.
+        guess: a guess at the units, in words.
+        trouble: the sources of trouble, one sentence each.
     """
 
     mass: float
@@ -98,26 +98,26 @@ class Units:
 
 @dataclass(frozen=True)
 class Analysis:
-    """What a problem is. Each quantity says how it was found and what counted as zero.
+    """The analysis of a problem. Each quantity has its method and its bound for zero.
 
     Attributes:
-        problem: what was analysed.
+        problem: the problem that was analysed.
         digest: of its data.
-        nnz: entries that are not zero of each matrix, those of the local form too.
+        nnz: number of nonzero entries of each matrix, also of the local form.
         sparsity: the same over rows times columns.
         asymmetry: of W, M and R: max |A - A^T| / max |A|.
-        definiteness: of the symmetric part of W.
-        spectra: rank and conditioning of H, W, M, R, where they are. With bilateral constraints
-            "W" is W' = W - V R^-1 V^T, and is missing where that is rounding or too large.
-        islands: how many have contacts; largest_island: contacts of the largest.
-        contact_density: m / n, unknowns of the contacts a degree of freedom (RT-0444; nan for a
-            local problem, which has lost n).
-        hyperstaticity: m - rank W, the dimension of the reactions that move nothing; None where
-            the rank is not known.
+        definiteness: definiteness of the symmetric part of W.
+        spectra: rank and conditioning of H, W, M, R, if the problem has them. With bilateral
+            constraints "W" is W' = W - V R^-1 V^T, and is missing if that is rounding or too large.
+        islands: number of islands with contacts; largest_island: number of contacts of the largest.
+        contact_density: m / n, contact unknowns for each degree of freedom (RT-0444; nan for a
+            local problem, which does not know n).
+        hyperstaticity: m - rank W, the dimension of the reactions that move nothing; None if the
+            rank is not known.
         hyperstaticity_ratio: m / rank W.
-        units, slater, existence, uniqueness, reactions, self_stress: see there.
-        enumeration: what the states of all contacts say; None where theorems say it all.
-        isolated_solutions: how many there are; None where that is not known.
+        units, slater, existence, uniqueness, reactions, self_stress: see their classes.
+        enumeration: result of trying the states of all contacts; None if theorems say it all.
+        isolated_solutions: their number; None if not known.
     """
 
     problem: _solve.Problem = field(repr=False, compare=False)
@@ -142,19 +142,19 @@ class Analysis:
 
     @property
     def isolated_solutions(self) -> int | None:
-        """How many solutions have no other near them."""
+        """The number of solutions that have no other near them."""
         if self.enumeration is None:
             return 1
         return len(self.enumeration.isolated) if self.enumeration.complete else None
 
     @property
     def certificate(self) -> Certificate | None:
-        """The proof where there is no solution."""
+        """The proof that there is no solution, if there is one."""
         return self.existence.certificate
 
     @property
     def record(self) -> dict[str, Any]:
-        """One flat dictionary of JSON values; the keys are those of ``docs/analysis.md``."""
+        """One flat dictionary of JSON values; its keys are those of ``docs/analysis.md``."""
         problem = self.problem
         record: dict[str, Any] = {
             "digest": self.digest,
@@ -249,10 +249,10 @@ class Analysis:
 
     @property
     def matrix_info(self) -> dict[str, _core.MatrixInfo]:
-        """MATRIX_INFO of RT-0444, of the matrices that the problem has and that were looked at."""
+        """MATRIX_INFO of RT-0444, for the matrices that the problem has and that were analysed."""
         own = {name for name in self.nnz if getattr(self.problem, name, None) is not None}
         if self.problem.p:
-            own.discard("W")  # what is known is of W'
+            own.discard("W")  # the known facts are of W'
         known = self.problem.matrix_info
         result = dict(known)
         for name in sorted(own & set(self.spectra)):
@@ -276,19 +276,19 @@ def analyze(
     time_limit: float = 20.0,
     dense: int = DENSE,
 ) -> Analysis:
-    """What a problem is: sizes, ranks, conditioning, units, existence and uniqueness.
+    """Analyse a problem: sizes, ranks, conditioning, units, existence and uniqueness.
 
     Args:
         problem: any formulation.
-        tol: the error up to which a solution is at hand.
+        tol: the error up to which a vector counts as a solution.
         time_limit: [s] wall clock, of the solver and of each conic program. The solver has at most
-            2 s where Slater's condition proves that there is a solution.
-        dense: the side of a block up to which singular values are found densely.
+            2 s if Slater's condition proves that there is a solution.
+        dense: largest side of a block whose singular values are found densely.
 
     Raises:
         fclib.ProblemError: the data is not valid.
         fclib.UnsuitableError: M is singular, so that there is no local form.
-        ImportError: Clarabel is needed for the verdict, and not installed.
+        ImportError: Clarabel is needed for the verdict, but not installed.
     """
     problem.validate()
     data = Data.of(problem)
@@ -316,7 +316,7 @@ def analyze(
     condition = slater(data, joints, semidefinite, full, time_limit)
     unique = uniqueness(data, joints, sign, full, dense)
     states = None
-    # one solution, by theorems; else the states of the contacts say how many
+    # theorems show a single solution; otherwise the states of the contacts give the number
     if not (condition.holds and unique.verdict == "unique" and unique.reactions):
         states = enumerate_solutions(problem, time_limit=min(time_limit, ENUMERATION))
         unique = enumerated(unique, states)
@@ -354,7 +354,7 @@ def analyze(
 
 
 def definite_by_bodies(data: Data) -> bool:
-    """Whether M is positive definite and no joint follows from others, so that W' is what it is."""
+    """Whether M is positive definite and no joint follows from others, so that W' is exact."""
     M, G = data.matrices.get("M"), data.matrices.get("G")
     if M is None or (M != M.T).nnz or not lower_bound(M) > 0:
         return False
@@ -362,7 +362,7 @@ def definite_by_bodies(data: Data) -> bool:
 
 
 def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> Definiteness:
-    """Of the symmetric part of W, or of W'."""
+    """The definiteness of the symmetric part of W, or of W'."""
     symmetric = columns((reduced.W + reduced.W.T) / 2)
     if found.extremes is not None:
         (low, high), method = found.extremes, found.method
@@ -385,9 +385,9 @@ def _definiteness(data: Data, reduced: Reduced, found: Spectrum, dense: int) -> 
 def indefinite_in_part(
     symmetric: Any, dense: int, own_size: Array | None = None, own_rounding: float = 0.0
 ) -> bool:
-    """Whether a part is indefinite that is next to nothing beside the rest, as of heavy bodies.
+    """Whether a part is indefinite that is tiny beside the rest, for example of heavy bodies.
 
-    With a diagonal of ones each part counts, and only rounding of its own size is zero.
+    If the diagonal is scaled to ones, each part counts, and its own rounding counts as zero.
     """
     scaled = balanced(symmetric, own_size)
     low, high, _ = lowest_eigenvalue(scaled, dense)
@@ -398,10 +398,9 @@ def indefinite_in_part(
 def uniqueness(
     data: Data, joints: Joints, sign: Definiteness, full: bool, dense: int
 ) -> Uniqueness:
-    """By the contraction of the fixed point on s (Acary, Cadoux, Lemarechal & Malick 2011).
+    """By contraction of the fixed point on s (Acary, Cadoux, Lemarechal & Malick 2011).
 
-    Nothing is unique of joints that contradict each other. If their rank is not shown, W' is not
-    either.
+    If joints contradict each other, nothing is unique. If their rank is not shown, neither is W'.
     """
     if not joints.certain:
         return Uniqueness("undecided", joints.reason, float("nan"), False)
@@ -416,7 +415,7 @@ def uniqueness(
     symmetric = asymmetry(balanced(reduced.W, reduced.own_size)) <= SYMMETRIC
     if symmetric and sign.word == DEFINITE[0]:
         constant = _contraction(data, reduced, dense)
-        # from above: what the inverse may have lost to rounding
+        # upper bound of the rounding error of the inverse
         lost = 10 * sign.threshold / sign.lowest
         constant = constant * (1 + lost) if lost < 0.1 else float("nan")
     if constant < 1:
@@ -433,7 +432,7 @@ def uniqueness(
 
 
 def enumerated(found: Uniqueness, states: Enumeration) -> Uniqueness:
-    """With what the states of the contacts say."""
+    """Uniqueness with the results of the states of the contacts."""
     if found.verdict == "unique" or states.velocity_unique is None:
         return found
     return replace(
@@ -483,7 +482,7 @@ def _contraction(data: Data, reduced: Reduced, dense: int) -> float:
 
 
 def _units(data: Data, verdict: Existence) -> Units:
-    """A guess at the units, and what is far from 1 in them."""
+    """A guess at the units, and the sizes that are far from 1 in them."""
     nc, d = data.problem.nc, data.d
     if nc == 0:
         nan = float("nan")

@@ -1,7 +1,8 @@
-"""Bounds that hold: sums in rational numbers, eigenvalues and singular values from one side.
+"""Guaranteed bounds: sums in rational numbers, one-sided bounds of eigen- and singular values.
 
-That a matrix has no eigenvalue below a bound is shown by a Cholesky factorisation of it with that
-bound and its own rounding taken off (Rump 2006, "Verification of positive definiteness").
+To show that a matrix has no eigenvalue below a bound, the bound and the rounding are subtracted
+from its diagonal. It suffices that the result has a Cholesky factorisation (Rump 2006,
+"Verification of positive definiteness").
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ Exact = list[dict[int, Fraction]]  # rows
 
 
 def exact_rows(a: Any, other: Any = None) -> Exact:
-    """The rows in rational numbers; of half the sum with another matrix."""
+    """The rows in rational numbers; or of half the sum with another matrix."""
     rows: Exact = [{} for _ in range(a.shape[0])]
     for matrix in (a,) if other is None else (a, other):
         entries = sp.coo_array(matrix)
@@ -39,10 +40,10 @@ def dot(row: dict[int, Fraction], x: list[Fraction]) -> Fraction:
 
 
 def least_singular(B: Any) -> float:
-    """A number that no singular value of a matrix with more columns than rows is below."""
+    """A lower bound of the singular values of a matrix with more columns than rows."""
     B = sp.csr_array(B)
     product = sp.csr_array(B @ B.T)
-    # what a sum of so many terms may have lost
+    # rounding error of a sum of so many terms
     lost = (int(np.diff(B.indptr).max(initial=0)) + 2) * EPS * (abs(B) @ abs(B).T)
     off = float(lost.sum(axis=1).max()) if lost.nnz else 0.0
     product = sp.csr_array((product + product.T) / 2)
@@ -50,12 +51,12 @@ def least_singular(B: Any) -> float:
 
 
 def length(row: dict[int, Fraction]) -> Fraction:
-    """||row||, from above."""
+    """An upper bound of ||row||."""
     return root_above(sum((one * one for one in row.values()), Fraction()))
 
 
 def below(x: Fraction) -> float:
-    """A double that is not more than x."""
+    """A double that is at most x."""
     try:
         return nextafter(float(x), -inf)
     except OverflowError:
@@ -63,7 +64,7 @@ def below(x: Fraction) -> float:
 
 
 def root_above(x: Fraction) -> Fraction:
-    """A rational number not less than the root, by 1e-15 of it."""
+    """A rational number at least the root, and larger by at most 1e-15 of it."""
     if x <= 0:
         return Fraction()
     shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
@@ -75,9 +76,9 @@ def root_above(x: Fraction) -> Fraction:
 
 
 def lower_bound(a: Any) -> float:
-    """A number that no eigenvalue of a symmetric matrix is below; -inf where none was found.
+    """A lower bound of the eigenvalues of a symmetric matrix; -inf if none was found.
 
-    By blocks that nothing links, each up to DENSE.
+    It is found by independent blocks, each up to the side DENSE.
     """
     a = sp.csr_array(a)
     if a.nnz == 0:
@@ -93,7 +94,7 @@ def lower_bound(a: Any) -> float:
 
 
 def _lower_bound(a: Array) -> float:
-    """Of a dense block: Cholesky's factorisation of a - shift succeeds."""
+    """Whether the Cholesky factorisation of a dense block a - shift succeeds."""
     n = len(a)
     diagonal = np.diag(a)
     if n == 1:
@@ -104,7 +105,7 @@ def _lower_bound(a: Array) -> float:
         guess = float(np.linalg.eigvalsh(a)[0])
     except np.linalg.LinAlgError:
         return -inf
-    gamma = (n + 2) * EPS  # of n + 1 terms
+    gamma = (n + 2) * EPS  # rounding of n + 1 terms
     size = n * EPS * float(abs(a).max())
     for target in (guess / 2, 2 * guess, 0.0, *(-size * 4.0**k for k in range(8))):
         if target > guess:

@@ -1,8 +1,8 @@
-"""What is cheaply known of a problem: for every file that is built.
+"""The cheap part of the analysis, for every file that is built.
 
-Ranks and conditioning by dense eigenvalues of blocks up to a small size, of W on the bodies where
-these are fewer: the eigenvalues of W that are not zero are those of M^-1/2 H H^T M^-1/2. Slater's
-condition without a conic program, uniqueness where a theorem gives it. `analyze` does the rest.
+Ranks and conditioning by dense eigenvalues of blocks up to a small size, of W on the bodies if
+these are fewer: the nonzero eigenvalues of W are those of M^-1/2 H H^T M^-1/2. Slater's condition
+without a conic program, uniqueness if a theorem gives it. `analyze` does the rest.
 """
 
 from __future__ import annotations
@@ -38,19 +38,19 @@ from fclib.analysis._joints import joints_of
 from fclib.analysis._reactions import reactions
 from fclib.analysis._spectrum import Spectrum, blocks_of, spectrum
 
-SIDE = 1000  # of a block that is treated densely
-JOINTS = 0.5  # [s] wall clock, to decide whether joints agree
+SIDE = 1000  # largest side of a block that is treated densely
+JOINTS = 0.5  # [s] wall clock limit for deciding whether joints agree
 
 
 @dataclass(frozen=True)
 class Brief:
-    """What was found, and what was left out.
+    """The facts found, and the parts left out.
 
     Attributes:
         matrix_info: MATRIX_INFO of RT-0444, by the names of both forms' matrices.
         words: MATH_INFO of RT-0444.
-        record: for a catalogue; None where nothing is known.
-        left_out: what `analyze` would look at, in words.
+        record: for a catalogue; None if nothing is known.
+        left_out: parts that `analyze` would add, in words.
     """
 
     matrix_info: dict[str, _core.MatrixInfo] = field(default_factory=dict)
@@ -67,14 +67,14 @@ def brief(
     refuted: bool = False,
     states: Enumeration | None = None,
 ) -> Brief:
-    """What is known of a problem, its local form at hand.
+    """The cheap facts on a problem whose local form is at hand.
 
     Args:
         problem: any formulation.
         local: its local form, or itself.
-        solution: one that is at hand.
-        refuted: whether a solver has proved that there is none.
-        states: what the states of the contacts say, if they were looked at.
+        solution: a known solution.
+        refuted: whether a solver has proved that there is no solution.
+        states: the result of trying the states of the contacts, if they were tried.
     """
     data = Data(problem, local)
     matrices = data.matrices
@@ -146,7 +146,7 @@ def brief(
 
 
 def spectrum_of_W(data: Data, skewness: float) -> Spectrum | None:
-    """Of W, on the bodies where they are fewer; None where there are joints, or it costs much."""
+    """Spectrum of W, on the bodies if these are fewer; None with joints, or if it costs much."""
     problem = data.problem
     if problem.p or skewness > SYMMETRIC:
         return None
@@ -162,11 +162,11 @@ def spectrum_of_W(data: Data, skewness: float) -> Spectrum | None:
 
 
 def on_bodies(data: Data) -> Any:
-    """M^-1/2 H H^T M^-1/2 as csc_array; None where M is not positive definite, or too large."""
+    """M^-1/2 H H^T M^-1/2 as csc_array; None if M is not positive definite, or too large."""
     M, H = data.matrices["M"], data.matrices["H"]
     if data.problem.n > SIDE or asymmetry(M) > SYMMETRIC:
         return None
-    # zeros between bodies stay exact zeros, and the blocks are found again
+    # zeros between bodies stay exact, so that the blocks are found again
     gram = (H @ H.T).toarray()
     try:
         factor = cholesky(M.toarray(), lower=True)
@@ -178,7 +178,7 @@ def on_bodies(data: Data) -> Any:
 
 
 def sign_of(data: Data, found: Spectrum) -> Definiteness:
-    """The sign of W: on the bodies it is a square, and has no negative eigenvalue."""
+    """The definiteness of W: on the bodies it is a square without negative eigenvalues."""
     size = data.problem.m
     bodies = data.problem.n and data.problem.n < size
     low, high = found.extremes if found.extremes is not None else (0.0, found.largest)
@@ -197,7 +197,7 @@ def sign_of(data: Data, found: Spectrum) -> Definiteness:
 def matrix_info_of(
     matrices: dict[str, Any], spectra: dict[str, Spectrum]
 ) -> dict[str, _core.MatrixInfo]:
-    """Sparsity of each matrix, and what is known of its singular values."""
+    """The sparsity of each matrix, and known facts on its singular values."""
     known = {}
     for name, matrix in matrices.items():
         entries = max(1, matrix.shape[0] * matrix.shape[1])
@@ -216,5 +216,5 @@ def matrix_info_of(
 
 
 def digits(value: float) -> float:
-    """Three digits, which all machines agree on."""
+    """Three digits, on which all machines agree."""
     return float(f"{value:.2e}")

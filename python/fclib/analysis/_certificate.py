@@ -1,14 +1,14 @@
 """Proofs that a problem has no solution, checked on its data as given, in rational arithmetic.
 
-u^ is in K* exactly where u_N >= 0, so what proves that there is no solution is (Farkas) y >= 0, one
-number a contact, and z, one a bilateral constraint, with
+u^ is in K* exactly if u_N >= 0. So, by Farkas' lemma, a proof that there is no solution is y >= 0,
+one number for each contact, and z, one for each bilateral constraint, with
 
     local    -(W^T E y + V z) in K*,  V^T E y + R^T z = 0,  y . q_N + z . s < 0
     global   H E y + G z = 0,                               y . w_N + z . b < 0
 
-Every double is a rational number, and so are the sums. A W that was condensed carries the rounding
-of that; what of W^T E y is left then is accepted under the two conditions of `check`, with the norm
-of reactions up to which the proof holds.
+Every double is a rational number, and so are the sums. A condensed W carries rounding errors. The
+rest of W^T E y is then accepted under the two conditions of `check`, and the proof holds up to a
+norm of the reactions.
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from scipy.linalg import qr
 from fclib import _core, _digest, _solve
 from fclib.analysis._data import Array
 
-LAST_DIGITS = 8  # of W's last digits, how many times their rounding may be left
-LEAST_GAIN = Fraction(1, 10**8)  # below this part of its terms a gain is rounding
-LEAST_SPEED = 1e-6  # of ||q||: what closes more slowly is within the tolerance of solutions
-NEAREST = 1e-9  # of each y, how far that of an exact proof may be
-MOST = 60  # unknowns up to which a kernel is found in rational arithmetic
-DIGITS = 5000  # of a number in a file, at most
+LAST_DIGITS = 8  # the rest may be so many times the rounding of W's last digits
+LEAST_GAIN = Fraction(1, 10**8)  # a gain below this share of its terms is rounding
+LEAST_SPEED = 1e-6  # in ||q||: a slower closing speed is within the tolerance of solutions
+NEAREST = 1e-9  # largest relative change of each y by an exact proof
+MOST = 60  # largest number of unknowns for a kernel in rational arithmetic
+DIGITS = 5000  # largest number of digits of a number in a file
 FORMAT = "fclib certificate 1"
 
 Numbers = Mapping[int, Fraction]
@@ -43,14 +43,14 @@ Numbers = Mapping[int, Fraction]
 
 @dataclass(frozen=True)
 class Certificate:
-    """A proof that there is no solution, of a problem as it was given.
+    """A proof that there is no solution, of a problem as given.
 
     Attributes:
         y: (nc,) >= 0 and z: (p,), or None without bilateral constraints, as doubles.
-        exact_y, exact_z: the same as rational numbers, zeros left out.
-        gain: -(y . q_N + z . s), or of w and b, positive.
-        distance: of -(W^T E y + V z) from K*, from above; 0 for an exact proof.
-        bound: no reactions of a norm below this are a solution; inf for an exact proof.
+        exact_y, exact_z: the same as rational numbers, without zeros.
+        gain: -(y . q_N + z . s), or the same with w and b; positive.
+        distance: upper bound of the distance of -(W^T E y + V z) from K*; 0 for an exact proof.
+        bound: no reactions with a norm below this are a solution; inf for an exact proof.
     """
 
     y: Array = field(repr=False)
@@ -68,11 +68,11 @@ class Certificate:
 
     @property
     def contacts(self) -> int:
-        """How many contacts the proof speaks of."""
+        """The number of contacts in the proof."""
         return len(self.exact_y)
 
     def record(self, problem: _solve.Problem) -> dict[str, Any]:
-        """What a file of a certificate has; numbers are exact, as "3/7"."""
+        """The content of a certificate's file; numbers are exact, for example "3/7"."""
         return {
             "format": FORMAT,
             "digest": _digest.digest(problem),
@@ -84,12 +84,12 @@ class Certificate:
 
 
 class CertificateError(_core.ProblemError):
-    """A certificate that does not prove what it says, with the contact that breaks it."""
+    """A certificate proves nothing; the message names the contact that breaks it."""
 
 
 @dataclass(frozen=True)
 class _System:
-    """The terms of the sums, by unknown: y are the first nc, z the others."""
+    """The terms of the sums, by unknown: the first nc are y, the others z."""
 
     nc: int
     p: int
@@ -141,7 +141,7 @@ def _system(problem: _solve.Problem, used: set[int]) -> _System:
 def _sum(
     terms: Mapping[int, list[tuple[int, Fraction]]], x: Numbers
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]]:
-    """The sums that are not zero, and those of the sizes of their terms."""
+    """The sums that are not zero, and the sums of the sizes of their terms."""
     total: dict[int, Fraction] = defaultdict(Fraction)
     size: dict[int, Fraction] = defaultdict(Fraction)
     for k, value in x.items():
@@ -152,7 +152,7 @@ def _sum(
 
 
 def _outside(problem: _solve.Problem, a: int, part: Sequence[Fraction]) -> float:
-    """From above, how far the part of a contact is from K*; 0 exactly where it is inside."""
+    """An upper bound of the distance of a contact's part from K*; 0 exactly if it is inside."""
     d = problem.spacedim
     groups = [(problem.mu, slice(1, d))]
     if isinstance(problem, (_core.LocalRollingProblem, _core.GlobalRollingProblem)):
@@ -174,7 +174,7 @@ def _outside(problem: _solve.Problem, a: int, part: Sequence[Fraction]) -> float
 
 
 def _root(x: Fraction) -> float:
-    """The root from above."""
+    """An upper bound of the root."""
     if x == 0:
         return 0.0
     shift = (x.denominator.bit_length() - x.numerator.bit_length()) // 2
@@ -185,20 +185,21 @@ def _root(x: Fraction) -> float:
 def check(
     problem: _solve.Problem, y: Mapping[int, Any], z: Mapping[int, Any] | None = None
 ) -> Certificate:
-    """The proof that y and z are, in exact arithmetic.
+    """The proof that y and z give, in exact arithmetic.
 
-    Where W^T E y is not in K* the proof is accepted for a local problem without bilateral
-    constraints, up to a norm of reactions, if what is left is no more than the last digits of W,
-    and y . W_NN y < 0: this W is not positive semidefinite, so that it was rounded. Where W is,
-    what is left is a velocity that the contacts can have.
+    If W^T E y is not in K*, the proof can still be accepted for a local problem without bilateral
+    constraints, up to a norm of the reactions. It is if the rest is at most the last digits of W,
+    and y . W_NN y < 0: then W is not positive semidefinite, so it was rounded. If W is positive
+    semidefinite, the rest is a velocity that the contacts can have.
 
     Args:
         problem: any formulation.
-        y: by contact, anything that Fraction takes.
-        z: by bilateral constraint.
+        y: one number for each contact, of any type that Fraction takes.
+        z: one number for each bilateral constraint.
 
     Raises:
-        CertificateError: it proves nothing, with the contact or the constraint that breaks it.
+        CertificateError: it proves nothing; the message names the contact or constraint that breaks
+            it.
     """
     exact_y = _rationals(y, problem.nc, "y", "contact")
     exact_z = _rationals(z or {}, problem.p, "z", "bilateral constraint")
@@ -277,10 +278,9 @@ def _check(problem: _solve.Problem, exact_y: Numbers, exact_z: Numbers) -> Certi
 
 
 def check_arrays(problem: _solve.Problem, y: Array, z: Array | None = None) -> Certificate:
-    """`check` of y (nc,) and z (p,) as arrays, as `fclib.Result` has them.
+    """`check` of y (nc,) and z (p,) as arrays, as in `fclib.Result`.
 
-    Where doubles are too coarse for sums that vanish, it is the proof next to them, in rational
-    numbers.
+    If doubles are too coarse for the sums to vanish, it is the nearest proof in rational numbers.
 
     Raises:
         CertificateError: they prove nothing.
@@ -304,7 +304,7 @@ def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dic
         if not 0 <= key < count:
             raise CertificateError(f"{name}: there is no {of} {key}, the problem has {count}")
         try:
-            # what such a text stands for would fill the memory
+            # the number of such a text would fill the memory
             if isinstance(value, str) and abs(Decimal(value.partition("/")[0]).adjusted()) > DIGITS:
                 raise ValueError
             number = Fraction(value)
@@ -316,12 +316,12 @@ def _rationals(values: Mapping[int, Any], count: int, name: str, of: str) -> dic
 
 
 def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None:
-    """The proof that y (and z) are, or one near them; None where none was found.
+    """The proof that y (and z) give, or one near them; None if none was found.
 
     Args:
         problem: any formulation.
         y: (nc,) as in Certificate.
-        z: (p,) likewise; found from y where it is left out.
+        z: (p,) likewise; found from y if it is left out.
 
     Raises:
         fclib.ProblemError: y or z is not of this size.
@@ -354,7 +354,7 @@ def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None
             best = None
         if best is not None and best.exact:
             return best
-    # what doubles cannot say: the kernel in rational numbers
+    # doubles cannot decide: find the kernel in rational numbers
     if len(own) + p <= MOST:
         for rows in ("zero", "all"):
             if (exact := _completed(problem, own, near, rows)) is None:
@@ -371,7 +371,7 @@ def farkas(problem: _solve.Problem, y: Any, z: Any = None) -> Certificate | None
 def _completed(
     problem: _solve.Problem, y: Numbers, z: Numbers, which: str
 ) -> tuple[dict[int, Fraction], dict[int, Fraction]] | None:
-    """Y and z moved so that the sums vanish exactly: those that must, or all of them."""
+    """Y and z moved so that the sums vanish exactly: those that must vanish, or all of them."""
     nc, p = problem.nc, problem.p
     system = _system(problem, {*y, *range(nc, nc + p)})
     rows: dict[tuple[bool, int], dict[int, Fraction]] = defaultdict(dict)
@@ -384,7 +384,7 @@ def _completed(
                 own[k] = own.get(k, Fraction()) + value
     if not rows:
         return None
-    # the bilateral multipliers follow from y, and of y what changes least for it
+    # the bilateral multipliers follow from y; of y, change the entries that change least
     unknowns = [*range(nc, nc + p), *_by_independence(list(rows.values()), y, range(nc, nc + p))]
     pivots: dict[int, dict[int, Fraction]] = {}
     place = {k: number for number, k in enumerate(unknowns)}
@@ -417,7 +417,7 @@ def _completed(
 
 
 def _by_independence(equations: list[dict[int, Fraction]], y: Numbers, joints: range) -> list[int]:
-    """The contacts of y, first those whose terms are large and least dependent on each other."""
+    """The contacts of y, first those with large terms that depend least on each other."""
     order = [*joints, *y]
     place = {k: number for number, k in enumerate(order)}
     terms = np.zeros((len(equations), len(order)))
@@ -436,10 +436,10 @@ def _by_independence(equations: list[dict[int, Fraction]], y: Numbers, joints: r
 
 
 def read_certificate(path: str | Path) -> tuple[dict[int, Any], dict[int, Any], str | None]:
-    """Y, z and the digest of a file that `Certificate.record` went into, or that has its y and z.
+    """Y, z and the digest from a file with a `Certificate.record`, or with its y and z.
 
     Raises:
-        fclib.FileError: it is no certificate.
+        fclib.FileError: the file is not a certificate.
     """
     try:
         record = json.loads(Path(path).read_text())

@@ -1,4 +1,4 @@
-"""Conic programs for Clarabel: rows of s = b - A x in zeros, nonnegatives, second-order cones."""
+"""Conic programs for Clarabel: s = b - A x in zeros, nonnegatives and second-order cones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def available() -> bool:
 
 @dataclass
 class Program:
-    """min 1/2 x^T P x + c^T x subject to what is added."""
+    """min 1/2 x^T P x + c^T x subject to the constraints added."""
 
     size: int
     zeros: list[tuple[Any, Array]] = field(default_factory=list)
@@ -38,12 +38,12 @@ class Program:
         self.nonnegatives.append((-sp.csr_array(B), c))
 
     def second_order(self, B: Any, c: Array, size: int) -> None:
-        """B x + c in cones of `size` rows each, the first bounds the norm of the others."""
+        """B x + c in cones of `size` rows each, the first row bounds the norm of the others."""
         if c.size:
             self.cones.append((-sp.csr_array(B), c, size))
 
     def solve(self, c: Array, P: Any = None, tol: float = 1e-10, time_limit: float = 60.0) -> Any:
-        """Clarabel's answer. Raises ImportError, saying what to install."""
+        """Clarabel's answer. Without Clarabel an ImportError says what to install."""
         if not available():
             raise ImportError(MISSING)
         clarabel = importlib.import_module("clarabel")
@@ -67,12 +67,12 @@ def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -
     """A x + c in K*, for all contacts: u_N >= mu ||u_T|| (+ mu_r ||u_R||).
 
     Args:
-        program: takes the constraints.
+        program: receives the constraints.
         data: the problem.
-        A: (m, size of the program).
+        A: (m, number of unknowns of the program).
         c: (m,).
-        first: of the unknowns that share u_N between sliding and rolling: nc of them where there is
-            rolling friction, none else.
+        first: place of the first unknown that shares u_N between sliding and rolling: nc of them
+            with rolling friction, otherwise none.
     """
     d, nc = data.d, data.problem.nc
     A = sp.csr_array(A)
@@ -84,7 +84,7 @@ def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -
         program.nonnegative(share, np.zeros(nc))
         program.nonnegative(A[::d] - share, c[::d])
     for number, (mu, part) in enumerate(data.friction):
-        # with rolling, the first cone is given what the share says and the second one the rest
+        # with rolling, the first cone gets the share and the second one the rest
         if len(data.friction) == 1:
             top, constant = A[::d], c[::d]
         elif number == 0:
@@ -109,5 +109,5 @@ def add_dual_cones(program: Program, data: Data, A: Any, c: Array, first: int) -
 
 
 def shares(data: Data) -> int:
-    """The unknowns that add_dual_cones needs."""
+    """The number of unknowns that add_dual_cones needs."""
     return data.problem.nc if len(data.friction) > 1 else 0

@@ -1,4 +1,4 @@
-"""What happens at each contact of a solution, and where the energy goes."""
+"""The state of each contact of a solution, and the energy balance."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def completed(data: Data, solution: _core.Solution) -> tuple[Array, Array]:
 def velocity(
     problem: _core.GlobalProblem | _core.GlobalRollingProblem, data: Data, solution: _core.Solution
 ) -> Array:
-    """The generalised velocity: the solution's, or what follows from its reactions."""
+    """The generalised velocity: the solution's, or the one that follows from its reactions."""
     if solution.v is not None:
         return solution.v
     impulse = data.matrices["H"] @ solution.r + problem.f
@@ -43,17 +43,17 @@ def _velocity_of(data: Data, impulse: Array) -> Array:
 
 
 def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[np.void]:
-    """One row a contact, as ``pandas.DataFrame(contacts(...))`` takes it.
+    """One row for each contact, in a form that ``pandas.DataFrame(contacts(...))`` takes.
 
     Args:
         problem: any formulation.
-        solution: of it; u is recomputed from the data, never taken from the solution.
+        solution: its solution; u is recomputed from the data, never taken from the solution.
 
     Returns:
         A structured array (nc,): contact, island, mu (and mu_r with rolling), status (open, stick
-        or slide, as Merit counts them), r_n and r_t [N s], u_n and u_t [m/s] (and r_r, u_r with
-        rolling), used (||r_T|| / (mu r_N), nan where there is no friction or no reaction), error
-        (||r - P_K(r - u^)|| of the contact, [N s] + [m/s] as the merit has it), cone [N s] and
+        or slide, as in Merit), r_n and r_t [N s], u_n and u_t [m/s] (and r_r, u_r with
+        rolling), used (||r_T|| / (mu r_N), nan without friction or reaction), error
+        (||r - P_K(r - u^)|| of the contact, [N s] + [m/s] as in the merit), cone [N s] and
         dual_cone [m/s] (distances from K and K*), dissipated [J] (-r . u).
 
     Raises:
@@ -94,19 +94,20 @@ def contacts(problem: _solve.Problem, solution: _core.Solution) -> npt.NDArray[n
 
 @dataclass(frozen=True)
 class Energy:
-    """The energy balance of a solution, in J; powers where r is a force.
+    """The energy balance of a solution, in J; powers if r is a force.
 
     Of the velocity without reactions v_f and the one with them v,
 
         kinetic - free = work - prescribed + bilateral,   work = r . (u + q) / 2.
 
     Attributes:
-        work: of the reactions, r . (u + q) / 2, in the frame of what is prescribed (w).
-        dissipated: by friction and by what moves apart, -r . u: the sum over the contacts.
-        prescribed: r . w, of what is moved from outside; nan for a local problem, which has no w.
-        bilateral: of the bilateral constraints, lambda . (G^T (v + v_f)) / 2 or its local form.
+        work: work of the reactions, r . (u + q) / 2, in the frame of the prescribed motion (w).
+        dissipated: energy lost by friction and separation, -r . u: the sum over the contacts.
+        prescribed: r . w, work of the prescribed motion; nan for a local problem, which has no w.
+        bilateral: work of the bilateral constraints, lambda . (G^T (v + v_f)) / 2 or its local
+            form.
         kinetic, free: v . M v / 2 and v_f . M v_f / 2; nan for a local problem.
-        residual: what the balance leaves, relative to its largest term: of the kinetic energy for
+        residual: rest of the balance, relative to its largest term: of the kinetic energy for
             a global problem, whose M must be symmetric; of r . u = r . (W r + V lambda + q), u the
             solution's, for a local one.
     """
@@ -126,7 +127,7 @@ def energy(problem: _solve.Problem, solution: _core.Solution) -> Energy:
     Raises:
         fclib.ProblemError: problem or solution is not valid.
     """
-    _core.merit(problem, solution)  # validates both
+    _core.merit(problem, solution)  # this validates both
     data = Data.of(problem)
     r, u = completed(data, solution)
     q = data.local.q

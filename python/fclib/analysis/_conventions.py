@@ -1,11 +1,11 @@
-"""Whether a problem looks as if its data were in another order than N, T1, T2.
+"""Whether a problem's data seem to be in another order than N, T1, T2.
 
 Nothing in a problem says which component of a contact is the normal: with the rows T1, T2, N it is
-another problem, which may be solved with an error of 0 while bodies fall through each other. Two
-signs of it are looked for, which contacts with the normal first do not have together:
+another problem. That one may be solved with an error of 0 while bodies fall through each other.
+There are two signs; contacts with the normal first do not have both:
 
-- components that close (q < 0, as by gravity) where the first one does not;
-- entries of W's diagonal: of a round body those of T1 and T2 are equal, and that of N is not.
+- components close (q < 0, for example by gravity), but the first one does not;
+- on W's diagonal, a round body has equal entries for T1 and T2, and another one for N.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ import numpy as np
 from fclib import _core, _solve
 from fclib.analysis._data import columns
 
-MOST: Final = 0.9  # share of the contacts that must show a sign
-FEW: Final = 0.1  # share of the contacts that may close along the first component
-EQUAL: Final = 1e-6  # relative difference of entries that are equal
-DIFFERENT: Final = 1e-2  # and of entries that are not
-SMALL: Final = 1e-9  # of the largest q: below it a component neither closes nor opens
-LARGEST: Final = 1000  # contacts of a global problem up to which it is condensed to be looked at
+MOST: Final = 0.9  # least share of the contacts that must show a sign
+FEW: Final = 0.1  # largest share of the contacts that may close along the first component
+EQUAL: Final = 1e-6  # relative difference of entries that count as equal
+DIFFERENT: Final = 1e-2  # and of entries that count as different
+SMALL: Final = 1e-9  # relative to the largest q: below it a component neither closes nor opens
+LARGEST: Final = 1000  # a global problem with more contacts is not condensed for this check
 
 
 def conventions(problem: _solve.Problem) -> list[str]:
-    """What about a problem's data suggests another convention, a line each; mostly nothing.
+    """The signs of another convention in a problem's data, one line each; usually none.
 
-    Of a global problem with more contacts than LARGEST nothing.
+    A global problem with more contacts than LARGEST is not checked.
     """
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         if problem.nc > LARGEST:
             return []
         try:
             local = problem.condense()
-        except _core.Error:  # what is wrong with it others say better
+        except _core.Error:  # other checks report the error better
             return []
     else:
         local = problem
@@ -56,7 +56,7 @@ def conventions(problem: _solve.Problem) -> list[str]:
                 f"q_N is negative in {round(closes[0] * count)} of {count} contacts, and component"
                 f" {k + 1} of q in {round(closes[k] * count)}: is the normal first?"
             ]
-        other = 3 - k  # of the two that may be tangents
+        other = 3 - k  # the other of the two possible tangents
         if force < 3 or closes[0] >= MOST:
             continue
         near = np.abs(diagonal[:, 0] - diagonal[:, other]) <= EQUAL * diagonal[:, 0]

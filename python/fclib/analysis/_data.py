@@ -1,4 +1,4 @@
-"""What the parts of the analysis share: a problem's matrices as SciPy has them, its cones."""
+"""Common data of the analysis: a problem's matrices in SciPy's form, and its cones."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 Global: TypeAlias = _core.GlobalProblem | _core.GlobalRollingProblem
 
-DENSE = 2000  # the side up to which a matrix is treated densely
+DENSE = 2000  # largest side of a matrix that is treated densely
 EPS = float(np.finfo(float).eps)
 
 
 def norm(x: Any) -> float:
-    """||x||, whose squares neither overflow nor vanish; the largest double at most."""
+    """||x||, computed without overflow or underflow; at most the largest double."""
     with np.errstate(over="ignore"):
         found = float(np.hypot.reduce(np.asarray(x, dtype=float), initial=0.0))
     return min(found, float(np.finfo(float).max))
@@ -35,7 +35,7 @@ def norm(x: Any) -> float:
 def balanced(a: Any, size: Array | None = None) -> Any:
     """D A D of a square csc_array, D = 1 / size; by default the diagonal becomes one.
 
-    A row without a diagonal entry is given the size that makes its largest entry one.
+    A row without a diagonal entry gets the size that makes its largest entry one.
     """
     if a.nnz == 0:
         return a
@@ -53,13 +53,13 @@ def balanced(a: Any, size: Array | None = None) -> Any:
 
 @dataclass(frozen=True)
 class Reduced:
-    """W' = W - V R^-1 V^T, and up to where its eigenvalues may be rounding.
+    """W' = W - V R^-1 V^T, and the bound below which its eigenvalues may be rounding.
 
     Attributes:
         W: W'.
-        rounding: of its eigenvalues.
+        rounding: rounding of its eigenvalues.
         own_size, own_rounding: entry (i, j) is rounded by own_rounding own_size_i own_size_j; no
-            sizes where W' is W.
+            sizes if W' is W.
     """
 
     W: Any
@@ -77,21 +77,21 @@ class Data:
 
     @classmethod
     def of(cls, problem: _solve.Problem) -> Data:
-        """Raises fclib.UnsuitableError where M is singular."""
+        """Raises fclib.UnsuitableError if M is singular."""
         if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
             return cls(problem, problem.condense())
         return cls(problem, problem)
 
     @cached_property
     def matrices(self) -> dict[str, Any]:
-        """Those of the problem and of its local form, by their names."""
+        """The matrices of the problem and of its local form, by their names."""
         found = {name: getattr(self.problem, name, None) for name in ("M", "H", "G")}
         found |= {name: getattr(self.local, name) for name in ("W", "V", "R")}
         return {name: columns(a) for name, a in found.items() if a is not None}
 
     @property
     def d(self) -> int:
-        """Components of a contact."""
+        """The number of components of a contact."""
         return self.problem.spacedim
 
     @property
@@ -101,10 +101,10 @@ class Data:
 
     @cached_property
     def reduced(self) -> Reduced | None:
-        """W' = W - V R^-1 V^T, what W is without bilateral constraints; None where it is rounding.
+        """W' = W - V R^-1 V^T, the W without bilateral constraints; None if it is rounding.
 
-        Of a symmetric global problem it is A^T A, A what is left of M^-1/2 H beside the range of
-        M^-1/2 G: no difference of large terms, and joints may be redundant.
+        Of a symmetric global problem it is A^T A, with A the part of M^-1/2 H orthogonal to the
+        range of M^-1/2 G. So there is no difference of large terms, and joints may be redundant.
         """
         if self.problem.p == 0:
             return Reduced(self.W, 0.0)
@@ -126,7 +126,7 @@ class Data:
             size = np.linalg.norm(B, axis=0)
             U, sigma, _ = np.linalg.svd(B / np.where(size > 0, size, 1.0), full_matrices=False)
             digits = max(B.shape) * EPS
-            # a direction that the joints may or may not hold, by rounding, is undecided
+            # because of rounding, it is undecided whether the joints hold this direction
             if ((sigma > digits) & (sigma < 1e6 * digits)).any():
                 return None
             Q = U[:, sigma > digits]
@@ -134,7 +134,7 @@ class Data:
             left -= Q @ (Q.T @ left)
             off = max(A.shape) * EPS * float(1 / sigma[sigma > digits].min(initial=1.0))
             lengths = np.linalg.norm(A, axis=0)
-            # columns that the joints hold entirely are zero, not rounding
+            # if the joints hold a column entirely, it is zero, not rounding
             left[:, np.linalg.norm(left, axis=0) <= 16 * off * lengths] = 0
             digits = 16 * off
             largest_length = float(lengths.max(initial=0.0))
@@ -159,7 +159,7 @@ class Data:
 
     @property
     def friction(self) -> list[tuple[Array, slice]]:
-        """The coefficients, each with the components of a contact that it bounds."""
+        """The friction coefficients, each with the components of a contact that it bounds."""
         d = self.d
         if isinstance(self.local, _core.LocalRollingProblem):
             half = (d + 1) // 2
@@ -173,15 +173,15 @@ class Data:
         return np.asarray(np.sum(terms, axis=0))
 
     def dual_margin(self, u: Array) -> Array:
-        """How far each contact's u is inside K*: u_N - mu ||u_T|| (- mu_r ||u_R||)."""
+        """The depth of each contact's u inside K*: u_N - mu ||u_T|| (- mu_r ||u_R||)."""
         return np.asarray(u[:: self.d] - self.resistance(u))
 
     @property
     def stiffness(self) -> float:
-        """The mean of the diagonal of W, 1 where it vanishes."""
+        """The mean of the diagonal of W; 1 if it vanishes."""
         return float(self.W.diagonal().mean()) or 1.0 if self.problem.nc else 1.0
 
     @property
     def speed(self) -> float:
-        """||q||, 1 where it vanishes."""
+        """||q||; 1 if it vanishes."""
         return norm(self.local.q) or 1.0

@@ -7,19 +7,19 @@ In the plane each contact is in one of four states, of which exactly one holds a
     slide -   u_N = 0,  u_T < 0,      r = n (1, mu),  n >= 0
     stick     u_N = 0,  u_T = 0,      r in K
 
-and without friction, in the plane or in space, in one of two: open, or u_N = 0 and r_N >= 0. In a
-state of all contacts the law is linear: the solutions in it are a polyhedron, often a point or
+and without friction, in the plane or in space, in one of two states: open, or u_N = 0 and r_N >= 0.
+In a state of all contacts the law is linear: the solutions in it are a polyhedron, often a point or
 nothing. Klarbring 1990, "Examples of non-uniqueness and non-existence of solutions to quasistatic
-contact problems with friction" (Ingenieur-Archiv 60), does so by hand.
+contact problems with friction" (Ingenieur-Archiv 60), does this by hand.
 
 The equations are those of the whole problem, with v and lambda: nothing is condensed in doubles and
-no R^-1 is needed. They are solved in rational arithmetic (_rational.py). Contacts are given states
-one after the other; those that have none yet only satisfy u_N >= 0 and r in K. Where a linear
-program has no solution, Farkas' lemma gives a reason, which refutes all states that it fits. Before
-that, states are refuted in doubles, many at a time, by the inverses of their systems: with bounds
-of all rounding, and of a change of q and s by ROBUST ||(q, s)||.
+no R^-1 is needed. They are solved in rational arithmetic (_rational.py). Contacts get their
+states one after the other; a contact without a state only satisfies u_N >= 0 and r in K. If a
+linear program has no solution, Farkas' lemma gives a reason, which refutes all states that it fits.
+Before that, states are refuted in doubles, many at a time, by the inverses of their systems. This
+uses bounds of all rounding, and of a change of q and s by ROBUST ||(q, s)||.
 
-A single spatial contact with friction is decided too (_spatial.py).
+A single spatial contact with friction is also decided (_spatial.py).
 """
 
 from __future__ import annotations
@@ -36,13 +36,14 @@ from fclib.analysis._data import EPS, Array, columns, norm
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError, Table, integers
 from fclib.analysis._spatial import one_contact
 
-MOST_STATES = 4**8  # of all contacts together
-MOST_UNKNOWNS = 200  # n + p, taken out of the equations in rational arithmetic
-ROBUST = 1e-6  # of ||(q, s)||: what such a change of q and s makes solvable is not refuted
-SOUND = 1e-8  # the error in doubles of a solution that does not rest on the data's last digits
-FEW_STATES = 64  # up to which doubles are not asked first
-LARGEST, SMALLEST = Fraction(10**300), Fraction(1, 10**290)  # of what is rounded to doubles
-BATCH = 4096  # states whose systems are inverted at a time
+MOST_STATES = 4**8  # largest number of states of all contacts together
+MOST_UNKNOWNS = 200  # largest n + p that is eliminated in rational arithmetic
+ROBUST = 1e-6  # in ||(q, s)||: a state that such a change of q and s makes solvable is not refuted
+SOUND = 1e-8  # a solution with a smaller error in doubles does not depend on the data's last digits
+FEW_STATES = 64  # up to so many states, doubles are not tried first
+# bounds of numbers that are rounded to doubles
+LARGEST, SMALLEST = Fraction(10**300), Fraction(1, 10**290)
+BATCH = 4096  # number of states whose systems are inverted at a time
 
 EXISTS = "exists"
 NONE = "none"
@@ -59,13 +60,12 @@ class SolutionSet:
     Attributes:
         states: (nc,) "open", "stick", "slide +" (u_T > 0), "slide -" (u_T < 0) or, without
             friction, "closed".
-        solution: one of them, in doubles.
-        error: its merit in doubles, without the natural map that is not scaled: the same in all
-            units.
-        velocity: whether all of them have this u.
-        reaction: whether all of them have this r.
+        solution: one of the solutions, in doubles.
+        error: its merit in doubles, without the unscaled natural map: it is the same in all units.
+        velocity: whether all solutions have this u.
+        reaction: whether all solutions have this r.
         isolated: whether it is a point, with no other solution near it.
-        u, r: (m,) the solution, exact; where a spatial contact slides to 24 digits.
+        u, r: (m,) the solution, exact; to 24 digits if a spatial contact slides.
     """
 
     states: tuple[str, ...]
@@ -80,15 +80,15 @@ class SolutionSet:
 
 @dataclass(frozen=True)
 class Enumeration:
-    """What the states of all contacts say of a problem, in exact arithmetic, of the data as given.
+    """The result of trying the states of all contacts, in exact arithmetic, on the data as given.
 
     Attributes:
-        solutions: the sets of solutions, of different states.
-        missing: why these may not be all; empty where each state was decided.
-        robust: whether what was refuted is so too where each component of q and s changes by 1e-6
+        solutions: the sets of solutions, each in one state.
+        missing: the reason why these may not be all; empty if each state was decided.
+        robust: whether the refuted states stay refuted if each component of q and s changes by 1e-6
             of ||(q, s)||.
-        contacts, states: how many contacts there are, and states of all of them together.
-        speed: [m/s] ||(q, s)||, of a global problem of its local form.
+        contacts, states: number of contacts, and number of states of all of them together.
+        speed: [m/s] ||(q, s)||; for a global problem, of its local form.
     """
 
     solutions: tuple[SolutionSet, ...]
@@ -105,7 +105,7 @@ class Enumeration:
 
     @property
     def reason(self) -> str:
-        """In words, what was found, or why nothing was."""
+        """The result in words, or the reason why there is none."""
         if not self.states:
             return f"not decided by enumeration of contact states: {self.missing}"
         plural = "s" * (self.contacts != 1)
@@ -136,8 +136,8 @@ class Enumeration:
     def verdict(self) -> str:
         """One of "exists", "none" and "undecided".
 
-        A solution whose error in doubles is above 1e-8 rests on the last digits of the data, and is
-        not enough.
+        If the error of a solution in doubles is above 1e-8, it depends on the last digits of the
+        data, and is not enough.
         """
         if self.sound:
             return EXISTS
@@ -145,12 +145,12 @@ class Enumeration:
 
     @property
     def sound(self) -> tuple[SolutionSet, ...]:
-        """The sets whose solution is one in doubles too, of an error up to 1e-8."""
+        """The sets whose solution is also one in doubles, with an error up to 1e-8."""
         return tuple(found for found in self.solutions if found.error <= SOUND)
 
     @property
     def isolated(self) -> tuple[SolutionSet, ...]:
-        """The isolated solutions among these; of such as differ by rounding one."""
+        """The isolated solutions among these; only one of those that differ by rounding."""
         kept: list[SolutionSet] = []
         for found in self.sound:
             if found.isolated and all(
@@ -161,12 +161,12 @@ class Enumeration:
 
     @property
     def velocity_unique(self) -> bool | None:
-        """Whether all solutions have one u; None where that is not known, or there is none."""
+        """Whether all solutions have one u; None if not known, or if there is none."""
         return self._unique([found.u for found in self.sound], "velocity", self.speed)
 
     @property
     def reaction_unique(self) -> bool | None:
-        """Whether all solutions have one r; None where that is not known, or there is none."""
+        """Whether all solutions have one r; None if not known, or if there is none."""
         return self._unique([found.r for found in self.sound], "reaction", 0.0)
 
     def _unique(self, points: list[Numbers], part: str, size: float) -> bool | None:
@@ -174,7 +174,7 @@ class Enumeration:
             return False
         if not all(getattr(found, part) for found in self.sound):
             return False
-        # what rests on the last digits leaves it open
+        # a solution that depends on the last digits leaves it open
         known = self.complete and self.robust and self.sound == self.solutions
         alike = known and len(set(points)) == 1
         return True if alike else None
@@ -186,14 +186,14 @@ def _error(problem: _solve.Problem, solution: _core.Solution) -> float:
 
 
 def _apart(a: Numbers, b: Numbers, size: float = 0.0) -> bool:
-    """Whether they differ by more than the last digits of the data, relative to `size` or to a."""
+    """Whether they differ by more than the data's last digits, relative to `size` or to a."""
     difference = max((abs(x - y) for x, y in zip(a, b, strict=True)), default=Fraction())
     return difference > Fraction(SOUND) * max([Fraction(size), *map(abs, a)])
 
 
 @dataclass(frozen=True)
 class _State:
-    """Of a contact: its name, the columns that need not be zero, and that which is positive."""
+    """A contact's state: its name, the columns that may be nonzero, and the positive one."""
 
     name: str
     columns: tuple[int, ...]
@@ -201,14 +201,14 @@ class _State:
 
 
 class _Whole:
-    """The equations of the whole problem, v and lambda taken out of them exactly.
+    """The equations of the whole problem, with v and lambda eliminated exactly.
 
     Attributes:
-        elimination: what is left, and how the others follow.
-        smooth: the numbers of u_T where there is no friction, taken out too.
+        elimination: the rest of the equations, and how the other unknowns follow.
+        smooth: the numbers of u_T without friction, which are eliminated too.
         changes: the numbers of the changes of the joints' right sides.
-        plain: whether what is left is u = W r + q.
-        drifts: whether a lambda moves such u_T and nothing else, so that u is never unique.
+        plain: whether the rest is u = W r + q.
+        drifts: whether some lambda moves such u_T and nothing else, so that u is never unique.
     """
 
     def __init__(self, problem: _solve.Problem, end: float) -> None:
@@ -220,14 +220,14 @@ class _Whole:
         self.changes = range(first, first + problem.p)
         self.elimination = Elimination(equations, end=end)
         left = self.elimination.take_out(hidden, inner)
-        # what redundant joints leave is 0 = 0, or says something of r, or is impossible
+        # redundant joints leave 0 = 0, or an equation for r, or a contradiction
         for k in inner:
             if all(j in self.changes for j in equations[k]):
                 equations[k] = {}
         plain = not any(equations[k] for k in inner)
         smooth = [d * a + k for a in range(problem.nc) if not self.mu[a] > 0 for k in range(1, d)]
         self.elimination.take_out(smooth)
-        # what is left of lambda, where joints are redundant
+        # the rest of lambda, if joints are redundant
         loose = self.elimination.take_out(left)
         self.plain = plain and len(loose) == len(left)
         self.smooth = set(smooth)
@@ -238,10 +238,10 @@ class _Whole:
         )
 
     def rows(self) -> list[tuple[dict[int, Fraction], Fraction, float]]:
-        """Of a plain one each u_k = row . r + constant that is left, in order.
+        """For a plain system, each remaining u_k = row . r + constant, in order.
 
-        Row (by components of r), constant, and how much u_k changes at most where q and the right
-        sides of the joints change by 1.
+        Each entry has the row (by components of r), the constant, and the largest change of u_k if
+        q and the right sides of the joints change by 1.
         """
         m = self.problem.m
         result = []
@@ -256,7 +256,7 @@ class _Whole:
         return [values for _, values in sorted(result, key=lambda one: one[0])]
 
     def solution(self, whole: dict[int, Fraction]) -> _core.Solution:
-        """Of all unknowns, in doubles."""
+        """The values of all unknowns, in doubles."""
         problem, m = self.problem, self.problem.m
         bodies = isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
         n = problem.n if bodies else 0
@@ -267,15 +267,15 @@ class _Whole:
 
 
 def _double(exact: Fraction) -> float:
-    """Rounded to the nearest, by a part of EPS at most; nan where doubles have no such number."""
+    """Rounded to the nearest double, by at most EPS relative; nan if there is no such double."""
     return float(exact) if not exact or SMALLEST < abs(exact) < LARGEST else float("nan")
 
 
 class _System:
-    """The equations of all contacts, A x = b with x >= 0, and what the columns stand for.
+    """The equations of all contacts, A x = b with x >= 0, and the meaning of the columns.
 
     The columns of a contact with friction are u_N, u_T > 0, u_T < 0, and r along both edges of K;
-    those of one without are u_N and r_N.
+    those of a contact without friction are u_N and r_N.
     """
 
     def __init__(self, whole: _Whole) -> None:
@@ -309,7 +309,7 @@ class _System:
                         _State("closed", (first + 1,), None),
                     ]
                 )
-        # the columns of u, with what they are of
+        # the columns of u, with their contact and component
         self.speeds = {
             k: part for k, ((of, _), *_rest) in enumerate(self.parts) if (part := of) < m
         }
@@ -321,17 +321,17 @@ class _System:
             ]
             moved = [row.get(k, Fraction()) for k in whole.changes]
             table.append([*entries, *moved, row.get(CONSTANT, Fraction())])
-        # with the determinant all entries are minors of the whole system, which are integers
+        # times the determinant, all entries are minors of the whole system, which are integers
         self.denominator = int(self.elimination.determinant)
         entire = [[int(value * self.denominator) for value in row] for row in table]
         values = np.array(entire, dtype=object).reshape(len(rows), self.count + 1)
         self.A, self.b = values[:, :-1], values[:, -1]
 
     def plain_form(self) -> tuple[Array, Array, Array, tuple[list[Any], list[Any], list[Any]]]:
-        """Of a plain system, u = G x + q in doubles, x what the columns of r are.
+        """For a plain system, u = G x + q in doubles; x are the unknowns of the columns of r.
 
-        Also how q changes, as in `rows`; and for each contact and state: which x may be positive,
-        which u are zero, and the signs of the other u that have one.
+        Also the change of q, as in `rows`. And for each contact and state: the x that may be
+        positive, the u that are zero, and the signs of the other u, if they have one.
         """
         m = self.problem.m
         reactions = [k for k, part in enumerate(self.parts) if part[0][0] >= m]
@@ -370,11 +370,11 @@ class _System:
 
     @property
     def count(self) -> int:
-        """The columns, those of the joints' changes too, which are zero."""
+        """The columns, also those of the joints' changes, which are zero."""
         return len(self.parts) + len(self.whole.changes)
 
     def exact(self, x: dict[int, Fraction]) -> tuple[dict[int, Fraction], Numbers, Numbers]:
-        """All unknowns, u and r of a point."""
+        """All unknowns of a point, and its u and r."""
         m = self.problem.m
         values: dict[int, Fraction] = {}
         for column, value in x.items():
@@ -388,10 +388,10 @@ class _System:
 
 
 def _equations(problem: _solve.Problem) -> tuple[list[Equation], list[int], set[int]]:
-    """The equations of the whole problem; the numbers of v and lambda; which equations are theirs.
+    """The equations of the whole problem; the numbers of v and lambda; and their equations.
 
-    The unknowns are u, r, v, lambda, in this order, and then a change of each joint's right side,
-    which is zero.
+    The unknowns are u, r, v, lambda, in this order, and then a change of each joint's right side;
+    the change is zero.
     """
     m, p = problem.m, problem.p
     equations: list[Equation] = []
@@ -453,7 +453,7 @@ def _equations(problem: _solve.Problem) -> tuple[list[Equation], list[int], set[
 
 
 def qualifies(problem: _solve.Problem) -> str:
-    """Why a problem is not decided by the states of its contacts; empty where it may be."""
+    """The reason why contact states cannot decide a problem; empty if they can."""
     if problem.n + problem.p > MOST_UNKNOWNS:
         return f"n + p is above {MOST_UNKNOWNS}"
     rubbing = problem.mu > 0
@@ -475,9 +475,9 @@ def enumerate_solutions(problem: _solve.Problem, *, time_limit: float = 5.0) -> 
     """All solutions, by the states of the contacts, in exact arithmetic.
 
     Args:
-        problem: planar with up to eight contacts, or without friction with up to sixteen; of any
+        problem: planar with up to eight contacts, or without friction with up to sixteen; in any
             formulation, with any W, R and M. Others are undecided, and the reason says why.
-        time_limit: [s] wall clock, after which what was found is returned as not complete.
+        time_limit: [s] wall clock, after which the solutions found are returned as incomplete.
 
     Raises:
         fclib.ProblemError: the data is not valid.
@@ -496,7 +496,7 @@ def enumerate_solutions(problem: _solve.Problem, *, time_limit: float = 5.0) -> 
 
 
 def _single(whole: _Whole) -> Enumeration:
-    """Of one spatial contact with friction."""
+    """The enumeration for one spatial contact with friction."""
     problem = whole.problem
     if not whole.plain:
         return Enumeration((), "redundant joints act on the contact")
@@ -567,7 +567,7 @@ class _Search:
         if not undecided:
             self._leaf(table, states)
             return
-        # the contact with the fewest states left
+        # choose the contact with the fewest states left
         possible = [
             left.any(axis=tuple(k for k in range(len(undecided)) if k != place))
             for place in range(len(undecided))
@@ -600,7 +600,7 @@ class _Search:
         return allowed
 
     def _kill(self, fits: Any, strict: int | None = None) -> None:
-        """Refutes all states whose columns fit; with `strict`, those that want it positive."""
+        """Refute all states whose columns fit; with `strict`, those that need a positive value."""
         refuted: Any = np.ones((), dtype=bool)
         for own in self.system.states:
             held = [all(fits[k] for k in state.columns) for state in own]
@@ -610,7 +610,7 @@ class _Search:
         self.alive &= ~refuted
 
     def _weigh(self, proof: Any) -> None:
-        """Whether the proof stands where q and s change a little, in each component."""
+        """Whether the proof still holds if each component of q and s changes a little."""
         moved = {k: abs(proof[k]) for k in range(len(self.system.parts), self.system.count)}
         for k, of in self.system.speeds.items():
             moved[-of - 1] = abs(proof[k])
@@ -646,13 +646,13 @@ class _Search:
             for of, factor in self.system.parts[k]:
                 gain = functionals.setdefault(of, np.zeros(self.system.count, dtype=object))
                 gain[k] = 1 if factor > 0 else -1
-        # r_T of edges that are alike in size is mu times their difference
+        # r_T of two edges of equal size is mu times their difference
         for of, gain in functionals.items():
             part = int(of >= m)
             if result[part] or table.free(allowed).size == 0:
                 continue
             result[part] = table.rises(gain, allowed) or table.rises(-gain, allowed)
-        # u_T without friction follows from the others
+        # without friction u_T follows from the others
         images: dict[int, list[Fraction]] = {}
         if self.system.whole.smooth and not result[0]:
             for column, own in enumerate(self.system.parts):
@@ -691,7 +691,7 @@ class _Search:
         return Enumeration(tuple(found), missing, robust, *size, self.speed)
 
     def _near(self, u: Numbers, r: Numbers, states: Any) -> bool:
-        """Whether a point is in the closure of a state."""
+        """Whether a point is in the closure of a state's set."""
         d = self.problem.spacedim
         for a, s in enumerate(states):
             name = self.system.states[a][s].name
@@ -715,25 +715,25 @@ class _Search:
 
 
 def _speed(problem: _solve.Problem) -> float:
-    """||(q, s)||, of a global problem of its local form."""
+    """||(q, s)||; for a global problem, of its local form."""
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         problem = problem.condense()
     return norm([*problem.q, *(() if problem.s is None else problem.s)])
 
 
 def _refute(system: _System, alive: Any, change: float, end: float) -> None:
-    """Refutes states in doubles, beyond all rounding and a change of each q and s.
+    """Refutes states in doubles, despite all rounding and any small change of q and s.
 
-    Of a state the system B x = -q of what is not zero has an approximate inverse Y. Where
-    e = ||I - Y B||_inf < 1, B is regular and x is within |Y| rho + e / (1 - e) max(|Y| rho) of any
-    x', rho the residual of x' (Rump 2010, "Verification methods: rigorous results using
+    In a state, the system B x = -q of the nonzero unknowns has an approximate inverse Y. If e = ||I
+    - Y B||_inf < 1, B is regular and x is within |Y| rho + e / (1 - e) max(|Y| rho) of any x', rho
+      the residual of x' (Rump 2010, "Verification methods: rigorous results using
     floating-point arithmetic", section 10).
     """
     G, q, moved, names = system.plain_form()
     if not (np.isfinite(G).all() and np.isfinite(q).all()):
         return
     changes = change * moved
-    # rows and columns of like sizes, by powers of two: nothing is rounded
+    # bring rows and columns to similar sizes by powers of two: nothing is rounded
     rows, cols = np.ones(len(q)), np.ones(G.shape[1])
     for _ in range(4):
         scaled = abs(G) * rows[:, None] * cols
@@ -742,7 +742,7 @@ def _refute(system: _System, alive: Any, change: float, end: float) -> None:
     rows, cols = (np.exp2(np.round(np.log2(factor))) for factor in (rows, cols))
     G, q, changes = G * rows[:, None] * cols, q * rows, changes * rows
     G_size, q_size = abs(G), abs(q)
-    unit = 2 * EPS * (2 * max(G.shape) + 4)  # of sums of products, entries being rounded too
+    unit = 2 * EPS * (2 * max(G.shape) + 4)  # rounding of sums of products, with rounded entries
 
     numbers = np.argwhere(alive)
     used, held, sign = (
@@ -759,7 +759,7 @@ def _refute(system: _System, alive: Any, change: float, end: float) -> None:
             j = np.nonzero(used[batch])[1].reshape(batch.size, size)
             B = G[i[:, :, None], j[:, None, :]]
             try:
-                # any Y will do: this one is there for exactly singular systems too
+                # any Y will do: this one also exists for exactly singular systems
                 Y = np.linalg.inv(B + 1e-14 * np.diag(np.linspace(0.5, 1, size)))
             except np.linalg.LinAlgError:
                 continue

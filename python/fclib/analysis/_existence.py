@@ -1,18 +1,18 @@
-"""Whether a problem has a solution: Slater's condition, a solution at hand, or a proof of none.
+"""Whether a problem has a solution: Slater's condition, a known solution, or a proof of none.
 
 Let S be the symmetric part of W, positive semidefinite. Reactions that grow without bound tend
-to a direction d in K with S d = 0 and q . d <= 0; so there is a solution where no such d is, and by
-the theorem of the alternative that is where some u = S x + q is strictly inside K*. For symmetric W
+to a direction d in K with S d = 0 and q . d <= 0; so there is a solution if no such d exists. By
+the theorem of the alternative this holds if some u = S x + q is strictly inside K*. For symmetric W
 this is the criterion of Cadoux: a velocity strictly inside the dual cone exists (Acary, Cadoux,
 Lemarechal & Malick 2011, "A formulation of the linear discrete Coulomb friction problem via convex
 optimization"; Klarbring & Pang 1998, "Existence of solutions to discrete semicoercive frictional
 contact problems").
 
-Few contacts are decided by all their states (_enumerate.py).
+If there are few contacts, all their states are tried (_enumerate.py).
 
-With bilateral constraints W is W' = W - V R^-1 V^T here: a W that is positive definite says nothing
-where W' is not. There are velocities at all only if the joints agree: nothing is said to exist
-unless that is shown (_joints.py). A proof that there is no solution is checked in exact arithmetic
+With bilateral constraints W is W' = W - V R^-1 V^T here: a positive definite W says nothing if W'
+is not positive definite. There are velocities only if the joints agree, so existence is claimed
+only if that is shown (_joints.py). A proof that there is no solution is checked in exact arithmetic
 (_certificate.py).
 
 The lack of a Slater point proves nothing: jammed packings have solutions under prestress.
@@ -33,9 +33,9 @@ from fclib.analysis._data import SYMMETRIC, Array, Data, asymmetry
 from fclib.analysis._enumerate import EXISTS, NONE, Enumeration
 from fclib.analysis._joints import Joints, joints_of_rows
 
-PAIRS = 500  # of contacts, that are tried as a proof at most
+PAIRS = 500  # largest number of pairs of contacts tried as a proof
 MARGIN = 1e-7  # least margin of a Slater point inside K*, relative to ||q||
-LOOK = 2.0  # [s] for a solution that no verdict waits for, at most
+LOOK = 2.0  # [s] time limit for a solution that no verdict needs
 
 EXISTS_SLATER = "exists by Slater"
 EXISTS_ENUMERATED = "exists by enumeration"
@@ -50,13 +50,13 @@ class Slater:
     """Slater's condition: a velocity strictly inside K* at every contact.
 
     Attributes:
-        holds: whether one was found; None where the question was not decided.
+        holds: whether one was found; None if the question was not decided.
         margin: the least u_N - mu ||u_T|| (- mu_r ||u_R||) of the best velocity found, relative to
-            ||q||, at most 1; nan where none was looked for.
+            ||q||, at most 1; nan if none was sought.
         velocity: (m,) that velocity, [m/s].
-        method: how it was found.
+        method: the method that found it.
         threshold: what the margin must exceed.
-        witness: what that velocity comes from, where that was sought: v of a global problem, else x
+        witness: the source of that velocity, if it was sought: v of a global problem, otherwise x
             of u = S x + q.
     """
 
@@ -69,7 +69,7 @@ class Slater:
 
 
 def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
-    """A proof that there is no solution, or None where none was found.
+    """A proof that there is no solution, or None if none was found.
 
     Raises:
         ImportError: Clarabel is not installed.
@@ -100,8 +100,8 @@ def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
     y, z = np.maximum(0, x[:nc]), x[nc : nc + p] if p else None
     if not np.isfinite(x).all() or not y.any():
         return None
-    # contacts outside the proof keep small parts, which are left out; the others are brought to
-    # where the image vanishes, which it does for symmetric W
+    # contacts outside the proof keep small parts, which are dropped; the others are moved to make
+    # the image vanish, as it does for symmetric W
     for least in (1e-3, 1e-6, 1e-9, 0.0):
         kept = y > least * y.max()
         for trial in (_refined(data, E, kept, y, z), (np.where(kept, y, 0), z)):
@@ -109,7 +109,7 @@ def prove(data: Data, time_limit: float = 60.0) -> Certificate | None:
                 return proof
     if p:
         return None
-    # contacts in pairs, where W has lost what they share: any of them may show it
+    # try pairs of contacts, in case W has lost their common part: any pair may show it
     normal = data.W.tocsr()[::d][:, ::d]
     upper = sp.coo_array(sp.triu(normal, k=1))
     diagonal = normal.diagonal()
@@ -156,19 +156,19 @@ def slater(
     *,
     conic: bool = True,
 ) -> Slater:
-    """Looks for a velocity strictly inside K*.
+    """Look for a velocity strictly inside K*.
 
     Args:
         data: the problem.
-        joints: those of `joints_of`.
+        joints: the result of `joints_of`.
         semidefinite: whether the symmetric part of W (W' with bilateral constraints) is positive
             semidefinite; else the condition says nothing of solutions, and is not looked at.
-        full: whether that part has full rank: each velocity can be reached.
+        full: whether that part has full rank, so that each velocity can be reached.
         time_limit: [s] of the conic solver.
-        conic: whether a conic program decides what nothing simpler does.
+        conic: whether a conic program may decide if no simpler test does.
 
     Raises:
-        ImportError: Clarabel is needed, and not installed.
+        ImportError: Clarabel is needed, but not installed.
     """
     d, nc, p = data.d, data.problem.nc, data.problem.p
     if nc == 0:
@@ -192,10 +192,10 @@ def slater(
         return Slater(True, margin, data.local.q, "the velocity without reactions")
     A, c, B, e = reachable(data)
     if e.size and (abs(B - joints.B).nnz if B.shape == joints.B.shape else True):
-        joints = joints_of_rows(B, e)  # of a problem that is not symmetric
+        joints = joints_of_rows(B, e)  # the problem is not symmetric
     if not joints.certain:
         return Slater(None, np.nan, None, joints.reason)
-    # the velocity that leaves every contact at the same speed, where it can be reached
+    # the velocity that opens every contact at the same speed, if it can be reached
     if p == 0:
         x = lsmr(A, inside - c, atol=1e-14, btol=1e-14, maxiter=500)[0]
         if found := _witness(data, A, c, joints, x, "least squares"):
@@ -204,7 +204,7 @@ def slater(
         return Slater(None, np.nan, None, "left out: the conic program")
     own = shares(data)
     k = A.shape[1]
-    program = Program(k + 1 + own)  # x, t and what rolling needs
+    program = Program(k + 1 + own)  # x, t and the unknowns of rolling
     top = sp.csr_array((np.full(nc, -1.0), (d * np.arange(nc), np.zeros(nc, int))), (d * nc, 1))
     row_scale = abs(A.data).max(initial=0.0) or 1.0
     map_ = sp.hstack([A / row_scale, top, sp.csr_array((d * nc, own))])
@@ -219,7 +219,7 @@ def slater(
     x = np.array(answer.x)[:k] * data.speed / row_scale
     if np.isfinite(x).all() and (found := _witness(data, A, c, joints, x, "conic program")):
         return found
-    # t is free below, so that there is a solution: t <= 0 is an answer, if it came to an end
+    # t has no lower bound, so that there is a solution: t <= 0 is an answer if the solver finished
     reached = float(answer.x[k])
     solved = "Solved" in str(answer.status) and "Almost" not in str(answer.status)
     return Slater(False if solved and reached <= MARGIN else None, reached, None, "conic program")
@@ -255,7 +255,7 @@ def _symmetric_part(a: sp.sparray) -> sp.csr_array:
 def _witness(
     data: Data, A: sp.csr_array, c: Array, joints: Joints, x: Array, method: str
 ) -> Slater | None:
-    """A Slater point near x, judged from the data; None where none is shown to be one."""
+    """A Slater point near x, checked from the data; None if none is shown to be one."""
     B, e = joints.B, joints.e
     for _ in range(2 if e.size else 0):
         x = x - lsmr(B, B @ x - e, atol=1e-15, btol=1e-15, conlim=0, maxiter=20 * sum(B.shape))[0]
@@ -263,7 +263,7 @@ def _witness(
     u = A @ x + c
     lengths = np.sqrt(np.asarray(A.multiply(A).sum(axis=1)).ravel())
     rounding = 1e-12 * (abs(A) @ abs(x) + abs(c)).reshape(-1, data.d).sum(axis=1)
-    if off > 0:  # the velocity that the joints allow is so far from this one
+    if off > 0:  # the velocity that the joints allow is at most so far from this one
         rounding = rounding + off * (lengths[:: data.d] + data.resistance(lengths))
     margin = float((data.dual_margin(u) - rounding).min()) / data.speed
     if not margin > MARGIN:
@@ -278,8 +278,8 @@ class Existence:
     Attributes:
         verdict: one of five.
         reason: in words.
-        certificate: the proof where there is no solution and Farkas' lemma shows it.
-        solution: the one at hand, of whatever verdict; error: its merit (nan without one).
+        certificate: the proof, if there is no solution and Farkas' lemma shows it.
+        solution: the known one, whatever the verdict; error: its merit (nan without one).
     """
 
     verdict: str
@@ -297,15 +297,15 @@ def existence(
     tol: float,
     time_limit: float,
 ) -> Existence:
-    """The verdict; `states` is what those of the contacts say, where they were asked.
+    """The verdict; `states` is the result of the states of the contacts, if they were tried.
 
     Raises:
-        ImportError: Clarabel is needed, and not installed.
+        ImportError: Clarabel is needed, but not installed.
     """
     problem = data.problem
     solution, error, proof = None, float("nan"), None
     why = ""
-    agreed = ""  # why other joints are solved and judged than those of the data
+    agreed = ""  # the reason why other joints are used than those of the data
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         found = problem.consistent()
         agreed = found[1] if found is not None else ""
@@ -371,7 +371,7 @@ def _contradiction(
     solution: _core.Solution | None,
     error: float,
 ) -> Existence:
-    """Of joints that contradict each other: a proof, unless it is within rounding."""
+    """The proof by joints that contradict each other, unless it is within rounding."""
     for sign in () if agreed else (1, -1):
         z = {k: sign * value for k, value in joints.combination.items()}
         try:

@@ -2,10 +2,10 @@
 
 With M symmetric, x is the velocity of the bodies, and B = G^T. Nothing is rounded:
 
-- Rows that are independent by more than rounding have a solution. No singular value of B is below
-  the number `least`, so that some x* with B x* = e is within ||B x - e|| / least of any x.
-- Other rows are eliminated in rational numbers. Each row carries its name along: what is left of it
-  says which combination z of rows vanishes, B^T z = 0. If e . z is not zero, no x is there. Else
+- Rows that are clearly independent have a solution. `least` is a lower bound of the singular values
+  of B, so that some x* with B x* = e is within ||B x - e|| / least of any x.
+- Other rows are eliminated in rational numbers. Each row carries its name along, which gives the
+  combination z of rows that vanishes, B^T z = 0. If e . z is not zero, there is no x. Otherwise
   these rows follow from the others, which are enough.
 """
 
@@ -27,7 +27,7 @@ from fclib.analysis._bounds import dot, exact_rows, least_singular, root_above
 from fclib.analysis._data import DENSE, Array, Data
 from fclib.analysis._rational import CONSTANT, Elimination, Equation, LateError
 
-EXACT = 5.0  # [s] wall clock, of the elimination in rational numbers
+EXACT = 5.0  # [s] wall clock, limit of the elimination in rational numbers
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ class Joints:
 
     Attributes:
         B: (p x size), e: (p,).
-        agree: whether some x satisfies them all, exactly; None where that is not shown.
+        agree: whether some x satisfies them all, exactly; None if that is not shown.
         reason: in words, if they do not agree, or if that is not shown.
         kept: rows from which all others follow exactly, if they agree.
         scale: (p,) powers of two that bring the rows to a length near 1.
-        least: no singular value of the rows that are kept, times their scale, is below; 0 if that
-            is not shown.
+        least: lower bound of the singular values of the rows kept, times their scale; 0 if none is
+            shown.
         combination: z with B^T z = 0 and e . z != 0, by row, if they contradict each other.
     """
 
@@ -56,19 +56,19 @@ class Joints:
 
     @property
     def certain(self) -> bool:
-        """Whether they agree, and their rank does not rest on the last digits."""
+        """Whether they agree, and their rank does not depend on the last digits."""
         return self.agree is True and self.least > 0
 
     @property
     def gap(self) -> float:
-        """By how much the largest row of the combination is off if the others hold [m/s]."""
+        """The violation [m/s] of the largest row of the combination if the others hold."""
         if not self.combination:
             return 0.0
         total = sum((z * Fraction(float(self.e[k])) for k, z in self.combination.items()), _ZERO)
         return abs(float(total / max(map(abs, self.combination.values()))))
 
     def distance(self, x: Array) -> float:
-        """From above, how far from x some point is that satisfies the rows; inf: not shown."""
+        """A bound of the distance from x to a point that satisfies the rows; inf: not shown."""
         if not self.certain or not np.isfinite(x).all():
             return inf
         exact = [Fraction(float(one)) for one in x]
@@ -84,7 +84,7 @@ _ZERO = Fraction()
 
 
 def joints_of(data: Data, time_limit: float = EXACT) -> Joints:
-    """Those of a problem: G^T v = -b, or V^T r + R lambda = -s."""
+    """The joints of a problem: G^T v = -b, or V^T r + R lambda = -s."""
     problem = data.problem
     if problem.p == 0:
         return Joints(sp.csr_array((0, 0)), np.zeros(0))
@@ -97,7 +97,7 @@ def joints_of(data: Data, time_limit: float = EXACT) -> Joints:
 
 
 def joints_of_rows(B: sp.csr_array, e: Array, time_limit: float = EXACT) -> Joints:
-    """Those of B x = e."""
+    """The joints of the rows B x = e."""
     if e.size == 0:
         return Joints(B, e)
     end = time.monotonic() + time_limit
@@ -162,7 +162,7 @@ def _contradicting(joints: Joints, combination: Mapping[int, Fraction]) -> Joint
 
 
 def _eliminated(B: sp.csr_array, e: Array, end: float) -> tuple[int, dict[int, Fraction]]:
-    """The rank, and the combination of rows that vanishes and contradicts e the most; or none."""
+    """The rank, and the vanishing combination of rows that contradicts e the most, if any."""
     size = B.shape[1]
     equations: list[Equation] = exact_rows(B)
     for k, equation in enumerate(equations):

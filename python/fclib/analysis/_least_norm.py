@@ -1,9 +1,8 @@
 """The reactions of least norm of a solution whose reactions are not unique.
 
-min ||r|| over W r = W r*, r in the faces of the cones that the velocity leaves open - none where
-the contact opens, a ray where it slides, K where it sticks. That is a conic program, solved island
-by island; its answer is brought into the kernel of W on these faces, where W r keeps its value to
-rounding.
+min ||r|| over W r = W r*, with r in the faces of the cones that the velocity allows: zero if the
+contact opens, a ray if it slides, K if it sticks. This conic program is solved island by island.
+Its answer is moved into the kernel of W on these faces, so that W r keeps its value up to rounding.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ MOVES = 1e-9  # a velocity above this, relative to max(||u||, ||q||), opens or s
 def least_norm(
     data: Data, solution: _core.Solution, target: float
 ) -> tuple[str, int, _core.Solution]:
-    """Whether the reactions of the velocity are unique, how free they are, and the least ones."""
+    """Whether the reactions of the velocity are unique, their freedom, and the least ones."""
     problem, d = data.problem, data.d
     if problem.nc == 0:
         return "unique", 0, solution
@@ -46,7 +45,7 @@ def least_norm(
             continue
         block = local_W[rows][:, rows].toarray()
         if V is not None:
-            # lambda may change too, and no velocity of it
+            # lambda may also change, without any change of velocity
             block = _held(block, V.tocsr()[rows].toarray(), data.matrices["R"].toarray())
         faces = _faces(data, island, r, u, threshold)
         kernel = _kernel(block @ faces.basis)
@@ -78,7 +77,7 @@ def _multiplier(data: Data, r: Array) -> Array | None:
 
 
 def complete(data: Data, solution: _core.Solution) -> _core.Solution:
-    """With u, recomputed, and v of a global problem."""
+    """The solution with u recomputed, and with v for a global problem."""
     problem = data.problem
     _, u = completed(data, solution)
     if isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
@@ -89,13 +88,13 @@ def complete(data: Data, solution: _core.Solution) -> _core.Solution:
 
 @dataclass(frozen=True)
 class Faces:
-    """The reactions that a velocity leaves open, contact by contact.
+    """The reactions that a velocity allows, contact by contact.
 
     Attributes:
-        basis: (d contacts, directions): where nothing slides, unit vectors.
-        sticking: positions in the island of the contacts that may have any reaction in K.
-        rays: the directions that are those of sliding contacts: not negative.
-        contacts: of the island.
+        basis: (d contacts, directions): unit vectors if nothing slides.
+        sticking: places in the island of contacts that may have any reaction in K.
+        rays: the directions of sliding contacts; their coefficients are not negative.
+        contacts: the contacts of the island.
     """
 
     basis: Array
@@ -142,10 +141,10 @@ def _kernel(a: Array) -> Array:
 
 
 def _least_in(data: Data, faces: Faces, W: Array, r: Array, kernel: Array) -> Array | None:
-    """The reaction of least norm with the same W r, or None where it was not found.
+    """The reaction of least norm with the same W r, or None if it was not found.
 
-    The conic program leaves W r and the cones by its tolerance. Its answer is brought into the
-    kernel, and Newton steps of least norm on the constraints that are broken end at rounding.
+    The conic program violates W r and the cones by its tolerance. Its answer is moved into the
+    kernel. Then Newton steps of least norm on the violated constraints end at rounding.
     """
     d, B = data.d, sp.csr_array(faces.basis)
     size = B.shape[1]

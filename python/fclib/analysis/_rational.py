@@ -1,4 +1,4 @@
-"""Linear systems and linear programs in rational arithmetic, for what is to be proven.
+"""Linear systems and linear programs in rational arithmetic, for proofs.
 
 Doubles are rational numbers, so that nothing is rounded. The simplex method keeps one table of
 integers with one denominator (Edmonds 1967, "Systems of distinct representatives and linear
@@ -17,26 +17,26 @@ from typing import Any
 import numpy as np
 
 CONSTANT = -1  # the key of an equation's right side
-GREEDY = 200  # pivots by the steepest column, before Bland's rule makes an end certain
+GREEDY = 200  # pivots by the steepest column, before Bland's rule makes the end certain
 
 Equation = dict[int, Fraction]  # sum over k of equation[k] x_k = equation[CONSTANT]
 
 
 class LateError(Exception):
-    """The time is over."""
+    """The time limit is over."""
 
 
 @dataclass
 class Elimination:
-    """Unknowns taken out of equations, and how they follow from the others."""
+    """Unknowns eliminated from equations, and how they follow from the others."""
 
     equations: list[Equation]
     pivots: list[tuple[int, Equation]] = field(default_factory=list)
-    end: float = inf  # of time.monotonic(), after which LateError is raised
-    determinant: Fraction = Fraction(1)  # of what was solved for, up to its sign
+    end: float = inf  # time by time.monotonic() after which LateError is raised
+    determinant: Fraction = Fraction(1)  # determinant of the eliminated part, up to its sign
 
     def take_out(self, unknowns: Iterable[int], among: set[int] | None = None) -> list[int]:
-        """Takes unknowns out by the equations of these numbers, or by all; those left are returned.
+        """Eliminate unknowns by the equations of these numbers, or by all; return those left.
 
         An equation that was used is empty afterwards.
         """
@@ -70,9 +70,9 @@ class Elimination:
         return left
 
     def complete(self, x: Mapping[int, Fraction], constant: int = 1) -> dict[int, Fraction]:
-        """All unknowns: those that were taken out follow, others that are not in x are zero.
+        """All unknowns: the eliminated ones follow, others that are not in x are zero.
 
-        Of the equations with their right sides times `constant`: with 0, how unknowns change.
+        The right sides of the equations are multiplied by `constant`: 0 gives changes of unknowns.
         """
         result = dict(x)
         for k, pivot in reversed(self.pivots):
@@ -93,30 +93,30 @@ def integers(row: list[Fraction]) -> list[int]:
 class Table:
     """A table of the simplex method: A x = b, x >= 0, with the rows solved for a basis.
 
-    Columns may be barred (not `allowed`): these are at zero.
+    Columns may be barred (not `allowed`): their variables are zero.
     """
 
     def __init__(self, A: Any, b: Any, denominator: int = 1) -> None:
         """A (rows, columns) and b (rows,), arrays of objects that are int, over a denominator.
 
-        Where unknowns were taken out of equations in integers it is the determinant of that.
+        If unknowns were eliminated in integers, it is the determinant of the elimination.
         """
         sign = np.where(b < 0, -1, 1).astype(object)
         self.T = np.concatenate([A, b[:, None]], axis=1) * sign[:, None]
         self.denominator = denominator
-        # -1 stands for a variable of its own, which is to become zero
+        # -1 stands for an artificial variable of the row, which must become zero
         self.basis = np.full(len(b), -1)
         self.ray: dict[int, Fraction] = {}
 
     def copy(self) -> Table:
-        """With arrays of its own."""
+        """A copy with its own arrays."""
         result = object.__new__(Table)
         result.T, result.denominator = self.T.copy(), self.denominator
         result.basis, result.ray = self.basis.copy(), {}
         return result
 
     def value(self, k: int) -> Fraction:
-        """Of the variable k."""
+        """The reduced column of the variable k."""
         rows = np.flatnonzero(self.basis == k)
         return Fraction(self.T[rows[0], -1], self.denominator) if rows.size else Fraction()
 
@@ -138,10 +138,10 @@ class Table:
             self.basis[row] = column
 
     def _minimise(self, cost: Any, own: int, allowed: Any, enough: int | None = None) -> Any:
-        """Minimises cost . x over the allowed columns; `own`: the cost of the rows' own variables.
+        """Minimise cost . x over the allowed columns; `own` is the cost of artificial variables.
 
-        Ends early where the variable `enough` is positive. Returns the last row of the table, the
-        reduced costs and minus the least value, times the denominator; None where there is none.
+        It ends early if the variable `enough` is positive. It returns the last row of the table:
+        the reduced costs and minus the least value, times the denominator; None if there is none.
         """
         at = np.where(self.basis < 0, own, cost[self.basis]).astype(object)
         last = np.append(cost, 0) * self.denominator - at @ self.T
@@ -172,17 +172,17 @@ class Table:
             self.T = self.T[:-1]
 
     def feasible(self, allowed: Any) -> Any:
-        """Brings what is not allowed to zero: None where that is possible, else the proof that not.
+        """Bring barred variables to zero. None if that is possible, else the proof that it is not.
 
-        The proof (columns + 1,) is y . A and y . b, integers, of some y: y . b > 0, and y . A <= 0
-        for what is allowed.
+        The proof (columns + 1,) is y . A and y . b, in integers, for some y: y . b > 0, and y . A
+        <= 0 for the allowed columns.
         """
         cost = np.where(allowed, 0, 1).astype(object)
         last = self._minimise(cost, 1, allowed)
         if last[-1] < 0:
             return np.append(cost, 0) * self.denominator - last
-        # what is at zero and not allowed leaves the basis; where nothing can replace it, the row
-        # says nothing of what is allowed
+        # barred variables at zero leave the basis; if none can replace one, its row does not
+        # restrict the allowed ones
         for row in range(self.basis.size):
             k = self.basis[row]
             if k >= 0 and allowed[k]:
@@ -196,7 +196,7 @@ class Table:
         return None
 
     def point(self) -> dict[int, Fraction]:
-        """The variables that are not zero; moved along the ray where one was found."""
+        """The nonzero variables; moved along the ray if one was found."""
         x = dict(self.ray)
         for row, k in enumerate(self.basis):
             if k >= 0 and self.T[row, -1]:
@@ -205,10 +205,10 @@ class Table:
         return x
 
     def positive(self, k: int, allowed: Any) -> Any:
-        """Makes x_k positive in `point`: None where that is possible, else a proof that it is zero.
+        """Make x_k positive in `point`. None if that is possible, else a proof that it is zero.
 
-        Of a table that is feasible. The proof (columns + 1,) is z . A and z . b of some z:
-        z . b = 0, z . A >= 0 for what is allowed, and (z . A)_k > 0.
+        The table must be feasible. The proof (columns + 1,) is z . A and z . b for some z: z . b =
+        0, z . A >= 0 for the allowed columns, and (z . A)_k > 0.
         """
         cost = np.zeros(self.T.shape[1] - 1, dtype=object)
         cost[k] = -1
@@ -218,7 +218,7 @@ class Table:
         return last - np.append(cost, 0) * self.denominator
 
     def rises(self, gain: Any, allowed: Any) -> bool:
-        """Whether gain . x can be more than it is. Of a feasible table, which it changes."""
+        """Whether gain . x can be increased. The table must be feasible, and is changed."""
         start = self._dot(gain)
         last = self._minimise(-gain, 0, allowed)
         return last is None or self._dot(gain) > start

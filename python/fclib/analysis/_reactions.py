@@ -1,15 +1,15 @@
 """Whether the reactions of a problem are unique, apart from its velocity.
 
-All reactions of one velocity u are r + k, where k moves nothing and r + k stays in the faces of the
-cones that u leaves open: none if the contact opens, a ray if it slides, K if it sticks. So
+All reactions of one velocity u are r + k, if k moves nothing and r + k stays in the faces of the
+cones that u allows: zero if the contact opens, a ray if it slides, K if it sticks. So
 
 - if no k but 0 lies in these faces' directions, the reactions of this velocity are unique;
 - if there is a k at contacts whose r lies inside its face, r + t k is a solution for all small t:
   they are not unique;
-- else k leads out of a cone at once, or not: that is left undecided.
+- otherwise k may lead out of a cone at once, or not: this is left undecided.
 
-Ranks are those of doubles. Of a global problem k moves nothing if H k = G l for some l; no inverse
-of M is needed.
+Ranks are computed in doubles. In a global problem k moves nothing if H k = G l for some l; no
+inverse of M is needed.
 """
 
 from __future__ import annotations
@@ -28,12 +28,13 @@ from fclib.analysis._enumerate import Enumeration
 from fclib.analysis._spectrum import blocks_of
 
 UNIQUE, SEVERAL, UNDECIDED = "unique", "not unique", "undecided"
-# a velocity above this, relative to max(||u||, ||q||), opens or slides; not less than so many
-# times the error of the solution, which its velocity may be wrong by
+# a velocity above this, relative to max(||u||, ||q||), opens or slides; but the bound is at least
+# so many times the error of the solution: its velocity may be wrong by as much
 MOVES, UNCERTAIN = 1e-9, 1e2
-# how far inside of its face a reaction is at least, relative to mu r_N, and r_N to the largest
+# least distance of an inside reaction from its face's edge, relative to mu r_N; least r_N, relative
+# to the largest
 INSIDE = 1e-6
-DOUBTFUL = 1e3  # times what counts as zero: up to here a pivot may be rounding, or not
+DOUBTFUL = 1e3  # a pivot up to so many times the bound for zero may be rounding, or not
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Faces:
     """Directions (m x k) in which the reactions of a velocity may differ.
 
     Attributes:
-        all: of the whole faces; inside: of those in which r lies inside.
+        all: directions of all faces; inside: directions of the faces in which r lies inside.
     """
 
     all: Any
@@ -78,13 +79,13 @@ def reactions(
     """Whether the reactions are unique.
 
     Args:
-        data: of the problem.
+        data: data of the problem.
         velocity: the verdict on the velocity.
-        follow: whether reactions follow from the velocity: W is regular.
-        states: what the states of the contacts say, if they were looked at.
-        solution: one that is at hand, and its error.
-        error: see there.
-        side: of a block that is treated densely; of a larger one nothing is said.
+        follow: whether reactions follow from the velocity, as W is regular.
+        states: the result of the states of the contacts, if they were tried.
+        solution: a known solution.
+        error: its error.
+        side: largest side of a block; a larger one is left undecided.
     """
     if data.problem.nc == 0:
         return Reactions(UNIQUE, "there is no contact")
@@ -122,14 +123,14 @@ def reactions(
 
 
 def faces_of(data: Data, solution: _core.Solution, error: float) -> Faces:
-    """The directions that a solution leaves open."""
+    """The directions that a solution allows."""
     d, nc = data.d, data.problem.nc
     _, u = completed(data, solution)
     speed, reaction = u.reshape(nc, d), solution.r.reshape(nc, d)
     threshold = max(MOVES, UNCERTAIN * error) * max(float(np.linalg.norm(u)), data.speed)
     least = INSIDE * float(abs(reaction[:, 0]).max(initial=0.0))
     entries: list[tuple[int, int, float]] = []
-    inner: list[bool] = []  # of each direction
+    inner: list[bool] = []  # for each direction
     for a in np.flatnonzero(speed[:, 0] <= threshold):
         N = d * int(a)
         ray = [(N, 1.0)]
@@ -161,22 +162,22 @@ def faces_of(data: Data, solution: _core.Solution, error: float) -> Faces:
 
 @dataclass(frozen=True)
 class Freedom:
-    """A dimension, or what it is at least."""
+    """A dimension, or a lower bound of it, in words."""
 
     least: int
     exact: bool = True
 
 
 def freedom(data: Data, faces: Any, side: int) -> Freedom:
-    """The dimension of what moves nothing in these directions.
+    """The dimension of the reactions that move nothing in these directions.
 
-    With joints: of the directions beside their multipliers, less what the multipliers alone leave.
+    With joints: the same for directions with multipliers, minus that for multipliers alone.
     """
     matrices, size = data.matrices, faces.shape[1]
     if size == 0:
         return Freedom(0)
     if "H" in matrices:
-        # rows of bodies of all masses count alike
+        # scale rows so that bodies of all masses count alike
         mass = matrices["M"].diagonal()
         if not (mass > 0).all():
             return Freedom(0, False)
@@ -189,7 +190,7 @@ def freedom(data: Data, faces: Any, side: int) -> Freedom:
         joints = sp.vstack([V, R])
     else:
         moved, joints = matrices["W"] @ faces, None
-    # more directions than rows need no rank; rows without an entry are none
+    # with more directions than rows no rank is needed; rows without an entry do not count
     held = np.unique(columns(moved).indices).size
     if size > held:
         return Freedom(size - held, False)
@@ -202,9 +203,9 @@ def freedom(data: Data, faces: Any, side: int) -> Freedom:
 
 
 def rank_of(a: Any, side: int) -> int | None:
-    """The rank, with columns of length 1; None of a large matrix, or if doubles do not tell.
+    """The rank, with columns of length 1; None if the matrix is large, or doubles cannot tell.
 
-    By a factorisation Q R with pivots, which costs a tenth of the singular values.
+    It uses a QR factorisation with pivots, which costs a tenth of the singular values.
     """
     a = columns(a)
     lengths: Array = np.sqrt(np.asarray(a.power(2).sum(axis=0)).ravel())
@@ -220,7 +221,7 @@ def rank_of(a: Any, side: int) -> int | None:
     found = np.concatenate([np.zeros(0), *pivots])
     threshold = 10 * max(a.shape) * EPS * float(found.max(initial=0.0))
     kept = found[found > threshold]
-    # a pivot between what is rounding and what is none leaves the rank open
+    # a pivot that may or may not be rounding leaves the rank open
     if kept.min(initial=np.inf) < DOUBTFUL * threshold:
         return None
     return int(kept.size)

@@ -1,10 +1,11 @@
 """Reference solutions: to the limit of double precision, by two unrelated algorithms.
 
 The first algorithm gives the solution, the second one confirms it: it shares no iteration with the
-first, and its velocity must agree. It starts from zero; where it ends nowhere, or at another
-solution (frictional problems may have several), from the first's reactions rounded to three digits.
+first, and its velocity must agree. It starts from zero. If it fails, or ends at another solution
+(frictional problems may have several), it starts again from the first's reactions, rounded to three
+digits.
 
-Where the reactions of a velocity are not unique, the solution has the one of least norm
+If the reactions of a velocity are not unique, the solution has those of least norm
 (`_least_norm.py`).
 """
 
@@ -22,10 +23,10 @@ from fclib.analysis._contacts import completed
 from fclib.analysis._data import Array, Data
 from fclib.analysis._least_norm import least_norm
 
-TARGET = 1e-12  # of the merit
+TARGET = 1e-12  # for the merit
 CONFIRMED = 1e2  # the confirming error may be this many times the target
 AGREE = 1e-8  # distance of the velocities, relative to max(||u||, ||q||)
-DIGITS = 3  # of the reactions that a second try starts from
+DIGITS = 3  # digits of the reactions from which a second try starts
 
 FIRST = ("auto", "nsn-jm", "nsn-ac", "ppa-nsn", "admm", "nsgs", "apgd")
 SECOND = ("nsn-jm", "nsn-ac", "admm", "apgd", "aclm", "nsgs", "fp-eg-upk", "ppa-nsgs")
@@ -36,11 +37,11 @@ class Confirmation:
     """A run of one algorithm.
 
     Attributes:
-        solver: its name; families: what it is made of.
+        solver: its name; families: the methods of which it consists.
         error: the merit it reached; status: of the result.
-        difference: of its velocity from the reference's, relative to max(||u||, ||q||); 0 for the
-            first.
-        start: "zero" or "rounded", the first's reactions to three digits.
+        difference: distance of its velocity from the reference's, relative to max(||u||, ||q||); 0
+            for the first.
+        start: "zero" or "rounded", the first's reactions, to three digits.
     """
 
     solver: str
@@ -53,19 +54,19 @@ class Confirmation:
 
 @dataclass(frozen=True)
 class Reference:
-    """A solution and what stands behind it.
+    """A solution and the evidence for it.
 
     Attributes:
-        solution: the reference, None where no algorithm came within 100 targets.
-        merit: of the solution, on the problem as it was given.
-        target: of the merit.
-        runs: the algorithms, the first and those that were asked to confirm it.
-        confirmed: whether a run of no common family agrees.
+        solution: the reference, None if no algorithm came within 100 targets.
+        merit: merit of the solution, on the problem as given.
+        target: target of the merit.
+        runs: the runs of the algorithms: the first, and those that should confirm it.
+        confirmed: whether a run without a common family agrees.
         reaction: "unique" (given the velocity), "minimum norm" or "one of several".
         freedom: dimension of the reactions of this velocity, before the cones bound them.
-        others: differences of the velocities of other solutions that were met, of an error within
-            the target: the velocity is not unique.
-        reason: why it is not certified, empty where it is.
+        others: velocity differences of other solutions found, with an error within the target: the
+            velocity is not unique.
+        reason: the reason why it is not certified; empty if it is.
     """
 
     problem: _solve.Problem = field(repr=False, compare=False)
@@ -86,7 +87,7 @@ class Reference:
 
     @property
     def error(self) -> float:
-        """Of the solution; nan without one."""
+        """The error of the solution; nan without one."""
         return self.merit.error if self.merit is not None else float("nan")
 
     @property
@@ -121,7 +122,7 @@ class Reference:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """What the file says of /solution: the merits, the algorithms, versions and date."""
+        """The attributes of /solution in a file: the merits, algorithms, versions and date."""
         if self.solution is None or self.merit is None:
             raise _core.ProblemError("there is no solution to speak of")
         merits = {f"merit_{name}": float(getattr(self.merit, name)) for name in _solve.ERRORS}
@@ -146,7 +147,7 @@ class Reference:
 
 
 def versions() -> str:
-    """Of fclib and of what it computes with."""
+    """The versions of fclib and of the libraries that it uses."""
     names = ("numpy", "scipy", "clarabel")
     found = [f"fclib {_core.version}"]
     for name in names:
@@ -165,8 +166,8 @@ def reference(
     Args:
         problem: any formulation.
         target: bound on the merit.
-        time_limit: [s] wall clock of each run. How many runs are made depends on the problem: two
-            where all goes well.
+        time_limit: [s] wall clock of each run. The number of runs depends on the problem: two if
+            all goes well.
 
     Raises:
         fclib.ProblemError: the data is not valid.
@@ -204,19 +205,19 @@ def reference(
 
 
 def _families(result: _core.Result) -> tuple[str, ...]:
-    """What a solver is made of; of a chain, what worked on the solution."""
+    """The methods in a solver; in a chain, those that worked on the solution."""
     if result.solver != "auto":
         return (_registry.find_solver(result.solver).family,)
     found: set[str] = set()
     for stage in result.stages:
-        # sweeps come first in nearly every chain: they count where they ended the work
+        # nearly every chain begins with sweeps: they count only if they ended the work
         if stage.solved or stage.families != "splitting":
             found |= set(stage.families.split(", "))
     return tuple(sorted(found)) or ("none",)
 
 
 def _first(data: Data, target: float, time_limit: float) -> tuple[_core.Result, Confirmation]:
-    """The best result of the first algorithms, up to one within the target."""
+    """The best result of the first algorithms, ending once one is within the target."""
     best = None
     for name in FIRST:
         try:
@@ -245,7 +246,7 @@ def _confirm(
     others: list[float] = []
     for start in ("zero", "rounded"):
         guess = None if start == "zero" else _rounded(solution)
-        # what does not come soon from zero is not waited for
+        # do not wait for a solution that does not come soon from zero
         limit = min(time_limit, 2.0) if start == "zero" else time_limit
         for name in SECOND:
             info = _registry.find_solver(name)

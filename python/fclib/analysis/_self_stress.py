@@ -1,4 +1,4 @@
-"""Whether reactions can grow without moving anything, with a proof that the data carries.
+"""Whether reactions can grow while nothing moves, with a proof from the data.
 
 solvable    a velocity strictly inside K* is reached, and W is positive semidefinite. Then there is
             a solution, and all of them are bounded. Let u0 = H^T v0 + w be that velocity and vf the
@@ -7,21 +7,21 @@ solvable    a velocity strictly inside K* is reached, and W is positive semidefi
 
                 c ||r|| <= ||v0 - vf||_M ||r||_W - ||r||_W^2 <= ||v0 - vf||_M^2 / 4
 
-            For a local problem v0 - vf is the x of u0 = S x + q, S the symmetric part of W. Where
-            S has eigenvalues down to -delta, W being rounded,
+            For a local problem v0 - vf is the x of u0 = S x + q, S the symmetric part of W. If S
+            has eigenvalues down to -delta, because W is rounded,
 
                 (c - delta ||x||) rho - delta rho^2 > (x . S x + delta ||x||^2) / 4
 
-            for some rho is what is needed: on the ball of that radius, where the law has a solution
-            as a variational inequality (Hartman & Stampacchia 1966), none touches the boundary. It
-            holds between two radii, so that others may be beyond the larger one.
+            must hold for some rho: on the ball of that radius the law has a solution as a
+            variational inequality (Hartman & Stampacchia 1966), and none touches the boundary. It
+            holds between two radii, so that other solutions may be beyond the larger one.
 prestressed r_bar in K, not zero, with W r_bar = 0 (H r_bar + G l = 0 of a global problem).
 open        neither is proven.
 
-Sums are those of rational numbers, so that nothing is rounded, and eigenvalues are bounded
-(_bounds.py). r_bar is near what a conic program gives: small ones by elimination in rational
-numbers, others because H has full row rank on the contacts that carry them, so that some r_bar is
-no farther than what is left of H r over the least singular value.
+Sums are in rational numbers, so that nothing is rounded, and eigenvalues are bounded (_bounds.py).
+r_bar is near the result of a conic program. In small problems it is found by elimination in
+rational numbers. In others H has full row rank on the contacts that carry r_bar, so that some r_bar
+is no farther than the rest of H r over the least singular value.
 """
 
 from __future__ import annotations
@@ -55,23 +55,22 @@ from fclib.analysis._rational import Elimination
 SOLVABLE = "solvable"
 PRESTRESSED = "prestressed"
 OPEN = "open"
-FEW = 40  # unknowns that are eliminated in rational numbers: their digits grow with each
+FEW = 40  # largest number of unknowns eliminated in rational numbers: digits grow with each
 
 
 @dataclass(frozen=True)
 class SelfStress:
-    """Whether reactions can grow without moving anything.
+    """Whether reactions can grow while nothing moves.
 
     Attributes:
         verdict: "solvable", "prestressed" or "open".
         reason: in words.
-        vector: what proves it: (n,) the velocity v0 of a global problem, (m,) the x of a local one,
+        vector: the proof: (n,) the velocity v0 of a global problem, (m,) the x of a local one,
             or (m,) the reactions r_bar, as doubles near them.
         margin: solvable: the least u_N - mu ||u_T|| (- mu_r ||u_R||) of u0, over ||q||;
             prestressed: the share of ||r_bar|| by which its contacts are inside K.
-        bound: where it is solvable, no solution has a norm ||r|| between this one and `far`; else
-            inf.
-        far: inf where W is shown to be positive semidefinite.
+        bound: if solvable, no solution has a norm ||r|| between this one and `far`; else inf.
+        far: inf if W is shown to be positive semidefinite.
     """
 
     verdict: str
@@ -85,10 +84,10 @@ class SelfStress:
 def self_stress(
     data: Data, joints: Joints, condition: Slater, time_limit: float = 60.0
 ) -> SelfStress:
-    """The verdict; `joints` are those of `joints_of`.
+    """The verdict; `joints` is the result of `joints_of`.
 
     Raises:
-        ImportError: Clarabel is needed, and not installed.
+        ImportError: Clarabel is needed, but not installed.
     """
     if data.problem.nc == 0:
         return SelfStress(SOLVABLE, "there is no contact", np.zeros(0), 1.0, 0.0)
@@ -149,7 +148,7 @@ def _solvable(data: Data, joints: Joints, condition: Slater) -> tuple[SelfStress
 
 
 def _free(data: Data, joints: Joints) -> Array:
-    """The velocity of a global problem without reactions of contacts."""
+    """The velocity of a global problem without contact reactions."""
     problem = data.problem
     assert isinstance(problem, (_core.GlobalProblem, _core.GlobalRollingProblem))
     M = data.matrices["M"]
@@ -163,16 +162,16 @@ def _free(data: Data, joints: Joints) -> Array:
 
 
 def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> tuple[Array, Array]:
-    """Of each contact, from below: u_N - mu ||u_T|| (- ...), and u . r over ||r|| on K.
+    """Lower bounds for each contact: of u_N - mu ||u_T|| (- ...), and of u . r over ||r|| on K.
 
-    `off` is how far the x that is meant may be from this one.
+    `off` bounds the distance of the exact x from this one.
     """
     d, nc = data.d, data.problem.nc
     exact = [Fraction(float(one)) for one in x]
     margins, forces = np.zeros(nc), np.zeros(nc)
     for a in range(nc):
         u = [dot(rows[d * a + k], exact) + Fraction(float(constant[d * a + k])) for k in range(d)]
-        steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), whose squares may be beyond doubles
+        steep, left = 1.0, u[0]  # sqrt(1 + mu^2 + ...), its squares may overflow doubles
         if off:
             left -= Fraction(off) * length(rows[d * a])
         for mu, part in data.friction:
@@ -193,11 +192,11 @@ def _inside(data: Data, rows: Exact, x: Array, constant: Array, off: float) -> t
 
 
 def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]:
-    """Reactions that move nothing, with as many contacts inside their cones as can be."""
+    """Reactions that move nothing, with as many contacts inside their cones as possible."""
     B = _moved(data)
     nc, d, own = data.problem.nc, data.d, data.problem.m
     extra = B.shape[1] - own
-    # r and what joints do, then t of each contact: r_a - t_a e_N in K, 0 <= t_a <= 1
+    # r and the joints' multipliers, then t of each contact: r_a - t_a e_N in K, 0 <= t_a <= 1
     size = B.shape[1] + nc
     program = Program(size)
     scale = float(abs(B.data).max(initial=0.0)) or 1.0
@@ -226,7 +225,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
     kept = np.flatnonzero(y[B.shape[1] :] > 0.5)
     if kept.size == 0:
         return None, "no reactions that move nothing were found"
-    # frictionless contacts have their normal reaction alone
+    # frictionless contacts have only their normal reaction
     columns = [d * a for a in kept.tolist()]
     for mu, part in data.friction:
         columns += [d * a + k for a in kept.tolist() if mu[a] > 0 for k in range(d)[part]]
@@ -260,7 +259,7 @@ def _prestressed(data: Data, time_limit: float) -> tuple[SelfStress | None, str]
 
 
 def _moved(data: Data) -> sp.csr_array:
-    """B of B (r, l) = 0: what reactions, and those of joints, move."""
+    """B of B (r, l) = 0: the motion by reactions, and by those of joints."""
     if isinstance(data.problem, (_core.GlobalProblem, _core.GlobalRollingProblem)):
         parts = [data.matrices["H"]] + ([data.matrices["G"]] if "G" in data.matrices else [])
         return sp.csr_array(sp.hstack(parts))
@@ -271,7 +270,7 @@ def _moved(data: Data) -> sp.csr_array:
 
 
 def _in_kernel(B: sp.csr_array, y: Array) -> tuple[list[Fraction], float] | None:
-    """A vector near y and how far from it one is whose image is exactly zero; None: not shown."""
+    """A vector near y, and its distance to one whose image is exactly zero; None: not shown."""
     B = sp.csr_array(B)
     B = B[np.flatnonzero(np.diff(B.indptr))]
     for _ in range(2):
@@ -291,7 +290,7 @@ def _in_kernel(B: sp.csr_array, y: Array) -> tuple[list[Fraction], float] | None
     elimination = Elimination(equations)
     elimination.take_out(order[:rank].tolist())
     if any(equations):
-        return None  # what is left says that the rank is higher, by rounding
+        return None  # the rest shows that the rank is higher, because of rounding
     start = {int(k): Fraction(float(y[k])) for k in order[rank:]}
     full = elimination.complete(start)
     return [full.get(k, Fraction()) for k in range(B.shape[1])], 0.0

@@ -1,6 +1,6 @@
 """All solutions of one spatial contact with friction, in rational arithmetic.
 
-Where it slides, r = n (1, mu e) and u_T = -sigma e with a direction e, n > 0, sigma > 0. With
+If it slides, r = n (1, mu e) and u_T = -sigma e with a direction e, n > 0, sigma > 0. With
 e = (1 - t^2, 2 t) / (1 + t^2) the part of u_T across e vanishes at the roots of a quartic P(t)
 (Bonnefon & Daviet 2011, "Quartic formulation of Coulomb 3D frictional contact"); the signs of n and
 sigma are those of two other polynomials. Sturm's theorem counts and separates the roots, and the
@@ -19,10 +19,10 @@ import numpy as np
 from fclib.analysis._data import EPS
 from fclib.analysis._rational import integers
 
-CELLS = 1 << 18  # of the directions of sliding, each of which is refuted in doubles
-NEAR = 1 - 5e-5  # the cosine of the angle, a hundredth, within which directions are alike
-REGULAR = 1e8  # the condition of W up to which what sticks is known to a change of q
-DIGITS = Fraction(1, 2**80)  # to which the roots are found
+CELLS = 1 << 18  # largest number of cells of sliding directions; each is refuted in doubles
+NEAR = 1 - 5e-5  # cosine of the angle, a hundredth, within which directions count as equal
+REGULAR = 1e8  # largest condition of W for which a sticking solution is safe against a change of q
+DIGITS = Fraction(1, 2**80)  # precision of the roots
 
 Number = Fraction
 Polynomial = list[Fraction]  # the coefficient of t^k at k; without zeros at the end
@@ -31,7 +31,7 @@ Vector = tuple[Fraction, ...]
 
 @dataclass(frozen=True)
 class Point:
-    """Solutions in one state: u and r of one of them, and whether these are those of all."""
+    """Solutions in one state: u and r of one of them, and whether all have the same."""
 
     state: str
     u: Vector
@@ -42,7 +42,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Found:
-    """The solutions, why they may not be all (else empty), and as robust of Enumeration."""
+    """The solutions, the reason if they may not be all, and `robust` as in Enumeration."""
 
     points: list[Point]
     missing: str
@@ -50,8 +50,8 @@ class Found:
 
 
 def one_contact(W: list[list[Fraction]], q: list[Fraction], mu: Fraction, change: float) -> Found:
-    """All solutions of u = W r + q and Coulomb's law; `change` is that of q for `robust`."""
-    if not any(map(any, W)):  # what nothing moves: u = q, and any r will do that goes with it
+    """All solutions of u = W r + q and Coulomb's law; `change` of q is for `robust`."""
+    if not any(map(any, W)):  # nothing moves: u = q, and any r that fits to it is a solution
         state = "open" if q[0] > 0 else "slide" if any(q) else "stick"
         still = Point(state, tuple(q), (Fraction(0),) * 3, reaction=q[0] > 0)
         return Found([still] if q[0] >= 0 else [], "", q[0] == 0 or abs(q[0]) > change)
@@ -105,7 +105,7 @@ def _stick(W: list[list[Fraction]], q: list[Fraction], mu: Fraction) -> tuple[li
         _times(_trim([mu * r[0], mu * d[0]]), _trim([mu * r[0], mu * d[0]])),
         *(_scale(_times(_trim([r[k], d[k]]), _trim([r[k], d[k]])), -1) for k in (1, 2)),
     )
-    # where one of them vanishes, and between
+    # points at which one of them vanishes, and points between
     product = _times(normal or [Fraction(1)], cone or [Fraction(1)])
     tried = [(s, False) for s in between(product)]
     tried += [(low, True) for low, high in roots(product) if low == high]
@@ -129,7 +129,7 @@ def _slide(W: list[list[Fraction]], q: list[Fraction], mu: Fraction) -> tuple[li
     E = [along(W[k][1], W[k][2], W[k][0]) for k in (1, 2)]
     minus = Fraction(-1)
     if q[0] == 0:
-        if len(D) == 3 and not roots(D):  # no direction has D = 0
+        if len(D) == 3 and not roots(D):  # D = 0 for no direction
             return [], ""
         return [], "q_N = 0, and a sliding reaction may be of any size"
     P = _add(
@@ -145,7 +145,7 @@ def _slide(W: list[list[Fraction]], q: list[Fraction], mu: Fraction) -> tuple[li
         return [], ""
 
     def point(t: Fraction | None, only: bool) -> Point | None:
-        """At t, or at its infinity, e = (-1, 0), where the leading coefficients count."""
+        """At t, or at its infinity, e = (-1, 0), for which the leading coefficients count."""
         size, slip = (_at(D, t), _at(S, t)) if t is not None else (_get(D, 2), _get(S, 4))
         if not (-q[0] * size > 0 and q[0] * slip > 0):
             return None
@@ -156,14 +156,14 @@ def _slide(W: list[list[Fraction]], q: list[Fraction], mu: Fraction) -> tuple[li
         u = (Fraction(0), -sigma * e[0], -sigma * e[1])
         return Point("slide", u, (n, n * mu * e[0], n * mu * e[1]), only, only)
 
-    if not P:  # every direction will do that has the signs
+    if not P:  # every direction with the right signs is a solution
         tried = [point(t, False) for t in [*between(signs), None]]
         some = next((one for one in tried if one is not None), None)
         return ([some] if some is not None else []), ""
     found = []
     if _get(P, 4) == 0 and (one := point(None, True)) is not None:
         found.append(one)
-    # roots of D are no solutions (n is infinite), those of S stick
+    # roots of D are not solutions (n is infinite); at those of S the contact sticks
     P = _quotient(P, _gcd(P, _derivative(P)))
     P = _quotient(P, _gcd(P, signs))
     for low, high in roots(P, apart_from=signs):
@@ -175,17 +175,18 @@ def _slide(W: list[list[Fraction]], q: list[Fraction], mu: Fraction) -> tuple[li
 def _robust(
     W: list[list[Fraction]], q: list[Fraction], mu: Fraction, change: float, points: list[Point]
 ) -> bool:
-    """Whether all solutions are near these where q differs by `change` in each component.
+    """Whether all solutions stay near these if q changes by `change` in each component.
 
-    Directions of sliding in cells: where none of the points slides, a sign or the part of u_T
-    across is wrong by more than it changes in the cell, by rounding and by the change of q.
+    Directions of sliding are divided into cells. If no solution slides in a cell, a sign or the
+    part of u_T across must be wrong there, by more than its change in the cell, by rounding and by
+    the change of q.
     """
     A, b, m = np.array(W, dtype=float), np.array(q, dtype=float), float(mu)
     if abs(b[0]) <= 2 * change or np.linalg.cond(A) > REGULAR:
         return False
     inverse = np.linalg.inv(A)
     r = -inverse @ b
-    room = m * r[0] - np.hypot(r[1], r[2])  # of the reaction that sticks
+    room = m * r[0] - np.hypot(r[1], r[2])  # room of the sticking reaction inside its cone
     off = (abs(inverse).sum() * change + EPS * REGULAR * abs(r).sum()) * (1 + m)
     if abs(room) <= 2 * off and r[0] >= -off:
         return False
@@ -196,7 +197,7 @@ def _robust(
     E = A[1:, :1] + m * A[1:, 1:] @ e
     P = -b[0] * (across * E).sum(axis=0) + D * (b[1:] @ across)
     S = -b[0] * (e * E).sum(axis=0) + D * (b[1:] @ e)
-    # each is a sum of products of at most two of e, W and q; half a cell, and rounding
+    # each is a sum of products of at most two of e, W and q; bounds for half a cell and rounding
     size = abs(A).sum() * (1 + m)
     half = np.pi / CELLS + 100 * EPS
     wide = size * (4 * abs(b).sum() * half + 4 * change)
@@ -293,11 +294,11 @@ def _signed(p: list[int], t: Fraction) -> int:
 
 
 def roots(p: Polynomial, apart_from: Polynomial | None = None) -> list[tuple[Fraction, Fraction]]:
-    """Intervals (low, high) of one real root each, to 80 bits; low = high where it is rational.
+    """Intervals (low, high) of one real root each, to 80 bits; low = high if it is rational.
 
     Args:
-        p: not zero.
-        apart_from: a polynomial without a common root, that has none in the intervals either.
+        p: a polynomial, not zero.
+        apart_from: a polynomial without a common root; it has no root in the intervals either.
     """
     if len(p) < 2:
         return []
@@ -306,7 +307,7 @@ def roots(p: Polynomial, apart_from: Polynomial | None = None) -> list[tuple[Fra
     other = None
     if apart_from and len(apart_from) > 1:
         other = _sturm(_quotient(apart_from, _gcd(apart_from, _derivative(apart_from))))
-    # Cauchy's bound, as a power of two: all middles are short
+    # Cauchy's bound, as a power of two, so that all middles have few digits
     bound = Fraction(2 ** ceil(1 + max(abs(value / p[-1]) for value in p)).bit_length())
     found = []
     todo = [(-bound, bound)]
@@ -329,7 +330,7 @@ def roots(p: Polynomial, apart_from: Polynomial | None = None) -> list[tuple[Fra
 
 
 def between(p: Polynomial) -> list[Fraction]:
-    """A number between each two roots, and beyond them. p is not zero."""
+    """A number between every two roots, and one beyond each end. p is not zero."""
     ends = roots(p)
     if not ends:
         return [Fraction(0)]

@@ -1,8 +1,8 @@
 """Rank and conditioning of a matrix, by its blocks.
 
-A matrix falls apart into blocks that share no row and no column; its singular values are theirs.
-Blocks that are small are treated densely, all of one shape at once. Of a large one the singular
-values are counted: those of a symmetric A above t are the eigenvalues of A - t and -A - t that are
+A matrix decomposes into blocks that share no row and no column; its singular values are theirs.
+Small blocks are treated densely, all of one shape at once. For a large block the singular values
+are counted: those of a symmetric A above t are the eigenvalues of A - t and -A - t that are
 positive, which Sylvester's law reads off a sparse factorisation (Parlett, "The symmetric eigenvalue
 problem", 1980, section 3.3); those of any other are the roots of the eigenvalues of A^T A.
 """
@@ -21,23 +21,23 @@ from scipy.sparse.linalg import eigsh, splu
 from fclib.analysis._data import DENSE, EPS, Array, asymmetry
 
 SPARSE_SYMMETRIC = 1e-10  # threshold of the rank, relative to the largest singular value
-SPARSE_GRAM = 1e-6  # the same, where A^T A stands for A
-HALVINGS = 12  # of the decades between the threshold and the largest singular value
+SPARSE_GRAM = 1e-6  # the same, if A^T A is used for A
+HALVINGS = 12  # bisections of the decades between the threshold and the largest singular value
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """The singular values of a matrix, in short.
+    """A summary of the singular values of a matrix.
 
     Attributes:
-        rank: singular values above the threshold.
+        rank: number of singular values above the threshold.
         largest, smallest: the largest, and the smallest above the threshold; 0 without any.
-        conditioning: their ratio; 0 without any. It is the condition number where the rank is full.
-        method: how they were found.
-        threshold: what counts as zero, absolute.
+        conditioning: their ratio; 0 without any. It is the condition number if the rank is full.
+        method: the method that found them.
+        threshold: absolute bound below which a value counts as zero.
         extremes: the lowest and the highest eigenvalue of a symmetric matrix that is treated
             densely, else None.
-        doubtful: singular values that the matrix has and that may be its rounding.
+        doubtful: number of singular values that may be only rounding.
     """
 
     rank: int
@@ -50,7 +50,7 @@ class Spectrum:
 
     @property
     def conditioning(self) -> float:
-        """Of the part that is not singular."""
+        """The conditioning of the nonsingular part."""
         return self.largest / self.smallest if self.smallest else 0.0
 
 
@@ -63,15 +63,15 @@ class Blocks:
 
     @property
     def method(self) -> str:
-        """In words."""
+        """The method in words."""
         words = ["dense"] if self.dense or not self.sparse else []
         return " and ".join([*words, *(["Sylvester's inertia"] if self.sparse else [])])
 
 
 def blocks_of(a: Any, limit: int = DENSE, square: bool = False) -> Blocks:
-    """The blocks of a csc_array that hold anything, of at most `limit` densely.
+    """The nonempty blocks of a csc_array; those up to `limit` are dense.
 
-    With `square`, rows and columns of one number stay together: the blocks of a matrix that acts
+    With `square`, a row and the column of the same number stay together, as for a matrix that acts
     on one space.
     """
     rows, cols = a.shape
@@ -109,7 +109,7 @@ def blocks_of(a: Any, limit: int = DENSE, square: bool = False) -> Blocks:
 
 
 def _places(label: Any, count: int) -> Any:
-    """The number of each entry among those of its label."""
+    """The place of each entry among those of its label."""
     order = np.argsort(label, kind="stable")
     starts = np.concatenate([[0], np.cumsum(np.bincount(label, minlength=count))])[:-1]
     places = np.empty(label.size, dtype=np.int64)
@@ -120,8 +120,8 @@ def _places(label: Any, count: int) -> Any:
 def spectrum(a: Any, limit: int = DENSE, rounding: float = 0.0) -> Spectrum:
     """Rank and conditioning of a csc_array; dense blocks have at most `limit` rows or columns.
 
-    The threshold is that of NumPy's matrix_rank, max(shape) eps sigma_1, where all is dense, or
-    `rounding` where that is more.
+    The threshold is that of NumPy's matrix_rank, max(shape) eps sigma_1, if all is dense, or
+    `rounding` if that is more.
     """
     square = a.shape[0] == a.shape[1] and asymmetry(a) <= max(a.shape) * EPS
     blocks = blocks_of(a, limit, square)
@@ -166,13 +166,13 @@ class _Counter:
         if self.gram and a.shape[0] < a.shape[1]:
             self.matrix = a @ a.T
         self.threshold = SPARSE_GRAM if self.gram else SPARSE_SYMMETRIC
-        # a start of its own makes the same matrix give the same digits
+        # a fixed start makes the same matrix give the same digits
         start = np.random.default_rng(0).standard_normal(self.matrix.shape[0])
         top = float(abs(eigsh(self.matrix, k=1, v0=start, return_eigenvectors=False)[0]))
         self.largest = float(np.sqrt(top)) if self.gram else top
 
     def above(self, value: float) -> int:
-        """How many singular values are above the value."""
+        """The number of singular values above the value."""
         if self.gram:
             return positive(self.matrix, value**2)
         return positive(self.matrix, value) + positive(-self.matrix, value)
@@ -190,7 +190,7 @@ class _Counter:
 
 
 def positive(a: Any, shift: float) -> int:
-    """How many eigenvalues of a symmetric sparse A are above the shift."""
+    """The number of eigenvalues of a symmetric sparse A above the shift."""
     shifted = sp.csc_array(a - shift * sp.eye_array(a.shape[0]))
     # pivots on the diagonal: U's diagonal is D of L D L^T
     factors = splu(
@@ -205,7 +205,7 @@ def positive(a: Any, shift: float) -> int:
 def lowest_eigenvalue(a: Any, limit: int = DENSE) -> tuple[float, float, str]:
     """The smallest and the largest eigenvalue of a symmetric csc_array, and the method.
 
-    Of sparse blocks only the sign of the smallest is known: it is -threshold or 0.
+    For sparse blocks only the sign of the smallest is known: it is -threshold or 0.
     """
     blocks = blocks_of(a, limit, square=True)
     values = [np.linalg.eigvalsh(stack).ravel() for stack in blocks.dense]

@@ -1,28 +1,28 @@
-"""The bench: solvers are run here, and judged by the merit, never by themselves.
+"""The bench: it runs solvers. The merit judges them, never the solvers themselves.
 
     campaign ──> job ──> pool | cluster ──> supervisor ──> worker: the solver
                                                 │
     profiles, plots <── store <── record <──────┘ the merit
 
-One run by hand is `run`; thousands are a `Campaign` and `run_campaign`. A supervisor is a process
+`run` makes one run by hand; `Campaign` and `run_campaign` make thousands. A supervisor is a process
 that has a worker forked, hands it a job, watches its time and memory, and judges what it returns.
 
-campaign.py     what is to be run: a TOML file becomes jobs. Needs problems.py, made.py, modules.py
-problems.py     the files that a campaign names, and what it knows of the problem in each
+campaign.py     makes jobs of a TOML file. Needs problems.py, made.py, modules.py
+problems.py     the files that a campaign names, and what the campaign knows of each problem
 made.py         problems that a campaign has made: steps of a scene, random ones
 modules.py      files of Python with solvers of the user's own
 fingerprint.py  what tells two versions of a solver apart
 job.py          what travels: a job there, a record back, and the statuses of a record
-runner.py       runs a campaign: what the store lacks goes to the pool or the cluster, twice and
-                a third time where something from outside has spoilt it
+runner.py       runs a campaign: jobs that the store lacks go to the pool or the cluster; a
+                job that something from outside has spoilt is tried up to three times
 pool.py         supervisors on this machine, several at once
 cluster.py      the same in the workers of Dask, on many machines
 supervisor.py   the process that watches a worker, and judges. Knows no campaign
-copies.py       the same problem in other numbers, against answers known by heart and luck
+copies.py       renumbered copies of a problem, against memorised answers and luck
 template.py     the process that workers are forked from
 worker.py       the process that solves
-warm_up.py      its first call of a solver, which is not measured
-meter.py        what the kernel says a run took: a control group, or the processes
+warm_up.py      the first call of a solver in a worker, which is not measured
+meter.py        time and memory of a run, counted by the kernel
 processes.py    processes as Linux shows them
 machine.py      what a record says of its machine; cores for one run alone
 layout.py       how a store lies in SQLite: tables, columns, a checksum for each row
@@ -30,7 +30,7 @@ table.py        runs in columns
 store.py        one SQLite file, one row a run
 table.py        runs in columns
 comparison.py   what an instance is, which of them are compared, and their costs
-profiles.py     what the runs of a store say. Knows runs alone
+profiles.py     profiles, means and ratios of the runs of a store. It knows no problem
 plots.py        profiles as pictures
 single.py       one run by hand, in this process
 """

@@ -1,7 +1,7 @@
 """A campaign: problems x solvers with options x tolerances x repeats, under limits.
 
-It is a TOML file (docs/bench.md), or made from the flags of the command line. `plan` makes the
-jobs of it.
+It is a TOML file (docs/bench.md), or made from the flags of the command line. `plan` makes its
+jobs.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from fclib.bench.store import Store
 PUBLISHED = Path(__file__).with_name("campaigns")
 if not PUBLISHED.is_dir():  # in the repository, from which a development install is imported
     PUBLISHED = Path(__file__).resolve().parents[3] / "campaigns"
-NUMBERS = ("time_limit", "wall_limit", "memory")  # that a group of problems may set for itself
+NUMBERS = ("time_limit", "wall_limit", "memory")  # a group of problems may set its own
 KNOWN = {
     "name",
     "title",
@@ -50,7 +50,7 @@ KNOWN = {
     "problems",
 }
 DEFAULTS: Mapping[str, Any] = {"tolerances": [1e-8], "time_limit": 10.0, "memory": 4000.0}
-WHAT = {"files", "set", "simulate", "planted"}  # one of which a group of problems has
+WHAT = {"files", "set", "simulate", "planted"}  # a group of problems has exactly one of these
 KNOWN_OF_PROBLEMS = {"family", "form", "sample", "tolerances", *WHAT, *NUMBERS}
 KNOWN_OF_PROBLEMS |= {"optional", "published_mean", "sequence"}
 KNOWN_OF_SEQUENCE = {"start", "count", "stride"}
@@ -64,7 +64,7 @@ MADE = {
 
 
 class CampaignError(_core.Error, ValueError):
-    """A campaign asks for what cannot be done, or what is not understood."""
+    """A campaign asks for something impossible, or has an entry that is not understood."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class Steps:
     stride: int = 1
 
     def name(self, of: str) -> str:
-        """What stores call the sequence: "rt444/Chain, from 100 by 2"."""
+        """The name of the sequence in stores: "rt444/Chain, from 100 by 2"."""
         return f"{of}, from {self.start}" + (f" by {self.stride}" if self.stride > 1 else "")
 
     @property
     def slice(self) -> slice:
-        """The same of a list."""
+        """The steps that a list describes."""
         end = None if self.count is None else self.start + self.count * self.stride
         return slice(self.start, end, self.stride)
 
@@ -95,17 +95,17 @@ class Group:
     family: str = ""
     files: tuple[str, ...] = ()
     set: str = ""  # of the collection, or a family of it
-    form: str | None = None  # of its problems, "global" or "local"
+    form: str | None = None  # form of its problems: "global" or "local"
     sample: int | None = None
     simulate: Mapping[str, Any] | None = None
     planted: Mapping[str, Any] | None = None
-    optional: bool = False  # left out where there is no such file
-    sequence: Steps | None = None  # of which each step is solved from the one before, too
+    optional: bool = False  # a missing file is left out, without an error
+    sequence: Steps | None = None  # each step is also solved from the solution before
 
 
 @dataclass(frozen=True)
 class Campaign:
-    """What is to be run."""
+    """Problems, solvers, tolerances, repeats and limits of the runs."""
 
     name: str
     solvers: tuple[SolverChoice, ...]
@@ -121,7 +121,7 @@ class Campaign:
     budget: float | None = None  # [s] for all runs together
     base: Path = field(default_factory=Path.cwd)  # what paths are relative to
     text: str = ""  # as it was written
-    missing: tuple[str, ...] = ()  # optional solvers that are not here, and why
+    missing: tuple[str, ...] = ()  # optional solvers that are not installed, and why
 
     @classmethod
     def read(
@@ -136,8 +136,8 @@ class Campaign:
         Args:
             path: the file, or the name.
             changes: entries that take the place of the file's, in its groups of problems too.
-            sample: so many problems of each group, where it is given.
-            solvers: besides those of the file.
+            sample: number of problems to take from each group; None takes all.
+            solvers: solvers to run besides those of the file.
 
         Raises:
             CampaignError: there is none, or it is not valid; the message names the entry.
@@ -155,7 +155,7 @@ class Campaign:
             entries = toml().loads(text)
         except ValueError as error:
             raise CampaignError(f"{file}: {error}") from None
-        # what a published campaign names is found from where it is run
+        # the paths in a published campaign are relative to the current folder
         base = Path.cwd() if file.parent == PUBLISHED else file.resolve().parent
         try:
             groups = [
@@ -210,7 +210,7 @@ class Campaign:
     def plan(
         self, store: Store | None = None, tell: Callable[[str], None] = lambda _: None
     ) -> list[Job]:
-        """The jobs, in the order in which they are to be done, as `plan_by_key` has them."""
+        """The jobs, in the order in which they are to be done, as `plan_by_key` gives them."""
         return list(self.plan_by_key(store, tell).values())
 
     def plan_by_key(
@@ -220,16 +220,17 @@ class Campaign:
 
         They go repeat by repeat, each shuffled.
 
-        Where there is a budget, problem after problem, so that what it suffices for is spread
-        evenly over the groups and families, and all solvers have run what was begun.
+        If there is a budget, they go problem after problem. So the budget is spread evenly over the
+        groups and families, and every problem that was begun has been solved by all solvers.
 
         Args:
-            store: what it knows of files is not found out again.
-            tell: is called with what is left out, and why, and with how far a set is built.
+            store: files that it knows are not read again.
+            tell: called with each thing left out and why, and with the progress of a build.
 
         Raises:
             fclib.Error: a problem cannot be found, made or read.
-            ImportError: a problem is to be simulated or of a set, and what that needs is not there.
+            ImportError: a problem is to be simulated or of a set, and the package that this needs
+                is missing.
         """
         found: list[tuple[ProblemFacts, Group]] = []
         sequences: list[tuple[str, list[ProblemFacts], Group]] = []
@@ -271,7 +272,7 @@ class Campaign:
             if self.budget is not None:
                 ours = spread(ours)
             for job in ours:
-                jobs.setdefault(job.key, job)  # one problem under two names is run once
+                jobs.setdefault(job.key, job)  # a problem that has two names is run once
         return jobs
 
     def _job(
@@ -300,7 +301,7 @@ class Campaign:
         tol: float,
         repeat: int,
     ) -> list[Job]:
-        """The warm runs of a solver along a sequence, each after the one of the step before."""
+        """The warm runs of a solver along a sequence; each waits for the step before."""
         chain: list[Job] = []
         for step, facts in enumerate(steps):
             along = Along(name, step, chain[-1].key if chain else "")
@@ -313,7 +314,7 @@ class Campaign:
         if group.sequence is None:
             return paths
         steps = group.sequence
-        if group.set:  # these were chosen where they were made
+        if group.set:  # a set was already sampled when it was made
             steps = replace(steps, start=0, stride=1)
         chosen = paths[steps.slice]
         if len(chosen) < 2:
@@ -346,7 +347,7 @@ class Campaign:
 
 
 def spread(jobs: Sequence[Job]) -> list[Job]:
-    """Jobs in an order whose beginning has of each family its share, and of each problem all."""
+    """The jobs in an order whose first part has all jobs of its problems, of all families."""
     families: dict[str, dict[str, list[Job]]] = defaultdict(lambda: defaultdict(list))
     for job in jobs:
         families[job.problem.family][job.problem.hash].append(job)
@@ -359,7 +360,7 @@ def spread(jobs: Sequence[Job]) -> list[Job]:
 
 
 def published_means(store: str | Path) -> dict[tuple[str, float], float]:
-    """Means of the fastest solver, by family and tolerance, which the campaigns quote."""
+    """Published means of the fastest solver, by family and tolerance, that campaigns quote."""
     found = {}
     with Store(store, create=False) as opened:
         for text in opened.texts():
@@ -432,7 +433,7 @@ def _count(entries: Mapping[str, Any], name: str, default: int, where: str = "")
 
 
 def _yes(entries: Mapping[str, Any], name: str, where: str = "") -> bool:
-    """Whether an entry is true; false where it is left out."""
+    """Whether an entry is true; false if it is left out."""
     value = entries.get(name, False)
     if not isinstance(value, bool):
         raise CampaignError(f"{where}{name}: {value!r} is neither true nor false")
@@ -515,7 +516,7 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
 
 
 def _steps(row: Mapping[str, Any], where: str) -> Steps:
-    """The sequence of a group of problems; a sample of it are its first steps."""
+    """The sequence of a group of problems; a sample takes its first steps."""
     own = row["sequence"]
     _only(own, KNOWN_OF_SEQUENCE, f"{where}sequence.")
     if WHAT & set(row) not in ({"files"}, {"set"}, {"simulate"}):
@@ -573,9 +574,9 @@ def _solvers(
 
 
 def described(info: _core.SolverInfo) -> str:
-    """What a solver says of itself, in JSON: stores keep it, and ask no solver again.
+    """The description of a solver, in JSON. Stores keep it, so that no solver is asked again.
 
-    An option is its name, type or choices, default, unit and meaning.
+    Each option has a name, a type or choices, a default, a unit and a meaning.
     """
     options = [
         [
@@ -600,7 +601,7 @@ def described(info: _core.SolverInfo) -> str:
 
 
 def parse_solver(text: str) -> dict[str, Any]:
-    """A solver as one text: "nsgs relaxation=1.2"; what follows cmd: is one name."""
+    """A solver as one text: "nsgs relaxation=1.2"; all after "cmd:" is one name."""
     if text.startswith("cmd:"):
         return {"name": text}
     name, *pairs = shlex.split(text) or [""]

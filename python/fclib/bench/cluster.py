@@ -1,11 +1,11 @@
 """Jobs on a Dask cluster: the same campaign on many machines.
 
-A task is a job; in the worker of Dask it is done by a supervisor, as on one machine, so that no
-solver harms the worker. Where a worker of Dask dies, the scheduler has its tasks repeated by
-others. The records come back to the one process that writes the store.
+A task of Dask is one job. In the worker of Dask a supervisor does it, as on one machine, so that no
+solver harms the worker. If a worker of Dask dies, the scheduler gives its tasks to others. The
+records come back to the one process that writes the store.
 
-The problems are read from where the campaign found them, a folder that all machines share, or are
-sent: then each worker gets the bytes of a file once, and keeps it in its cache folder.
+If all machines share a folder, they read the problems from where the campaign found them. Otherwise
+the problems are sent: each worker gets the bytes of a file once, and keeps it in its cache folder.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ from fclib.bench import made
 from fclib.bench.job import Job, ProblemFacts, Record, Runner
 from fclib.bench.pool import SupervisorClient
 
-AHEAD = 3  # jobs a thread of the cluster that are on their way at once
+AHEAD = 3  # jobs for each thread of the cluster that are sent ahead
 PATIENCE = 20.0  # [s] for a scheduler to answer
 LOOK = 5.0  # [s] between two looks at the jobs of Slurm
-USELESS = 3  # jobs of Slurm that end one after the other before a worker has joined
-QUEUED = "PENDING,CONFIGURING,RUNNING,SUSPENDED,RESIZING,REQUEUED"  # states of jobs that may work
-RETRIES = 5  # of a job whose worker of Dask dies
+USELESS = 3  # give up after so many jobs of Slurm in a row end before a worker joins
+# states of jobs that work or may still work
+QUEUED = "PENDING,CONFIGURING,RUNNING,SUSPENDED,RESIZING,REQUEUED"
+RETRIES = 5  # how often a job is repeated if its worker of Dask dies
 
 # ---- in the workers of Dask
 
@@ -51,8 +52,8 @@ def do(job: Job, data: bytes | None = None, before: bytes | None = None) -> Reco
 
     Args:
         job: as it was planned.
-        data: the file of its problem, where it is not shared.
-        before: likewise that of the problem that its guess is of.
+        data: the bytes of its problem's file, if the file is not on a shared folder.
+        before: the same for the problem of its guess.
     """
     if data is not None:
         job = dataclasses.replace(job, problem=_moved(job.problem, data))
@@ -69,12 +70,12 @@ def do(job: Job, data: bytes | None = None, before: bytes | None = None) -> Reco
 
 
 def _moved(problem: ProblemFacts, data: bytes) -> ProblemFacts:
-    """The problem, with its file in the cache folder."""
+    """The problem; its file is now in the cache folder."""
     return dataclasses.replace(problem, path=str(_kept(problem.hash, data)))
 
 
 def _kept(name: str, data: bytes) -> Path:
-    """The file of these bytes in the cache folder."""
+    """The file in the cache folder that holds these bytes."""
     folder = made.cache_folder() / "sent"
     path = folder / f"{name}.hdf5"
     if not path.exists():
@@ -90,7 +91,7 @@ def _kept(name: str, data: bytes) -> Path:
 
 
 def say(word: str) -> None:
-    """Say something to who waits for a cluster."""
+    """Tell the user, who waits for a cluster, something."""
     print(word, file=sys.stderr, flush=True)
 
 
@@ -105,9 +106,9 @@ def runner(
     Args:
         client: a ``distributed.Client``.
         send: whether the problems are sent, because the machines share no folder.
-        tell: is called where there is no worker to do the jobs.
-        look: is called every `LOOK` seconds, with whether a run was done since, and raises where
-            there is no use in waiting.
+        tell: called if no worker is there to do the jobs.
+        look: called every `LOOK` seconds; its argument says whether a run was done since the last
+            call. It raises if waiting is of no use.
     """
 
     def run(jobs: Iterator[Job]) -> Iterator[tuple[Job, Record]]:
@@ -146,12 +147,12 @@ def runner(
             return AHEAD * max(1, sum(map(int, client.nthreads().values())))
 
         def result(future: Any) -> Record | None:
-            """What came of it; None if that is lost with the worker that had it, and done again."""
+            """The record; None if it was lost with its worker. Then the job is done again."""
             try:
                 record: Record = future.result(timeout=LOOK)
             except KilledWorker as error:
                 return Record("lost", f"the workers of Dask that tried it died: {error}")
-            except (TimeoutError, asyncio.TimeoutError):  # two in Python 3.10
+            except (TimeoutError, asyncio.TimeoutError):  # Python 3.10 has two
                 future.add_done_callback(done.put)
                 return None
             return record
@@ -187,7 +188,7 @@ def runner(
                 progress = True
                 yield job, record
         except (CancelledError, OSError, TimeoutError, RuntimeError) as error:
-            # with the scheduler go all the tasks that it knew of
+            # if the scheduler is gone, so are all its tasks
             if isinstance(error, _core.Error) or client.status == "running":
                 raise
             raise _core.Error(
@@ -203,7 +204,7 @@ def runner(
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Let Dask not say what this module says in one line."""
+    """Silence the messages of Dask that this module gives in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
     levels = {logger: logger.level for logger in map(logging.getLogger, names)}
     for logger in levels:
@@ -233,18 +234,18 @@ def on_scheduler(address: str, send: bool = False) -> Iterator[Runner]:
 
 
 def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
-    """A cluster of Slurm jobs, none of them submitted yet, and how many workers are wanted.
+    """A cluster of Slurm jobs, none submitted yet, and the number of workers wanted.
 
     Args:
-        options: ``workers`` (processes of Dask in all), and what ``dask_jobqueue.SLURMCluster``
-            has: ``queue``, ``account``, ``cores`` and ``processes`` of a job, ``memory``,
-            ``walltime``. Where a job has no number of processes, there is one for each core. Others
-            go to sbatch as they are: ``constraint=cascade`` as ``--constraint=cascade``.
+        options: ``workers`` (number of processes of Dask in all), and the options of
+            ``dask_jobqueue.SLURMCluster``: ``queue``, ``account``, ``cores`` and ``processes`` of a
+            job, ``memory``, ``walltime``. If a job has no number of processes, it has one for each
+            core. Other options go to sbatch: ``constraint=cascade`` as ``--constraint=cascade``.
 
     Raises:
-        fclib.OptionError: a number is none.
+        fclib.OptionError: a value that must be a number is not one.
     """
-    # its import takes Ctrl-C for itself, and would end the campaign without a word
+    # its import catches Ctrl-C, and would end the campaign without a message
     handler = signal.getsignal(signal.SIGINT)
     SLURMCluster = importlib.import_module("dask_jobqueue").SLURMCluster
     signal.signal(signal.SIGINT, handler)
@@ -272,7 +273,7 @@ def slurm_cluster(options: Mapping[str, str]) -> tuple[Any, int]:
 
 
 def _ask_sbatch(script: str) -> None:
-    """Whether Slurm would take the job: later its refusal would reach nobody."""
+    """Ask whether Slurm would take the job; nobody would see a later refusal."""
     with tempfile.NamedTemporaryFile("w", prefix="fclib-", suffix=".sh") as file:
         file.write(script)
         file.flush()
@@ -289,30 +290,30 @@ def _ask_sbatch(script: str) -> None:
 
 
 class Keeper:
-    """Sees to it that so many jobs of Slurm are there as are wanted, however they end.
+    """Keeps the number of Slurm jobs at what is wanted, however they end.
 
-    A job may be cancelled, preempted or at its walltime before a worker has joined from it, or
-    with several workers: so it is Slurm that is asked, and not the scheduler of Dask.
+    A job may be cancelled, preempted or reach its walltime, before a worker has joined from it or
+    after several have. So Slurm is asked, and not the scheduler of Dask.
     """
 
     def __init__(self, cluster: Any, workers: int, tell: Callable[[str], None] = say) -> None:
         self.cluster = cluster
         self.workers = workers
         self.tell = tell
-        self.useless = 0  # jobs that have ended one after the other, while no run was done
+        self.useless = 0  # jobs that ended in a row while no run was done
 
     def look(self, progress: bool) -> None:
-        """Submit a job for each that has gone.
+        """Submit a new job for each that has ended.
 
         Args:
             progress: whether a run was done since the last look.
 
         Raises:
-            fclib.Error: one after the other ends before a worker has joined.
+            fclib.Error: several jobs in a row end before a worker joins.
         """
         there = queued()
         if there is None:
-            return  # Slurm does not answer: it may later
+            return  # Slurm does not answer now, but may later
         known = self.cluster.workers.items()
         gone = {name: job.job_id for name, job in known if job.job_id and job.job_id not in there}
         if progress or self.cluster.scheduler_info["workers"]:
@@ -331,14 +332,14 @@ class Keeper:
             self.cluster.scale(self.workers)
 
     async def forget(self, names: list[str]) -> None:
-        """Let the cluster know nothing more of jobs; in its own loop."""
+        """Make the cluster forget jobs; this runs in its own loop."""
         for name in names:
             self.cluster.worker_spec.pop(name, None)
             self.cluster.workers.pop(name, None)
 
 
 def queued() -> set[str] | None:
-    """The jobs of this user that work or will; None where Slurm does not answer."""
+    """The jobs of this user that work or will work; None if Slurm does not answer."""
     command = ["squeue", "--noheader", f"--user={os.getuid()}", f"--states={QUEUED}"]
     try:
         asked = subprocess.run(

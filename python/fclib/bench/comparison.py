@@ -1,19 +1,21 @@
 """What is compared: what an instance is, what solved means, and which set of instances counts.
 
 The command line, the figures, the site, the tables of the pages and the classes of problems all
-ask here, and nowhere else. It knows runs and numbers, and no problem.
+take these meanings from here. This module knows runs and numbers, but no problem.
 
-- **Instance**: a problem at a tolerance, under one limit; of a sequence, a step of it. A problem is
+- **Instance**: a problem at a tolerance, under one limit; in a sequence, one step. A problem is
   known by the digest of its data, never by its name. Its global and its local form are one problem,
   and so are its renumbered copies.
 - **Solved**: the recomputed error is at most the tolerance, or the bench has checked the proof that
   there is no solution; both within the limits (`SOLVED`).
-- **Cost** of a solver on an instance: infinite where it failed, the least of its repeats where at
-  least half of them solved it; of renumbered copies the median. Of two forms the global one counts,
-  or else the one that the solver takes. What was not run for a cause from outside has no cost.
+- **Cost** of a solver on an instance: infinite if the solver failed. If at least half of its
+  repeats solved the instance, it is the least of them; for renumbered copies it is the median. If a
+  problem has two forms, the global one counts, unless the solver takes only the local one. A run
+  that did not happen for a cause from outside has no cost.
 - **Compared set**: the instances that all of the solvers have run and take, the *common* set; or,
   if that is asked for, for each solver those that it has run and takes, its *own* set.
-- **Weights**: all instances weigh the same; or all families do, and a large one decides no mean.
+- **Weights**: all instances weigh the same; or all families do, so that no large family decides a
+  mean.
 """
 
 from __future__ import annotations
@@ -39,11 +41,11 @@ Array: TypeAlias = npt.NDArray[np.float64]
 Integers: TypeAlias = npt.NDArray[np.int64]
 Mask: TypeAlias = npt.NDArray[np.bool_]
 Weigh: TypeAlias = Literal["families", "instances"]
-# of an instance: the problem's hash, tolerance, sequence and step
+# key of an instance: the problem's hash, tolerance, sequence and step
 Key: TypeAlias = tuple[str, float, str, int]
 
 WEIGH: tuple[Weigh, ...] = ("families", "instances")
-# what a run may cost, and the least that is told from nothing
+# each measure of cost, with the smallest value that differs from zero
 METRICS: Mapping[str, tuple[str, float]] = MappingProxyType(
     {
         "cpu_s": ("CPU time [s]", 1e-6),
@@ -54,21 +56,21 @@ METRICS: Mapping[str, tuple[str, float]] = MappingProxyType(
     }
 )
 TIMES = ("cpu_s", "total_cpu_s", "wall_s")
-# share of the instances that the common set has at least: a solver that has run few of them would
+# the common set keeps at least this share of the instances: a solver that has run few would
 # make it small for all others, and is compared only if it is asked for
 COMMON = 0.5
 FORM = re.compile(r"(.+)-(global|local)$")  # the stem of a file with one form of a problem
 
 
 class ProfileError(_core.Error, ValueError):
-    """There is nothing to be compared."""
+    """There is nothing to compare."""
 
 
-# ---- columns, also of tables that have not all of them
+# ---- columns, also of tables that lack some of them
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
-    """Runs in columns, which they may be already; what a row has not is None."""
+    """Runs as a table of columns; a table stays as it is. A missing value is None."""
     if isinstance(rows, Table):
         return rows
     known = list(rows)
@@ -77,7 +79,7 @@ def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
 
 
 def words_in(runs: Table, name: str) -> Words:
-    """A column of texts; None in each row where there is no such column."""
+    """A column of texts; None in each row if there is no such column."""
     if name not in runs:
         return Words.of([None] * len(runs))
     own = runs[name]
@@ -87,11 +89,11 @@ def words_in(runs: Table, name: str) -> Words:
 
 
 def numbers_in(runs: Table, name: str, missing: float = math.nan) -> Array:
-    """A column of numbers; `missing` where there is none."""
+    """A column of numbers; `missing` if there is none."""
     if name not in runs:
         return np.full(len(runs), missing)
     own = runs[name]
-    if isinstance(own, Words):  # of nothing at all
+    if isinstance(own, Words):  # a column of texts that is all None
         return np.full(len(runs), missing)
     values = own.astype(float)
     return np.asarray(
@@ -100,18 +102,18 @@ def numbers_in(runs: Table, name: str, missing: float = math.nan) -> Array:
 
 
 def kept(runs: Table, mask: Mask) -> Table:
-    """Some of the runs; without a copy if that is all of them."""
+    """Some of the runs; all of them are not copied."""
     return runs if mask.all() else runs.where(mask)
 
 
 def in_order(words: Words) -> list[Any]:
-    """The texts that occur, in the order in which they come first."""
+    """The texts that occur, in the order of their first appearance."""
     _, first = np.unique(words.codes, return_index=True)
     return [words.values[words.codes[place]] for place in np.sort(first)]
 
 
 def solved_in(runs: Table) -> Mask:
-    """Whether each run is solved. The column `solved` of a store may be older than the meaning."""
+    """Whether each run is solved. A store's column `solved` may be outdated."""
     return words_in(runs, "status").is_in(SOLVED)
 
 
@@ -120,7 +122,7 @@ def solved_in(runs: Table) -> Mask:
 
 @dataclass(frozen=True)
 class Instance:
-    """A problem at a tolerance; of a sequence, a step of it."""
+    """A problem at a tolerance; in a sequence, one step."""
 
     hash: str
     problem: str
@@ -135,7 +137,7 @@ class Instance:
 
     @property
     def key(self) -> Key:
-        """What makes two instances the same."""
+        """Two instances with the same key are the same."""
         return self.hash, self.tol, self.sequence, self.step
 
 
@@ -143,8 +145,8 @@ def pair_forms(problems: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """The hash of the global form, by the hash of each local form of the same problem.
 
     Two forms of a problem lie in one folder SET/FAMILY, as NUMBER-global and NUMBER-local, and
-    agree in family, contacts, components and constraints. Where several problems were at one place,
-    as before and after a family was made anew, none is paired: nothing tells which belong together.
+    agree in family, contacts, components and constraints. If several problems were at one place,
+    for example because a family was made anew, none is paired: which belong together is unknown.
 
     Args:
         problems: with hash, path, family, nc, p, spacedim and formulation.
@@ -166,7 +168,7 @@ def pair_forms(problems: Iterable[Mapping[str, Any]]) -> dict[str, str]:
 
 
 def keys_of(runs: Table, both_forms: bool = False) -> tuple[Integers, list[Key]]:
-    """For each run the number of its instance, and the instances."""
+    """The number of the instance of each run, and the instances."""
     hashes, same, sequences = (words_in(runs, name) for name in ("hash", "same_as", "sequence"))
     known: dict[str, int] = {}
     own = np.array([known.setdefault(value, len(known)) for value in hashes.values], np.int64)
@@ -197,9 +199,10 @@ def keys_of(runs: Table, both_forms: bool = False) -> tuple[Integers, list[Key]]
 
 
 def one_limit(rows: Iterable[Mapping[str, Any]], both_forms: bool = False) -> Table:
-    """Of each instance the runs under one limit: that of the most solvers.
+    """For each instance, the runs under one limit: the limit that most solvers ran under.
 
-    Of several such the largest: where a limit was raised, the runs before do not count.
+    If several limits have as many, the largest counts. So if a limit was raised, the runs before
+    do not count.
     """
     runs = table_of(rows)
     if not len(runs):
@@ -218,7 +221,7 @@ def one_limit(rows: Iterable[Mapping[str, Any]], both_forms: bool = False) -> Ta
     pairs, count = np.unique(each, return_counts=True)
     order = np.lexsort((pairs % len(kinds), count, pairs // len(kinds)))
     chosen = np.zeros(len(keys), np.int64)
-    chosen[pairs[order] // len(kinds)] = pairs[order]  # of each instance the last one stays
+    chosen[pairs[order] // len(kinds)] = pairs[order]  # the last one of each instance stays
     return kept(runs, pair == chosen[place])
 
 
@@ -231,17 +234,17 @@ class Costs:
 
     instances: tuple[Instance, ...]
     solvers: tuple[str, ...]
-    values: Array  # (instances, solvers), inf where it failed, nan where it has none
+    values: Array  # (instances, solvers), inf: the solver failed, nan: it has no cost
     metric: str
-    # by tolerance the instances that some solver has not run, or does not take
+    # for each tolerance, the instances that some solver has not run or does not take
     left: Mapping[float, int] = field(default_factory=dict)
-    spread: Array | None = None  # of the repeats, relative to the least; nan where there is one
-    unsuitable: Mask | None = None  # where the solver does not take such problems
-    copies: Array | None = None  # spread over renumbered copies; nan where there is one
+    spread: Array | None = None  # spread of the repeats, relative to the least; nan if there is one
+    unsuitable: Mask | None = None  # True: the solver does not take such problems
+    copies: Array | None = None  # spread over renumbered copies; nan if there is one
     forms: Integers | None = None  # which form of the instance counts
-    # by tolerance the runs that do not count, because they are of the other form of a problem
+    # for each tolerance, the runs that do not count: they are of the other form of a problem
     other: Mapping[float, int] = field(default_factory=dict)
-    both_forms: bool = False  # whether the two forms of a problem are two problems
+    both_forms: bool = False  # whether the two forms of a problem count as two problems
 
     @property
     def left_out(self) -> int:
@@ -260,20 +263,20 @@ class Costs:
 
     @property
     def there(self) -> Mask:
-        """(instances, solvers) where a solver has run the instance, and takes it."""
+        """(instances, solvers) True if the solver takes the instance and has run it."""
         return ~np.isnan(self.values)
 
     @property
     def best(self) -> Array:
-        """(instances) of the virtual best solver; inf where none solves it."""
+        """(instances) of the virtual best solver; inf if none solves it."""
         return least(self.values)
 
     @property
     def charges(self) -> Array:
-        """(instances) what a failure is charged before the penalty.
+        """(instances) the charge for a failure, before the penalty.
 
-        For a time it is the limit of the run; for another metric the largest cost of a solver that
-        solves the instance, or any instance where none does.
+        For a time it is the limit of the run. For another metric it is the largest cost among the
+        solvers that solve the instance; if none does, the largest cost on any instance.
         """
         if self.metric == "wall_s":
             limits = [(one.wall_limit, one.limit) for one in self.instances]
@@ -286,7 +289,7 @@ class Costs:
         return np.asarray(np.where(self.solved.any(axis=1), largest, overall))
 
     def weights(self, weigh: Weigh = "instances") -> Array:
-        """(instances, solvers) what each instance weighs for each solver; the sum of each is 1.
+        """(instances, solvers) the weight of each instance; the weights of each solver sum to 1.
 
         If families weigh the same, each of them has the same sum. A solver without an instance has
         no weights, only zeros.
@@ -310,7 +313,7 @@ class Costs:
         return replace(part, values=part.values / contacts[there, None])
 
     def shared(self, solvers: Sequence[str] | None = None) -> Costs:
-        """Of some solvers, all by default, on the instances that all of these have run and take."""
+        """The costs of some solvers on the instances that all of them take and have run."""
         part = self.chosen(self.solvers if solvers is None else solvers)
         kept = np.flatnonzero(part.there.all(axis=1))
         lost = part.there.any(axis=1) & ~part.there.all(axis=1)
@@ -318,15 +321,15 @@ class Costs:
         return replace(part.of(kept), left=dict(left))
 
     def own(self, solvers: Sequence[str] | None = None) -> Costs:
-        """Of some solvers, each on the instances that it has run and takes."""
+        """The costs of some solvers, each on the instances that it has run and takes."""
         part = self.chosen(self.solvers if solvers is None else solvers)
         return part.of(np.flatnonzero(part.there.any(axis=1)))
 
     def widest(self) -> tuple[str, ...]:
-        """The solvers whose common set has at least `COMMON` of what they have run.
+        """The solvers whose common set has at least the share `COMMON` of their instances.
 
-        That is asked for at each tolerance.
-        The one with the fewest instances is left out first; two are kept.
+        This must hold at each tolerance. The solver with the fewest instances is left out first; at
+        least two stay.
         """
         count = self.there.sum(axis=0)
         ranked = sorted(zip((-count).tolist(), self.solvers, strict=True))
@@ -347,7 +350,7 @@ class Costs:
         )
 
     def chosen(self, solvers: Sequence[str]) -> Costs:
-        """Of some solvers, on all instances."""
+        """The costs of some solvers, on all instances."""
         columns = [self.solvers.index(name) for name in solvers]
 
         def of(own: Any) -> Any:
@@ -364,7 +367,7 @@ class Costs:
         )
 
     def of(self, chosen: Iterable[int]) -> Costs:
-        """Some of the instances."""
+        """The costs on some of the instances."""
         numbers = list(chosen)
 
         def of(own: Any) -> Any:
@@ -381,18 +384,18 @@ class Costs:
         )
 
     def at(self, tol: float) -> Costs:
-        """Those at a tolerance."""
+        """The costs at one tolerance."""
         part = self.of(k for k, one in enumerate(self.instances) if one.tol == tol)
         left = {t: n for t, n in self.left.items() if t == tol}
         return replace(part, left=left, other={t: n for t, n in self.other.items() if t == tol})
 
     @property
     def tolerances(self) -> list[float]:
-        """The largest first."""
+        """The tolerances, the largest first."""
         return sorted({instance.tol for instance in self.instances}, reverse=True)
 
     def cells_of(self, runs: Table) -> tuple[Integers, Integers]:
-        """For each run the number of its instance and of its solver; -1 where it is of none."""
+        """The number of the instance and of the solver of each run; -1 if the run has none here."""
         place, keys = keys_of(runs, self.both_forms)
         numbers = {one.key: k for k, one in enumerate(self.instances)}
         instance = np.array([numbers.get(key, -1) for key in keys], np.int64)
@@ -402,7 +405,7 @@ class Costs:
         return instance[place], own[solver.codes]
 
     def counts(self) -> list[tuple[int, int]]:
-        """For each solver how many instances it solves, of how many."""
+        """The number of instances that each solver solves, and of those that it has."""
         pairs = zip(self.solved.sum(axis=0), self.there.sum(axis=0), strict=True)
         return [(int(solved), int(of)) for solved, of in pairs]
 
@@ -413,7 +416,7 @@ class Costs:
 
 
 def least(values: Array) -> Array:
-    """(instances) the least cost of each; inf where no solver has one."""
+    """(instances) the least cost of each; inf if no solver has one."""
     return np.asarray(np.where(np.isnan(values), np.inf, values).min(axis=1, initial=np.inf))
 
 
@@ -423,7 +426,7 @@ def gather(
     count_unsuitable: bool = False,
     both_forms: bool = False,
 ) -> Costs:
-    """The costs of all solvers on all instances that one has run; nan where another has not.
+    """The costs of all solvers on all instances that any has run; nan if a solver has not.
 
     Args:
         rows: runs, of one machine and one merit.
@@ -493,7 +496,7 @@ def gather(
 
 
 def described(runs: Table, place: Integers, keys: Sequence[Key]) -> tuple[list[Instance], Integers]:
-    """The instances, and for each run which form of its instance it is of."""
+    """The instances, and the form of its instance that each run has solved."""
     hashes = words_in(runs, "hash")
     pairs = np.unique(place * len(hashes.values) + hashes.codes)
     own: list[list[str]] = [[] for _ in keys]
@@ -507,7 +510,7 @@ def described(runs: Table, place: Integers, keys: Sequence[Key]) -> tuple[list[I
         numbers[k] = forms.index(hashes.values[pair % len(hashes.values)])
     code = place * len(hashes.values) + hashes.codes
     form = numbers[np.searchsorted(pairs, code)]
-    # what is said of an instance is said by its main form
+    # the facts of an instance are those of its main form
     order = np.lexsort((np.arange(len(runs)), form, place))
     first = order[np.searchsorted(place[order], np.arange(len(keys)))]
     names = ("problem", "family", "nc", "time_limit", "wall_limit")
@@ -533,7 +536,7 @@ def described(runs: Table, place: Integers, keys: Sequence[Key]) -> tuple[list[I
 
 @dataclass(frozen=True)
 class _Cells:
-    """What runs come to, of each solver on each instance."""
+    """The cost of each solver on each instance, from its runs."""
 
     cells: Integers
     cost: Array
@@ -543,11 +546,11 @@ class _Cells:
 
 
 def _cells(cell: Integers, form: Integers, copy: Array, spent: Array) -> _Cells:
-    """Repeats become a copy's cost, copies a form's, and one of the forms counts."""
+    """Repeats give the cost of a copy, copies the cost of a form; one of the forms counts."""
     if not len(cell):
         none = np.zeros(0)
         return _Cells(cell, none, none, none, cell)
-    # the repeats of a run beside each other, the quickest first
+    # sort the repeats of a run side by side, the quickest first
     order = np.lexsort((spent, copy, form, cell))
     cell, form, copy, spent = cell[order], form[order], copy[order], spent[order]
     first = _starts(cell, form, copy)
@@ -558,7 +561,7 @@ def _cells(cell: Integers, form: Integers, copy: Array, spent: Array) -> _Cells:
     with np.errstate(invalid="ignore"):
         spread = np.where((solved > 1) & np.isfinite(quickest), slowest / quickest - 1, np.nan)
     cell, form = cell[first], form[first]
-    # the copies of a form beside each other, the quickest first: the lower of two in the middle
+    # sort the copies of a form, the quickest first; of two in the middle the lower is the median
     order = np.lexsort((cost, form, cell))
     cell, form, cost, spread = cell[order], form[order], cost[order], spread[order]
     first = _starts(cell, form)
@@ -569,13 +572,13 @@ def _cells(cell: Integers, form: Integers, copy: Array, spent: Array) -> _Cells:
         copies = np.where(solved > 1, slowest / cost[first] - 1, np.nan)
     spread = np.fmax.reduceat(spread, first)
     cost, cell, form = cost[first + (count - 1) // 2], cell[first], form[first]
-    # of the forms the first, which is the main one where it was run
+    # take the first form: the main one if it was run
     kept = _starts(cell)
     return _Cells(cell[kept], cost[kept], spread[kept], copies[kept], form[kept])
 
 
 def _starts(*sorted_columns: npt.NDArray[Any]) -> Integers:
-    """Where a group of equal rows begins."""
+    """The place of the first row of each group of equal rows."""
     new = np.zeros(len(sorted_columns[0]), bool)
     new[0] = True
     for own in sorted_columns:
@@ -611,11 +614,11 @@ def costs(
 
 
 def compared(every: Costs, solvers: Sequence[str] | None = None, own_set: bool = False) -> Costs:
-    """The costs on the set that is compared: what each table, figure and page begins with.
+    """The costs on the set that is compared: each table, figure and page begins with these.
 
     Args:
-        every: what `gather` has found.
-        solvers: those that are asked for; None: the `widest` of all.
+        every: the result of `gather`.
+        solvers: the solvers asked for; None: the `widest` of all.
         own_set: whether each solver counts on what it has run and takes.
 
     Raises:
@@ -635,7 +638,7 @@ def compared(every: Costs, solvers: Sequence[str] | None = None, own_set: bool =
 
 
 def runs_of(rows: Iterable[Mapping[str, Any]], chosen: Costs) -> Table:
-    """The runs that costs are of: of these solvers, on these instances, in the form that counts."""
+    """The runs behind the costs: of these solvers, on these instances, in the form that counts."""
     runs = one_limit(rows, chosen.both_forms)
     fits = ~words_in(runs, "status").is_in((*SURROUNDINGS, UNSUITABLE))
     if not len(runs) or not chosen.instances:
@@ -663,7 +666,7 @@ def odds(solved: int, of: int) -> tuple[float, float]:
 
 
 def names_of(instances: Sequence[Instance]) -> list[str]:
-    """A name for each problem: with the beginning of its digest where another has the same name."""
+    """A name for each problem; if two share a name, the start of the digest is added."""
     own: dict[str, set[str]] = defaultdict(set)
     for one in instances:
         own[one.problem].add(one.hash)
@@ -674,7 +677,7 @@ def names_of(instances: Sequence[Instance]) -> list[str]:
 
 
 def count_by_status(runs: Table) -> Counter[str]:
-    """How many ended so, the most frequent first."""
+    """How many runs ended with each status, the most frequent first."""
     words = words_in(runs, "status")
     counts = np.bincount(words.codes, minlength=len(words.values)).tolist()
     return Counter({word: n for word, n in zip(words.values, counts, strict=True) if n})

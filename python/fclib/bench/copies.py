@@ -1,10 +1,10 @@
-"""Renumbered copies of a problem: the same mechanics in other numbers.
+"""Renumbered copies of a problem: the mechanics are the same, the numbers differ.
 
-The contacts are in another order, the tangential directions of each are turned, and velocities and
-impulses are in another unit, one for both, so that W and all relative errors stay what they are.
-A solver that knows an answer by heart does not know that of a copy, and a result that only the luck
-of rounding has made differs from copy to copy. Judged is the problem that it is a copy of: the
-solution is carried back first.
+The contacts are in another order, and the tangential directions of each are turned. Velocities and
+impulses are in another unit, the same for both, so that W and all relative errors do not change. A
+solver that knows an answer by heart does not know the answer of a copy. A result that depends on
+the luck of rounding differs from copy to copy. The solution is carried back first, and judged on
+the original problem.
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-FACTOR = 10.0  # between which and its inverse the unit lies; no power of 2, which rounds alike
+# the unit lies between 1 / FACTOR and FACTOR; a power of 2 would not change the rounding
+FACTOR = 10.0
 
 
 class Copy:
     """A copy of a problem, and the way back from its solution."""
 
     def __init__(self, problem: Any, number: int) -> None:
-        """Make it.
+        """Make a copy.
 
         Args:
-            problem: any formulation.
-            number: of the copy; 0 is the problem itself, and the same number the same copy.
+            problem: in any formulation.
+            number: number of the copy; 0 is the problem itself. The same number gives the same
+                copy.
         """
         draw = np.random.default_rng([number, problem.nc])
         self.unit = float(FACTOR ** draw.uniform(-1.0, 1.0))
@@ -57,7 +59,7 @@ class Copy:
         return made if isinstance(matrix, np.ndarray) else made.asformat(matrix.format)
 
     def back(self, vectors: Mapping[str, Any]) -> dict[str, Any]:
-        """What a solver returned, for the problem; what has another size than it should stays."""
+        """The problem's solution, from the copy's; an array of wrong size stays as it is."""
         found = dict(vectors)
         for name, value in vectors.items():
             if name in ("u", "r", "certificate_y") and value.shape == self.turn.shape[:1]:

@@ -1,8 +1,8 @@
-"""What tells two versions of a solver apart: a digest of what it is made of.
+"""A digest of the sources of a solver: two versions of it have different digests.
 
-A run is done again where the solver has changed since, and not where it has not.
+A run is repeated only if its solver has changed since.
 
-    of the core     its sources and those they include, when the core was built
+    of the core     its sources and those they include, as the core was built
     a program       the files that the command names, the program itself too
     a plugin        its shared object
     a module        its file and those it imports; of packages the version
@@ -33,11 +33,11 @@ INSTALLED = tuple(
 
 
 def version_of(info: _core.SolverInfo, modules: Sequence[str] = ()) -> str:
-    """The version of a solver, of which two with the same are the same.
+    """The version of a solver; two solvers with the same version are the same.
 
     Args:
         info: the solver.
-        modules: the user's files, one of which may have it.
+        modules: the user's files; one of them may define it.
     """
     if info.name in _core.fingerprints():
         return f"{_core.version}-{_core.fingerprints()[info.name]}"
@@ -50,7 +50,7 @@ def version_of(info: _core.SolverInfo, modules: Sequence[str] = ()) -> str:
             return _of_module(sys.modules[info.origin], Path(path))
     for adapter in external.adapters():
         if info.name.startswith(adapter.PREFIX):
-            return adapter.version().partition(" in ")[0]  # whichever interpreter has it
+            return adapter.version().partition(" in ")[0]  # without the interpreter that has it
     try:
         return importlib.metadata.version(info.origin)
     except (importlib.metadata.PackageNotFoundError, ValueError):
@@ -85,7 +85,7 @@ def _of_module(module: ModuleType, path: Path) -> str:
     while waiting:
         current, file = waiting.pop()
         text = file.read_bytes()
-        # by its whole name: packages have files of one name
+        # by its whole name: files of two packages may have the same name
         parts[f"{current.__name__}.py"] = hashlib.sha256(text).digest()
         for name in _imported(text, current.__name__, getattr(current, "__package__", "") or ""):
             found = sys.modules.get(name)
@@ -104,7 +104,7 @@ def _of_module(module: ModuleType, path: Path) -> str:
 
 
 def _installed(name: str, file: Path) -> bytes:
-    """The version of a package; of one without a version its file."""
+    """The version of a package; if it has none, its file."""
     for package in importlib.metadata.packages_distributions().get(name, [name]):
         try:
             return importlib.metadata.version(package).encode()

@@ -1,4 +1,4 @@
-"""What travels between a campaign and the processes that run it: a job there, a record back."""
+"""Messages of a campaign and its processes: a job goes out, a record comes back."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from fclib._solve import MeritKind
 from fclib._verdicts import is_solved
 
-# how a run may end; the first group is said by the solver and confirmed by the merit
+# how a run may end; the solver says the first group, and the merit confirms it
 STATUSES: Mapping[str, str] = MappingProxyType(
     {
         "converged": "the recomputed error is at most the tolerance, within the limits",
@@ -43,9 +43,9 @@ STATUSES: Mapping[str, str] = MappingProxyType(
         "lost": "the process that watches it, or the machine, has ended or does not answer",
     }
 )
-# faults of the surroundings: no solver's. Such a run is tried again, and then counts as not run
+# faults from outside, not of the solver. The run is tried again, and then counts as not run
 SURROUNDINGS = ("killed", "unreadable", "no_space", "lost")
-KEPT = ("u", "r", "l")  # of a solution that is stored
+KEPT = ("u", "r", "l")  # the vectors of a solution that are stored
 # after these a worker is kept; after any other, who knows what the solver did to its process
 ORDERLY = frozenset(
     (
@@ -63,13 +63,13 @@ ORDERLY = frozenset(
 
 @dataclass(frozen=True)
 class ProblemFacts:
-    """A problem as campaigns know it: where it is, and what it is."""
+    """The facts of a problem that campaigns know: its file, form and size."""
 
     hash: str  # fclib.digest
     name: str
     family: str
     path: str  # absolute
-    kind: str  # which of the problems of the file
+    kind: str  # which problem of the file
     formulation: str
     spacedim: int
     n: int  # degrees of freedom, 0 for a local problem
@@ -88,13 +88,13 @@ class SolverChoice:
     version: str = ""
     family: str = ""
     origin: str = ""
-    label: str = ""  # what tables call it
-    about: str = ""  # JSON, what the solver says of itself: `campaign.described`
-    # the spacedims it takes, of problems without rolling friction and with it; None: not known
+    label: str = ""  # its name in tables
+    about: str = ""  # the description of the solver in JSON: `campaign.described`
+    # dimensions it takes, without rolling friction and with it; None: not known
     dimensions: tuple[tuple[int, ...], tuple[int, ...]] | None = None
 
     def suits(self, problem: ProblemFacts) -> bool:
-        """Whether the solver takes problems of this kind, by what it has declared."""
+        """Whether the solver takes problems of this kind, by what it declares."""
         if self.dimensions is None:
             return True
         return problem.spacedim in self.dimensions[problem.kind.endswith("rolling")]
@@ -108,33 +108,33 @@ class SolverChoice:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a run may take."""
+    """The limits of a run."""
 
     time: float  # [s] of CPU, all of its processes together
     wall: float  # [s]
-    memory: float  # [MB] resident, beyond the idle worker
+    memory: float  # [MB] resident size, beyond that of the idle worker
 
 
 @dataclass(frozen=True)
 class Along:
-    """The place of a run in a sequence of steps, each solved from the solution of one before."""
+    """The place of a run in a sequence of steps, solved one after another."""
 
     sequence: str
     step: int  # 0, 1, ...; the first has nothing to start from
-    after: str  # the key of the same solver's run of the step before, empty at the first
+    after: str  # key of the run of the step before by this solver; empty at the first
 
 
 @dataclass(frozen=True)
 class Guess:
     """A solution of an earlier step, from which a run starts, contact by contact."""
 
-    problem: ProblemFacts  # that step's
+    problem: ProblemFacts  # the problem of that step
     step: int
     r: bytes  # (m) float64
     multipliers: bytes | None  # (p) float64
 
     def order(self) -> dict[str, Any]:
-        """As a worker is told it, in JSON's types."""
+        """The guess in JSON's types, as it is sent to a worker."""
         vectors = {"r": self.r, "l": self.multipliers}
         facts = {name: getattr(self.problem, name) for name in ("path", "kind", "hash")}
         return facts | {
@@ -154,21 +154,21 @@ class Job:
     repeat: int
     threads: int
     history: bool = False
-    modules: tuple[str, ...] = ()  # files of Python to be imported before, with users' solvers
+    modules: tuple[str, ...] = ()  # files of Python with users' solvers, imported first
     merit: MeritKind = "both"  # what the tolerance bounds
     along: Along | None = None  # None: cold, from nothing
     keep: bool = False  # whether the solution is stored
-    guess: Guess | None = None  # known when the run is begun, and follows from `along`
+    guess: Guess | None = None  # known once the run begins; `along` decides it
     renumber: bool = False  # whether each repeat but the first is of a copy: copies.py
 
     @property
     def start(self) -> str:
-        """What the solver starts from: "cold" from nothing, "warm" from a step before."""
+        """The start of the solver: "cold" from nothing, "warm" from a step before."""
         return "warm" if self.along else "cold"
 
     @property
     def key(self) -> str:
-        """What makes two runs the same; a store has no two rows of one key from one machine."""
+        """Two runs of one key are the same; a store keeps one row for each key and machine."""
         parts = [
             self.problem.hash,
             self.solver.name,
@@ -178,7 +178,8 @@ class Job:
             [repr(float(x)) for x in (self.limits.time, self.limits.wall, self.limits.memory)],
             self.threads,
             self.repeat,
-            *([self.merit] if self.merit != "natural" else []),  # once it was the only one
+            # left out: it was the only one when stores began
+            *([self.merit] if self.merit != "natural" else []),
             *([["after", self.along.after]] if self.along else []),
             *(["copy"] if self.copy else []),
         ]
@@ -190,7 +191,7 @@ class Job:
         return self.repeat if self.renumber else 0
 
     def order(self) -> dict[str, Any]:
-        """The job as a supervisor is told it, in JSON's types."""
+        """The job in JSON's types, as it is sent to a supervisor."""
         return {
             "path": self.problem.path,
             "kind": self.problem.kind,
@@ -213,24 +214,24 @@ class Job:
 
 @dataclass
 class Record:
-    """What came of a job; None is what is not known, as the error of a run that was killed."""
+    """The result of a job; None means not known, for example the error of a run that was killed."""
 
     status: str
     message: str = ""
     iterations: int | None = None
-    cpu_s: float | None = None  # [s] of the solver alone, as far as the kernel bears it out
-    said_cpu_s: float | None = None  # [s] of the solver alone, as the driver and it say
+    cpu_s: float | None = None  # [s] of the solver alone, as far as the kernel confirms it
+    said_cpu_s: float | None = None  # [s] of the solver alone, as the driver and the solver say
     setup_s: float | None = None  # [s] of conversions and judgement inside the solve
     total_cpu_s: float | None = None  # [s] of all processes of the run, counted by the kernel
     wall_s: float | None = None  # [s]
-    memory: float | None = None  # [MB] by which the run's processes grew at most, together
-    merits: Mapping[str, float] | None = None  # by MERITS, recomputed by the bench
+    memory: float | None = None  # [MB] largest growth of all processes of the run together
+    merits: Mapping[str, float] | None = None  # value of each of MERITS, recomputed by the bench
     certificate: str | None = None  # JSON, the proof that there is no solution
-    stages: str | None = None  # JSON, of a solver that chains others
+    stages: str | None = None  # JSON, the stages of a solver that chains others
     history: list[tuple[int, float, float, str]] | None = None  # iteration, error, time [s], stage
     guessed: bool = False  # whether it started from the guess of its job
-    solution: Mapping[str, bytes] | None = None  # u, r and l as float64, where it is to be stored
-    measured: str = ""  # by what: "cgroup", "cgroup, PSS" or "processes"
+    solution: Mapping[str, bytes] | None = None  # u, r and l as float64, if it is to be stored
+    measured: str = ""  # the way of measuring: "cgroup", "cgroup, PSS" or "processes"
     warm: bool = False  # whether the solver had been called before in this process
     pinned: bool = False  # whether the run had cores for itself
     machine: Mapping[str, Any] | None = None
@@ -240,14 +241,14 @@ class Record:
 
     @property
     def solved(self) -> bool:
-        """Whether the error, recomputed, met the tolerance within the limits, or a proof holds."""
+        """Whether the recomputed error met the tolerance within the limits, or a proof holds."""
         return is_solved(self.status)
 
     @property
     def ran(self) -> bool:
-        """Whether it is the solver's own: nothing from outside has decided it."""
+        """Whether the solver alone decided the result, and nothing from outside."""
         return self.status not in SURROUNDINGS
 
 
-# does jobs, here or elsewhere, and yields each with its record as it is done
+# does jobs, here or elsewhere; yields each with its record once it is done
 Runner: TypeAlias = Callable[[Iterator[Job]], Iterator[tuple[Job, Record]]]

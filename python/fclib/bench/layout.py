@@ -1,9 +1,9 @@
-"""How a store lies in SQLite: tables, their columns, and a checksum for each row.
+"""How a store lies in SQLite: tables, their columns, and the checksum of each row.
 
-Of each row `checksum` is the CRC-32 (ISO 3309) of its numbers, as doubles in little endian in the
-order of the columns, nan for NULL; then of its texts and blobs, in the order of the columns, with a
-null character between two, each in the file's bytes, and 0xFF for NULL. A row whose checksum is
-another one was damaged after it was written.
+The column `checksum` of a row is the CRC-32 (ISO 3309) of two parts. First come its numbers, in the
+order of the columns, as doubles in little endian, with nan for NULL. Then come its texts and blobs,
+in the order of the columns, with a null character between two, each in the file's bytes, and 0xFF
+for NULL. If the checksum does not agree, the row was damaged after it was written.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from fclib._solve import MERITS
 from fclib.bench.job import ProblemFacts
 
 VERSION = 5  # of the schema
-RELEASED = 4  # the one before, without checksums and without what solvers say of themselves
+RELEASED = 4  # version before: it has no checksums and no descriptions of solvers
 APPLICATION = 0x46434C42  # "FCLB"
-NOTHING = b"\xff"  # instead of NULL among bytes: no text in UTF-8 has it
+NOTHING = b"\xff"  # stands for NULL among bytes: no text in UTF-8 contains it
 
 SCHEMA = """
 CREATE TABLE campaigns (
@@ -119,12 +119,12 @@ RUN = (
 )
 FAULT = ("key", "campaign", "problem", "solver", "tol", "status", "message", "started")
 HISTORY = ("iteration", "error", "time", "stage")
-OF_A_RUN = ("history", "certificates", "solutions")  # tables with more of a run
+OF_A_RUN = ("history", "certificates", "solutions")  # tables with further data of a run
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The columns of a table, but its checksum."""
+    """The columns of a table, except its checksum."""
 
     table: str
     numbers: tuple[str, ...]
@@ -133,11 +133,11 @@ class Layout:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of a row as `query` gives it, but its checksum."""
+        """The checksum of a row that `query` gives; the row's own checksum is left out."""
         return self.numbers + self.texts
 
     def query(self, condition: str = "") -> str:
-        """What selects rows as `wrong` takes them: the number of the row, and its checksum last."""
+        """The query for rows that `wrong` takes: the row's number first, its checksum last."""
         texts = (f"COALESCE(CAST({name} AS BLOB), x'{NOTHING.hex()}')" for name in self.texts)
         columns = ", ".join((*self.numbers, *texts))
         where = condition and f" WHERE {condition}"
@@ -146,7 +146,7 @@ class Layout:
 
 @functools.cache
 def layouts() -> dict[str, Layout]:
-    """Those of all tables, as SQLite understands the schema."""
+    """The layouts of all tables, as SQLite understands the schema."""
     database = sqlite3.connect(":memory:")
     found = {}
     for statement in STATEMENTS:
@@ -169,7 +169,7 @@ def declared_in(database: sqlite3.Connection, table: str) -> tuple[tuple[str, st
 
 @functools.cache
 def columns() -> tuple[str, ...]:
-    """Those of the view `results`, in order."""
+    """The columns of the view `results`, in order."""
     database = sqlite3.connect(":memory:")
     for statement in STATEMENTS:
         database.execute(statement)
@@ -181,7 +181,7 @@ def columns() -> tuple[str, ...]:
 def numbers_of(layout: Layout, rows: Sequence[tuple[Any, ...]]) -> npt.NDArray[np.float64]:
     """The numbers of rows as `Layout.query` selects them (rows, numbers); nan for NULL.
 
-    ValueError, TypeError, OverflowError where something is no number.
+    Raises ValueError, TypeError or OverflowError if something is not a number.
     """
     end = 1 + len(layout.numbers)
     found = np.array([row[1:end] for row in rows], dtype="<f8")
@@ -191,7 +191,7 @@ def numbers_of(layout: Layout, rows: Sequence[tuple[Any, ...]]) -> npt.NDArray[n
 def checksums(
     layout: Layout, rows: Sequence[tuple[Any, ...]], numbers: npt.NDArray[np.float64]
 ) -> list[int]:
-    """Of rows as `Layout.query` selects them, with their numbers."""
+    """The checksums of rows that `Layout.query` selects, with their numbers."""
     data, size, end = numbers.tobytes(), 8 * len(layout.numbers), 1 + len(layout.numbers)
     return [
         crc32(b"\0".join(row[end:-1]), crc32(data[k * size : (k + 1) * size]))
@@ -202,7 +202,7 @@ def checksums(
 def right(
     layout: Layout, rows: Sequence[tuple[Any, ...]]
 ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.float64]]:
-    """Which rows are as they were written, and the numbers of all."""
+    """A mask of the undamaged rows, and the numbers of all rows."""
     try:
         numbers = numbers_of(layout, rows)
         found = checksums(layout, rows, numbers)

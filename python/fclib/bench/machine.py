@@ -45,7 +45,7 @@ def _version(package: str) -> str:
 
 @functools.cache
 def facts() -> dict[str, Any]:
-    """What is worth knowing of this machine and its software, in JSON's types."""
+    """The facts of this machine and its software that a store keeps, in JSON's types."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     return {
         "node": platform.node(),
@@ -67,7 +67,7 @@ _sampled: tuple[float, float | None] = (-1.0, None)
 
 
 def frequency() -> float | None:
-    """[MHz] of the first core, at most a second old; None where the system does not say."""
+    """The frequency of the first core in MHz, at most a second old; None if it is unknown."""
     global _sampled
     now = time.monotonic()
     if _sampled[0] < 0 or now - _sampled[0] > 1:
@@ -81,9 +81,9 @@ def frequency() -> float | None:
 
 
 def reserve(count: int) -> tuple[set[int], list[int]]:
-    """So many cores that no other campaign of this user has, and the locks that hold them.
+    """Reserve so many cores that no other campaign of this user has. Return them with their locks.
 
-    None where fewer are free, or the system lets nobody choose, or where the folder of the locks
+    None if fewer are free, if the system does not allow the choice, or if the folder of the locks
     is not this user's.
     """
     held: dict[int, int] = {}
@@ -113,7 +113,7 @@ def reserve(count: int) -> tuple[set[int], list[int]]:
 
 
 def folder_of_locks() -> int:
-    """Open the folder of the locks of cores, which is made if there is none.
+    """Open the folder of the locks of cores; make it if it is missing.
 
     Raises:
         OSError: it is a link, another user's, or one that others may write to.

@@ -1,7 +1,7 @@
-"""Small problems that a campaign has made: steps of a scene, and random ones around a solution.
+"""Small problems that a campaign makes: steps of a scene, and random ones around a solution.
 
-What is made goes into a cache folder, under a name that says how it was made, so that it is made
-once; the same recipe gives the same problems, bit for bit.
+They go into a cache folder. The folder's name says how they were made, so that each is made once.
+The same recipe gives the same problems, bit for bit.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fclib.bench.problems import SUFFIXES
 
 
 def cache_folder() -> Path:
-    """Where problems that are made are kept: $FCLIB_CACHE, or fclib in the user's cache."""
+    """The folder for problems that are made: $FCLIB_CACHE, or fclib in the user's cache."""
     own = os.environ.get("FCLIB_CACHE")
     if own:
         return Path(own)
@@ -31,7 +31,7 @@ def cache_folder() -> Path:
 
 
 def made(recipe: Mapping[str, Any], make: Callable[[Path], None]) -> list[Path]:
-    """The files of a recipe; make(folder) writes them where they are not there yet."""
+    """The files of a recipe; make(folder) writes them if they are not there yet."""
     text = json.dumps({"fclib": _core.version, **recipe}, sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:16]
     folder = cache_folder() / "problems" / name
@@ -81,7 +81,7 @@ def simulated(
                 raise ValueError(f"has no parameter {unknown[0]}; it has {', '.join(known)}")
             scene = kind(**parameters).scene(seed)
         except (KeyError, TypeError, ValueError) as error:
-            # the text of a KeyError is in quotes otherwise
+            # str() of a KeyError would put its text in quotes
             raise _core.OptionError(f"simulate {family}: {error.args[0]}") from None
         for step in simulate.simulate(scene, max(wanted) + 1):
             if step.index in wanted and step.problem.nc:
@@ -102,8 +102,8 @@ def stored(name: str, form: str | None, start: int, count: int | None, stride: i
         name: SET/FAMILY.
         form: "global" or "local", of problems that have both.
         start: the first of them; 0 is the first that is stored.
-        count: how many; all where it is None.
-        stride: from one to the next.
+        count: how many; None: all.
+        stride: step from one problem to the next.
 
     Raises:
         ImportError: MuJoCo is not there.

@@ -1,10 +1,11 @@
-"""What a run takes, by the kernel's word: a control group of its own, or the tree of processes.
+"""The time and memory of a run, as the kernel counts them: by a control group, or by process.
 
-A control group (cgroup v2) counts the CPU time of all that was ever in it, and none of its
-processes leaves it by forking. It is made below the group of the supervisor, where the system lets
-us. With the memory controller it knows the memory, too, each page once. Else the supervisor adopts
-whatever loses its parent, so that all that a run starts are its descendants, and their clocks are
-added up; memory is the resident size of one process, or the proportional one (PSS) of several.
+A control group (cgroup v2) counts the CPU time of all processes that were ever in it, and none
+leaves it by forking. If the system allows it, the group is made below that of the supervisor. If it
+has the memory controller, it also counts the memory, each page once. Without a group, the
+supervisor adopts each process that loses its parent. So all processes of a run are its descendants,
+and their CPU times are added. Memory is then the resident size of one process, or the proportional
+size (PSS) of several.
 """
 
 from __future__ import annotations
@@ -20,15 +21,15 @@ from pathlib import Path
 from fclib.bench import processes
 
 PREFIX = "fclib-bench-"
-SHARE = 0.05  # of the time at most that goes into reading proportional sizes
+SHARE = 0.05  # largest share of the time spent on reading proportional sizes
 NUMBER = iter(range(1 << 62))
 
 
 @functools.cache
 def home() -> Path | None:
-    """The cgroup v2 of this process, where it may have groups below it.
+    """The cgroup v2 of this process, if this process may make groups below it.
 
-    None where FCLIB_CGROUP is 0.
+    None if FCLIB_CGROUP is 0.
     """
     if os.environ.get("FCLIB_CGROUP") == "0":
         return None
@@ -56,10 +57,10 @@ def home() -> Path | None:
 
 
 class Meter:
-    """What a worker with all that it has started takes; made by its supervisor before it forks."""
+    """Measures a worker and all that it starts; the supervisor makes it before it forks."""
 
     def __init__(self, foreign: bool = False, ours: Set[int] = frozenset()) -> None:
-        """Make it.
+        """Make a meter.
 
         Args:
             foreign: whether the worker's code may try to leave its control group.
@@ -77,23 +78,23 @@ class Meter:
         self.by_group = self.group is not None and (self.group / "memory.stat").exists()
         # [s] of descendants that had ended before
         self._ended = self._own_ended()
-        self._offset = 0.0  # [MB] of resident size that is not in the proportional one
-        self._next = 0.0  # when the proportional size may be read again
+        self._offset = 0.0  # [MB] resident size that the proportional one does not count
+        self._next = 0.0  # time at which the proportional size may be read again
         self._last = 0.0
 
     @property
     def how(self) -> str:
-        """By what, as a store has it."""
+        """The way of measuring, as a store names it."""
         if self.group is None:
             return "processes"
         return "cgroup" if self.by_group else "cgroup, PSS"
 
     def watch(self, pid: int) -> None:
-        """Measure this process, a child that has entered."""
+        """Begin to measure a child that has entered the group."""
         self.pid = pid
 
     def members(self) -> list[int]:
-        """The worker and all that it has started, and that has not ended."""
+        """The worker and all processes that it started, without those that have ended."""
         found = {self.pid}
         if self.group is not None:
             with contextlib.suppress(OSError):
@@ -104,10 +105,10 @@ class Meter:
         return [pid for pid in found if processes.state(pid) not in ("", "Z", "X")]
 
     def cpu(self) -> float:
-        """[s] of CPU of all that was ever started, the worker too.
+        """CPU time in seconds of the worker and of all processes it ever started.
 
-        Of foreign code the larger of two counts: that of the control group, which knows what has
-        ended, and that of the processes, which knows what has left the group.
+        For foreign code it is the larger of two counts: the control group also counts processes
+        that have ended, and the sum over the processes also counts those that have left the group.
         """
         by_group = None
         if self.group is not None:
@@ -127,7 +128,7 @@ class Meter:
         return [child for child in processes.children(os.getpid()) if child not in self.ours]
 
     def memory(self) -> float:
-        """[MB] in memory, each page once."""
+        """Memory in MB, each page counted once."""
         if self.by_group:
             assert self.group is not None
             with contextlib.suppress(OSError, ValueError, KeyError):
@@ -143,7 +144,7 @@ class Meter:
         return self._last
 
     def _proportional(self, members: list[int]) -> float:
-        """[MB] of some processes and of this one, from which they were forked."""
+        """Memory in MB of some processes and of this one, from which they were forked."""
         return sum(map(processes.proportional, [os.getpid(), *members]))
 
     @staticmethod
@@ -152,7 +153,7 @@ class Meter:
         return ended.ru_utime + ended.ru_stime
 
     def kill(self) -> int | None:
-        """End all of it, and wait for them; the exit status of the worker where it can be had."""
+        """End all processes of the run, and wait. Return the exit status of the worker."""
         if self.group is not None:
             with contextlib.suppress(OSError):
                 (self.group / "cgroup.kill").write_text("1")
@@ -163,13 +164,13 @@ class Meter:
 
 
 def of_group(stat: str) -> float:
-    """[MB] of a control group by its memory.stat, without the cache of the files that it reads."""
+    """Memory in MB of a control group (memory.stat), without cached files."""
     sizes = {name: int(size) for name, size in map(str.split, stat.splitlines())}
     return (sizes["anon"] + max(sizes["shmem"], sizes["file_mapped"])) / 1e6
 
 
 def remove(group: Path) -> None:
-    """End what is left in a control group, and remove it."""
+    """End the processes left in a control group, and remove the group."""
     for _ in range(200):
         try:
             group.rmdir()
@@ -190,11 +191,11 @@ def enter(group: str) -> None:
 
 
 def sweep(supervisor: int, mark: str) -> None:
-    """End what a supervisor has left behind, that one too, and remove its control groups.
+    """End a supervisor and the processes that it left, and remove its control groups.
 
     Args:
-        supervisor: its number; it may be stopped, or have ended.
-        mark: in the environment of all that it has started.
+        supervisor: its process number; it may be stopped, or have ended.
+        mark: a text in the environment of all processes that it started.
     """
     own = os.getpid()
     processes.kill([pid for pid in processes.marked(mark) if pid != own])

@@ -39,7 +39,7 @@ STYLE: Any = {
     "savefig.dpi": 300,
 }
 SIZE = (5.6, 3.2)  # [inch]
-ENDS = 1e4  # the largest ratio that is shown
+ENDS = 1e4  # largest ratio that is shown
 SHARES = {"instances": "instances", "families": "instances, by family,"}
 
 
@@ -50,13 +50,13 @@ def stroke(number: int) -> dict[str, Any]:
 
 
 def label(text: str) -> str:
-    """A name as Matplotlib shows it: it takes $ for mathematics, and hides what begins with _."""
+    """A name as Matplotlib shows it: it takes $ for mathematics, and hides a leading _."""
     text = text.replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
 
 
 def wrapped(caption: str, width: int = 110) -> str:
-    """A caption in lines that break between its parts, but inside of a very long one."""
+    """A caption broken into lines between its parts; only a very long part is broken inside."""
     parts = [part.replace(" ", "\0") for part in caption.split("; ")]
     whole = "; ".join(part if len(part) < width else part.replace("\0", " ") for part in parts)
     return "\n".join(textwrap.wrap(whole, width)).replace("\0", " ")
@@ -64,7 +64,7 @@ def wrapped(caption: str, width: int = 110) -> str:
 
 @contextmanager
 def figure(folder: Path, name: str, formats: Sequence[str], caption: str = "") -> Iterator[Any]:
-    """Axes to draw in; written to the folder in each of the formats, then closed.
+    """Axes to draw in. The figure is then written to the folder in each format, and closed.
 
     The caption stands below, in as many lines as it needs.
     """
@@ -82,10 +82,10 @@ def figure(folder: Path, name: str, formats: Sequence[str], caption: str = "") -
             folder.mkdir(parents=True, exist_ok=True)
             for kind in formats:
                 part = folder / f".{name}.part.{kind}"
-                # the same data give the same file
+                # so that the same data give the same file
                 stamp = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(kind)
                 drawn.savefig(part, metadata=stamp)
-                drawn.set_layout_engine("none")  # it stays as it is: a third of the time
+                drawn.set_layout_engine("none")  # the layout is fixed: saves two thirds of the time
                 part.replace(folder / f"{name}.{kind}")
         finally:
             plt.close(drawn)
@@ -96,7 +96,7 @@ def _legend(axes: Any) -> None:
 
 
 def _order(costs: Costs, heights: Array) -> list[int]:
-    """The solvers, the highest curve first, as the legend has them."""
+    """The solvers in the order of the legend, the highest curve first."""
     return sorted(range(len(costs.solvers)), key=lambda k: (-heights[k].mean(), k))
 
 
@@ -172,7 +172,7 @@ def work_precision(
     formats: Sequence[str],
     caption: str = "",
 ) -> None:
-    """The mean cost at each tolerance; hollow marks where not all problems were solved."""
+    """The mean cost at each tolerance; a mark is hollow if not all problems were solved."""
     solvers = list(dict.fromkeys(point["solver"] for point in points))
     least = {s: min(p["mean"] for p in points if p["solver"] == s) for s in solvers}
     with figure(folder, f"work-precision-{metric}", formats, caption) as axes:
@@ -214,7 +214,7 @@ def convergence(
     ending: str = "",
     legend: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """The least error that was reached, over time; at one tolerance."""
+    """The least error reached, over time, at one tolerance."""
     ends = {solver: float(curve[-1]) for solver, curve in curves.items()}
     with figure(folder, f"convergence{ending}", formats, caption) as axes:
         for rank, solver in enumerate(sorted(curves, key=lambda s: ends[s])):
@@ -236,7 +236,7 @@ def runtimes(
     ending: str = "",
     legend: Mapping[str, str] = MappingProxyType({}),
 ) -> None:
-    """The share of pairs of a run and an error that were reached within a time."""
+    """The share of pairs (run, error) in which the run reached the error within a time."""
     finite = np.concatenate([own[np.isfinite(own) & (own > 0)] for own in times.values()])
     if not finite.size:
         return

@@ -1,8 +1,8 @@
-"""Jobs on this machine: several supervisors at once, each a process of its own.
+"""Jobs on this machine: several supervisors work at once, each in its own process.
 
-A supervisor is started apart from the user's surroundings: Python's isolated mode, and the path of
-this process without the current folder. Where it is killed, stopped or silent, it is replaced, and
-what it was doing is `lost`; `fclib.bench.runner` tries that again.
+A supervisor is kept apart from the user's settings: it starts in Python's isolated mode, with the
+path of this process without the current folder. If it is killed, stopped or silent, it is replaced,
+and its job is `lost`; `fclib.bench.runner` tries that job again.
 """
 
 from __future__ import annotations
@@ -40,10 +40,10 @@ THREADS = (
     "RAYON_NUM_THREADS",
 )
 LOOK = 0.5  # [s] between two looks at supervisors that are silent
-STOPPED = 1.0  # [s] that one may be stopped, as by SIGSTOP
+STOPPED = 1.0  # [s] that a supervisor may be stopped, for example by SIGSTOP
 MARK = "FCLIB_BENCH_RUN"  # in the environment of all that a supervisor starts
-PREFIX = "fclib-bench-"  # of folders for temporary files
-MARK_OF_OURS = "mark"  # in them, beside the files of a worker
+PREFIX = "fclib-bench-"  # prefix of folders for temporary files
+MARK_OF_OURS = "mark"  # file that marks such a folder as ours
 FILES = "files"
 START = """
 import json, site, sys
@@ -57,7 +57,7 @@ main(link, alive, folder, mark, cores)
 
 
 def search_path() -> list[str]:
-    """Where a supervisor looks for modules: where this process does, but in the current folder."""
+    """A supervisor's path of modules: that of this process, without the current folder."""
     here = Path.cwd()
     found = [
         path
@@ -66,15 +66,15 @@ def search_path() -> list[str]:
     ]
     own = str(Path(_core.__file__).resolve().parent.parent)
     package = str(Path(__file__).resolve().parents[2])
-    # fclib itself, where it is in the current folder: after all others
+    # if fclib itself is in the current folder, it comes after all others
     return [*found, *(path for path in dict.fromkeys((package, own)) if path not in found)]
 
 
 def temporary_folder() -> tuple[Path, int]:
-    """A folder of ours in that for temporary files, and the lock that says that it is used.
+    """A new folder below the one for temporary files, and the lock that says that it is in use.
 
-    What campaigns that were killed have left is removed: folders with a mark of ours, of which
-    nobody holds the lock any more.
+    Folders that killed campaigns have left are removed: those with our mark whose lock nobody holds
+    any more.
     """
     above = Path(tempfile.gettempdir())
     for old in above.glob(f"{PREFIX}*"):
@@ -88,7 +88,7 @@ def temporary_folder() -> tuple[Path, int]:
 
 
 def words_of(folder: Path) -> bytes:
-    """What the mark of a folder says: a copy of the folder is not ours, whatever is in it."""
+    """The text of a folder's mark. It tells the folder from a copy, which is not ours."""
     facts = folder.lstat()
     return f"fclib bench: made by a campaign, {facts.st_dev} {facts.st_ino}\n".encode()
 
@@ -112,7 +112,7 @@ def remove_left(folder: Path) -> None:
 
 
 class SupervisorClient:
-    """The other end of a supervisor, which is started when it is needed."""
+    """The campaign's side of a supervisor, which is started once it is needed."""
 
     def __init__(self, threads: int, pin: bool = True) -> None:
         self.threads = threads
@@ -120,24 +120,24 @@ class SupervisorClient:
         self.process: subprocess.Popen[bytes] | None = None
         self.link: Connection | None = None
         self.job: Job | None = None
-        self.patience = math.inf  # [s] of the monotonic clock
-        self.stopped: float | None = None  # since when
+        self.patience = math.inf  # time [s] of the monotonic clock until which an answer is awaited
+        self.stopped: float | None = None  # time since which it is stopped
         self.mark = ""
         self.folder, self.lock = "", -1
         self.alive = -1  # the end of a pipe, open as long as this process lives
 
     def give(self, job: Job) -> None:
-        """Have a job done."""
+        """Send a job."""
         self.job = job
         if self.link is None or self.threads != job.threads:
             self.end()
             self.threads = job.threads
             self._start()
         assert self.link is not None
-        # no answer by then: it hangs. Up to three phases wait for what the worker reads and sends
+        # without an answer by then it hangs. Up to three phases wait for the worker to read or send
         most = 4 * READY_LIMIT + WARM_LIMIT + 2 * job.limits.wall
         self.patience, self.stopped = time.monotonic() + most, None
-        with contextlib.suppress(OSError):  # it has ended, which taking finds out
+        with contextlib.suppress(OSError):  # it has ended; `take` finds out
             self.link.send(job.order())
 
     def _start(self) -> None:
@@ -158,13 +158,13 @@ class SupervisorClient:
                 stdout=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno(), alive],
                 env=os.environ | dict.fromkeys(THREADS, str(self.threads)) | {MARK: self.mark},
-                start_new_session=True,  # Ctrl-C is not for it
+                start_new_session=True,  # Ctrl-C must not reach it
             )
         os.close(alive)
         self.link = Connection(ours.detach())
 
     def take(self) -> tuple[Job, Record]:
-        """What came of the job; `lost` where the supervisor is gone."""
+        """The record of the job; `lost` if the supervisor is gone."""
         assert self.job is not None
         assert self.link is not None
         try:
@@ -177,7 +177,7 @@ class SupervisorClient:
         return job, record
 
     def hangs(self) -> bool:
-        """Whether the supervisor is stopped, or long silent: then it is killed."""
+        """Whether the supervisor is stopped, or silent for too long; if so, it is killed."""
         if self.process is None:
             return False
         now = time.monotonic()
@@ -191,7 +191,7 @@ class SupervisorClient:
         return False
 
     def do(self, job: Job) -> Record:
-        """Have a job done, and wait for it."""
+        """Send a job, and wait for its record."""
         self.give(job)
         assert self.link is not None
         while not wait([self.link], LOOK):
@@ -199,12 +199,12 @@ class SupervisorClient:
         return self.take()[1]
 
     def kill(self) -> None:
-        """End the supervisor, and all that it has started."""
+        """End the supervisor and all processes that it started."""
         if self.process is not None:
             processes.kill(processes.tree(self.process.pid)[::-1])
 
     def end(self) -> int:
-        """Let the supervisor go, which kills what it runs; its exit status."""
+        """Dismiss the supervisor, which kills its run. Return its exit status."""
         code = 0
         if self.link is not None:
             self.link.close()
@@ -228,13 +228,13 @@ class SupervisorClient:
 
 
 def run(jobs: Iterator[Job], processes: int) -> Iterator[tuple[Job, Record]]:
-    """Do the jobs, so many at once; yields each with its record as it is done.
+    """Do the jobs, several at once; yield each with its record once it is done.
 
-    Where the iteration is given up, what is running is killed.
+    If the iteration is given up, the running jobs are killed.
 
     Args:
-        jobs: is asked for more after each result, also when it had no more before.
-        processes: supervisors.
+        jobs: asked for more after each result, even if it was empty before.
+        processes: number of supervisors.
     """
     idle = [SupervisorClient(0) for _ in range(processes)]
     everyone = list(idle)
@@ -262,7 +262,7 @@ def run(jobs: Iterator[Job], processes: int) -> Iterator[tuple[Job, Record]]:
                 taken = supervisor.take()
                 idle.append(supervisor)
                 if taken[1].ran:
-                    feed()  # the worker need not wait for what becomes of the record
+                    feed()  # so that the worker need not wait until the record is used
                 yield taken
                 feed()
     finally:

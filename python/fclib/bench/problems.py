@@ -1,4 +1,4 @@
-"""The files of a campaign: which they are, and what it has to know of the problem in each."""
+"""The files of a campaign: their list, and the facts that a campaign needs of each problem."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fclib import _core, _digest
 from fclib.bench.job import ProblemFacts
 
 SUFFIXES = (".hdf5", ".h5")
-PATIENCE = 10.0  # [s] between two words on how far a build is
+PATIENCE = 10.0  # [s] between two messages on the progress of a build
 
 
 def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
-    """The FCLIB files that patterns stand for: files, folders with all that is below, globs.
+    """The FCLIB files that patterns stand for: files, folders with all below them, globs.
 
     Raises:
-        fclib.FileError: a pattern stands for nothing.
+        fclib.FileError: a pattern matches no file.
     """
     found: dict[Path, None] = {}
     for pattern in patterns:
@@ -43,7 +43,7 @@ def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
 
 
 def _how_to_have(path: Path) -> str:
-    """The command that builds what is looked for in the folder of the collection; "" elsewhere."""
+    """The command that builds the problems that a folder of the collection lacks; "" elsewhere."""
     from fclib.collections import library, sets
 
     try:
@@ -60,15 +60,15 @@ def _how_to_have(path: Path) -> str:
 def of_set(
     name: str, form: str | None = None, tell: Callable[[str], None] = lambda _: None
 ) -> list[Path]:
-    """The files of a set of the collection, or of a family of it; built or fetched where needed.
+    """The files of a set or family of the collection; they are built or fetched if needed.
 
     Args:
-        name: as ``fclib collection list`` has it.
+        name: as ``fclib collection list`` prints it.
         form: "global" or "local"; by default the global one of a problem that has both.
-        tell: is told what is built, and how far that is.
+        tell: called with the name of each build and its progress.
 
     Raises:
-        fclib.Error: there is no such set, or it cannot be had.
+        fclib.Error: there is no such set, or it can neither be built nor fetched.
         ImportError: the collection needs a package that is not there.
     """
     from fclib.collections import library
@@ -94,7 +94,7 @@ def of_set(
 
 
 def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int, int], None]:
-    """Says how far the build of a family is: at its beginning, and every `PATIENCE` seconds."""
+    """Tells the progress of a family's build: at its beginning, and every `PATIENCE` seconds."""
     said = -PATIENCE
 
     def show(name: str, done: int, total: int) -> None:
@@ -107,7 +107,7 @@ def _now_and_then(which: str, tell: Callable[[str], None]) -> Callable[[str, int
 
 
 def check_names(path: str, kind: str) -> None:
-    """Whether a problem names its contacts, by which guesses go from step to step.
+    """Whether a problem names its contacts, so that a guess can go from step to step.
 
     Raises:
         fclib.Error: it does not, or cannot be read.
@@ -127,7 +127,7 @@ def _glob(path: Path) -> Iterator[Path]:
 
 
 def sample(paths: list[Path], count: int | None) -> list[Path]:
-    """So many of them, evenly spread over their order, one from the middle; all without a count."""
+    """So many of the paths, spread evenly; one is the middle one. Without a count: all."""
     if count is None or count >= len(paths):
         return paths
     first = 0 if count > 1 else (len(paths) - 1) / 2
@@ -136,11 +136,11 @@ def sample(paths: list[Path], count: int | None) -> list[Path]:
 
 
 def look(path: Path, family: str = "") -> ProblemFacts:
-    """What a campaign has to know of the problem of a file; of several the global one.
+    """The facts of the problem of a file; if there are several, of the global one.
 
     Args:
         path: an FCLIB file.
-        family: where it is empty, the scene that the problem says to be from, or the folder's name.
+        family: if empty, the scene that the problem names, or else the folder's name.
 
     Raises:
         fclib.Error: it cannot be read.

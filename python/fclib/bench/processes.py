@@ -1,4 +1,4 @@
-"""Processes as Linux shows them: who is whose child, and what they use."""
+"""Processes as Linux shows them: parents and children, time and memory."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SET_PDEATHSIG, SET_CHILD_SUBREAPER = 1, 36
 
 
 def supported() -> bool:
-    """Whether this system shows what the limits need."""
+    """Whether this system shows the facts that the limits need."""
     return (PROC / "self" / "stat").exists()
 
 
@@ -28,12 +28,12 @@ def _prctl(option: int, value: int) -> None:
 
 
 def die_with_parent() -> None:
-    """Have this process killed when the one that forked it ends, however that ends."""
+    """Ask the kernel to kill this process once its parent ends, however the parent ends."""
     _prctl(SET_PDEATHSIG, signal.SIGKILL)
 
 
 def adopt_orphans() -> None:
-    """What descendants leave behind becomes a child of this process, instead of init's."""
+    """Adopt processes whose parent has ended: they become children of this process, not of init."""
     _prctl(SET_CHILD_SUBREAPER, 1)
 
 
@@ -57,7 +57,7 @@ def children(pid: int) -> list[int]:
     except (FileNotFoundError, ProcessLookupError):
         if not Path(f"/proc/{pid}").exists() or _lists_children():
             return found
-        for entry in PROC.iterdir():  # a kernel without the list
+        for entry in PROC.iterdir():  # this kernel has no such list
             fields = _stat(int(entry.name)) if entry.name.isdigit() else None
             if fields and int(fields[1]) == pid:
                 found.append(int(entry.name))
@@ -78,7 +78,7 @@ def tree(pid: int) -> list[int]:
 
 
 def cpu_clock(pid: int) -> float:
-    """[s] of CPU that a process has used itself, all its threads, ended ones too; 0 if it is gone.
+    """CPU time in seconds of a process, in all its threads, ended ones too; 0 if it is gone.
 
     The clock of another process, as clock_getcpuclockid(3) makes it; to the nanosecond.
     """
@@ -89,19 +89,19 @@ def cpu_clock(pid: int) -> float:
 
 
 def cpu_of_ended(pid: int) -> float:
-    """[s] of CPU of the children that a process has waited for, in ticks of 10 ms."""
+    """CPU time in seconds of the children that a process has waited for, in ticks of 10 ms."""
     fields = _stat(pid)
     return sum(map(int, fields[13:15])) / TICKS if fields else 0.0
 
 
 def resident(pid: int) -> float:
-    """[MB] in memory, pages that it shares with others too; 0 where it has ended."""
+    """Resident size in MB, with the pages that it shares with others; 0 if it has ended."""
     fields = _stat(pid)
     return int(fields[21]) * PAGE / 1e6 if fields else 0.0
 
 
 def proportional(pid: int) -> float:
-    """[MB] in memory, of each page its share among those that have it (PSS)."""
+    """Proportional size (PSS) in MB: each page is divided among the processes that have it."""
     try:
         for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines():
             if line.startswith("Pss:"):
@@ -112,9 +112,9 @@ def proportional(pid: int) -> float:
 
 
 def unnamed(pids: list[int]) -> float:
-    """[MB] of files in memory without a name that processes have open (memfd_create(2)).
+    """Size in MB of files in memory without a name that processes have open (memfd_create(2)).
 
-    What they have mapped of one is in their resident size too.
+    Their mapped parts also count in the resident size.
     """
     found: dict[tuple[int, int], int] = {}
     for pid in pids:
@@ -130,7 +130,7 @@ def unnamed(pids: list[int]) -> float:
 
 
 def peak_memory(pid: int) -> float:
-    """[MB] the largest resident size of a process since `forget_peak`."""
+    """The largest resident size in MB of a process since `forget_peak`."""
     with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/status").read_text().splitlines():
             if line.startswith("VmHWM:"):
@@ -139,7 +139,7 @@ def peak_memory(pid: int) -> float:
 
 
 def belongings(pid: int) -> tuple[Any, ...]:
-    """What a process has of its own, as far as others see it: signals, limits, cores, timers."""
+    """The state of a process that others can see: signals, limits, cores, timers."""
     found: list[Any] = []
     with contextlib.suppress(OSError):
         for line in Path(f"/proc/{pid}/status").read_text().splitlines():
@@ -149,13 +149,13 @@ def belongings(pid: int) -> tuple[Any, ...]:
         found.append(os.sched_getaffinity(pid))
         found.append((os.getpriority(os.PRIO_PROCESS, pid), os.sched_getscheduler(pid)))
         found.append(os.readlink(f"/proc/{pid}/cwd"))  # noqa: PTH115
-    with contextlib.suppress(OSError):  # a kernel without the list
+    with contextlib.suppress(OSError):  # this kernel has no such list
         found.append(Path(f"/proc/{pid}/timers").read_text())
     return tuple(found)
 
 
 def environment() -> tuple[Any, ...]:
-    """What this process has of its own that only it can tell: arithmetic, alarms, variables."""
+    """The state of this process that only it can see: arithmetic, alarms, variables."""
     library = ctypes.CDLL(None)
     timers = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
     rounding = library.fegetround() if hasattr(library, "fegetround") else None
@@ -164,7 +164,7 @@ def environment() -> tuple[Any, ...]:
     return (
         rounding,
         traps,
-        least * 0.5 > 0.0,  # numbers that small are not taken for 0
+        least * 0.5 > 0.0,  # numbers as small as this are not rounded to 0
         [signal.getitimer(timer)[0] > 0 for timer in timers],
         dict(os.environ),
         os.umask(os.umask(0o077)),
@@ -172,7 +172,7 @@ def environment() -> tuple[Any, ...]:
 
 
 def forget_peak(pid: int) -> None:
-    """Let `peak_memory` begin anew."""
+    """Restart the count of `peak_memory`."""
     with contextlib.suppress(OSError):
         Path(f"/proc/{pid}/clear_refs").write_text("5")
 
@@ -184,7 +184,7 @@ def threads(pid: int) -> int:
 
 
 def state(pid: int) -> str:
-    """One letter of proc(5): R, S, D, Z, T for one that is stopped; empty where there is none."""
+    """One letter of proc(5): R, S, D, Z, T: it is stopped; empty if there is none."""
     fields = _stat(pid)
     return fields[0] if fields else ""
 
@@ -201,20 +201,20 @@ def marked(mark: str) -> list[int]:
 
 
 def kill(pids: list[int]) -> None:
-    """End processes, of which some may have ended."""
+    """End processes; some may have ended already."""
     for pid in pids:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(pid, signal.SIGKILL)
 
 
 def address_space(pid: int) -> int:
-    """[bytes] of a process, 0 where it has ended."""
+    """The size of a process in bytes; 0 if it has ended."""
     fields = _stat(pid)
     return int(fields[20]) if fields else 0
 
 
 def lower(pid: int, kind: int, value: int) -> None:
-    """Set the soft limit of a process, as far as its hard one allows."""
+    """Set the soft limit of a process, as far as its hard limit allows."""
     with contextlib.suppress(OSError):  # it has ended
         hard = resource.prlimit(pid, kind)[1]
         unlimited = resource.RLIM_INFINITY
@@ -223,7 +223,7 @@ def lower(pid: int, kind: int, value: int) -> None:
 
 
 def has_hard_limit(pid: int, kind: int) -> bool:
-    """Whether a process, which may have ended, has a limit that it could not lift any more."""
+    """Whether a process has a limit that it cannot lift; the process may have ended."""
     with contextlib.suppress(OSError):
         hard, own = (resource.prlimit(number, kind)[1] for number in (pid, 0))
         return hard != own
@@ -231,19 +231,19 @@ def has_hard_limit(pid: int, kind: int) -> bool:
 
 
 def release_memory() -> None:
-    """Give freed memory back to the system, so that the next run is not lent it."""
+    """Give freed memory back to the system, so that the next run does not get it."""
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
 
 
 def kill_all(pid: int, ours: Set[int] = frozenset(), patience: float = 5.0) -> int | None:
-    """Kill a child and all that descends from it, and wait for them; for a process that adopts.
+    """Kill a child and all its descendants, and wait for them; this process must adopt orphans.
 
     Args:
         pid: the child.
-        ours: other children of this process, that are left alone.
-        patience: [s] at most.
+        ours: other children of this process, which are left alone.
+        patience: longest wait [s].
 
     Returns:
         The exit status of the child as ``os.waitpid`` has it; None if it cannot be had.
@@ -251,7 +251,7 @@ def kill_all(pid: int, ours: Set[int] = frozenset(), patience: float = 5.0) -> i
     status: int | None = None
     end = time.monotonic() + patience
     with contextlib.suppress(ProcessLookupError):
-        os.kill(pid, signal.SIGSTOP)  # what it starts from now on is not missed
+        os.kill(pid, signal.SIGSTOP)  # it can start nothing more that would be missed
     targets = tree(pid)
     while True:
         kill(targets)
@@ -268,5 +268,5 @@ def kill_all(pid: int, ours: Set[int] = frozenset(), patience: float = 5.0) -> i
             if time.monotonic() > end:
                 return status
             time.sleep(1e-3)
-        # orphans are ours by now
+        # this process has adopted the orphans by now
         targets = [member for child in left for member in tree(child)]

@@ -1,22 +1,22 @@
-"""What the runs of a store say: profiles, means, ratios. Knows runs and numbers, no problem.
+"""Profiles, means and ratios of the runs of a store. This module knows no problem.
 
-What an instance is, what solved means and which instances count is in `comparison.py`. Runs that
-started from nothing (cold) and from the solution of a step before (warm) are never in one profile;
-`along` puts them beside each other. Sources:
+What an instance is, what solved means and which instances count are defined in `comparison.py`.
+Runs that started from nothing (cold) and from the solution of a step before (warm) are never in one
+profile; `along` compares the two. Sources:
 
 - performance profiles: Dolan & More, "Benchmarking optimization software with performance
   profiles" (2002): rho_s(tau) is the share of instances that s solves within tau times the cost of
   the best solver on each.
 - data profiles: More & Wild, "Benchmarking derivative-free optimization algorithms" (2009): the
-  share of instances solved within a cost, here by contact if wanted.
+  share of instances that are solved within a cost, or within a cost per contact.
 - shifted geometric means, exp(mean(log(t + s))) - s: Mittelmann's benchmarks; failures are charged
   a multiple of the limit.
 - runtimes to fixed targets: Hansen et al., "COCO: a platform for comparing continuous optimizers"
-  (2021): the share of pairs of an instance and an error that were reached within a time, from the
-  histories of all runs, also of those that failed.
-- success at an accuracy: qpbenchmark (Caron et al.): the error that was reached decides, whatever
-  the solver said.
-- intervals: the bootstrap draws problems, with all that was run on each (Efron & Tibshirani 1993);
+  (2021): the share of pairs (instance, error) in which the run reached the error within a time,
+  from the histories of all runs, also of those that failed.
+- success at an accuracy: qpbenchmark (Caron et al.): the error reached decides, whatever the solver
+  said.
+- intervals: the bootstrap draws problems, each with all its runs (Efron & Tibshirani 1993);
   if families weigh the same, it draws families, and problems in each.
 """
 
@@ -78,17 +78,17 @@ __all__ = [
 ]
 
 Start: TypeAlias = Literal["cold", "warm"]
-PENALTY = 10.0  # times the limit, for a failure in a mean
-SHIFT = 1e-3  # [s]
+PENALTY = 10.0  # a failure counts in a mean as so many times the limit
+SHIFT = 1e-3  # [s] of the shifted geometric mean
 RESAMPLES = 2000
-BANDS = 400  # the same for the bands of curves
-CHUNK = 100  # of them at once: 40 MB where there are 50,000 problems
-LAST = 3  # drift is that of the last third of a sequence
-SPREAD = 0.2  # of repeats, relative to the least, from which on a figure is marked
-MARK, LOADED = "~", "^"  # of such a figure, and of one with runs under load
+BANDS = 400  # number of draws for the bands of curves
+CHUNK = 100  # draws at once: 40 MB for 50,000 problems
+LAST = 3  # drift is measured in the last third of a sequence
+SPREAD = 0.2  # a figure is marked if its repeats spread more than this, relative to the least
+MARK, LOADED = "~", "^"  # marks of such a figure, and of one with runs under load
 ACCURACIES = (1e-2, 1e-4, 1e-6, 1e-8)
 VIRTUAL_BEST = "virtual best"
-# columns of a store that no table, figure or page is of: a third of the memory
+# no table, figure or page needs these columns of a store; they take a third of the memory
 UNREAD = frozenset(
     (
         *("natural", "scaled_natural", "dynamics", "bilateral", "kinematics", "cone", "dual_cone"),
@@ -118,22 +118,23 @@ def load(
     start: Start | None = "cold",
     more: Sequence[str] = (),
 ) -> Table:
-    """The runs of a store that a profile is of.
+    """The runs of a store for a profile.
 
     Args:
-        store: the file.
+        store: file of the store.
         campaign: only its runs.
-        families: only their problems.
+        families: only problems of these.
         solvers: only these, by their labels, in this order.
         tolerances: only these.
-        machine: its node's name.
-        merit: only runs whose tolerance bounds this.
-        start: only runs that started from nothing, or, "warm", the steps of sequences but the first
-            ones, which had no step before them; None for both, which no profile takes.
-        more: columns of long texts that are wanted too, as "message".
+        machine: only runs on the machine of this node name.
+        merit: only runs whose tolerance bounds this merit.
+        start: "cold": only runs that started from nothing. "warm": only the steps of sequences,
+            without the first steps, which had no step before them. None: both, which no profile
+            takes.
+        more: further columns of long texts, for example "message".
 
     Raises:
-        StoreError: the file is no store.
+        StoreError: the file is not a store.
         ProfileError: no run is left, or they are of several machines or merits.
     """
     with Store(store, create=False) as opened:
@@ -174,7 +175,7 @@ def load(
             " literature alone, which does not compare; choose one by merit: both, natural"
         )
     runs = one_limit(runs)
-    # by the labels of the store, in the order that was asked for
+    # by the labels of the store, in the order asked for
     order = {name: k for k, name in enumerate(solvers)}
     solver = words_in(runs, "solver")
     rank = np.array([order.get(str(name), len(order)) for name in solver.values], int)
@@ -184,7 +185,7 @@ def load(
 
 
 def read(store: Store, more: Sequence[str] = ()) -> Table:
-    """All runs of a store; `same_as` says of a local form which global one it is of."""
+    """All runs of a store; `same_as` gives the global form of each local form."""
     runs = store.table(more=("path", *more))
     runs = Table({name: runs[name] for name in runs.names if name not in UNREAD})
     if not len(runs):
@@ -194,12 +195,12 @@ def read(store: Store, more: Sequence[str] = ()) -> Table:
     said = words_in(runs, "same_as")
     own = words_in(runs, "hash").map(lambda digest: pairs.get(str(digest)))
     if not pairs or any(said.values):
-        return runs  # the campaign has said which are the same
+        return runs  # the campaign already said which forms belong together
     return runs.with_columns(same_as=own)
 
 
 def _name_machines(runs: Table) -> Table:
-    """Give machines of one name different ones, where they have other processors."""
+    """Rename machines of the same name that have different processors."""
     number, first = runs.numbers("node", "cpu", "cores")
     kinds = list(runs.where(first))
     several = Counter(kind["node"] or "" for kind in kinds)
@@ -214,7 +215,7 @@ def _name_machines(runs: Table) -> Table:
 
 
 def _name_solvers(runs: Table) -> Table:
-    """Give solvers of one label different ones, where they were not run in the same way."""
+    """Relabel solvers of the same label that ran with different settings."""
 
     def of(row: Mapping[str, Any]) -> dict[str, str]:
         options = object_in(row["options"])
@@ -244,7 +245,7 @@ def _name_solvers(runs: Table) -> Table:
 
 
 def ratios(values: Array) -> Array:
-    """r_ps = t_ps / min_s t_ps (instances, solvers); inf where s fails, nan where it has none."""
+    """r_ps = t_ps / min_s t_ps (instances, solvers); inf if s fails, nan if it has no cost."""
     best = least(values)[:, None]
     with np.errstate(invalid="ignore"):
         found = np.where(np.isfinite(values), values / best, np.inf)
@@ -255,9 +256,9 @@ def share_within(values: Array, bounds: Array, weights: Array | None = None) -> 
     """The share of instances whose value is at most each bound (solvers, bounds).
 
     Args:
-        values: (instances, solvers); of a solver those instances count for which it has a value.
+        values: (instances, solvers); for each solver, only the instances count that have a value.
         bounds: in growing order.
-        weights: (instances, solvers), as `Costs.weights` has them; by default all the same.
+        weights: (instances, solvers), as `Costs.weights` gives them; by default all equal.
     """
     if weights is None:
         count = np.maximum(1, (~np.isnan(values)).sum(axis=0))[:, None]
@@ -282,10 +283,10 @@ def bands(
     """The ends of 95 % intervals of `share_within`, by drawing problems `BANDS` times.
 
     Args:
-        costs: what the values are of.
+        costs: the costs that the values belong to.
         values: (instances, solvers) of the curves: costs or ratios.
-        bounds: (k) in growing order.
-        weigh: what weighs the same.
+        bounds: (k) the bounds, in growing order.
+        weigh: which unit weighs the same, as in `Costs.weights`.
         seed: of the bootstrap.
     """
     problems, groups = _problems(costs, np.arange(len(costs.instances)), weigh)
@@ -293,7 +294,7 @@ def bands(
     weights = costs.weights(weigh)
     low, high = np.zeros((2, len(costs.solvers), len(bounds)))
     for k, own in enumerate(values.T):
-        # of each problem the weight of its instances up to each bound, then of what was drawn
+        # first the weight of each problem's instances up to each bound, then that of the draws
         there = ~np.isnan(own)
         step = np.searchsorted(bounds, own[there], side="left")
         sums = np.zeros((drawn.shape[1], len(bounds) + 1))
@@ -308,9 +309,9 @@ def bands(
 def _problems(
     costs: Costs, places: npt.NDArray[np.int64], weigh: Weigh
 ) -> tuple[npt.NDArray[np.int64], list[list[int]]]:
-    """For each of some instances the number of its problem; and the problems, drawn group by group.
+    """The problem's number of each of some instances; and the problems, to be drawn by group.
 
-    A group is a family where these weigh the same, else it is all.
+    If families weigh the same, a group is a family; else all problems are one group.
     """
     known: dict[str, int] = {}
     groups: dict[str, list[int]] = defaultdict(list)
@@ -325,9 +326,9 @@ def _problems(
 
 
 def _draws(groups: Sequence[Sequence[int]], count: int, seed: int) -> Iterator[Array]:
-    """(some, problems) how often each problem was drawn: the bootstrap, so many times in all.
+    """(some, problems) how often each bootstrap draw takes each problem.
 
-    Groups are drawn, and of each as many problems as it has.
+    Groups are drawn, and from each group as many problems as it has.
     """
     random = np.random.Generator(np.random.PCG64([seed, len(groups)]))
     size = sum(map(len, groups))
@@ -353,10 +354,10 @@ def shifted_geometric_mean(
     shift: float = SHIFT,
     weights: Array | None = None,
 ) -> Array:
-    """(solvers) of costs (instances, solvers); a failure counts as penalty times its charge.
+    """(solvers) of costs (instances, solvers); a failure costs penalty times its charge.
 
-    Of a solver those instances count for which it has a cost; nan where there is none. All weigh
-    the same without `weights` (instances, solvers), as `Costs.weights` has them.
+    For each solver, only the instances count that have a cost; nan if there are none. `weights`
+    (instances, solvers) are those of `Costs.weights`; without them all weigh the same.
     """
     whole = np.where(np.isinf(values), penalty * charges[:, None], values)
     there = ~np.isnan(values)
@@ -369,7 +370,7 @@ def shifted_geometric_mean(
 
 @dataclass(frozen=True)
 class Pair:
-    """Two solvers on the instances that both solve, at a tolerance."""
+    """Two solvers on the instances that both solve, at one tolerance."""
 
     tol: float
     first: str
@@ -377,7 +378,7 @@ class Pair:
     both: int
     only_first: int
     only_second: int
-    ratio: float  # geometric mean of t_first / t_second, nan where there is none
+    ratio: float  # geometric mean of t_first / t_second, nan if there is none
     low: float  # 95 % interval of it, by bootstrap over the problems
     high: float
 
@@ -385,13 +386,13 @@ class Pair:
 def pairs(
     costs: Costs, against: str | None = None, seed: int = 0, weigh: Weigh = "instances"
 ) -> list[Pair]:
-    """Each two of the solvers at each tolerance, or each of the others and one.
+    """The ratio of every two solvers at each tolerance, or of each solver to a given one.
 
     Args:
-        costs: of all.
-        against: the one, as the second of each pair.
+        costs: of all solvers.
+        against: the given solver, the second of each pair; None: every two.
         seed: of the bootstrap, which draws the problems `RESAMPLES` times.
-        weigh: what weighs the same.
+        weigh: which unit weighs the same, as in `Costs.weights`.
     """
     names = costs.solvers
     chosen = [
@@ -405,14 +406,14 @@ def pairs(
 
 
 def _pairs(costs: Costs, chosen: Sequence[tuple[int, int]], seed: int, weigh: Weigh) -> list[Pair]:
-    """At one tolerance. All pairs share the draws, so that many problems take little time."""
+    """The same at one tolerance. All pairs share the draws, which saves time."""
     (tol,) = costs.tolerances
     some = np.flatnonzero(costs.solved.any(axis=1))
     if not len(some):
         some = np.arange(len(costs.instances))
     numbers, groups = _problems(costs, some, weigh)
     size = sum(map(len, groups))
-    # of each problem what its instances weigh for a pair, and their logarithms by these weights
+    # for each problem and pair: the weight of its instances, and their weighted logarithms
     sums, sizes = np.zeros((2, size, len(chosen)))
     ratios = np.full(len(chosen), math.nan)
     for k, (a, b) in enumerate(chosen):
@@ -428,7 +429,7 @@ def _pairs(costs: Costs, chosen: Sequence[tuple[int, int]], seed: int, weigh: We
     means = []
     for drawn in _draws(groups, RESAMPLES, seed):
         total = drawn @ sizes
-        # a draw without any of their problems says nothing
+        # a draw without any of their problems does not count
         with np.errstate(invalid="ignore", divide="ignore"):
             means.append(np.where(total > 0, (drawn @ sums) / total, np.nan))
     ends = np.full((2, len(chosen)), math.nan)
@@ -458,13 +459,13 @@ def summary(
     shift: float = SHIFT,
     weigh: Weigh = "instances",
 ) -> list[dict[str, Any]]:
-    """A row a tolerance and solver: the virtual best, then by what they solve and their means.
+    """One row for each tolerance and solver: the virtual best first, then by solved and mean.
 
     Args:
-        costs: of all tolerances; no figure is of several of them.
-        penalty: what a failure is charged, times the limit.
+        costs: of all tolerances; each figure is of one tolerance.
+        penalty: a failure is charged so many times the limit.
         shift: of the geometric mean.
-        weigh: what weighs the same in the share that is solved, and in the mean.
+        weigh: which unit weighs the same in the share solved and in the mean.
     """
     parts = [costs.at(tol) for tol in costs.tolerances]
     return [row for part in parts for row in _summary(part, penalty, shift, weigh)]
@@ -481,7 +482,7 @@ def _summary(costs: Costs, penalty: float, shift: float, weigh: Weigh) -> list[d
     )
     values, weights = whole.values, whole.weights(weigh)
     means = shifted_geometric_mean(values, costs.charges, penalty, shift, weights)
-    # of the best, on the instances of each solver
+    # the virtual best, on the instances of each solver
     beside = np.where(whole.there, best[:, None], np.nan)
     least_means = shifted_geometric_mean(beside, costs.charges, penalty, shift, weights)
     quotients = ratios(values)
@@ -515,7 +516,7 @@ def _count(marks: npt.NDArray[np.bool_] | None, k: int) -> int:
 
 
 def _median(spread: Array | None, k: int) -> float | None:
-    """The median spread of the repeats or the copies of a solver, where there are any."""
+    """The median spread of a solver's repeats or copies, if there are any."""
     if spread is None or k < 0:
         return None
     own = spread[np.isfinite(spread[:, k]), k]
@@ -523,7 +524,7 @@ def _median(spread: Array | None, k: int) -> float | None:
 
 
 def left_out(every: Costs, chosen: Costs) -> list[dict[str, Any]]:
-    """A row a tolerance and solver that is not compared: what it solves of what it has run."""
+    """A row for each tolerance and solver left out: how many of its runs it solves."""
     rows = []
     for tol in every.tolerances:
         part = every.at(tol)
@@ -550,7 +551,7 @@ def left_out(every: Costs, chosen: Costs) -> list[dict[str, Any]]:
 def shifts(
     costs: Costs, penalty: float = PENALTY, shift: float = SHIFT, weigh: Weigh = "instances"
 ) -> list[dict[str, Any]]:
-    """A row a tolerance and solver: its mean over the virtual best's, for other shifts too."""
+    """A row for each tolerance and solver: its mean over the virtual best's, for several shifts."""
     tables = {
         f"shift {s:g}": {
             (row["tol"], row["solver"]): row["to best"] for row in summary(costs, penalty, s, weigh)
@@ -568,20 +569,21 @@ def shifts(
 def accuracies(
     rows: Iterable[Mapping[str, Any]], costs: Costs, weigh: Weigh = "instances"
 ) -> list[dict[str, Any]]:
-    """A row a tolerance and solver: the share of instances on which a run reached an error in time.
+    """A row for each tolerance and solver: the share of instances that reached each error in time.
 
-    The recomputed error decides, whatever the solver said; of repeats each counts a part.
+    The recomputed error decides, whatever the solver said; repeats share the weight of their
+    instance.
 
     Args:
-        rows: the runs that the costs are of, or more.
-        costs: which instances count, and for whom.
-        weigh: what weighs the same.
+        rows: the runs behind the costs; more are allowed.
+        costs: they say which instances count for which solver.
+        weigh: which unit weighs the same, as in `Costs.weights`.
     """
     runs = runs_of(rows, costs)
     place, column = costs.cells_of(runs)
     weights = costs.weights(weigh)
     tols = np.array([one.tol for one in costs.instances])
-    # each solver's weights at one tolerance have the sum 1
+    # the weights of each solver at one tolerance sum to 1
     for tol in np.unique(tols):
         part = costs.at(float(tol))
         weights[tols == tol] = part.weights(weigh)
@@ -607,7 +609,7 @@ def accuracies(
 
 
 def failures(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """A row a tolerance and solver: how many of all its runs ended in which status."""
+    """A row for each tolerance and solver: how many of all its runs ended in each status."""
     runs = table_of(rows)
     tols = numbers_in(runs, "tol")
     solver, status = words_in(runs, "solver"), words_in(runs, "status")
@@ -629,7 +631,7 @@ def failures(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def families(
     costs: Costs, published: Mapping[tuple[str, float], float] = MappingProxyType({})
 ) -> list[dict[str, Any]]:
-    """A row a family and tolerance: the fastest solver of each problem, as in a paper's table.
+    """A row for each family and tolerance: the fastest solver of each problem, as in papers.
 
     Args:
         costs: of all families.
@@ -669,16 +671,16 @@ def work_precision(
     shift: float = SHIFT,
     weigh: Weigh = "instances",
 ) -> list[dict[str, Any]]:
-    """A row a solver and tolerance: what the accuracy costs.
+    """A row for each solver and tolerance: the cost of that accuracy.
 
     `error` is the geometric mean of the recomputed errors of the runs that were solved.
 
     Args:
-        rows: the runs that the costs are of, or more.
+        rows: the runs behind the costs; more are allowed.
         costs: of all tolerances.
-        penalty: what a failure is charged, times the limit.
+        penalty: a failure is charged so many times the limit.
         shift: of the geometric mean.
-        weigh: what weighs the same.
+        weigh: which unit weighs the same, as in `Costs.weights`.
     """
     runs = runs_of(rows, costs)
     solver, tols = words_in(runs, "solver"), numbers_in(runs, "tol")
@@ -713,24 +715,24 @@ def work_precision(
 def along(
     store: str | Path, rows: Iterable[Mapping[str, Any]], campaign: str | None = None
 ) -> list[dict[str, Any]]:
-    """A row a sequence, tolerance and solver: its warm runs against its cold ones.
+    """A row for each sequence, tolerance and solver: its warm runs against its cold ones.
 
-    The steps count that were run in both ways, with the same settings. What failed counts with what
-    it took. `drift` is the largest difference of the two velocities u at the contacts, over the
-    largest velocity, in the last third of the steps that both solved; as problems are given, an
-    error of one step reaches the next one by the guess alone.
+    Only steps count that were run in both ways with the same settings. A failed run counts with the
+    time it took. `drift` is the largest difference of the two velocities u at the contacts, over
+    the largest velocity, in the last third of the steps that both solved. The problems are given,
+    so an error of one step reaches the next one only by the guess.
 
     Args:
-        store: the file that the rows are of.
-        rows: as `load` gives them with start=None.
-        campaign: only its warm runs; the cold ones beside them may be of an earlier campaign.
+        store: the file of the rows.
+        rows: rows of `load` with start=None.
+        campaign: only its warm runs; its cold runs may be of an earlier campaign.
     """
 
     def same(row: Mapping[str, Any]) -> tuple[Any, ...]:
         names = ("hash", "solver", "tol", "merit", "repeat", "time_limit", "wall_limit")
         return tuple(row[name] for name in names)
 
-    # of what was run cold alone nothing is said here
+    # steps with cold runs alone are left out here
     every = table_of(rows)
     hashes, warm = words_in(every, "hash"), words_in(every, "start").is_in(["warm"])
     every = kept(every, hashes.is_in(in_order(words_in(every.where(warm), "hash"))))
@@ -776,12 +778,12 @@ def along(
 
 
 def _spent(row: Mapping[str, Any]) -> float:
-    """[s] of CPU; the whole run's where the solver's own is not known."""
+    """CPU time in seconds: the solver's own, or the whole run's if the former is not known."""
     return float(row["cpu_s"] if row["cpu_s"] is not None else row["total_cpu_s"] or 0.0)
 
 
 def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float | None:
-    """How far two velocities are from each other, over the size of the second; None without."""
+    """The distance of two velocities over the size of the second; None if one is missing."""
     if "u" not in one or "u" not in other or one["u"].shape != other["u"].shape:
         return None
     size = float(np.abs(other["u"]).max(initial=1e-300))
@@ -794,10 +796,11 @@ def _apart(one: Mapping[str, Array], other: Mapping[str, Array]) -> float | None
 def curves(
     store: str | Path, rows: Iterable[Mapping[str, Any]]
 ) -> dict[str, list[tuple[Array, Array]]]:
-    """For each run of each solver the times [s] and the least errors until then.
+    """For each solver and run: the times [s], and the least error up to each of them.
 
-    The times are of CPU: those of the history, which are of the wall clock, in proportion. A run
-    that left no history, as one that was killed, has reached nothing. Empty where no run has one.
+    The times are CPU times: the history's times, which are of the wall clock, in proportion. A run
+    without a history, for example one that was killed, has reached nothing. If no run has a
+    history, the result is empty.
     """
     runs = table_of(rows)
     runs = runs.where(~words_in(runs, "status").is_in((UNSUITABLE,)))
@@ -820,7 +823,7 @@ def curves(
 def least_errors(
     history: Sequence[tuple[int, float, float, str]], cpu_s: float | None
 ) -> tuple[Array, Array]:
-    """The times [s] of CPU of the reports of a run, and the least error until each of them."""
+    """The times [s] of CPU of the reports of a run, and the least error up to each of them."""
     times = np.array([time for _, _, time, _ in history], dtype=float)
     errors = np.array([error for _, error, _, _ in history], dtype=float)
     if times.size and cpu_s is not None and times[-1] > 0:
@@ -831,19 +834,20 @@ def least_errors(
 def convergence(
     store: str | Path, rows: Iterable[Mapping[str, Any]], times: Array
 ) -> dict[str, Array]:
-    """The least error reached by a time, its median over all runs, by solver.
+    """For each solver: the least error reached by a time, as the median over all runs.
 
     Args:
-        store: the file that the rows are of.
-        rows: as `load` gives them, at one tolerance.
-        times: (k) [s] of CPU, growing.
+        store: the file of the rows.
+        rows: rows of `load`, at one tolerance.
+        times: (k) CPU times in seconds, growing.
 
     Returns:
-        For each solver an array (k), inf before half of its runs have reported; of an even number
-        of runs the larger error in the middle. Empty where no run has a history.
+        For each solver an array (k). It is inf before half of its runs have reported. If the number
+        of runs is even, the larger of the two errors in the middle counts. If no run has a history,
+        the result is empty.
 
     Raises:
-        ProfileError: the runs are at several tolerances: they end at different errors.
+        ProfileError: the runs are at several tolerances, so that they end at different errors.
     """
     rows = table_of(rows)
     if len(np.unique(numbers_in(rows, "tol"))) > 1:
@@ -860,17 +864,17 @@ def convergence(
 
 
 def targets(tol: float) -> Array:
-    """The errors that runtimes are to: powers of ten from 0.1 on, the tolerance last."""
+    """The target errors of runtimes: powers of ten from 0.1 down, the tolerance last."""
     last = math.floor(math.log10(tol) + 1e-9)
     return np.array([*(10.0**k for k in range(-1, last, -1)), tol])
 
 
 def runtimes(store: str | Path, rows: Iterable[Mapping[str, Any]], tol: float) -> dict[str, Array]:
-    """For each solver the times [s] of CPU to the `targets` of all its runs; inf where not reached.
+    """For each solver: CPU times [s] of its runs to each of `targets`; inf if not reached.
 
     Args:
-        store: the file that the rows are of.
-        rows: as `load` gives them.
+        store: the file of the rows.
+        rows: rows of `load`.
         tol: only runs at this tolerance.
     """
     wanted = targets(tol)
@@ -879,7 +883,7 @@ def runtimes(store: str | Path, rows: Iterable[Mapping[str, Any]], tol: float) -
     for solver, own in curves(store, runs.where(numbers_in(runs, "tol") == tol)).items():
         times = np.full((len(own), len(wanted)), np.inf)
         for k, (moments, errors) in enumerate(own):
-            # the errors fall: the first that is small enough
+            # the errors fall, so take the first that is small enough
             first = np.searchsorted(-errors, -wanted, side="left")
             reached = first < len(errors)
             times[k, reached] = moments[first[reached]]
@@ -887,7 +891,7 @@ def runtimes(store: str | Path, rows: Iterable[Mapping[str, Any]], tol: float) -
     return found
 
 
-# ---- what a figure says of itself
+# ---- the caption of a figure
 
 
 def caption(
@@ -896,7 +900,7 @@ def caption(
     weigh: Weigh = "instances",
     own_set: bool = False,
 ) -> str:
-    """Instances, which of them, tolerances, limits, machine, date and version, in one line."""
+    """One line: the number and set of instances, tolerances, limits, machine, date and version."""
 
     def span(values: Iterable[float]) -> str:
         known = sorted(set(values))
@@ -912,7 +916,7 @@ def caption(
     some = started[started > 0]
     ends = (float(some.min()), float(some.max())) if some.size else ()
     days = sorted({time.strftime("%Y-%m-%d", time.gmtime(t)) for t in ends})
-    # of the core; modules and programs have digests of their own
+    # version of the core only; modules and programs have their own digests
     own = runs.where(words_in(runs, "origin") == "fclib")
     versions = sorted(
         {str(word or "").partition("-")[0] for word in in_order(words_in(own, "version"))}
@@ -944,7 +948,7 @@ def caption(
 
 
 def loaded(rows: Iterable[Mapping[str, Any]]) -> dict[str, int]:
-    """How many runs of each solver were begun while the load was above the number of cores."""
+    """How many runs of each solver began while the load was above the number of cores."""
     runs = table_of(rows)
     load, cores = numbers_in(runs, "load", 0.0), numbers_in(runs, "cores", 0.0)
     solver = words_in(runs.where((load > cores) & (cores > 0)), "solver")

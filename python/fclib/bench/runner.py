@@ -1,4 +1,4 @@
-"""Runs a campaign: what is not in the store yet is run, and stored as it comes."""
+"""Runs a campaign: runs each job that the store lacks, and stores each record at once."""
 
 from __future__ import annotations
 
@@ -22,23 +22,23 @@ from fclib.bench.store import Store
 from fclib.bench.table import Table
 
 BEAT = 2.0  # [s] between two signs of life in the store
-RETRIES = 2  # of a run that something from outside has spoilt
-PAUSES = (0.5, 5.0)  # [s] before the first and before each other of them
-TOO_MANY = 0.1  # share of the runs that cannot be done, at which a campaign stops
+RETRIES = 2  # times that a run is tried again if something from outside spoilt it
+PAUSES = (0.5, 5.0)  # [s] pause before the first retry, and before each later one
+TOO_MANY = 0.1  # a campaign stops once this share of its runs cannot be done
 
 
 @dataclass
 class Progress:
-    """How far a campaign is."""
+    """The progress of a campaign."""
 
     planned: int
-    skipped: int  # were in the store before
-    statuses: Counter[str] = field(default_factory=Counter)  # of the runs done now
-    not_run: Counter[str] = field(default_factory=Counter)  # by what kept them from it
-    reason: str = ""  # of the last of them
-    left_over: int = 0  # for which the budget does not suffice
-    stopped: str = ""  # why it has ended before its end
-    spent: float = 0.0  # [s] of its budget
+    skipped: int  # runs that were in the store before
+    statuses: Counter[str] = field(default_factory=Counter)  # statuses of the runs done now
+    not_run: Counter[str] = field(default_factory=Counter)  # causes that kept runs from being done
+    reason: str = ""  # cause of the last run that was not done
+    left_over: int = 0  # runs that the budget does not cover
+    stopped: str = ""  # why it stopped early
+    spent: float = 0.0  # [s] budget used
     start: float = field(default_factory=time.monotonic)
     last: Job | None = None
 
@@ -49,20 +49,20 @@ class Progress:
 
     @property
     def solved(self) -> int:
-        """Of those done now."""
+        """The runs done now."""
         return sum(self.statuses[name] for name in SOLVED)
 
     @property
     def rate(self) -> float:
-        """Runs a second."""
+        """Runs per second."""
         return sum(self.statuses.values()) / max(1e-9, time.monotonic() - self.start)
 
 
 class Queue(Iterator[Job]):
-    """The jobs that are to be done, each until it is done or was tried often enough.
+    """The jobs to do. Each stays until it is done or was tried often enough.
 
-    It may have another job after it had none: when one comes back, or when the step of a sequence
-    is done that one waits for.
+    It may be empty and later have a job again: if a job comes back, or if a step of a sequence is
+    done that a job waits for.
     """
 
     def __init__(
@@ -73,19 +73,22 @@ class Queue(Iterator[Job]):
         left: Callable[[Job, Record | None], None] = lambda *_: None,
     ) -> None:
         self.jobs = deque(jobs)
-        self.begin = begin  # a job as it is to be done; None where it is not, any more
+        self.begin = begin  # gives the job to run; None if it need not be run any more
         self.retries = retries
-        self.left = left  # is told of each that is not done, because the step before it was not
-        self.open = {job.key for job in jobs}  # not settled yet
-        self.held: dict[str, list[Job]] = defaultdict(list)  # by the run that they wait for
-        self.gone: dict[str, Record | None] = {}  # not done, and why; None: the budget is spent
-        self.again: deque[tuple[float, Job]] = deque()  # with the time before which it is not tried
+        # called with each job that is skipped because the step before it was not done
+        self.left = left
+        self.open = {job.key for job in jobs}  # jobs that are not settled yet
+        self.held: dict[str, list[Job]] = defaultdict(list)  # jobs by the run that they wait for
+        # jobs not done, with the cause; None: the budget is spent
+        self.gone: dict[str, Record | None] = {}
+        # each with the earliest time of its next try
+        self.again: deque[tuple[float, Job]] = deque()
         self.attempts: Counter[str] = Counter()
         self.many = max(1.0, TOO_MANY * len(jobs))
         self.failed = 0
 
     def __next__(self) -> Job:
-        """The next one; those that come back after all others, but not if they are too many."""
+        """The next job. Jobs that came back are last, and are dropped if they are too many."""
         while self.jobs and not (self.again and self.troubled):
             job = self.jobs.popleft()
             after = job.along.after if job.along else ""
@@ -104,11 +107,11 @@ class Queue(Iterator[Job]):
 
     @property
     def troubled(self) -> bool:
-        """Whether so many cannot be done that it is no use to begin others."""
+        """Whether so many jobs cannot be done that beginning others is of no use."""
         return self.failed + len(self.again) >= self.many
 
     def give_back(self, job: Job) -> bool:
-        """Take a job that was not done for another time; False where it was tried enough."""
+        """Take back a job that was not done; False if it was tried often enough."""
         self.attempts[job.key] += 1
         count = self.attempts[job.key]
         if count > self.retries:
@@ -118,7 +121,7 @@ class Queue(Iterator[Job]):
         return True
 
     def settle(self, job: Job) -> None:
-        """A job is done: what waits for it comes next."""
+        """A job is done: the jobs that wait for it come next."""
         self.open.discard(job.key)
         self.jobs.extendleft(self.held.pop(job.key, ()))
 
@@ -131,37 +134,37 @@ class Queue(Iterator[Job]):
             later += self.skip(job, record)
 
     def skip(self, job: Job, record: Record | None) -> list[Job]:
-        """Note that a job is not done; which jobs wait for it."""
+        """Note that a job is not done; return the jobs that wait for it."""
         self.open.discard(job.key)
         self.gone[job.key] = record
         return self.held.pop(job.key, [])
 
     def stop(self) -> None:
-        """Have no more jobs."""
+        """Drop all jobs."""
         self.jobs.clear()
         self.again.clear()
 
 
 def cost(record: Record) -> float:
-    """[s] of a budget that a run takes: of CPU, or of waiting where that ended it."""
+    """Seconds of the budget that a run takes: CPU time, or wall time if that limit ended it."""
     waited = record.status == "wall_limit"
     return (record.wall_s if waited else record.total_cpu_s) or 0.0
 
 
 def spent(runs: Table, keys: Collection[str]) -> float:
-    """[s] of a budget that the runs of some keys have taken."""
+    """Seconds of the budget that the runs of some keys have taken."""
     waited = runs["status"] == "wall_limit"
     costs = np.where(waited, runs["wall_s"], runs["total_cpu_s"])
     return float(np.nansum(costs[runs["key"].is_in(keys)]))
 
 
 def with_guess(job: Job, by_key: Mapping[str, Job], store: Store) -> Job:
-    """A run of a sequence with the last solution that the solver found before; others as they are.
+    """A job of a sequence with the solver's last solution before it; other jobs stay as they are.
 
     Args:
-        job: any.
+        job: of any kind.
         by_key: the runs of its sequence.
-        store: with the solutions, so that a campaign that goes on has the same guess.
+        store: holds the solutions, so that a resumed campaign has the same guess.
     """
     along = job.along
     while along and along.after:
@@ -188,16 +191,16 @@ def run_campaign(
 
     Args:
         campaign: what to run.
-        store: an SQLite file, made where there is none.
-        jobs: runs at once, on this machine.
+        store: an SQLite file, made if there is none.
+        jobs: number of runs at once on this machine.
         runner: runs the jobs elsewhere instead, as `fclib.bench.cluster.runner` does.
-        retries: how often a run is tried again that something from outside has spoilt.
-        retry: statuses; runs of the campaign that ended so are done again.
-        tell: is called with what is left out of the campaign, and why, and with warnings.
-        show: is called at the start, and after each run.
+        retries: how often a run is tried again if something from outside spoilt it.
+        retry: runs of the campaign that ended in one of these statuses are done again.
+        tell: called with each thing left out of the campaign and why, and with warnings.
+        show: called at the start, and after each run.
 
     Raises:
-        StoreError: the file is no store.
+        StoreError: the file is not a store.
         fclib.Error: a problem cannot be found, made or read.
     """
     if not processes.supported():
@@ -228,7 +231,7 @@ def run_campaign(
         by_key = {key: job for key, job in plan.items() if job.along}
 
         def begin(job: Job) -> Job | None:
-            """A job, unless another campaign has done it meanwhile, or it cannot be paid for."""
+            """The job; None if another campaign has done it, or the budget is too small."""
             if opened.has(job.key):
                 progress.skipped += 1
                 queue.settle(job)
@@ -280,13 +283,13 @@ def run_campaign(
                         opened.alive(number)
                         beat = time.monotonic()
         finally:
-            # also where it is interrupted, so that nobody waits for it
+            # also after an interrupt, so that nobody waits for it
             opened.alive(number, ended=True)
         return progress
 
 
 def warn_of_load(busy: int, tell: Callable[[str], None]) -> None:
-    """Say so where runs would share cores, with each other or with other work."""
+    """Warn if runs would share cores, with each other or with other work."""
     cores, load = machine.facts()["usable_cores"] or os.cpu_count() or 1, os.getloadavg()[0]
     if busy > cores:
         tell(f"{busy} threads at once on {cores} cores: their times do not compare")
@@ -298,7 +301,7 @@ def warn_of_load(busy: int, tell: Callable[[str], None]) -> None:
 
 
 def warn_of_locks(tell: Callable[[str], None]) -> None:
-    """Say so if no run gets cores for itself, because others could hold their locks."""
+    """Warn if no run gets cores for itself, because others could hold the locks."""
     try:
         os.close(machine.folder_of_locks())
     except OSError as error:

@@ -1,4 +1,4 @@
-"""One run: a problem, a solver, and what came of it."""
+"""One run: a problem, a solver and the result."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from fclib import _core, _solve
 
 @dataclass(frozen=True)
 class Run:
-    """One run, as it is printed and stored; the first eleven columns are its record."""
+    """One run, in the form that is printed and stored; the first eleven columns are its record."""
 
     problem: str
     formulation: str
     n: int  # degrees of freedom, 0 for a local problem
     nc: int  # contacts
-    solver: str  # with the options that were set: "nsgs relaxation=1.2"
+    solver: str  # with the options set: "nsgs relaxation=1.2"
     status: str
     iterations: int
     cpu_s: float  # [s] CPU time of the solver alone
-    error: float  # what the tolerance bounds, recomputed from the returned solution
+    error: float  # the merit that the tolerance bounds, recomputed from the returned solution
     natural: float
     scaled_natural: float
     result: _core.Result = field(repr=False, compare=False)
@@ -61,7 +61,7 @@ def run(
     """Solve a problem and judge the solution.
 
     Args:
-        name: what the record calls the problem.
+        name: name of the problem in the record.
         problem: any formulation.
         solver: a name of ``fclib.solvers()``.
         tol: bound on the merit.

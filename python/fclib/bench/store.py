@@ -1,17 +1,17 @@
 """The store of a campaign: one SQLite file, one row a run.
 
-Tables: runs, and what they refer to by number: problems, solvers, machines, campaigns; history has
-the reports of runs for which they were asked; faults has what kept runs from being done, and is no
-solver's. The view `results` has all of a run in one row. The columns and their units are in
-docs/bench.md, and `layout.SCHEMA` is what that says.
+The table `runs` refers by number to problems, solvers, machines and campaigns. `history` has the
+reports of runs, if they were asked for. `faults` has the causes that kept runs from being done,
+which are no solver's. The view `results` has all facts of a run in one row. docs/bench.md, which
+describes `layout.SCHEMA`, has the columns and their units.
 
-A run is identified by its key (`fclib.bench.job.Job.key`). `Store.add` inserts it in one statement
-unless there is one of that key: a run is stored once, whatever is interrupted and however many
-campaigns write. The file is in WAL mode, which needs a local file system.
+The key of a run (`fclib.bench.job.Job.key`) identifies it. `Store.add` inserts a run in one
+statement, unless there is one of that key. So a run is stored once, whatever is interrupted and
+however many campaigns write. The file is in WAL mode, which needs a local file system.
 
-Each row has a checksum (`layout.py`). A row that was damaged is left out by all that reads a store,
-and a `DamageWarning` names it; so is a run that refers to such a row. What has a name in a store is
-text: no name is looked up anywhere, least of all run.
+Each row has a checksum (`layout.py`). All readers of a store leave a damaged row out, and also the
+runs that refer to it; a `DamageWarning` names the row. Names in a store are text: no name is looked
+up anywhere, or run.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ from fclib.bench.layout import (
 from fclib.bench.table import TEXTS, Column, Table, Words, numbers_of
 
 PATIENCE = 60.0  # [s] to wait for another writer
-BATCH = 20_000  # rows that are read at once: some 20 MB
-NAMED = 5  # damaged rows of a table that a warning names one by one
-# columns of texts that differ from run to run, and the path of a problem, which is of its machine
+BATCH = 20_000  # rows read at once: some 20 MB
+NAMED = 5  # a warning names at most so many damaged rows of a table one by one
+# columns whose texts differ from run to run, and a problem's path, which differs by machine
 LONG = ("key", "message", "stages")
 MORE = (*LONG, "path")
-# what a run refers to: table, and for each column of `results` the one that it is there
+# tables that a run refers to: for each column of `results`, the column in that table
 REFERRED: dict[str, dict[str, str]] = {
     "problem": {"problem": "name"}
     | {name: name for name in ("family", "formulation", "spacedim", "n", "p", "nc", "nnz")}
@@ -71,16 +71,16 @@ REFERRED: dict[str, dict[str, str]] = {
     "campaign": {"campaign": "name"},
 }
 MENDING = "fclib bench merge NEW.sqlite saves what can be read"
-NUMBER = {"run": "id"}  # what columns of `results` are in `runs`, where their names differ
+NUMBER = {"run": "id"}  # columns of `results` that have another name in `runs`
 
 
 def text_of(text: str) -> str:
-    """What SQLite takes for a text: without lone surrogates and null characters."""
+    """The text that SQLite accepts: without lone surrogates and null characters."""
     return text.encode(errors="replace").decode().replace("\0", "?")
 
 
 class StoreError(_core.Error, ValueError):
-    """A file is no store, or one of another version."""
+    """A file is not a store, or is one of another version."""
 
 
 class DamagedError(StoreError):
@@ -88,7 +88,7 @@ class DamagedError(StoreError):
 
 
 class DamageWarning(UserWarning):
-    """Rows of a store were damaged, and are left out."""
+    """Rows of a store were damaged; they are left out."""
 
 
 def _one_line(word: str) -> str:
@@ -96,7 +96,7 @@ def _one_line(word: str) -> str:
 
 
 def explained(path: Path, error: Exception) -> StoreError:
-    """What an error of SQLite means for a store, and what to do."""
+    """The meaning of an error of SQLite for a store, and what to do."""
     word = _one_line(str(error))
     if "readonly" in word:
         todo = "cannot be written: copy it into a folder of your own"
@@ -115,7 +115,7 @@ def explained(path: Path, error: Exception) -> StoreError:
 
 
 class _Cursor(sqlite3.Cursor):
-    """A cursor whose errors are those of stores."""
+    """A cursor that raises the errors of stores."""
 
     def execute(self, *arguments: Any) -> Any:
         return self._explained(super().execute, *arguments)
@@ -138,7 +138,7 @@ class _Cursor(sqlite3.Cursor):
     def _explained(self, call: Callable[..., Any], *arguments: Any) -> Any:
         try:
             return call(*arguments)
-        # SQLite's own message may quote what is no text
+        # SQLite's own message may quote bytes that are not text
         except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
             path = getattr(self.connection, "path", None)
             if path is None or isinstance(error, sqlite3.ProgrammingError):
@@ -147,7 +147,7 @@ class _Cursor(sqlite3.Cursor):
 
 
 class _Connection(sqlite3.Connection):
-    """A connection whose errors are those of stores, once it has a path."""
+    """A connection that raises the errors of stores, once it has a path."""
 
     path: Path
 
@@ -169,7 +169,7 @@ def _rows_of(places: Sequence[int]) -> str:
 
 
 def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
-    """The rows of a table, over what of it cannot be read."""
+    """The rows of a table, without those that cannot be read."""
     last, step = -1, 1
     while step < 1 << 40:
         query = f"SELECT rowid, * FROM {table} WHERE rowid > ? ORDER BY rowid"
@@ -184,7 +184,7 @@ def _rows(source: sqlite3.Connection, table: str) -> Iterator[tuple[Any, ...]]:
 
 @dataclass(frozen=True)
 class Status:
-    """How far a campaign is."""
+    """The progress of a campaign."""
 
     name: str
     planned: int
@@ -192,26 +192,26 @@ class Status:
     solved: int
     statuses: dict[str, int]
     started: float  # [s] since 1970
-    seen: float  # when it last said that it is alive
+    seen: float  # time of its last sign of life
     ended: float | None
     node: str
     pid: int
-    done_before: int  # of the runs planned, those that were there at the start
+    done_before: int  # planned runs that were there at the start
 
     @property
     def rate(self) -> float:
-        """Runs a second, since it was started."""
+        """Runs per second since its start."""
         return (self.done - self.done_before) / max(1e-9, (self.ended or self.seen) - self.started)
 
 
 class Store:
-    """An open store; ``with Store(path) as store``."""
+    """An open store; use it as ``with Store(path) as store``."""
 
     def __init__(self, path: str | Path, create: bool = True) -> None:
         """Open a store, or make it.
 
         Raises:
-            StoreError: the file is no store, or there is none and none is to be made.
+            StoreError: the file is not a store, or there is no file and none may be made.
         """
         self.path = Path(path)
         if not create and not self.path.exists():
@@ -228,7 +228,7 @@ class Store:
             raise StoreError(f"{self.path}: is empty, and no store")
         try:
             self.db = sqlite3.connect(
-                # WAL wants to write beside the file, even to read it
+                # WAL mode writes beside the file, even to read it
                 f"{self.path.resolve().as_uri()}?mode=ro&immutable=1"
                 if self.read_only
                 else self.path,
@@ -270,7 +270,7 @@ class Store:
             if empty:
                 raise StoreError(f"{self.path}: is empty, and cannot be written")
             if version == RELEASED:
-                # brought up to date in memory
+                # an older version is brought up to date in memory
                 copy = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
                 copy.path = self.path
                 db.backup(copy)
@@ -283,7 +283,7 @@ class Store:
         db.execute("PRAGMA synchronous = NORMAL")
         if empty:
             with self.transaction():
-                # another may have made it meanwhile
+                # another process may have made it meanwhile
                 if not db.execute("SELECT 1 FROM sqlite_master LIMIT 1").fetchone():
                     for statement in STATEMENTS:
                         db.execute(statement)
@@ -304,14 +304,14 @@ class Store:
                 )
 
     def _check_tables(self) -> None:
-        """DamagedError where the file's tables are not those of this version."""
+        """DamagedError if the file's tables are not those of this version."""
         for table, own in layouts().items():
             if layout.declared_in(self.db, table) != own.declared:
                 raise DamagedError(f"{self.path}: is damaged: the columns of {table} are others")
 
     def _upgrade(self) -> None:
         with self.transaction():
-            # another may have brought it up to date meanwhile
+            # another process may have brought it up to date meanwhile
             if self.db.execute("PRAGMA user_version").fetchone()[0] == VERSION:
                 return
             for table, own in layouts().items():
@@ -327,7 +327,7 @@ class Store:
             self.db.execute(f"PRAGMA user_version = {VERSION}")
 
     def _saved(self) -> str:
-        """What can be done for a store that is damaged."""
+        """The advice for a damaged store."""
         try:
             with warnings.catch_warnings(), Store.recover(self.path) as saved:
                 warnings.simplefilter("ignore", DamageWarning)
@@ -338,21 +338,21 @@ class Store:
 
     @classmethod
     def recover(cls, path: str | Path) -> Store:
-        """What can be read of a damaged store, in memory.
+        """The readable part of a damaged store, in memory.
 
         Raises:
-            StoreError: nothing can.
+            StoreError: nothing can be read.
         """
         made = cls.__new__(cls)
         made.path, made.read_only, made._ids = Path(path), True, {}
         made.db = sqlite3.connect(":memory:", isolation_level=None, factory=_Connection)
         source = sqlite3.connect(f"{made.path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)
-        # what is no text any more is read, and has another checksum then
+        # a damaged text is read as bytes, and then has another checksum
         source.text_factory = lambda data: data.decode(errors="replace")
         try:
             names = "SELECT name FROM sqlite_master WHERE type = 'table'"
             there = {name for (name,) in source.execute(names)}
-            # an own schema: that of the file may be damaged too
+            # our own schema: that of the file may be damaged too
             for statement in STATEMENTS:
                 made.db.execute(statement)
             made.db.execute(f"PRAGMA user_version = {VERSION}")
@@ -360,7 +360,7 @@ class Store:
                 if table not in there:
                     continue
                 columns = [name for name, _ in layout.declared_in(source, table)]
-                # of the released version, which had no checksums
+                # tables of the released version, which had no checksums
                 bare = len(columns) < len(own.declared) and "checksum" not in columns
                 names = ", ".join(
                     [name for name, _ in own.declared if name not in ("about", "copy", "checksum")]
@@ -388,12 +388,12 @@ class Store:
     def _batches(
         self, table: str, condition: str = "", values: Sequence[Any] = ()
     ) -> Iterator[list[tuple[Any, ...]]]:
-        """The rows of a table as the file has them, as `Layout.query` selects them."""
+        """The rows of a table as they are in the file, in the columns of `Layout.query`."""
         cursor = self.db.cursor()
         rows: list[tuple[Any, ...]] = []
         first = True
         while first or rows:
-            # bytes, since a damaged text may be none; for the time of this call alone
+            # read texts as bytes during this call, since a damaged text may not decode
             self.db.text_factory = bytes
             try:
                 if first:
@@ -408,7 +408,7 @@ class Store:
     def _right(
         self, table: str, condition: str = "", values: Sequence[Any] = ()
     ) -> Iterator[tuple[list[tuple[Any, ...]], npt.NDArray[np.float64]]]:
-        """The rows of a table that are as they were written, with their numbers.
+        """The undamaged rows of a table, with their numbers.
 
         A warning names the others.
         """
@@ -417,7 +417,7 @@ class Store:
         for rows in self._batches(table, condition, values):
             good, numbers = layout.right(layouts()[table], rows)
             places = np.array([row[0] for row in rows], dtype=np.int64)
-            # in a damaged tree a row may come twice
+            # in a damaged tree a row may appear twice
             good &= places > np.maximum.accumulate(np.concatenate([[last], places[:-1]]))
             last = max(last, int(places.max()))
             if not good.all():
@@ -435,7 +435,7 @@ class Store:
     def _read(
         self, table: str, condition: str = "", values: Sequence[Any] = ()
     ) -> Iterator[dict[str, Any]]:
-        """The right rows of a table as dicts, with `rowid`."""
+        """The undamaged rows of a table as dicts, with `rowid`."""
         own = layouts()[table]
         whole = [kind == "INTEGER" for name in own.numbers for n, kind in own.declared if n == name]
         blobs = {name for name, kind in own.declared if kind == "BLOB"}
@@ -460,7 +460,7 @@ class Store:
             self.db.executemany(update, [(c, row[0]) for c, row in zip(found, rows, strict=True)])
 
     def seal(self) -> None:
-        """Write the checksums of all rows anew, as they are: of rows that were written by hand."""
+        """Write the checksums of all rows anew; needed after rows were written by hand."""
         for table in layouts():
             self._seal(table, "")
 
@@ -475,7 +475,7 @@ class Store:
         self.db.close()
 
     def discard(self) -> None:
-        """Close the file, and remove it where no campaign was ever begun in it."""
+        """Close the file, and remove it if no campaign was ever begun in it."""
         begun = self.db.execute("SELECT 1 FROM campaigns LIMIT 1").fetchone()
         self.close()
         if not begun:
@@ -483,19 +483,19 @@ class Store:
 
     @contextmanager
     def transaction(self) -> Iterator[None]:
-        """All or nothing of what is done in it."""
+        """A transaction: all that is done inside is stored, or nothing."""
         self.db.execute("BEGIN IMMEDIATE")
         try:
             yield
             self.db.execute("COMMIT")
         except BaseException:
             self._ids.clear()
-            if self.db.in_transaction:  # a full disk has ended it
+            if self.db.in_transaction:  # otherwise a full disk has ended it
                 self.db.execute("ROLLBACK")
             raise
 
     def _id(self, table: str, names: Sequence[str], values: Sequence[Any]) -> int:
-        """The number of a row of a table whose first column is its hash; it is made if needed."""
+        """The number of the row with a hash in its first column; it is made if needed."""
         if table not in self._ids:
             self._ids[table] = {row["hash"]: row["id"] for row in self._read(table)}
         known, digest = self._ids[table], values[0]
@@ -516,7 +516,7 @@ class Store:
         return known[digest]
 
     def begin(self, name: str, text: str, planned: int, skipped: int, node: str) -> int:
-        """Note that a campaign starts; `skipped` of its `planned` runs are there. Its number."""
+        """Note that a campaign starts with `skipped` runs stored. Return its number."""
         now = time.time()
         with self.transaction():
             cursor = self.db.execute(
@@ -539,9 +539,9 @@ class Store:
             self._seal("campaigns", "id = ?", campaign)
 
     def mend(self) -> int:
-        """Remove damaged rows, which a warning names, and what refers to them; how many runs.
+        """Remove damaged rows and all rows that refer to them. Return the number of runs removed.
 
-        They are run again by the campaign that goes on.
+        A warning names the rows. The campaign that goes on runs them again.
         """
         gone: dict[str, list[int]] = {}
         kept: dict[str, set[int]] = {}
@@ -560,7 +560,7 @@ class Store:
         if not gone:
             return 0
         with self.transaction():
-            # indexes have what rows were before they were damaged
+            # indexes hold the values that rows had before the damage
             self.db.execute("REINDEX")
             for table, places in gone.items():
                 rows = [(place,) for place in places]
@@ -573,7 +573,7 @@ class Store:
         return len(runs)
 
     def mended(self) -> Table:
-        """All runs with their keys, after what was damaged is removed."""
+        """All runs with their keys, after the damaged rows are removed."""
         with warnings.catch_warnings(record=True) as said:
             warnings.simplefilter("always", DamageWarning)
             runs = self.table(more=("key",))
@@ -587,9 +587,9 @@ class Store:
         return set(self.table(more=("key",))["key"].values)
 
     def forget(self, keys: Iterable[str], statuses: Sequence[str]) -> int:
-        """Remove the runs of some keys that ended in one of the statuses; how many.
+        """Remove the runs of some keys that ended in one of the statuses. Return their number.
 
-        With a run of a sequence go those of the steps after it, which follow from it.
+        The runs of later steps of a sequence follow from an earlier one, so they go with it.
         """
         wanted, ended = set(keys), set(statuses)
         every = [(row["id"], row["key"], row["status"], row["after"]) for row in self._read("runs")]
@@ -623,14 +623,14 @@ class Store:
         problem = self._id("problems", PROBLEM, [getattr(job.problem, name) for name in PROBLEM])
         facts = ("\n".join(values), *values, choice.family, choice.origin, choice.about)
         solver = self._id("solvers", SOLVER, facts)
-        if choice.about:  # which a store of an earlier version does not know
+        if choice.about:  # a store of an earlier version lacks this
             query = "UPDATE solvers SET about = ? WHERE id = ? AND about IS NULL"
             if self.db.execute(query, (choice.about, solver)).rowcount:
                 self._seal("solvers", "id = ?", solver)
         return problem, solver
 
     def fault(self, job: Job, record: Record, campaign: int | None = None) -> None:
-        """Note what has kept a run from being done, as often as it was tried."""
+        """Note the cause that kept a run from being done, once for each try."""
         with self.transaction():
             self._insert_fault(
                 (
@@ -649,7 +649,7 @@ class Store:
         self._seal("faults", "id = ?", self.db.execute(query, values).lastrowid)
 
     def faults(self) -> list[dict[str, Any]]:
-        """What was not run, for a cause from outside, and has not been run since."""
+        """The runs that a cause from outside prevented, and that have not been done since."""
         last: dict[str, dict[str, Any]] = {}
         for row in self._read("faults"):
             if row["key"] not in last or (row["started"] or 0) > (last[row["key"]]["started"] or 0):
@@ -664,7 +664,7 @@ class Store:
             solver = known["solver"].get(row["solver"])
             campaign = known["campaign"].get(row["campaign"], {"name": None})
             if problem is None or solver is None:
-                continue  # of a damaged row, which was named
+                continue  # refers to a damaged row, which was named
             found.append(
                 {
                     "solver": solver["label"],
@@ -678,24 +678,24 @@ class Store:
         return found
 
     def _by_number(self, column: str) -> dict[int, dict[str, Any]]:
-        """The right rows of what runs refer to by a column."""
+        """The undamaged rows that runs refer to by a column."""
         return {row["id"]: row for row in self._read(f"{column}s")}
 
     def add(self, job: Job, record: Record, campaign: int | None = None) -> bool:
-        """Store a run; False where there is one of its key."""
+        """Store a run; False if there is one of its key."""
         return self.add_all([(job, record)], campaign) == 1
 
     def add_all(self, runs: Iterable[tuple[Job, Record]], campaign: int | None = None) -> int:
-        """Store runs, all or none; how many there were not of their keys."""
+        """Store runs, all or none. Return how many of their keys were new."""
         with self.transaction():
             added = [self._add(job, record, campaign) for job, record in runs]
             new = [run for run in added if run is not None]
-            if new:  # the last ones: nobody else writes meanwhile
+            if new:  # they are the last rows: nobody else writes meanwhile
                 self._seal("runs", "id >= ?", new[0])
         return len(new)
 
     def _add(self, job: Job, record: Record, campaign: int | None) -> int | None:
-        """The number of a run that is stored, without its checksum; None where it is there."""
+        """Store a run without its checksum. Return its number; None if it is there already."""
         merits = record.merits or {}
         problem, solver = self._of(job)
         facts = dict(record.machine or {})
@@ -765,7 +765,7 @@ class Store:
         vectors: Sequence[bytes | None] | None,
         history: Sequence[Sequence[Any]],
     ) -> None:
-        """Store what of a run lies in other tables."""
+        """Store the parts of a run that lie in other tables."""
         if certificate:
             query = "INSERT INTO certificates (run, certificate) VALUES (?, ?)"
             self.db.execute(query, (run, certificate))
@@ -779,7 +779,7 @@ class Store:
             self.db.executemany(query, [(run, *report) for report in history])
             self._seal("history", "run = ?", run)
 
-    # ---- what is known of files, so that a campaign need not read them again
+    # ---- facts of files, so that a campaign need not read them again
 
     def known(self, path: Path) -> ProblemFacts | None:
         """The problem of a file that has not changed since it was noted."""
@@ -792,9 +792,9 @@ class Store:
         return None
 
     def note(self, path: Path, facts: ProblemFacts) -> None:
-        """Note what a file holds."""
+        """Note the facts of the problem in a file."""
         if text_of(str(path)) != str(path):
-            return  # SQLite does not know such names
+            return  # SQLite cannot store such names
         info = path.stat()
         with self.transaction():
             problem = self._id("problems", PROBLEM, [getattr(facts, name) for name in PROBLEM])
@@ -804,13 +804,13 @@ class Store:
             )
             self._seal("files", "path = ?", str(path))
 
-    # ---- what others read
+    # ---- reading, for other modules
 
     def table(self, more: Sequence[str] = ()) -> Table:
         """All runs, in the order in which they were stored, in the columns of `results`.
 
         Args:
-            more: which of the columns of `MORE` are read too.
+            more: the columns of `MORE` to read too.
         """
         own = layouts()["runs"]
         known = {column: list(self._by_number(column).values()) for column in REFERRED}
@@ -879,7 +879,7 @@ class Store:
         return list(table)
 
     def history(self, run: int) -> list[tuple[int, float, float, str]]:
-        """The reports of a run: iteration, error, time [s], stage."""
+        """The reports of a run, each with iteration, error, time [s] and stage."""
         return [
             tuple(row[name] for name in HISTORY)
             for row in self._read("history", "run = ?", (run,))
@@ -887,19 +887,19 @@ class Store:
         ]
 
     def certificate(self, run: int) -> str | None:
-        """The proof that a run gave that there is no solution, in JSON."""
+        """The proof of a run that there is no solution, in JSON."""
         for row in self._read("certificates", "run = ?", (run,)):
             return str(row["certificate"])
         return None
 
     def solution(self, run: int) -> dict[str, npt.NDArray[np.float64]]:
-        """The vectors u, r and l that a run of a sequence found; empty where it solved nothing."""
+        """The vectors u, r and l that a run of a sequence found; empty if it did not solve."""
         for row in self._read("solutions", "run = ?", (run,)):
             return {name: np.frombuffer(row[name]) for name in KEPT if row[name] is not None}
         return {}
 
     def solution_of(self, key: str) -> tuple[bytes, bytes | None] | None:
-        """The reactions and multipliers that the run of a key found; None where it found none."""
+        """The reactions and multipliers that the run of a key found; None if it found none."""
         for run in self._read("runs", "key = ?", (key,)):
             if run["key"] != key:
                 continue  # an index may be damaged
@@ -908,12 +908,12 @@ class Store:
         return None
 
     def texts(self) -> list[str]:
-        """The campaigns that have written here, as their files have them."""
+        """The texts of the campaigns that have written here."""
         found = [row["text"] for row in self._read("campaigns")]
         return list(dict.fromkeys(text for text in found if text is not None))
 
     def status(self) -> list[Status]:
-        """The campaigns that have written here, the last one first."""
+        """The campaigns that have written here, the latest first."""
         own = layouts()["runs"]
         campaign = own.numbers.index("campaign")
         status = own.texts.index("status") + 1 + len(own.numbers)
@@ -942,15 +942,15 @@ class Store:
         return found
 
     def merge(self, others: Iterable[str | Path]) -> int:
-        """Take over the runs of other stores, those of other machines beside the own ones.
+        """Take over the runs of other stores; runs of other machines stay apart.
 
         A run of the same key from the same machine is taken once.
 
         Returns:
-            How many were new.
+            The number of new runs.
 
         Raises:
-            StoreError: one of them is no store.
+            StoreError: one of them is not a store.
         """
         added = 0
         self.mend()
@@ -984,7 +984,7 @@ class Store:
             numbers["campaign"][number] = found[0] if found else new
 
         def adapt(row: dict[str, Any]) -> bool:
-            """Give a row the numbers that are used here; False where it is of a damaged row."""
+            """Give a row the numbers used here; False if it refers to a damaged row."""
             columns = [column for column in numbers if column in row]
             good = all(row[column] in numbers[column] for column in columns)
             if good:
@@ -1023,10 +1023,10 @@ class Store:
         return added
 
     def export(self, path: str | Path) -> int:
-        """Write `results` as .csv or .parquet, whole or not at all; the number of rows.
+        """Write `results` as .csv or .parquet, whole or not at all. Return the number of rows.
 
         Raises:
-            StoreError: the name ends otherwise.
+            StoreError: the name has another ending.
             ImportError: Parquet needs pyarrow.
         """
         path = Path(path)
@@ -1052,7 +1052,7 @@ class Store:
 
 
 class _Places(dict[bytes, int]):
-    """Numbers things as they first come."""
+    """Numbers things in the order of their first appearance."""
 
     def __missing__(self, key: bytes) -> int:
         self[key] = number = len(self)
@@ -1060,7 +1060,7 @@ class _Places(dict[bytes, int]):
 
 
 def _text(value: bytes) -> str | None:
-    """Of a text as `Layout.query` selects it."""
+    """The value of a text that `Layout.query` selects."""
     return None if value == NOTHING else value.decode(errors="replace")
 
 
@@ -1071,7 +1071,7 @@ def _marks(names: Sequence[str]) -> str:
 def _places(
     numbers: npt.NDArray[np.float64], known: Sequence[dict[str, Any]]
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.bool_]]:
-    """The places of numbers among rows, the last one for nan; and whether there is such a row."""
+    """The places of numbers among rows (the last place for nan), and whether the row exists."""
     ids = np.array([row["id"] for row in known], dtype=np.float64)
     order = np.argsort(ids)
     at = np.searchsorted(ids[order], numbers)
@@ -1081,7 +1081,7 @@ def _places(
 
 
 def refers(numbers: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """The tables that rows with these columns refer to, and the columns by which they do."""
+    """The tables that rows with these columns refer to, and the columns that refer to them."""
     for column in (*REFERRED, "run"):
         if column in numbers:
             yield f"{column}s", column

@@ -1,17 +1,19 @@
-"""The process over a worker: it hands it a job, watches it, kills it, and judges its answer.
+"""The supervisor of a worker: it sends jobs, watches, kills if needed, and judges answers.
 
-`main` serves jobs from a socket until that is closed. The supervisor never runs a solver: that is
-done by a worker. One worker serves the built-in solvers. It is renewed after every failure, and if
-it is not as it was: a process or a thread is left, or its signals, limits, cores or arithmetic
-have changed. Each run of any other solver has a worker of its own, which is apart if the system
-allows it (template.py). The supervisor reads the problem, and hands its numbers over once the
-solver is loaded and warm. The solution comes back as numbers, and the supervisor recomputes every
-merit from its own copy of the problem, so that nothing a solver does in its process changes the
-verdict. What a run took is what the kernel counted while the worker had the problem (meter.py);
-what the solver says of its time must fit in there.
+`main` takes jobs from a socket until that is closed. The supervisor itself never runs a solver; a
+worker does. One worker runs all built-in solvers. It is replaced after every failure, and if its
+state has changed: a process or thread is left, or its signals, limits, cores or arithmetic differ.
+Any other solver gets a new worker for each run. If the system allows it, that worker is apart
+(template.py).
 
-A run is killed with all processes that descend from it, in whatever group or session they are: what
-loses its parent becomes a child of the supervisor.
+The supervisor reads the problem. Once the solver is loaded and warm, the worker gets the numbers.
+The solution comes back as numbers, and the supervisor recomputes every merit from its own copy of
+the problem. So nothing that a solver does in its process can change the verdict. The kernel counts
+the time of a run while the worker has the problem (meter.py). The time that the solver reports must
+fit into that count.
+
+A run is killed with all its descendants, whatever their group or session: a process that loses its
+parent becomes a child of the supervisor.
 """
 
 from __future__ import annotations
@@ -56,35 +58,37 @@ from fclib.bench.worker import (
 )
 from fclib.external import command
 
-READY_LIMIT = 600.0  # [s] to load the solver, to take the problem, or to send the solution
-LOAD_LIMIT = 60.0  # [s] of CPU to load a solver, at most; PyTorch takes 5
-WARM_LIMIT = 5.0  # [s] for the first call of a solver, at most
+READY_LIMIT = 600.0  # [s] limit for loading the solver, taking the problem, or sending the solution
+LOAD_LIMIT = 60.0  # [s] CPU time limit for loading a solver; PyTorch takes 5
+WARM_LIMIT = 5.0  # [s] limit for the first call of a solver
 PAUSES = (0.005, 0.05)  # [s] the first and the longest pause between two looks at a run
-GRACE = 0.5  # [s] beyond the limit, for a solver that keeps it itself to return
-LIMIT_CPU_AFTER = 1.0  # [s] of CPU after which the kernel has the limit too: Watch.limit_cpu
-LONGEST = 1 << 26  # [bytes] of a message that is no array
-OUTPUT = 1e9  # [bytes] that a run may write into one file, where its memory is not more
-# what a solver says of its time may differ from what the kernel says by so much
+GRACE = 0.5  # [s] extra time in which a solver that keeps the limit itself may return
+LIMIT_CPU_AFTER = 1.0  # [s] CPU time after which the kernel enforces the limit too: Watch.limit_cpu
+LONGEST = 1 << 26  # [bytes] largest message that is not an array
+# [bytes] a run may write so much into one file, or as much as its memory if that is more
+OUTPUT = 1e9
+# the time that a solver reports may differ from the kernel's count by so much
 SLACK, SHARE = 0.02, 0.02  # [s], [1]
-# taking a problem over may cost so many times what handing it over does, beyond SLACK: both copy
-# its arrays, and the pages of the new process are fresh
+# receiving a problem may cost so many times the cost of sending it, beyond SLACK: both copy the
+# arrays, and the pages of the new process are fresh
 TAKING = 5.0
-ROOM = 1 << 20  # [bytes] free on a disk that is not full
-UNSEEN = 0.1  # [1] of the CPU time that a thread's clock may miss before the kernel's counts
+ROOM = 1 << 20  # [bytes] a disk with less free space counts as full
+# [1] if a thread's clock misses more than this share of the CPU time, the kernel's count is used
+UNSEEN = 0.1
 
 
-# of an order, what the worker is told before it gets the problem
+# parts of an order that the worker gets before the problem
 TOLD = (
     *("solver", "options", "modules", "tol", "merit", "limits", "history"),
     *("kind", "spacedim", "warm", "nonce"),
 )
-# what a worker may say: that it was kept from its work by something outside, nobody believes it
+# statuses that a worker may report; it is not believed if it blames something outside
 SAID = frozenset(STATUSES) - {*SURROUNDINGS, "lied"} | {"no_space", "killed"}
 
 
 def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | None:
-    """The guess of an order: what is known of a problem before, contact by contact."""
-    from fclib.collections.guesses import guess_of  # which few runs need
+    """The guess of an order, from the solution of an earlier problem, contact by contact."""
+    from fclib.collections.guesses import guess_of  # few runs need it
 
     multipliers = None if known["l"] is None else np.array(known["l"], float)
     return guess_of(before, _core.Solution(r=np.array(known["r"], float), l=multipliers), problem)
@@ -92,7 +96,7 @@ def carry(known: dict[str, Any], before: Any, problem: Any) -> _core.Solution | 
 
 def copied(problem: Any, number: int) -> Any:
     """A renumbered copy of a problem."""
-    from fclib.bench.copies import Copy  # which few runs need
+    from fclib.bench.copies import Copy  # few runs need it
 
     return Copy(problem, number)
 
@@ -102,7 +106,7 @@ class CampaignGone(Exception):  # noqa: N818 (no error)
 
 
 class WorkerEnded(Exception):  # noqa: N818 (no error of ours)
-    """The worker has: on its own, or because it overran."""
+    """The worker has ended: by itself, or because it exceeded a limit."""
 
     def __init__(self, status: str, message: str) -> None:
         super().__init__(message)
@@ -110,7 +114,7 @@ class WorkerEnded(Exception):  # noqa: N818 (no error of ours)
 
 
 class Watch:
-    """What a worker may take from now on, and what it takes."""
+    """The limits of a worker from now on, and its use so far."""
 
     def __init__(
         self,
@@ -129,21 +133,21 @@ class Watch:
             self.resident_before = processes.resident(meter.pid)
             self.own_before = processes.cpu_clock(meter.pid)
             self.cpu_before = meter.cpu()
-        self.own = 0.0  # [s] of CPU of the worker alone
+        self.own = 0.0  # [s] CPU time of the worker alone
         self.cpu_limited = False
         self.start = time.monotonic()
         self.end: float | None = None
 
     @property
     def wall(self) -> float:
-        """[s] since the start."""
+        """Seconds since the start."""
         return (self.end or time.monotonic()) - self.start
 
     def check(self) -> None:
-        """Look at the worker and what it has started.
+        """Check the worker and all processes that it started.
 
         Raises:
-            WorkerEnded: it has overrun.
+            WorkerEnded: it has exceeded a limit.
         """
         most_wall, most_cpu, most_memory = self.limits
         if self.measured:
@@ -159,20 +163,20 @@ class Watch:
             raise WorkerEnded("wall_limit", f"killed after {self.wall:.1f} s")
 
     def stop(self) -> None:
-        """The worker says that it is done, and waits."""
+        """Note that the worker says it is done, and waits."""
         self.end = time.monotonic()
         self.cpu = max(self.cpu, self.meter.cpu() - self.cpu_before)
         self.own = processes.cpu_clock(self.meter.pid) - self.own_before
-        # between two looks: what the worker itself has grown by
+        # the growth of the worker itself between two looks
         grown = processes.peak_memory(self.meter.pid) - self.resident_before
         self.memory = max(self.memory, self.meter.memory(), self.memory_before + grown)
 
     def limit_cpu(self, seconds: int) -> None:
-        """Set RLIMIT_CPU of each process, for the case that this one is held up.
+        """Set RLIMIT_CPU of each process, in case this one is held up.
 
-        Not before a run has become a long one, and its worker does not serve another: where there
-        is such a limit, Linux counts the CPU time of a process in ticks of some milliseconds, even
-        after it is lifted, and those who measure short solves by it would read 0.
+        This happens only once a run has become long, and not if its worker serves others. A process
+        with such a limit has its CPU time counted in ticks of some milliseconds, even after the
+        limit is lifted (Linux). Solvers that measure short solves by that count would read 0.
         """
         self.cpu_limited = True
         for pid in self.meter.members():
@@ -188,14 +192,14 @@ class Worker:
     meter: Meter
     stderr: int  # its standard error
     apart: bool  # whether it is in a namespace of its own
-    belongings: tuple[Any, ...]  # what it had at first
-    tail: bytes = b""  # of what it has said on its standard error
-    cpu_limited: bool = False  # whether it has a limit of CPU time
-    unchanged: bool = False  # whether it says that it is as it was
+    belongings: tuple[Any, ...]  # its state at first
+    tail: bytes = b""  # end of its standard error
+    cpu_limited: bool = False  # whether it has a CPU time limit
+    unchanged: bool = False  # whether it says that its state is unchanged
 
 
 class Supervisor:
-    """A worker, and the problems that its answers are judged by."""
+    """A worker, and the problems that judge its answers."""
 
     def __init__(self, campaign: Connection, alive: int, folder: str, mark: str) -> None:
         self.campaign = campaign
@@ -203,11 +207,12 @@ class Supervisor:
         own_end = socket.socket(fileno=os.dup(campaign.fileno()))
         self.template = Template(own_end, alive, mark, serve)
         own_end.close()
-        self.ours = {self.template.pid}  # children that are no part of a run
+        self.ours = {self.template.pid}  # children that are not part of a run
         self.problems = Problems()
-        self.cores: set[int] = set()  # that the worker has for itself
-        self.worker: Worker | None = None  # that does the run
-        self.kept: Worker | None = None  # that serves the built-in solvers, while another one runs
+        self.cores: set[int] = set()  # cores that the worker has for itself
+        self.worker: Worker | None = None  # the worker of the run
+        # the worker of the built-in solvers, while another one runs
+        self.kept: Worker | None = None
 
     def start(self, solver: str) -> Worker:
         """The worker for a solver: the one that serves the built-in ones, or a new one."""
@@ -235,7 +240,7 @@ class Supervisor:
         return self.worker
 
     def stop(self) -> int | None:
-        """Kill the worker and all that it has started; its exit status where it has one."""
+        """Kill the worker and all that it started. Return its exit status, if it has one."""
         if self.worker is None:
             return None
         worker, self.worker = self.worker, None
@@ -248,7 +253,7 @@ class Supervisor:
         return status
 
     def end(self) -> None:
-        """Kill all workers, and let the template go."""
+        """Kill all workers, and dismiss the template."""
         self.stop()
         if self.kept is not None:
             self.ours.discard(self.kept.meter.pid)
@@ -266,7 +271,7 @@ class Supervisor:
                     path.unlink(missing_ok=True)
 
     def as_it_was(self) -> bool:
-        """Whether the worker is there, alone, and has what it had at first."""
+        """Whether the worker is alive, alone, and in its first state."""
         worker = self.worker
         if worker is None or worker.cpu_limited or not worker.unchanged:
             return False
@@ -276,15 +281,15 @@ class Supervisor:
         return worker.meter.members() == [pid] and processes.belongings(pid) == worker.belongings
 
     def clean(self, order: dict[str, Any]) -> bool:
-        """Whether nothing of a run is left in the worker, which may serve another."""
+        """Whether nothing of a run is left in the worker, so that it may serve another."""
         if self.worker is None or order["solver"] not in built_in():
-            return False  # code of others was in the process: who knows what it has changed
+            return False  # foreign code ran in the process, and may have changed anything
         if processes.threads(self.worker.meter.pid) > 1 and order["threads"] == 1:
             return False
         return self.as_it_was()
 
     def listen(self, worker: Worker) -> bool:
-        """Take what a worker says on its standard error, whose end is kept; False at the last."""
+        """Read the worker's standard error, and keep its end; False once it is closed."""
         text = os.read(worker.stderr, 1 << 16)
         worker.tail = (worker.tail + text)[-2000:]
         return bool(text)
@@ -300,7 +305,7 @@ class Supervisor:
         worker, link, pause = self.worker, self.worker.link, PAUSES[0]
         sources: list[Any] = [link, self.campaign, worker.stderr]
         got, size = bytearray(), 8
-        whole = False  # whether the length has been read
+        whole = False  # whether the message's length has been read
         while True:
             ready = select.select(sources, [], [], pause)[0]
             if self.campaign in ready:  # nothing is sent while a job is being done
@@ -327,10 +332,10 @@ class Supervisor:
                 pause = min(1.5 * pause, PAUSES[1])
 
     def said(self, order: dict[str, Any], watch: Watch) -> dict[str, Any]:
-        """The next word of the worker on this order.
+        """The next message of the worker about this order.
 
         Raises:
-            WorkerEnded: there will be none, or it is on no order of ours.
+            WorkerEnded: there will be none, or it is about another order.
         """
         try:
             said = json.loads(self.receive(order, watch))
@@ -361,14 +366,14 @@ class Supervisor:
         name = signal.Signals(number).name
         outside = True
         if foreign(solver):
-            # in its namespace nobody but those outside can send this one, and nobody any other
+            # such a signal can only come from outside its namespace, and no other can come
             outside = worker.apart and number == signal.SIGKILL and not limited
             if number == signal.SIGKILL and not outside:
                 last = f", and the kernel does not say who sent it{last}"
         return WorkerEnded(of_signal(number, outside), f"ended by {name}{last}")
 
     def do(self, order: dict[str, Any]) -> Record:
-        """Do a job."""
+        """Do a job, and return its record."""
         record = Record(
             "error",
             started=time.time(),
@@ -421,10 +426,10 @@ class Supervisor:
         return disk.f_bavail * disk.f_frsize > ROOM and disk.f_favail > 0
 
     def prepare(self, order: dict[str, Any]) -> tuple[Any, Any]:
-        """The problem of an order, and the guess that it starts from.
+        """The problem of an order, and the guess of its start.
 
         Raises:
-            fclib.Error: it cannot be read, or is another one than it was.
+            fclib.Error: it cannot be read, or has changed.
         """
         guess = None
         if known := order["guess"]:
@@ -434,10 +439,10 @@ class Supervisor:
     def ask(
         self, order: dict[str, Any], problem: Any, guess: Any, record: Record
     ) -> dict[str, Any]:
-        """Have the worker do a job: what it says goes into the record, its solution is returned.
+        """Have the worker do a job; its messages go into the record, its solution is returned.
 
         Raises:
-            WorkerEnded: it has ended, or was to be ended; what is known of it is in the record.
+            WorkerEnded: it has ended, or had to be ended; the known facts are in the record.
         """
         worker = self.start(order["solver"])
         meter = worker.meter
@@ -453,7 +458,7 @@ class Supervisor:
             try:
                 said = self.said(order, Watch(meter, wall, cpu, limits["memory"]))
             except WorkerEnded:
-                # the solver may do better on the problem that it is asked for
+                # the solver may do better on the real problem
                 self.stop()
                 return self.ask(order | {"warm": False}, problem, guess, record)
         if said.get("word") != "ready":
@@ -481,17 +486,17 @@ class Supervisor:
         names = take(said, record)
         vectors = self.arrays(order, names)
         after.stop()
-        # one that says too early that it is done gains nothing
+        # a worker that says "done" too early gains nothing
         outside = early + max(0.0, after.cpu - SLACK - TAKING * took)
         record.total_cpu_s = watch.cpu + outside
         check_times(order["solver"], record, said.get("reported") is True, watch, outside)
         return vectors
 
     def hand(self, order: dict[str, Any], problem: Any, guess: Any) -> tuple[float, float]:
-        """Hand the problem over.
+        """Send the problem to the worker.
 
         Returns:
-            [s] of CPU that this took here, and that the worker took meanwhile for something else.
+            CPU times [s]: of this process for sending, and of the worker meanwhile for other work.
         """
         assert self.worker is not None
         meter = self.worker.meter
@@ -528,10 +533,10 @@ class Supervisor:
 
     @staticmethod
     def limit(meter: Meter, memory: float) -> None:
-        """A limit of the kernel on the address space, at twice the memory that a run is killed at.
+        """Limit the address space by the kernel, to twice the memory at which a run is killed.
 
-        It is that of the worker and of what it has left from earlier runs, as the interpreter of
-        another package's solver; what it starts later inherits it.
+        The limit is set on the worker and on processes that earlier runs left, for example the
+        interpreter of another package's solver. Processes that it starts later inherit the limit.
         """
         most = memory < 1e12
         for pid in meter.members():
@@ -543,7 +548,7 @@ class Supervisor:
     def judge(
         self, order: dict[str, Any], problem: Any, record: Record, vectors: dict[str, Any]
     ) -> None:
-        """Recompute every merit, and let it decide."""
+        """Recompute every merit; they decide the status."""
         proof = [vectors.pop(name, None) for name in CERTIFICATE]
         if record.status in ("lied", "garbage"):
             return
@@ -568,7 +573,7 @@ def numbers(message: bytes) -> Any:
     """The array of a message.
 
     Raises:
-        WorkerEnded: it is none.
+        WorkerEnded: it is not such an array.
     """
     if len(message) % 8:
         raise WorkerEnded("garbage", "the worker sent what is no array")
@@ -576,10 +581,10 @@ def numbers(message: bytes) -> Any:
 
 
 def take(said: dict[str, Any], record: Record) -> list[str]:
-    """Put what a worker says into the record, where it can be so; the names of arrays that follow.
+    """Check a worker's answer and put it into the record. Return the names of arrays that follow.
 
     Raises:
-        WorkerEnded: it cannot.
+        WorkerEnded: the answer is not possible.
     """
     number = (int, float)
     try:
@@ -613,19 +618,19 @@ def take(said: dict[str, Any], record: Record) -> list[str]:
 
 
 def check_times(solver: str, record: Record, reported: bool, watch: Watch, outside: float) -> None:
-    """Hold what a solver says of its time and iterations against what the kernel has seen.
+    """Compare the time and iterations that a solver reports with the kernel's count.
 
-    More than that, or less than nothing, is a lie. The clock of the driver is that of the thread
-    that calls the solver: where the kernel has seen clearly more, in other threads or processes, it
-    is that which counts. A program that says itself what its solve took, and an adapter of another
-    package, may leave out their start.
+    A time above the kernel's count, or a negative one, is a lie. The driver's clock measures the
+    thread that calls the solver. If the kernel has counted clearly more, in other threads or
+    processes, the kernel's count is used. A program that reports the time of its solve, and an
+    adapter of another package, may leave out their start.
 
     Args:
         solver: its name.
-        record: gets the time that counts.
-        reported: whether a program has said itself what its solve took.
-        watch: of the run.
-        outside: [s] of CPU that the worker took with the problem in its hands, but not between
+        record: receives the time that counts.
+        reported: whether a program has reported the time of its solve.
+        watch: the watch of the run.
+        outside: CPU time [s] of the worker while it had the problem, but not between its messages
             `go` and `done`; it counts too.
     """
     said, setup, seen = record.cpu_s, record.setup_s or 0.0, watch.cpu + outside
@@ -657,7 +662,7 @@ def check_times(solver: str, record: Record, reported: bool, watch: Watch, outsi
 
 def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
     """Check the proof that there is no solution, and keep it."""
-    from fclib import analysis  # which few runs need
+    from fclib import analysis  # few runs need it
 
     try:
         if y is None:
@@ -674,14 +679,14 @@ def prove(problem: Any, record: Record, y: Any, z: Any) -> None:
 
 
 def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
-    """Serve the campaign at the other end of a socket.
+    """Do the jobs of the campaign at the other end of a socket.
 
     Args:
-        link: the socket.
-        alive: the end of a pipe whose other end the campaign alone has.
+        link: this end of the socket.
+        alive: the end of a pipe; only the campaign has its other end.
         folder: for temporary files of the worker.
-        mark: in the environment of this process.
-        cores: how many the worker is to have for itself, where they are free.
+        mark: a text in the environment of this process.
+        cores: number of cores that the worker gets for itself, if they are free.
     """
     campaign = Connection(link)
     processes.adopt_orphans()
@@ -694,7 +699,7 @@ def main(link: int, alive: int, folder: str, mark: str, cores: int) -> None:
             order = campaign.recv()
             campaign.send(supervisor.do(order))
     except (EOFError, OSError, CampaignGone, TemplateGone):
-        pass  # the campaign starts another one, if it is there
+        pass  # a campaign that still exists starts another supervisor
     finally:
         supervisor.end()
         for lock in held:

@@ -1,6 +1,6 @@
-"""Runs in columns: what a million of them need is arrays, not a dict for each.
+"""Runs in columns: a million runs need arrays, not a dict each.
 
-A column of numbers is a float64 array, nan where there is nothing; `solved` is an array of bool,
+A column of numbers is a float64 array, nan if a value is missing; `solved` is an array of bool,
 `run` one of int64. A column of texts is `Words`, which stores each text once.
 """
 
@@ -15,14 +15,14 @@ from typing import Any, TypeAlias, overload
 import numpy as np
 import numpy.typing as npt
 
-# of the columns of numbers those that are whole
+# columns of whole numbers
 WHOLE = frozenset(
     (
         *("run", "spacedim", "n", "p", "nc", "nnz", "threads", "repeat", "solved", "iterations"),
         *("copy", "step", "guess", "warm", "pinned", "cores"),
     )
 )
-# columns of texts, also where no row has one
+# columns that are texts even if no row has one
 TEXTS = frozenset(
     (
         *("key", "campaign", "problem", "family", "formulation", "title", "hash", "solver"),
@@ -39,7 +39,7 @@ Chosen: TypeAlias = npt.NDArray[np.bool_] | npt.NDArray[np.int64] | slice
 class Words:
     """A column of texts, each stored once: row k has ``values[codes[k]]``."""
 
-    values: npt.NDArray[np.object_]  # distinct; None is one of them where a row has nothing
+    values: npt.NDArray[np.object_]  # distinct; None is one of them if a row has no text
     codes: npt.NDArray[np.int64]
 
     @classmethod
@@ -78,7 +78,7 @@ class Words:
         return np.asarray(found[self.codes]) if len(found) else np.zeros(len(self), bool)
 
     def present(self) -> list[Text]:
-        """The texts that occur, sorted, and None last."""
+        """The texts that occur, sorted; None is last."""
         found = [self.values[k] for k in np.unique(self.codes)]
         return sorted(found, key=lambda text: (text is None, text or ""))
 
@@ -87,7 +87,7 @@ class Words:
         return list(self.values[self.codes]) if len(self) else []
 
     def map(self, function: Callable[[Text], Text]) -> Words:
-        """The column with another text for each one that there is."""
+        """The column with each text replaced by another."""
         new = Words.of(map(function, self.values))
         return Words(new.values, new.codes[self.codes] if len(self) else self.codes)
 
@@ -99,7 +99,7 @@ class Table:
     """Runs, a row each, in columns. Iterating gives dicts, one after another, which is slow."""
 
     def __init__(self, columns: Mapping[str, Column]) -> None:
-        """ValueError where columns are not equally long."""
+        """Raises ValueError if the columns differ in length."""
         self._columns = dict(columns)
         lengths = {len(column) for column in self._columns.values()}
         if len(lengths) > 1:
@@ -108,7 +108,7 @@ class Table:
 
     @classmethod
     def of(cls, rows: Iterable[Mapping[str, Any]]) -> Table:
-        """The table of rows with the same keys; other columns with a text are of texts too."""
+        """The table of rows with the same keys; a column with any text becomes one of texts."""
         rows = list(rows)
         found: dict[str, Column] = {}
         for name in rows[0] if rows else ():
@@ -121,7 +121,7 @@ class Table:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the columns."""
+        """The names of the columns."""
         return tuple(self._columns)
 
     def __contains__(self, name: object) -> bool:
@@ -148,10 +148,10 @@ class Table:
         return Table({**self._columns, **columns})
 
     def numbers(self, *names: str) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """A number for each row, the same where rows agree in all these columns.
+        """A number for each row; rows that agree in all these columns have the same.
 
         Returns:
-            The numbers, counted as they first come, and the first row of each number.
+            The numbers, in the order of their first appearance, and the first row of each number.
         """
         number = np.zeros(len(self), dtype=np.int64)
         for name in names:
@@ -162,7 +162,7 @@ class Table:
                 values, codes = np.unique(column, return_inverse=True)
                 count = len(values)
             number = number * count + codes.reshape(-1)
-            # small again, so that no product overflows
+            # renumbered from 0, so that no product overflows
             number = np.unique(number, return_inverse=True)[1].reshape(-1)
         _, first, number = np.unique(number, return_index=True, return_inverse=True)
         order = np.argsort(first, kind="stable")
@@ -171,7 +171,7 @@ class Table:
         return rank[number.reshape(-1)], first[order]
 
     def values(self, name: str) -> list[Any]:
-        """A column as Python has it: None where there is nothing, whole numbers as int."""
+        """A column in Python's types: None if a value is missing, whole numbers as int."""
         column = self._columns[name]
         if isinstance(column, Words):
             return column.tolist()
@@ -180,7 +180,7 @@ class Table:
         return [None if value != value else value for value in column.tolist()]
 
     def row(self, k: int) -> dict[str, Any]:
-        """A row as a dict: None where there is nothing, whole numbers as int."""
+        """A row as a dict: None if a value is missing, whole numbers as int."""
         return next(iter(self.where([k])))
 
     def __iter__(self) -> Iterator[dict[str, Any]]:
@@ -192,12 +192,12 @@ def numbers_of(name: str, values: Sequence[Any] | npt.NDArray[Any]) -> npt.NDArr
     """The column of numbers of this name; None is nan."""
     found = np.array(values, dtype=np.float64)
     if name == "solved":
-        return found > 0  # also of nan: False
+        return found > 0  # nan gives False
     return found.astype(np.int64) if name == "run" else found
 
 
 def object_in(text: str | None) -> dict[str, Any]:
-    """The object that a column has in JSON; an empty one where somebody has edited it."""
+    """The JSON object of a column; an empty one if it is not valid."""
     try:
         found = json.loads(text or "{}")
     except ValueError:

@@ -1,15 +1,15 @@
-"""The process that workers are forked from: it has imported what they need, and run nothing else.
+"""The process that workers are forked from: it has imported their modules, and run nothing else.
 
 A supervisor forks it before it reads a problem. So a new worker has no problem, path or solution in
-its memory, and costs milliseconds. The template lives as long as its supervisor and the campaign;
-once one of them is gone it ends what is left of both, and then itself.
+its memory, and costs milliseconds. The template lives as long as its supervisor and the campaign.
+Once one of them is gone, it ends the processes left of both, and then itself.
 
     supervisor: a request, with the worker's socket and its standard error
     template: the worker's number, and whether it is apart
 
-A worker that is *apart* is the first process of a namespace of processes (pid_namespaces(7)), in
-which nobody else is. There the kernel drops every signal that the run sends to its first process,
-SIGKILL too: one that ends it came from outside. No process of the run sees others, or outlives it.
+A worker that is *apart* is the first process of its own namespace of processes (pid_namespaces(7)).
+There the kernel drops every signal that the run sends to its first process, SIGKILL too. So a
+signal that ends it came from outside. No process of the run sees processes outside, or outlives it.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from typing import Any
 from fclib import _registry, external
 from fclib.bench import meter, processes
 
-# of clone(2) and mount(2)
+# constants of clone(2) and mount(2)
 NEW_MOUNTS, NEW_IPC, NEW_USER, NEW_PIDS = 0x00020000, 0x08000000, 0x10000000, 0x20000000
-PRIVATE = 0x00040000 | 0x00004000  # MS_PRIVATE, with all that is mounted below
+PRIVATE = 0x00040000 | 0x00004000  # MS_PRIVATE, and all mounts below
 NO_PROGRAMS = 0x2 | 0x4  # MS_NOSUID, MS_NODEV
 
-PATIENCE = 5.0  # [s] for a supervisor whose campaign is gone
+PATIENCE = 5.0  # [s] time for a supervisor to end after its campaign
 
 Serve = Callable[[socket.socket, dict[str, Any]], None]
 
@@ -46,16 +46,16 @@ class TemplateGone(Exception):  # noqa: N818 (of the surroundings)
 
 
 class Template:
-    """The supervisor's end of it."""
+    """The supervisor's side of the template."""
 
     def __init__(self, campaign: socket.socket, alive: int, mark: str, serve: Serve) -> None:
-        """Fork it.
+        """Fork the template.
 
         Args:
-            campaign: the supervisor's socket, which the template does not keep.
-            alive: the end of a pipe whose other end the campaign alone has.
-            mark: in the environment of all that the supervisor starts.
-            serve: what a worker does.
+            campaign: the supervisor's socket, the template closes it.
+            alive: the end of a pipe; only the campaign has its other end.
+            mark: a text in the environment of all that the supervisor starts.
+            serve: the function that a worker runs.
         """
         self.link, theirs = socket.socketpair()
         supervisor = os.getpid()
@@ -68,18 +68,18 @@ class Template:
             finally:
                 os._exit(1)
         theirs.close()
-        self.belongings: tuple[Any, ...] = ()  # what it had at first
+        self.belongings: tuple[Any, ...] = ()  # its state at first
 
     def fork(self, request: dict[str, Any], worker: int, errors: int) -> tuple[int, bool]:
         """A new worker: its number, and whether it is apart.
 
         Args:
-            request: `apart`, whether it should be; the others are for `serve`.
+            request: `apart` says whether it should be apart; the rest is for `serve`.
             worker: its socket.
             errors: its standard error.
 
         Raises:
-            TemplateGone: there is no template any more that is as it was.
+            TemplateGone: the template has ended, or its state has changed.
             OSError: no process can be started.
         """
         has = processes.belongings(self.pid)
@@ -96,7 +96,7 @@ class Template:
         return int(reply["pid"]), bool(reply["apart"])
 
     def end(self) -> None:
-        """Let it go."""
+        """Dismiss the template."""
         self.link.close()
         processes.kill([self.pid])
         with contextlib.suppress(ChildProcessError):
@@ -107,19 +107,19 @@ def _run(link: socket.socket, alive: int, supervisor: int, mark: str, serve: Ser
     """Fork workers, until the supervisor or the campaign is gone."""
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    # what workers would load one by one: matrices are unpickled with it, solvers found among these
+    # imports that each worker would need: to unpickle matrices, and to find solvers
     importlib.import_module("scipy.sparse")
     _registry.entry_points_there()
     external.adapters()
     gc.collect()
-    gc.freeze()  # what is there is not looked at again, and so not copied, in a worker
+    gc.freeze()  # workers do not scan existing objects, so their pages are not copied
     possible = _fork_apart_once()
     looked = select.poll()
     looked.register(link, select.POLLIN)
-    looked.register(alive, 0)  # that the other end is closed is always said
+    looked.register(alive, 0)  # poll always reports a closed other end
     while True:
         if alive in dict(looked.poll()):
-            # a supervisor that is not stopped ends by itself, and ends this process
+            # a supervisor that is not stopped ends by itself, and this process with it
             time.sleep(PATIENCE)
             break
         message, handles, _, _ = socket.recv_fds(link, 1 << 16, 2)
@@ -140,7 +140,7 @@ def _run(link: socket.socket, alive: int, supervisor: int, mark: str, serve: Ser
 
 
 def _fork(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> tuple[int, bool]:
-    """Fork a process that forks the worker and ends, so that the worker is the supervisor's."""
+    """Fork a process that forks the worker and ends, so that the supervisor adopts the worker."""
     reading, writing = os.pipe()
     between = os.fork()
     if between == 0:
@@ -189,9 +189,9 @@ def _begin(request: dict[str, Any], worker: int, errors: int, serve: Serve) -> N
 
 
 def _unshare() -> None:
-    """Have the next child be the first process of namespaces of its own.
+    """Make the next child the first process of its own namespaces.
 
-    Root needs no namespace of users. Others get one in which they are who they are.
+    Root needs no namespace of users. Other users get one that keeps their identity.
 
     Raises:
         OSError: the system does not let us.
@@ -207,7 +207,7 @@ def _unshare() -> None:
 
 
 def _fork_apart_once() -> bool:
-    """Whether the system lets a worker be apart, by trying; no where FCLIB_APART is 0."""
+    """Whether the system lets a worker be apart, found by trying; False if FCLIB_APART is 0."""
     if os.environ.get("FCLIB_APART") == "0":
         return False
     trial = os.fork()
@@ -222,7 +222,7 @@ def _fork_apart_once() -> bool:
 
 
 def _mount_own() -> None:
-    """Have /proc show the own processes alone, and /dev/shm nothing, if the system lets us."""
+    """Make /proc show only processes of this namespace, and /dev/shm empty, if allowed."""
     libc = ctypes.CDLL(None)
     libc.mount(b"none", b"/", None, PRIVATE, None)
     libc.mount(b"proc", b"/proc", b"proc", NO_PROGRAMS, None)

@@ -1,7 +1,7 @@
-"""The first call of a solver in a process: slower than all others, and therefore not measured.
+"""The first call of a solver in a process. It is slower than the others, so it is not measured.
 
-It loads what is loaded when it is needed, and has the processor see the code. The problem is a
-small one of the same kind, not the one that is measured: a solver may remember what it has solved.
+It loads what the solver loads late, and fills the caches of the processor. The problem is a small
+one of the same kind, not the measured one: a solver may remember what it has solved.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from fclib import _core, _solve
 
 CONTACTS = 6
-LIMIT = 1.0  # [s] of wall clock that the solver is told
+LIMIT = 1.0  # [s] wall clock limit that the solver gets
 
 
 def small(kind: str, d: int) -> Any:
@@ -25,7 +25,7 @@ def small(kind: str, d: int) -> Any:
     local, rolling = kind.startswith("local"), kind.endswith("rolling")
     if rolling:
         friction["mu_r"] = np.full(CONTACTS, 0.1)
-    # all columns depend on each other, contacts stick and slide
+    # the matrix couples all contacts; some stick and some slide
     A = np.sin(np.arange(1.0, m * m + 1)).reshape(m, m)
     q = np.cos(np.arange(1.0, m + 1))
     q[::d] = -1.0
@@ -39,6 +39,6 @@ def small(kind: str, d: int) -> Any:
 
 
 def call(kind: str, spacedim: int, solver: str, options: Mapping[str, Any]) -> None:
-    """Call a solver on a small problem, whatever comes of it."""
+    """Call a solver on a small problem, whatever the result."""
     with contextlib.suppress(Exception):
         _solve.solve(small(kind, spacedim), solver, 1e-6, time_limit=LIMIT, **options)

@@ -1,19 +1,19 @@
-"""The process that solves: it is limited, watched and never trusted.
+"""The process that solves: it has limits, is watched and is never trusted.
 
 It is forked from a template (template.py), and talks to its supervisor over a socket, in JSON and
 in the bytes of arrays:
 
-    supervisor: an order   which solver, and how; not which problem
-    worker: warming        a solver that it has not called before is called on a small problem
-    worker: ready          the solver is known
-    supervisor: a problem  its numbers and a guess, pickled: no title, no path, no solution
-    worker: taken          it has them
+    supervisor: an order   the solver and its options, but not the problem
+    worker: warming        it calls a new solver on a small problem first
+    worker: ready          the solver is loaded
+    supervisor: a problem  its numbers and a guess, pickled, without title, path and solution
+    worker: taken          it has received them
     supervisor: go         it has read the clocks, and set the limits
     worker: done           the solver has returned, or raised
     supervisor: go         it has read the clocks
-    worker: an answer      what the solver returned; the supervisor judges it
+    worker: an answer      the solver's result; the supervisor judges it
 
-Each word of the worker carries the number of the order, drawn by lot.
+Each message of the worker carries the number of the order, which is random.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ from fclib.bench import processes, warm_up
 from fclib.bench.modules import load_modules
 from fclib.external import command, plugin
 
-CACHE = 256e6  # [bytes] of problems that a process keeps
+CACHE = 256e6  # [bytes] size of the problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
 CERTIFICATE = ("certificate_y", "certificate_z")
 STAGE = ("name", "calls", "solved", "iterations", "time")
-HISTORY = 500  # reports that are kept of a run, the first and the last among them
+HISTORY = 500  # number of reports kept of a run, with the first and the last
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.ENFILE)
 NO_SPACE = (*map(os.strerror, FULL), "No usable temporary directory")
 GO = b"go"
-# what solvers that are not of the core say through fclib.SolverError
+# statuses that solvers outside of the core report by fclib.SolverError
 BY_SIGNAL = re.compile(r"(?:was ended by signal|ended with signal) (\d+)")
 NOTHING = ("made no output", "wrote no /solution")
 GARBAGE = ("its output", "its solution has", "returned an array of shape")
 
 
 class Problems:
-    """The problems read last, while they are small enough together."""
+    """The problems read last, as many as fit into CACHE bytes."""
 
     def __init__(self) -> None:
         self.kept: OrderedDict[tuple[str, str], tuple[_solve.Problem, int]] = OrderedDict()
@@ -65,7 +65,7 @@ class Problems:
         """The problem of an order.
 
         Raises:
-            fclib.Error: it cannot be read, or is another one than it was.
+            fclib.Error: it cannot be read, or has changed.
         """
         key = (order["path"], order["hash"])
         if key not in self.kept:
@@ -82,12 +82,12 @@ class Problems:
 
 
 def send(link: socket, message: bytes) -> None:
-    """Send a message: its length (8 bytes), and itself."""
+    """Send a message: first its length (8 bytes), then the message itself."""
     link.sendall(len(message).to_bytes(8, "little") + message)
 
 
 def receive(link: socket) -> bytes:
-    """The next message; EOFError where there is none."""
+    """The next message; EOFError if there is none."""
 
     def exactly(size: int) -> bytes:
         got = link.recv(size, MSG_WAITALL)
@@ -99,14 +99,14 @@ def receive(link: socket) -> bytes:
 
 
 def handed(problem: _solve.Problem, guess: _core.Solution | None) -> bytes:
-    """A problem as a worker gets it: without what says which one it is."""
+    """A problem as the worker gets it: without anything that identifies it."""
     values = problem.__getstate__()
     values["info"] = _core.ProblemInfo()
     return pickle.dumps((type(problem), values, guess), pickle.HIGHEST_PROTOCOL)
 
 
 def taken(message: bytes) -> tuple[_solve.Problem, _core.Solution | None]:
-    """What `handed` has made a message of."""
+    """The problem of a message that `handed` made."""
     kind, values, guess = pickle.loads(message)
     problem = kind.__new__(kind)
     problem.__setstate__(values)
@@ -114,25 +114,25 @@ def taken(message: bytes) -> tuple[_solve.Problem, _core.Solution | None]:
 
 
 def serve(supervisor: socket, request: dict[str, Any]) -> None:
-    """Do what comes, until the supervisor is gone.
+    """Do the orders that come, until the supervisor is gone.
 
     Args:
         supervisor: the link to it.
-        request: what it has asked the template for; `folder` is for temporary files.
+        request: the request to the template; `folder` is for temporary files.
     """
-    supervisor.recv(1, MSG_PEEK)  # once it has an order, the supervisor is its parent
+    supervisor.recv(1, MSG_PEEK)  # once an order is there, the supervisor is the parent
     processes.die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the campaign's
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     os.environ["TMPDIR"] = tempfile.tempdir = request["folder"]
     begun = processes.environment()
-    warm: set[str] = set()  # solvers that were called before
+    warm: set[str] = set()  # solvers already called
     while True:
         try:
             order = json.loads(receive(supervisor))
             reply, arrays = answer(order, supervisor, warm)
             reply |= {"nonce": order["nonce"], "unchanged": processes.environment() == begun}
-            send(supervisor, json.dumps(reply).encode())  # nan and inf are words of Python's JSON
+            send(supervisor, json.dumps(reply).encode())  # Python's JSON has nan and inf
             for array in arrays:
                 send(supervisor, array.tobytes())
         except (EOFError, OSError):
@@ -142,7 +142,7 @@ def serve(supervisor: socket, request: dict[str, Any]) -> None:
 def answer(
     order: dict[str, Any], supervisor: socket, warm: set[str]
 ) -> tuple[dict[str, Any], list[npt.NDArray[np.float64]]]:
-    """Run the solver of an order: what is to be said of it, and the vectors of its solution."""
+    """Run the solver of an order. Return the answer, and the vectors of the solution."""
 
     def say(word: str) -> None:
         send(supervisor, json.dumps({"nonce": order["nonce"], "word": word}).encode())
@@ -196,7 +196,7 @@ def answer(
     arrays: list[npt.NDArray[np.float64]] = []
     if result is not None:
         solution = result.solution
-        # the driver puts zeros in the place of what is not finite
+        # the driver puts zeros for values that are not finite
         if status == "diverged" and not solution.r.any():
             reply["status"] = "invalid"
         if status == "inaccurate" and not solution.r.any() and problem.nc:
@@ -222,7 +222,7 @@ def answer(
 
 
 def find(name: str, modules: list[str]) -> _core.SolverInfo:
-    """The solver of an order, from then on known to `fclib.solve` by its name.
+    """The solver of an order; from then on `fclib.solve` knows its name.
 
     Raises:
         fclib.Error: there is none, or a module cannot be imported.
@@ -230,7 +230,7 @@ def find(name: str, modules: list[str]) -> _core.SolverInfo:
     if name in built_in():
         return _registry.find_solver(name)
     if (info := external.find(name)) is not None:
-        _registry.register(info)  # so that no package is looked through for it
+        _registry.register(info)  # so that no package is searched for it
         return info
     load_modules(modules)
     return _registry.find_solver(name)
@@ -238,12 +238,12 @@ def find(name: str, modules: list[str]) -> _core.SolverInfo:
 
 @functools.cache
 def built_in() -> frozenset[str]:
-    """The solvers of the core, whose names no module can take."""
+    """The solvers of the core, modules cannot take their names."""
     return frozenset(solver.name for solver in _core.solvers())
 
 
 def adapted(name: str) -> bool:
-    """Whether a solver is of a package that FCLIB has an adapter for."""
+    """Whether a solver belongs to a package for which FCLIB has an adapter."""
     own = (command.PREFIX, plugin.PREFIX)
     return any(name.startswith(x.PREFIX) for x in external.adapters() if x.PREFIX not in own)
 
@@ -258,7 +258,7 @@ def classify(error: Exception, foreign: bool) -> str:
 
     Args:
         error: what was raised.
-        foreign: whether somebody else's code has raised it, whose word excuses nothing.
+        foreign: whether foreign code raised it; that excuses nothing.
     """
     if isinstance(error, _core.UnsuitableError):
         return "error" if foreign else "unsuitable"
@@ -279,7 +279,7 @@ def classify(error: Exception, foreign: bool) -> str:
     if isinstance(error, _registry.SolverError):
         if any(words in text for words in GARBAGE):
             return "garbage"
-        # not the solver has raised, but the conversion of its answer into numbers
+        # the conversion of the answer into numbers raised, not the solver
         trace = causes[-1].__traceback__
         if isinstance(causes[-1], (TypeError, ValueError)) and trace and not trace.tb_next:
             return "garbage"
@@ -287,11 +287,11 @@ def classify(error: Exception, foreign: bool) -> str:
 
 
 def of_signal(number: int, outside: bool) -> str:
-    """The status of a process that a signal has ended, where the supervisor has not sent it.
+    """The status of a process ended by a signal that the supervisor did not send.
 
     Args:
-        number: of the signal.
-        outside: whether a signal that ends processes can only have come from outside of the run.
+        number: the signal's number.
+        outside: whether such a signal can only have come from outside of the run.
     """
     if number == signal.SIGXCPU:
         return "cpu_limit"
@@ -300,14 +300,14 @@ def of_signal(number: int, outside: bool) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """What an exception says."""
+    """The message of an exception."""
     text = " ".join(str(error).encode(errors="replace").decode().split())
     known = isinstance(error, (_core.Error, OSError))
     return (text if known and text else f"{type(error).__name__}: {text}")[:500]
 
 
 def thinned(history: npt.NDArray[np.void]) -> list[tuple[int, float, float, str]]:
-    """The history, of a long one those at evenly spaced logarithms of the iteration."""
+    """The history; a long one is thinned evenly over the logarithm of the iteration."""
     count = len(history)
     chosen = list(range(count))
     if count > HISTORY:

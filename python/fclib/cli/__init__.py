@@ -1,13 +1,13 @@
 """The command line: ``fclib COMMAND``, one module for each command; none imports another's.
 
 All of them keep the same rules. Results go to the standard output, as a table or with ``--json`` as
-one object a line; errors and progress go to the standard error. The exit status is 0 only if all
-went well, 1 if not, 2 for a usage error.
+one object for each line; errors and progress go to the standard error. The exit status is 0 only if
+all went well, 1 if not, 2 for a usage error.
 
 What commands share:
 
-_output.py     tables, JSON lines, errors, a bar, options that many have
-_progress.py   bars for what takes long: a build, a campaign
+_output.py     tables, JSON lines, errors, a bar, common options
+_progress.py   bars for long work: a build, a campaign
 _files.py      files that hold several things
 _build.py      the build of `collection` and `simulate`
 _profile.py    the profile of `profile` and `demo`
@@ -48,7 +48,7 @@ COMMANDS = (
 
 
 class Imported(Mapping[str, Any]):
-    """The commands by name, each imported when it is asked for: most need little of fclib."""
+    """The commands by name, each imported on demand: most need little of fclib."""
 
     def __init__(self) -> None:
         self.known: dict[str, Any] = {}
@@ -74,7 +74,7 @@ class Imported(Mapping[str, Any]):
 
 
 class Commands(TyperGroup):
-    """The commands, with a help that fits a screen: what shells ask for is left out of it."""
+    """The commands, with a help that fits a screen: options for shells are left out."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -118,10 +118,10 @@ app.callback(invoke_without_command=True)(print_version)
 
 
 def main(imported: Callable[[], Any] | None = None) -> None:
-    """Run a command. What it does not deal with is one line all the same.
+    """Run a command. Any other error also becomes one line.
 
     Args:
-        imported: is called when all is imported, and the command is about to begin.
+        imported: called once all is imported, before the command begins.
     """
     try:
         app(obj=imported)

@@ -26,7 +26,7 @@ class Form(str, Enum):
 
 
 class Select(str, Enum):
-    """Which problems are kept, where not all are."""
+    """The rule for the problems to keep, if not all are kept."""
 
     EVERY = "every"
     HARD = "hard"
@@ -49,7 +49,7 @@ Pictures = Annotated[bool, typer.Option(help="Draw each scene and its distributi
 def build_plans(
     plans: list[collections.Plan], folder: Path, jobs: int | None, pictures: bool, as_json: bool
 ) -> None:
-    """Build plans, and print what came of them; exit status 1 where a problem was not solved."""
+    """Build plans, and print the results; exit status 1 if a problem was not solved."""
     told = [plan.name for plan in plans if plan.trajectory is None and simulated(plan)]
     if told:
         err.print(
@@ -113,7 +113,7 @@ def simulated(plan: collections.Plan) -> bool:
 
 
 def steps_of(plan: collections.Plan, folder: Path) -> list[str]:
-    """What went wrong in the simulation of a plan, if it was simulated here: a line each."""
+    """The faults in the simulation of a plan, if it was simulated here: one line each."""
     states = folder / plan.name / trajectory.OWN
     if plan.trajectory is not None or not simulated(plan) or not states.is_file():
         return []
@@ -130,20 +130,20 @@ def steps_of(plan: collections.Plan, folder: Path) -> list[str]:
 
 
 def spans(numbers: list[int]) -> str:
-    """Increasing numbers, those in a row together: 3, 5-9."""
+    """Increasing numbers, consecutive ones together: 3, 5-9."""
     ends = [number for number in numbers if number + 1 not in set(numbers)]
     starts = [number for number in numbers if number - 1 not in set(numbers)]
     return ", ".join(str(a) if a == b else f"{a}-{b}" for a, b in zip(starts, ends, strict=True))
 
 
 def ranges_of(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """A row for each family of a catalogue: how many problems, and from where to where."""
+    """A row for each family of a catalogue: the number of problems, the first and the last."""
     found = []
     for name, family in dict.fromkeys((row["collection"], row["family"]) for row in rows):
         own = [row for row in rows if (row["collection"], row["family"]) == (name, family)]
         origins = Counter(collections.origin_of(row) for row in own)
         tried = any(row["error"] is not None for row in own)
-        # an iterate of a problem that has no solution has an error of no interest
+        # if a problem has no solution, the error of an iterate does not matter
         errors = [
             row["error"] for row in own if row["error"] is not None and not catalog.is_proven(row)
         ]

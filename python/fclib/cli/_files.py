@@ -10,7 +10,7 @@ import fclib
 
 @dataclass(frozen=True)
 class Contents:
-    """The problems of a file, by their kinds, and which of them all else is of."""
+    """The problems of a file, by their kinds, and the one to which all else belongs."""
 
     kinds: tuple[str, ...]
     owner: str | None
@@ -20,7 +20,7 @@ class Contents:
 
 
 def contents_of(path: Path) -> Contents:
-    """What a file holds.
+    """The content of a file.
 
     Raises:
         fclib.FileError: the file cannot be read.
@@ -33,7 +33,7 @@ def contents_of(path: Path) -> Contents:
 
 
 def read_owner(path: Path) -> fclib.Problem:
-    """The problem that a solution in the file belongs to: the global one where there are several.
+    """The problem that a solution in the file belongs to: the global one if there are several.
 
     Raises:
         fclib.Error: the file cannot be read, or the problem is not valid.

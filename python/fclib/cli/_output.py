@@ -32,14 +32,14 @@ import fclib
 
 
 def plain(text: str) -> str:
-    """A text without what steers a terminal: files, stores and solvers are strangers' words."""
+    """A text without control characters: texts of files, stores and solvers are not trusted."""
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() or one in "\n\t" else " " for one in text)
 
 
 class _Plain(Console):
-    """A console on which no text steers the terminal. Colours are the console's own."""
+    """A console on which no text controls the terminal. Only the console makes colours."""
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
@@ -49,10 +49,10 @@ class _Plain(Console):
             yield part if part.control else part._replace(text=plain(part.text))
 
 
-# text is printed as it is: no brackets of a unit, no path is taken for markup
+# text is printed as it is: the brackets of a unit or a path are not markup
 out = _Plain(markup=False, emoji=False)
 if not out.is_terminal:
-    # nothing is folded on its way into a file or a pipe
+    # nothing is folded in a file or a pipe
     out = _Plain(width=240, markup=False, emoji=False)
 err = _Plain(stderr=True, soft_wrap=True, markup=False, emoji=False)
 
@@ -73,7 +73,7 @@ WRAPPED = (
     "what",
     "matrix_info",
 )  # columns that may be folded to fit the terminal
-FOLDED = 24  # characters that such a column has at least, where its entries are as long
+FOLDED = 24  # least width in characters of such a column, if its entries are as long
 GAP = 2  # between columns
 
 Files = Annotated[list[Path], typer.Argument(help="FCLIB files.", show_default=False)]
@@ -97,7 +97,7 @@ def print_version(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ) -> None:
-    """Print the version where it is asked for."""
+    """Print the version if it is asked for."""
     if version:
         out.print(f"fclib {fclib.__version__}", highlight=False)
         raise typer.Exit
@@ -118,19 +118,19 @@ def warn_of(path: Path, message: str) -> None:
 
 def interrupted(message: str = "interrupted") -> NoReturn:
     """End the process as Ctrl-C does: one line on the standard error and exit status 130."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second one has nothing left to end
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C has nothing left to end
     err.print(f"fclib: {message}", style="red", highlight=False)
     signal.signal(signal.SIGINT, before)  # a program may have called this, and goes on
     raise SystemExit(130)
 
 
 def warn(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Say a warning in one line on the standard error, without where in the code it is from."""
+    """Say a warning in one line on the standard error, without its place in the code."""
     err.print(f"fclib: {message}", style="yellow", highlight=False)
 
 
 def words_of(error: Exception) -> str:
-    """Of an error of the system the file and the reason, without its number."""
+    """The file and the reason of a system error, without its number."""
     if isinstance(error, OSError) and error.strerror:
         return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     return str(error)
@@ -172,9 +172,9 @@ def parse_options(pairs: Sequence[str]) -> dict[str, str]:
 
 @contextmanager
 def progress_bar(total: int) -> Iterator[Callable[[str], None]]:
-    """A bar on the standard error, where that is a terminal.
+    """A bar on the standard error, if that is a terminal.
 
-    Yields a function that says what comes next, and counts what came before as done.
+    It yields a function that names the next item, and counts the former as done.
     """
     columns = (
         SpinnerColumn(),
@@ -211,15 +211,15 @@ def format_value(value: object) -> str:
 
 
 def format_known(values: dict[str, object]) -> str:
-    """What is known of one thing in a cell: what is not there is left out."""
+    """The known facts on one thing in a cell; missing ones are left out."""
     return ", ".join(f"{key} {format_value(value)}" for key, value in values.items() if value)
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A table with a column a key; statuses and verdicts in colour.
+    """A table with a column for each key; statuses and verdicts in colour.
 
-    Where the terminal is too narrow for all columns, they are printed in several parts, each with
+    If the terminal is too narrow for all columns, they are printed in several parts, each with
     the first column: no number is cut.
     """
 
@@ -275,7 +275,7 @@ class Rows:
 
 
 def finite(value: Any) -> Any:
-    """The value with None for each number that is not finite, which is no JSON."""
+    """The value with None for each number that is not finite, because JSON has none."""
     if isinstance(value, dict):
         return {key: finite(inner) for key, inner in value.items()}
     if isinstance(value, list):
@@ -300,7 +300,7 @@ class Report:
             typer.echo(json.dumps(finite(record)))
 
     def error(self, path: Path, error: Exception) -> None:
-        """Report a file that could not be dealt with; the others go on."""
+        """Report a file that failed; the others go on."""
         self.failed = True
         if self.as_json:
             typer.echo(json.dumps({"problem": str(path), "message": str(error)}))
@@ -311,7 +311,7 @@ class Report:
         if self.records and not self.as_json:
             paths = [record["problem"] for record in self.records]
             names = [Path(path).name for path in paths]
-            # the folder is left out where the name says enough
+            # the folder is left out if the name is enough
             shortest = names if len(set(names)) == len(set(paths)) else paths
             out.print(
                 Rows(

@@ -17,7 +17,7 @@ from fclib.bench.table import Table
 from fclib.cli._output import Report, Rows, err, out
 
 TAUS = (1.0, 1.5, 2.0, 5.0, 10.0, 100.0)
-# columns of the summary that are shown only if one of them says something
+# columns of the summary that are shown only if one of them has a value
 RARE = ("unsuitable", "spread", "copies")
 
 
@@ -95,24 +95,24 @@ def print_profile(
 
 @dataclasses.dataclass(frozen=True)
 class Said:
-    """What tables and pictures say of the runs that they are of."""
+    """The notes of tables and pictures on their runs."""
 
-    rows: Table  # all that were asked for
-    compared: Table  # those that count
+    rows: Table  # all runs asked for
+    compared: Table  # the runs that count
     penalty: float
     shift: float
     weigh: profiles.Weigh
     own_set: bool
 
     def caption(self, costs: profiles.Costs) -> str:
-        """Of costs at one tolerance or at several."""
+        """Make them from costs at one tolerance or at several."""
         tols = comparison.numbers_in(self.rows, "tol")
         own = self.rows.where(np.isin(tols, costs.tolerances))
         return profiles.caption(costs, own, self.weigh, self.own_set)
 
 
 def show(tables: dict[str, list[dict[str, Any]]], costs: profiles.Costs, said: Said) -> None:
-    """The tables, for people: those of each tolerance together."""
+    """The tables for readers, grouped by tolerance."""
     words = profiles.METRICS[costs.metric][0]
     judged = profiles.JUDGED[said.rows.row(0)["merit"]]
     busy = profiles.loaded(said.rows)
@@ -178,7 +178,7 @@ def is_unsteady(row: dict[str, Any]) -> bool:
 
 
 def shown_summary(rows: Sequence[dict[str, Any]], busy: dict[str, int]) -> list[dict[str, Any]]:
-    """The summary at one tolerance, with marks; columns that say nothing are left out."""
+    """The summary at one tolerance, with marks; columns without values are left out."""
     silent = {name for name in RARE if not any(row[name] for row in rows)}
     found = []
     for row in rows:
@@ -299,7 +299,7 @@ def write_csv(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 def curve_rows(
     costs: profiles.Costs, values: comparison.Array, name: str, weigh: profiles.Weigh
 ) -> list[dict[str, Any]]:
-    """The steps of curves as a table: the bound, then a column a solver."""
+    """The steps of curves as a table: the bound, then a column for each solver."""
     finite = np.unique(values[np.isfinite(values)])
     shares = profiles.share_within(values, finite, costs.weights(weigh))
     return [

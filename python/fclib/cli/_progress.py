@@ -1,4 +1,4 @@
-"""How far what takes long is: the families of a build, the runs of a campaign."""
+"""The progress of long work: the families of a build, the runs of a campaign."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from rich.progress import (
 from fclib import bench
 from fclib.cli._output import err
 
-PAUSE = 10.0  # [s] between two lines where there is no terminal
+PAUSE = 10.0  # [s] between two lines if there is no terminal
 
 
 @contextmanager
@@ -49,7 +49,7 @@ def many_bars() -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
-    """Show how far a campaign is: a bar on a terminal, else a line every ten seconds."""
+    """Show the progress of a campaign: a bar on a terminal, else a line every ten seconds."""
     columns = (
         SpinnerColumn(),
         TextColumn("{task.description}", markup=False),
@@ -77,7 +77,7 @@ def live(name: str, quiet: bool) -> Iterator[Callable[[bench.Progress], None]]:
 
 
 def duration(seconds: float) -> str:
-    """A time for people: 0:12, 3:05:00."""
+    """A time for readers: 0:12, 3:05:00."""
     whole = round(max(0.0, seconds))
     hours, rest = divmod(whole, 3600)
     return f"{hours}:{rest // 60:02}:{rest % 60:02}" if hours else f"{rest // 60}:{rest % 60:02}"

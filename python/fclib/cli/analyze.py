@@ -1,4 +1,4 @@
-"""``fclib analyze``: what problems are, and whether they have a solution."""
+"""``fclib analyze``: the analysis of problems, and whether they have a solution."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def command(
 ) -> None:
     """Find ranks, units, existence with its proof, and uniqueness.
 
-    A solution is looked for too, for 2 s at most where Slater's condition proves that there is one.
+    A solution is sought too, for 2 s at most if Slater's condition proves that there is one.
     If a file has several problems, the global one is taken. The exit status is 1 if a problem
     cannot be analysed, or a reference solution cannot be certified.
     """
@@ -117,7 +117,7 @@ def command(
             if solve:
                 solved = analysis.reference(problem, time_limit=time_limit)
                 own = solved.record
-                # one name may be of both
+                # both may have the same name
                 record |= {f"reference_{key}": own[key] for key in own if key not in record}
                 good = solved.certified
             if write:

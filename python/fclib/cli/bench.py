@@ -33,20 +33,20 @@ from fclib.cli._output import (
 from fclib.cli._progress import duration, live
 from fclib.collections import library
 
-SILENT = 30.0  # [s] after which a campaign elsewhere that gives no sign of life is taken for dead
+SILENT = 30.0  # [s] a campaign elsewhere without a sign of life for so long counts as ended
 
 
 class WithDefault(TyperGroup):
     """A group of commands in which `run` need not be written: ``fclib bench CAMPAIGN``."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put `run` before what is neither a command nor the wish for help."""
+        """Put `run` before arguments that are neither a command nor a request for help."""
         if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
             args = ["run", *args]
         return super().parse_args(ctx, args)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
-        """The commands, and below them the options of `run`, which need not be named."""
+        """The commands, and below them the options of `run`, the default command."""
         super().format_help(ctx, formatter)
         run = self.commands["run"]
         run.format_help(run.context_class(run, info_name="run", parent=ctx), formatter)
@@ -125,7 +125,7 @@ def run(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run a campaign, or go on with it where it was interrupted."""
+    """Run a campaign, or go on if it was interrupted."""
     if status is not None:
         show_status(status, as_json)
         return
@@ -144,7 +144,7 @@ def run(
         if campaign is not None:
             if problems:
                 raise bench.CampaignError("a campaign names its own problems")
-            # where the published ones look for their problems
+            # the folder in which published campaigns find their problems
             os.environ.setdefault(library.FOLDER, str(library.default_folder()))
             chosen = bench.Campaign.read(campaign, flags, sample, solver or ())
         else:
@@ -228,7 +228,7 @@ def run(
 
 
 def group_problems(problems: list[str], sample: int | None) -> list[dict[str, Any]]:
-    """The groups of problems of --problems: files together, each set for itself."""
+    """The groups of problems of --problems: all files in one group, and a group for each set."""
     sets = [name for name in problems if name.startswith(SET)]
     files = [name for name in problems if not name.startswith(SET)]
     groups: list[dict[str, Any]] = [{"set": name} for name in sets]
@@ -237,7 +237,7 @@ def group_problems(problems: list[str], sample: int | None) -> list[dict[str, An
 
 
 def is_alive(status: Status) -> bool:
-    """Whether the process of a campaign is there; one run may take longer than it is silent."""
+    """Whether the process of a campaign is alive; during a long run it may be silent."""
     if status.node == machine.facts()["node"]:
         return Path(f"/proc/{status.pid}").exists()
     return time.time() - status.seen < SILENT

@@ -24,7 +24,7 @@ from fclib.cli._output import (
     out,
 )
 
-PARTS = MERITS[1:]  # of the error
+PARTS = MERITS[1:]  # parts of the error
 
 
 def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, Any]]:
@@ -45,7 +45,7 @@ def rows_of(problem: fclib.Problem, solution: fclib.Solution) -> list[dict[str, 
 
 
 def told_of(mismatch: dict[str, Any]) -> str:
-    """The stored number that disagrees with the rest of the solution: which, where, how much."""
+    """The stored number that disagrees with the rest of the solution: name, place, difference."""
     name = f"{mismatch['part']}[{mismatch['index']}] = {mismatch['stored']:.6g}"
     size = f"{abs(mismatch['difference']):.2g}"
     if mismatch["part"] == "l":
@@ -56,7 +56,7 @@ def told_of(mismatch: dict[str, Any]) -> str:
 
 
 def consistent_of(problem: fclib.Problem) -> str:
-    """Why other joints are judged than those of the file, in words; empty where none are."""
+    """The reason why other joints are judged than those of the file; empty if none are."""
     if isinstance(problem, (fclib.GlobalProblem, fclib.GlobalRollingProblem)):
         found = problem.consistent()
         return found[1] if found is not None else ""
@@ -118,7 +118,7 @@ def command(
     file has several problems, the global one is taken. The last columns count the contacts
     that are open, stick and slide.
     """
-    from fclib import analysis  # takes a while
+    from fclib import analysis  # the import takes a while
 
     report = Report(as_json, hidden=("n", "formulation", "says", "mismatches", "joints"))
     for path in each_file(files, "checking"):
@@ -164,7 +164,7 @@ def command(
             "error": judgement.error,
         }
         if merit is MeritKind.natural:
-            record["merit"] = merit.value  # the scaled map was left out, as was asked
+            record["merit"] = merit.value  # the scaled map was left out on request
         record |= {name: getattr(judgement.merit, name) for name in PARTS}
         record["mismatches"] = mismatches
         if agreed := consistent_of(problem):
@@ -174,7 +174,7 @@ def command(
             err.print(f"{path.name}: {told_of(one)}", highlight=False)
         for line in analysis.conventions(problem):
             err.print(f"{path.name}: {line}", highlight=False)
-        # what the file says of it is shown, and not believed
+        # the claim of the file is shown, but not trusted
         if told := fclib.read_attributes(path, "solution"):
             record["says"] = told
         rows = rows_of(problem, solution) if contacts else []

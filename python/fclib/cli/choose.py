@@ -125,9 +125,9 @@ def choose_standard(
 ) -> None:
     """Choose few problems of each kind, from all families.
 
-    Goes on after a kill. Families that changed, or are new, are simulated; of others the features
-    are read from the table where it is there. A problem of a list that is kept stays as it is,
-    whatever its family is by now.
+    It goes on after a kill. Families that changed, or are new, are simulated. Features of other
+    families are read from the table, if there is one. A problem of a list that is kept stays as it
+    is, even if its family has changed.
     """
     rule = select.Rule(problems=problems, clusters=clusters)
     held = known.Choice.read(kept) if kept is not None else ()
@@ -146,7 +146,7 @@ def choose_standard(
                     rows = [row for row in rows if row["family"] != name]
                     rows += select.described(found, bars)
                     select.write_table(table, rows)
-        # by the digits that are stored: whoever has the table chooses the same
+        # by the stored digits, so that everybody with the table gets the same choice
         rows = select.read_table(table)
         fixed = sorted({(choice.family, choice.number) for choice in held})
         chosen = [rows[k] for k in select.choose(rows, rule, fixed)]
@@ -212,7 +212,7 @@ def choose_tiny(target: List) -> None:
 
 
 def tell_chosen(names: list[str], target: Path) -> None:
-    """Say what was taken."""
+    """Print the problems taken."""
     for name in names:
         out.print(name, highlight=False)
     out.print(f"{len(names)} problems:  {target}")

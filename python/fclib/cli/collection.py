@@ -54,7 +54,7 @@ app = typer.Typer(
 app.add_typer(choose.app, name="choose")
 
 
-MOST_COPIES = 10  # that are named; the catalogue has all
+MOST_COPIES = 10  # largest number of copies named; the catalogue has all
 
 Rating = Enum("Rating", {name: name for name in CLASSES}, type=str)  # type: ignore[misc]
 Names = Annotated[list[str], typer.Argument(help="Sets or families, see fclib collection list.")]
@@ -69,7 +69,7 @@ ListFile = Annotated[
 
 
 def named(names: list[str] | None, path: Path | None) -> list[str]:
-    """The names that were given, and those of a list."""
+    """The names given, and those of a list."""
     found = list(names or [])
     if path is not None:
         try:
@@ -360,7 +360,7 @@ def simulate(
 
 
 def thinned(plan: collections.Plan, count: int | None) -> collections.Plan:
-    """A plan that keeps so many of its problems."""
+    """The plan, restricted to so many of its problems."""
     if count is None:
         return plan
     numbers = plan.numbers()
@@ -519,7 +519,7 @@ def status(
 
 
 def record_of(row: standing.Standing) -> dict[str, Any]:
-    """A problem and how it stands, for a table."""
+    """A problem and its class, for a table."""
     best = row.best
     return {
         "problem": row.id,
@@ -535,7 +535,7 @@ def record_of(row: standing.Standing) -> dict[str, Any]:
 
 
 def tell_problem(name: str, target: Path | None, as_json: bool) -> None:
-    """How one problem stands; written with the best solution that is known."""
+    """Show the class of one problem; write it with the best known solution."""
     rows, _ = standing.standings(name.split("/")[0])
     found = [row for row in rows if row.id == name]
     if not found:

@@ -17,21 +17,21 @@ from fclib.cli._output import Json, Report, each_file, err, usage_error
 
 
 class Format(str, Enum):
-    """What a file is written in."""
+    """The format of an output file."""
 
     hdf5 = "hdf5"
     siconos = "siconos"
 
 
 class Form(str, Enum):
-    """What a problem is brought to."""
+    """The formulation of the result."""
 
     local = "local"
     plain = "plain"
 
 
 class Storage(str, Enum):
-    """What matrices are brought to."""
+    """The storage of matrices in the result."""
 
     csr = "csr"
     csc = "csc"
@@ -46,7 +46,7 @@ HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of every file; None leaves things as they are."""
+    """The changes for every file; None leaves a thing as it is."""
 
     form: Form | None
     storage: Storage | None
@@ -55,19 +55,19 @@ class Request:
 
 
 def format_of(path: Path) -> Format:
-    """The format of a file that is there: its first bytes tell, or else its name."""
+    """The format of a file that is there: its first bytes decide, or else its name."""
     try:
         with path.open("rb") as file:
             if file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
                 return Format.hdf5
     except OSError:
-        pass  # reading it says what is wrong
+        pass  # reading it will report the fault
     return EXTENSIONS.get(path.suffix.lower(), Format.siconos)
 
 
 @dataclass(frozen=True)
 class Stored:
-    """A problem, and what is stored with it."""
+    """A problem, and the data stored with it."""
 
     problem: fclib.Problem
     solution: fclib.Solution | None = None
@@ -75,7 +75,7 @@ class Stored:
 
     @property
     def extras(self) -> dict[str, tuple[bool, str]]:
-        """Whether there is what a format may have no place for, and how it is called."""
+        """The names of data for which a format may have no place, and whether they exist."""
         return {
             "solution": (self.solution is not None, "the solution"),
             "guesses": (bool(self.guesses), "the guesses"),
@@ -84,7 +84,7 @@ class Stored:
 
 
 def read(path: Path, kind: str | None) -> Stored:
-    """The problem of a file in any format, and what is stored with it.
+    """The problem of a file in any format, and the data stored with it.
 
     Raises:
         fclib.Error: the file cannot be read, or the problem is not valid.
@@ -103,7 +103,7 @@ def is_global(problem: fclib.Problem) -> bool:
 
 
 def in_form(stored: Stored, form: Form | None) -> Stored:
-    """The problem in another form, with what its solution and its guesses still mean there.
+    """The problem in another form, with its solution and guesses as far as they still hold.
 
     Raises:
         fclib.UnsuitableError: M is singular, or bilateral constraints contradict each other.
@@ -121,7 +121,7 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
         return stored
 
     def taken(solution: fclib.Solution) -> fclib.Solution:
-        # r, and lambda where it is left, are the same; what follows from them is computed again
+        # r, and lambda if it is kept, are the same; all that follows from them is computed again
         return fclib.Solution(r=solution.r, l=solution.l if problem.p else None)
 
     solution = stored.solution
@@ -131,7 +131,7 @@ def in_form(stored: Stored, form: Form | None) -> Stored:
 
 
 def stored_as(problem: fclib.Problem, output: Format, asked: Storage | None) -> str:
-    """How the matrices of a problem stand in a file: those of W, or of M."""
+    """The storage of a problem's matrices in a file: that of W, or of M."""
     if isinstance(problem, (fclib.LocalProblem, fclib.LocalRollingProblem)):
         matrix = problem.W
     elif output is Format.hdf5:
@@ -151,7 +151,7 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
     """Convert one file, and return its record.
 
     Raises:
-        fclib.Error: something is wrong with a file or its problem, or cannot be done.
+        fclib.Error: a file or its problem is faulty, or the conversion is impossible.
     """
     if target.exists() and not request.force:
         raise fclib.FileError(f"{target}: is there already; --force replaces it")
@@ -194,7 +194,7 @@ def convert(source: Path, target: Path, output: Format, request: Request) -> dic
 
 
 def say_lost(source: Path, lost: Sequence[str]) -> None:
-    """Tell of what a text of Siconos cannot hold."""
+    """Warn of data that a text of Siconos cannot hold."""
     what = " and ".join(filter(None, [", ".join(lost[:-1]), lost[-1]]))
     verb, rest = ("is", "it") if lost == ["the solution"] else ("are", "them")
     note = f"fclib: {source}: {what} {verb} left out, Siconos' text has no place for {rest}"

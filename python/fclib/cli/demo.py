@@ -23,11 +23,11 @@ from fclib.cli._output import (
 from fclib.cli._profile import print_profile
 from fclib.cli._progress import live
 
-TABLE_ROWS = 24  # the CSV has them all
+TABLE_ROWS = 24  # largest number of rows; the CSV has all
 
 
 def summarize(runs: list[bench.Run]) -> list[dict[str, Any]]:
-    """A row for each solver: what it solved, and at what cost."""
+    """A row for each solver: the problems solved, and the cost."""
     rows = []
     for solver in dict.fromkeys(run.solver for run in runs):
         own = [run for run in runs if run.solver == solver]

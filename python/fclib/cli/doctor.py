@@ -1,4 +1,4 @@
-"""``fclib doctor``: what there is, what is missing, what is broken, and what to do about it."""
+"""``fclib doctor``: installed, missing and broken parts, with remedies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STYLE = {"ok": "green", "absent": "yellow", "broken": "red"}
 
 
 def show(finding: doctor.Finding) -> None:
-    """A line, and what to do where there is something to do."""
+    """A line, with a remedy if there is one."""
     line = Text("  ")
     line.append(f"{finding.state:6}", STYLE[finding.state])
     line.append(f"  {finding.name:14}", "bold")

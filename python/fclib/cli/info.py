@@ -1,4 +1,4 @@
-"""``fclib info``: what files hold."""
+"""``fclib info``: the content of files."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def command(files: Files, as_json: Json = False) -> None:
     for path in each_file(files, "reading"):
         try:
             contents = contents_of(path)
-            # None: reading says what is wrong
+            # None: reading will report the fault
             problems = [fclib.read(path, kind) for kind in contents.kinds or (None,)]
             left_out = fclib.left_out(path)
             for line in left_out:

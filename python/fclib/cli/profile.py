@@ -1,4 +1,4 @@
-"""``fclib profile``: what the runs of a store say."""
+"""``fclib profile``: profiles of the runs of a store."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ CPU_TIME = Metric("cpu_s")
 
 
 class Start(str, Enum):
-    """What runs start from: nothing, or the solution of a step before."""
+    """The start of runs: from nothing, or from the solution of a step before."""
 
     cold = "cold"
     warm = "warm"
 
 
 class Weigh(str, Enum):
-    """What weighs the same in shares and means: each family, or each instance."""
+    """The unit of equal weight in shares and means: each family, or each instance."""
 
     families = "families"
     instances = "instances"
 
 
 class Forms(str, Enum):
-    """Of a problem with a global and a local form the one that a solver takes, or both."""
+    """For a problem with a global and a local form: the form that a solver takes, or both."""
 
     one = "one"
     both = "both"

@@ -16,7 +16,7 @@ from fclib.cli._output import MeritKind, err, fail, out
 
 @contextmanager
 def bars() -> Iterator[Callable[[str, int, int], None]]:
-    """A bar for each part of the work on the standard error, where that is a terminal."""
+    """A bar for each part of the work on the standard error, if that is a terminal."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as shown:
         tasks = {}

@@ -24,7 +24,7 @@ from fclib.collections.plan import ON_DEMAND
 
 
 class Unsolved(str, Enum):
-    """What follows a step that is not solved."""
+    """The reaction to a step that is not solved."""
 
     BEST = "best"
     STOP = "stop"
@@ -213,5 +213,5 @@ def command(
 
 
 def further(activation: float) -> str:
-    """What an activation adds, in words."""
+    """The effect of an activation, in words."""
     return f", and {activation:g} m of further points" if activation else ""

@@ -30,7 +30,7 @@ STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
 
 
 class Trace:
-    """Prints the iterations of a solve on the standard error, thinned to what a person reads."""
+    """Prints the iterations of a solve on the standard error, thinned for readers."""
 
     def __init__(self, name: str) -> None:
         self.next = 0.0
@@ -38,7 +38,7 @@ class Trace:
         err.print(f"{name}\n{'iteration':>10}  {'error':>9}  {'time [s]':>9}  stage")
 
     def __call__(self, iteration: int, error: float, seconds: float, stage: str) -> None:
-        """A line where the stage changes, or the iterations have grown by a tenth."""
+        """Print a line if the stage changes, or the iterations have grown by a tenth."""
         if stage == self.stage and iteration < self.next:
             return
         self.stage, self.next = stage, max(iteration + 1, 1.1 * iteration)
@@ -111,7 +111,7 @@ def command(
             if run.result.message:
                 record["message"] = run.result.message
             if run.result.certificate is not None:
-                from fclib import analysis  # which takes its time to import
+                from fclib import analysis  # its import takes a while
 
                 proof = analysis.check_arrays(
                     problem, run.result.certificate, run.result.certificate_z

@@ -1,4 +1,4 @@
-"""``fclib solvers``: what there is, from the one place where each solver is written."""
+"""``fclib solvers``: the list of solvers, from the one place at which each is written."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def describe(option: fclib.OptionInfo) -> dict[str, Any]:
 
 
 def default_of(option: fclib.OptionInfo) -> str:
-    """The default as it is given on the command line."""
+    """The default, in the form of the command line."""
     default = option.default
     return str(default).lower() if isinstance(default, bool) else f"{default}"
 
@@ -55,7 +55,7 @@ def taken(solver: fclib.SolverInfo) -> str:
 
 
 def record_of(solver: fclib.SolverInfo) -> dict[str, Any]:
-    """All that is known of a solver."""
+    """All facts on a solver."""
     return {
         "solver": solver.name,
         "origin": solver.origin,
@@ -94,7 +94,7 @@ def show_chain(report: Report) -> None:
 
 
 def show(solver: fclib.SolverInfo) -> None:
-    """A solver in full."""
+    """Print all facts on a solver."""
     rolling = {3: "planar", 5: "spatial"}
     takes = [f"{d}D" for d in solver.dimensions]
     takes += [f"{rolling[d]} rolling" for d in solver.rolling_dimensions]

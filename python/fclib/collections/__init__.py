@@ -1,35 +1,36 @@
 """The collection: families of problems, built from scenes, with a catalogue.
 
-    fclib.collection("rt444")[100]      a problem, from the user's folder; built if it is not there
+    fclib.collection("rt444")[100]      a problem of the user's folder; built if missing
     fclib.load("tiny/RollingDiscs/0040")  one that comes with the package
-    collections.record(...)             scenes ──> trajectories: simulates, solves each step
+    collections.record(...)             scenes ──> trajectories: simulates, and solves each step
     collections.build(...)              trajectories ──> problems, solutions, files ──> catalogue
-    collections.verify(...)             files again as the catalogue says, solutions judged anew
+    collections.verify(...)             compares files with the catalogue, judges solutions again
     collections.publish(...), get(...)  archives with their SHA-256 for any static web server
 
-A problem is named SET/FAMILY/NUMBER, as rt444/KaplasTower/0100; its number counts the steps of
-the family's scene that have a contact, or the problems of a family assembled directly.
+The name of a problem is SET/FAMILY/NUMBER, for example rt444/KaplasTower/0100. The number counts
+the steps of the family's scene that have a contact, or the problems of a family that is assembled
+directly.
 
-plan.py       what is built of a family, and which of its problems are kept
-trajectory.py the states that problems are assembled from, and their files
+plan.py       which problems of a family are built, and which are kept
+trajectory.py stored states, from which problems are assembled, and their files
 published.py  the trajectories of all published versions. Needs trajectory.py
 known.py      the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py
-catalog.py    a row for each problem; catalog.parquet. Knows nothing of the others
-references.py solutions: found, judged by both maps, put into files. Needs catalog.py
-build.py      a family into files, gone on with after a kill. Needs plan.py, references.py and
+catalog.py    a row for each problem, in catalog.parquet. Needs no other module
+references.py solutions: finds them, judges them by both maps, stores them. Needs catalog.py
+build.py      makes the files of a family; goes on after a kill. Needs plan.py, references.py and
               standing.py
-verify.py     files as the catalogue says, solutions judged anew
-add.py        files that are already there, as a set. Needs build.py, known.py, references.py
+verify.py     compares files with the catalogue, and judges solutions again
+add.py        takes existing files in as a set. Needs build.py, known.py, references.py
 figures.py    distributions and pictures
 archives.py   publish and get. Needs catalog.py, known.py
-guesses.py    what a solution says of the next step's problem
+guesses.py    a guess for the next step's problem, from a solution
 rights.py     license and citation, in files and catalogues. Needs plan.py
 sequence.py   consecutive problems, with guesses. Needs guesses.py, library.py
 library.py    the package's and the user's folder, over all of these: `collection` and `load`
 choose.py     the lists of chosen problems, by rules that anyone can repeat
-candidates.py states of all families, of which `standard` is chosen. Needs known.py, record.py
-features.py   what tells problems apart: their data, and what solvers make of them
+candidates.py states of all families, from which `standard` is chosen. Needs known.py, record.py
+features.py   numbers that describe a problem: its data, and how solvers behave on it
 select.py     the set `standard` from a table of features. Needs candidates.py, features.py
 standing.py   which problems are easy, hard or open, by stored runs. Needs known.py
 """

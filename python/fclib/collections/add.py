@@ -1,13 +1,13 @@
-"""Files that are already there, as a set of a collection.
+"""Take existing files into a collection, as a set.
 
     OUT/NAME/FAMILY/0000-local.hdf5   a copy, with a reference solution (references.py)
                     catalog.parquet   of the family; column `source` has the file's path
                     distribution.*    histograms of its problems
 
-The family is the folder that a file lies in. The files themselves are read and never written. A
-row is known by path and SHA-256 of its file: what was taken in is left as it is, a file that has
-changed is another problem, and a run that was killed goes on. Files of equal problems are all
-taken in; column `same_as` names the first of them.
+The family is the folder of a file. The files themselves are read and never written. The path and
+SHA-256 of its file identify a row. So a file taken in before is left as it is, a file that has
+changed is a new problem, and a run that was killed goes on. Files of equal problems are all taken
+in; column `same_as` names the first of them.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ from fclib.collections.references import Found
 
 SUFFIXES = (".hdf5", ".h5")
 VERSION = "own"
-OF_FILE = "the file"  # instead of a solver, where the file's own solution is the better one
+OF_FILE = "the file"  # stands in place of a solver, if the file's own solution is better
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rules:
-    """How files are taken in."""
+    """Rules for taking files in."""
 
     references: bool = True  # whether solutions are looked for
-    tol: float = TOLERANCE  # that the solver is asked for
-    time_limit: float = 20.0  # [s] of each
-    license: str | None = None  # of the data
-    citation: str | None = None  # how to name them
+    tol: float = TOLERANCE  # tolerance of the solver
+    time_limit: float = 20.0  # [s] for each problem
+    license: str | None = None  # license of the data
+    citation: str | None = None  # citation of the data
 
 
 @dataclass(frozen=True)
@@ -61,18 +61,18 @@ def add(
     """Take the FCLIB files below a folder into a collection, as a set of it.
 
     Args:
-        source: the folder.
-        out: of the collection; made where it is not there.
-        name: of the set; by default that of the folder.
-        rules: see there.
+        source: the folder of the files.
+        out: the folder of the collection; made if it is missing.
+        name: name of the set; by default that of the folder.
+        rules: see `Rules`.
         progress: called with the family, the files done and their number.
 
     Returns:
-        The files that hold no valid problem; they are left out.
+        The files that were left out: they hold no valid problem.
 
     Raises:
-        NotADirectoryError: the source is no folder.
-        ValueError: a published set has the name, or a family that was built.
+        NotADirectoryError: the source is not a folder.
+        ValueError: a published set or a built family already has the name.
         FileNotFoundError: there is no HDF5 file in the source.
         OSError: the collection cannot be written.
     """
@@ -85,7 +85,7 @@ def add(
         raise ValueError(f"{collection}: is the name of a published set; choose another (--name)")
     families: dict[str, list[Path]] = {}
     for path in sorted(source.rglob("*")):
-        # a collection may lie inside
+        # the collection may lie inside the source
         if path.suffix in SUFFIXES and path.is_file() and out not in path.parents:
             inner = path.parent.relative_to(source).parts
             families.setdefault(plain("-".join(inner) or source.name), []).append(path)
@@ -103,7 +103,7 @@ def add(
 
 
 def plain(name: str) -> str:
-    """A name for a folder, without what URLs and shells do not take."""
+    """A name for a folder, without characters that URLs or shells refuse."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).strip(".") or "files"
 
 
@@ -111,7 +111,7 @@ class Part:
     """A family that is being taken in."""
 
     def __init__(self, source: Path, out: Path, collection: str, family: str, rules: Rules) -> None:
-        """Takes the rows that are there already."""
+        """Read the rows that are there already."""
         self.source, self.out, self.rules = source, out, rules
         self.collection, self.family = collection, family
         self.catalogue = out / collection / family / catalog.FILE
@@ -126,7 +126,7 @@ class Part:
                 self.rows[row["source"], row["source_sha256"]] = row
 
     def take(self, paths: Sequence[Path]) -> Iterator[Refusal | None]:
-        """Take files in; of each, None or why it is left out."""
+        """Take files in. For each, return None, or the reason why it is left out."""
         last = time.monotonic()
         try:
             for path in paths:
@@ -134,7 +134,7 @@ class Part:
                     self._take(path)
                     refusal = None
                 except (_core.Error, OSError) as error:
-                    # what cannot be written to the collection is no fault of the file
+                    # an error in writing the collection is not a fault of the file
                     if isinstance(error, OSError) and Path(error.filename or path) != path:
                         raise
                     words = str(error)
@@ -174,7 +174,7 @@ class Part:
         kinds = _core.kinds(path)
         if not kinds:
             raise _core.FileError(f"{path}: holds no problem of FCLIB")
-        # what a solution in the file belongs to
+        # the problem of the file's solution
         kind = "global" if "global" in kinds else kinds[0]
         problem: Any = _core.read(path, kind)
         own = _core.read_solution(path)
@@ -191,7 +191,7 @@ class Part:
                 if found is not None:
                     _core.write_attributes(beside, "solution", found.attributes)
                 return
-            # what is no solution goes, and with it what was said of it
+            # if it is not a solution, it is removed with all facts stored of it
             told = _core.read_attributes(path, "info")
             told.pop(MARK, None)
             references.write(beside, problem, found, _core.read_guesses(path), several)
@@ -220,14 +220,14 @@ class Part:
         }
 
     def _reference(self, problem: Any, own: _core.Solution | None) -> Found | None:
-        """The best that is known: the file's own solution, or a better one; None: there is none."""
+        """The best known solution: the file's own, or a better one; None if there is none."""
         rules = self.rules
         of_file = references.given(problem, own, OF_FILE) if own is not None else None
         if not rules.references or (of_file is not None and of_file.ok):
             return of_file
         try:
             found = references.find(problem, "auto", rules.tol, time_limit=rules.time_limit)
-        except _core.Error:  # a singular M: the problem is there all the same
+        except _core.Error:  # M is singular; the problem is kept all the same
             return of_file
         better = of_file is None or found.refuted or found.error < of_file.error
         return found if better else of_file

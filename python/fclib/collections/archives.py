@@ -23,18 +23,18 @@ from fclib.collections.known import folders
 REGISTRY = "registry.txt"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # so that equal files make equal archives
 TIMEOUT = 30.0  # longest silence of a server [s]
-TRIES = 3  # connections, for what broke off
-# times the size of an archive that its files may have: `publish` stores them as they are, and HDF5
-# has compressed them; what is made to fill a disk has a thousand times its size
+TRIES = 3  # connections for one download, if it breaks off
+# the files may be so many times as large as their archive. `publish` stores them as they are, and
+# HDF5 has compressed them; an archive made to fill a disk unpacks to a thousand times its size
 UNPACKED = 20
 
 
 class FetchError(OSError):
-    """An archive that could not be fetched whole."""
+    """An archive could not be fetched whole."""
 
 
 def pooch_module() -> Any:
-    """The module pooch. ImportError, with what to install, where it is not there."""
+    """The module pooch. Without it an ImportError says what to install."""
     try:
         return importlib.import_module("pooch")
     except ImportError as error:
@@ -51,18 +51,18 @@ def cache_folder() -> Path:
 def publish(folder: str | Path, site: str | Path) -> list[Path]:
     """Make the archives of all finished families of a folder, and their registry.
 
-    Families whose build was cut are left out, of the catalogue too (`catalog.unfinished`).
+    Families whose build was cut are left out, also from the catalogue (`catalog.unfinished`).
 
     Args:
-        folder: what `build` made.
-        site: the folder that a web server serves; made where it is not there.
+        folder: the folder that `build` made.
+        site: the folder that a web server serves; made if it is missing.
 
     Returns:
         The files written.
 
     Raises:
         CatalogError: the folder has no catalogue.
-        FetchError: a file is missing, or is not the one of the catalogue.
+        FetchError: a file is missing, or is not the file in the catalogue.
     """
     folder, site = Path(folder), Path(site)
     cut = catalog.unfinished(folder)
@@ -83,7 +83,7 @@ def publish(folder: str | Path, site: str | Path) -> list[Path]:
         for path, digest in members:
             if not (folder / path).is_file() or catalog.sha256(folder / path) != digest:
                 raise FetchError(f"{folder / path}: is not the catalogue's file; build it anew")
-        # and the states that they were assembled from, where those are in no package
+        # add the states of the problems, if no package has them
         parts = [f"{name}/{file}" for file in (trajectory.OWN, catalog.FILE)]
         paths = [path for path, _ in members]
         paths += [part for part in parts if (folder / part).is_file()]
@@ -114,20 +114,20 @@ def get(
 ) -> list[str]:
     """Fetch families from a server, check them, and unpack them into a folder.
 
-    A download that broke off is gone on with, where the server lets one ask for the rest.
+    A download that broke off is continued, if the server can send the rest alone.
 
     Args:
         names: sets, families, families in a set (SET/FAMILY), or scenes that are published there.
-        url: where `registry.txt` lies: an address, or a folder.
+        url: address or folder of `registry.txt`.
         folder: the collection's folder; the archives are kept in its `.archives`.
-        progress: called with the archive's name, the bytes there are, and how many there will be.
+        progress: called with the archive's name, the bytes received and the bytes expected.
 
     Returns:
         The folders SET/FAMILY that are there now.
 
     Raises:
-        KeyError: a name that is no set and no family, or is not published there.
-        FetchError: the server cannot be reached, or what came is not what the registry says.
+        KeyError: a name is neither a set nor a family, or is not published there.
+        FetchError: the server cannot be reached, or the received files differ from the registry.
     """
     pooch = pooch_module()
     folder = Path(folder)
@@ -136,7 +136,7 @@ def get(
     base = url if url.endswith("/") else url + "/"
     (archives / REGISTRY).unlink(missing_ok=True)
     download(base + REGISTRY, archives / REGISTRY)
-    # its words are for a console of its own
+    # its messages are for a console of its own
     pooch.get_logger().setLevel("WARNING")
     fetcher = pooch.create(path=archives, base_url=base, registry=None)
     try:
@@ -156,7 +156,7 @@ def get(
 
         def fetch(url: str, output_file: str, _pooch: Any, archive: str = archive) -> None:
             show = (lambda done, total: progress(archive, done, total)) if progress else None
-            # pooch's own file is new each time; ours stays, and is gone on with
+            # pooch would begin a new file each time; ours stays and is continued
             target = archives / f"{archive}.part"
             download(url, target, show)
             shutil.move(target, output_file)
@@ -177,9 +177,9 @@ def folder_of(archive: str) -> str:
 
 
 def wanted_of(name: str, published: Sequence[str]) -> list[str]:
-    """The folders that a name stands for, where these are published. KeyError for no name of ours.
+    """The published folders that a name stands for. KeyError if the name is unknown.
 
-    An MJCF scene is no family of ours, and known by its archive alone.
+    An MJCF scene is not a family of ours; only its archive is known.
     """
     try:
         ours = folders([name])
@@ -191,7 +191,7 @@ def wanted_of(name: str, published: Sequence[str]) -> list[str]:
 
 
 def download(url: str, target: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Fetch a file, or the rest of it where a part is there; copy that of a folder. FetchError."""
+    """Fetch a file, or only the rest if a part is there; copy it from a folder. FetchError."""
     if url.startswith("file://") or "://" not in url:
         path = Path(url2pathname(urlsplit(url).path) if "://" in url else url)
         try:
@@ -213,7 +213,7 @@ def download(url: str, target: Path, progress: Callable[[int, int], None] | None
                 if response.status_code == 416:  # nothing is left to ask for
                     return
                 response.raise_for_status()
-                # 200 where a server knows no ranges: from the start
+                # 200 means that the server does not support ranges: start anew
                 there = there if response.status_code == 206 else 0
                 length = response.headers.get("Content-Length")
                 total = there + int(length) if length else 0
@@ -238,11 +238,11 @@ def download(url: str, target: Path, progress: Callable[[int, int], None] | None
 
 
 def unpack(archive: Path, folder: Path, family: str) -> None:
-    """Unpack SET/FAMILY; its part of the catalogue comes last, since it says that all is there.
+    """Unpack SET/FAMILY; its part of the catalogue comes last, as the sign that all is there.
 
     Raises:
-        FetchError: the file is no archive of this family; nothing of it is unpacked then, or it was
-            damaged.
+        FetchError: the file is not an archive of this family, or is damaged. Then nothing is
+            unpacked.
     """
     try:
         with zipfile.ZipFile(archive) as zipped:
@@ -256,18 +256,19 @@ def unpack(archive: Path, folder: Path, family: str) -> None:
                 def write(path: Path, entry: Any = entry, content: bytes = content) -> None:
                     path.write_bytes(content)
                     if entry.filename == f"{family}/{catalog.FILE}":
-                        catalog.read_catalog(path)  # what is none takes no place
+                        # a file that is not a catalogue replaces nothing
+                        catalog.read_catalog(path)
 
                 catalog.replace_file(target, write)
     except catalog.CatalogError as error:
         raise FetchError(f"{archive}: {family}/{catalog.FILE} is no catalogue: {error}") from None
-    # what zipfile raises of an archive that is damaged, encrypted, or packed in another way
+    # zipfile raises these for an archive that is damaged, encrypted or packed in another way
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
         raise FetchError(f"{archive}: is no archive that can be unpacked: {error}") from None
 
 
 def _check(archive: Path, entries: Sequence[zipfile.ZipInfo], folder: Path, family: str) -> None:
-    """FetchError where an archive has what does not belong to a family, or is far too much."""
+    """FetchError if an archive holds a file that is not of the family, or is far too large."""
     for entry in entries:
         target = (folder / entry.filename).resolve()
         inside = target.is_relative_to((folder / family).resolve())

@@ -2,14 +2,14 @@
 
     OUT/SET/FAMILY/0100-global.hdf5     problem and solution
                    0100-local.hdf5
-                   states.trajectory    where the states were simulated for this build
-                   catalog.parquet      of the family; there when it is finished
-                   .state/              while it is not: where to go on
+                   states.trajectory    if the states were simulated for this build
+                   catalog.parquet      of the family; it exists once the family is finished
+                   .state/              until then: the place to go on from
     OUT/catalog.parquet                 of all problems that are finished
 
-Problems are assembled from the states of a trajectory, each by itself. The reference solution of
-each is found from nothing, and no problem depends on it (references.py). A build that was killed
-goes on from its last checkpoint, and ends with the same files.
+Each problem is assembled from one state of a trajectory. Its reference solution is found from a
+zero start, and no other problem depends on it (references.py). A build that was killed goes on from
+its last checkpoint, and ends with the same files.
 """
 
 from __future__ import annotations
@@ -43,19 +43,19 @@ from fclib.collections.references import Found
 if TYPE_CHECKING:
     from fclib.analysis import Enumeration
 
-COMPRESSION = 1  # 2 % more bytes than 6, two thirds of the time
-# up to here the states of all contacts are looked at: of three planar contacts there are 64; v and
-# lambda of two bodies are taken out in rational arithmetic
+COMPRESSION = 1  # level 1: 2 % more bytes than level 6 in two thirds of the time
+# all combinations of contact states are tried up to this number: three planar contacts have 64; v
+# and lambda of two bodies are eliminated in rational arithmetic
 SMALL_PLANAR, SMALL_UNKNOWNS = 3, 12
 CHECKPOINT = 5.0  # seconds between two checkpoints
-LISTING = 0.05  # of the time of a build that may go into the catalogue of all
+LISTING = 0.05  # share of a build's time that may go into the catalogue of all
 TOLD = 0.1  # seconds between two messages of progress
 
-Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, of how many
+Progress = Callable[[str, int, int], None]  # SET/FAMILY, problems looked at, their number
 
 
 class BuildError(Exception):
-    """What was built before does not fit what is asked for now."""
+    """The folder was built by another plan than the one asked for."""
 
 
 def build(
@@ -66,14 +66,14 @@ def build(
     progress: Progress | None = None,
     pictures: bool = True,
 ) -> Any:
-    """Build what the plans say into a folder, and return its catalogue (pyarrow.Table).
+    """Build the problems of plans into a folder. Return its catalogue (pyarrow.Table).
 
-    What is finished is left as it is; what was interrupted goes on.
+    A finished family is left as it is; an interrupted one goes on.
 
     Args:
         plans: one for each scene.
-        out: the folder; made where it is not there.
-        jobs: processes; a scene is never spread over two.
+        out: the folder; made if it is missing.
+        jobs: number of processes; each scene is built in one process.
         progress: called with the plan's name, the problems done and their number.
         pictures: also draw each scene's last state and its distribution of contacts.
 
@@ -109,7 +109,7 @@ def build_in_processes(
     with ProcessPoolExecutor(
         jobs, mp_context=context, initializer=begin_in_pool, initargs=(messages,)
     ) as pool:
-        # the long ones first
+        # long builds first
         ordered = sorted(plans, key=lambda plan: -plan.total)
         plan_of = {pool.submit(build_and_tell, plan, out, pictures): plan for plan in ordered}
         waiting = set(plan_of)
@@ -129,20 +129,20 @@ def build_in_processes(
         raise failed
 
 
-_messages: Any = None  # in a process of the pool: where progress goes
+_messages: Any = None  # in a process of the pool: the queue for progress
 
 
 def begin_in_pool(messages: Any) -> None:
-    """Of a process of the pool: where its progress goes, and that it ends with the build."""
+    """Start a process of the pool: it sends its progress here, and ends with the build."""
     global _messages
     _messages = messages
-    messages.cancel_join_thread()  # what nobody reads holds no process
+    messages.cancel_join_thread()  # unread messages must not keep the process alive
     parent = multiprocessing.parent_process()
     if parent is None:
         return
 
     def watch() -> None:
-        # where the build is killed nobody takes the results
+        # if the build is killed, nobody takes the results
         connection.wait([parent.sentinel])
         os._exit(1)
 
@@ -164,7 +164,7 @@ def build_and_tell(plan: Plan, out: Path, pictures: bool) -> list[dict[str, Any]
 
 
 def is_finished(plan: Plan, out: Path) -> bool:
-    """Whether the scene is built. BuildError where another plan built it."""
+    """Whether the scene is built. BuildError if another plan built it."""
     folder = out / plan.name
     part, state = folder / catalog.FILE, folder / STATE
     if part.is_file():
@@ -184,7 +184,7 @@ def is_finished(plan: Plan, out: Path) -> bool:
 
 
 def is_more(found: str, plan: Plan) -> bool:
-    """Whether a folder was built by this plan, but for which of its problems were chosen."""
+    """Whether this plan built a folder, whichever problems were chosen."""
     old, new = (json.loads(text) for text in (found, plan.fingerprint()))
     for one in (old, new):
         if one.pop("count") is not None:
@@ -194,13 +194,13 @@ def is_more(found: str, plan: Plan) -> bool:
 
 
 def numbers_in(found: str, plan: Plan) -> set[int]:
-    """The numbers that a folder was built with."""
+    """The numbers of the problems that a folder was built with."""
     chosen = json.loads(found)["chosen"]
     return set(range(plan.total)) if chosen is None else set(chosen)
 
 
 def joined(plan: Plan, out: Path) -> Plan:
-    """The plan with what a folder has of its problems already, which is then made again."""
+    """The plan, extended by the problems that the folder already has; they are made again."""
     part = out / plan.name / catalog.FILE
     if plan.chosen is None or not part.is_file():
         part.unlink(missing_ok=True)
@@ -223,20 +223,20 @@ def difference(found: str, asked: str) -> str:
 
 @dataclass
 class Kept:
-    """The rows of the problems that are kept, and how many were looked at."""
+    """The rows of the problems kept, and the number of problems looked at."""
 
     plan: Plan
     looked: int = 0
     rows: dict[int, dict[str, Any]] = field(default_factory=dict)  # by number
-    listed: float = 0.0  # when the catalogue of all was written last, and how long that took [s]
+    listed: float = 0.0  # time of the last writing of the catalogue of all, and its duration [s]
     listing: float = 0.0
 
     def wants(self, number: int) -> bool:
-        """Whether the rule takes this number; with `hard` each is looked at."""
+        """Whether the rule takes this number; the rule `hard` looks at every problem."""
         return self.plan.select == "hard" or number in self._numbers
 
     def add(self, row: dict[str, Any]) -> list[dict[str, Any]]:
-        """Keep a problem, and return those that must go for it."""
+        """Keep a problem, and return those that it replaces."""
         self.rows[row["number"]] = row
         if self.plan.select != "hard" or self.plan.count is None:
             return []
@@ -260,7 +260,7 @@ class Item:
 
 
 def states_of(plan: Plan, folder: Path, report: Progress) -> trajectory.Trajectory | None:
-    """The trajectory of a plan; simulated into the folder where there is none, and then told so.
+    """The trajectory of a plan. If there is none, it is simulated, and `report` is told so.
 
     None for a family that is assembled directly.
     """
@@ -278,7 +278,7 @@ def states_of(plan: Plan, folder: Path, report: Progress) -> trajectory.Trajecto
         last = int(states.number.max(initial=-1))
         if last + 1 < plan.problems:
             raise BuildError(f"{path}: has {last + 1} problems, and {plan.problems} are asked for")
-    # a file on this machine may refer to others beside it
+    # a local file may refer to others beside it
     return replace(states, scene=replace(states.scene, path=plan.scene.path))
 
 
@@ -302,9 +302,9 @@ def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> It
 def build_scene(
     plan: Plan, out: Path, report: Progress, pictures: bool = False
 ) -> list[dict[str, Any]]:
-    """Make the problems of a plan and store them; go on where a build before was interrupted.
+    """Make the problems of a plan and store them; an interrupted build goes on.
 
-    Their rows of the catalogue.
+    Return their rows of the catalogue.
     """
     folder = out / plan.name
     state_folder = folder / STATE
@@ -347,7 +347,7 @@ def build_scene(
 
 
 def finish(plan: Plan, out: Path, rows: list[dict[str, Any]]) -> None:
-    """Write the part of the catalogue that says that a plan is built, and the whole one."""
+    """Write the plan's part of the catalogue, which says that it is built; then the whole one."""
     folder = out / plan.name
     fingerprint = {catalog.FINGERPRINT: plan.fingerprint().encode()}
     catalog.write_catalog(folder / catalog.FILE, rows, fingerprint)
@@ -356,11 +356,11 @@ def finish(plan: Plan, out: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def reference(plan: Plan, problem: Any) -> Found | None:
-    """The reference solution of a problem, which follows from it alone; None: not asked for."""
+    """The reference solution, which follows from the problem alone; None: not asked for."""
     if not plan.references:
         return None
     found = references.find(problem, plan.solver, plan.tol, **plan.options)
-    # of a problem that was open somebody may know more
+    # somebody may know a better solution of an open problem
     if not found.ok and not found.refuted:
         stored = standing.stored_solution(_digest.digest(problem))
         if stored is not None:
@@ -381,7 +381,7 @@ class Before:
 
 
 def stored_before(plan: Plan, kept: Kept, out: Path) -> Before | None:
-    """The same from its file, where a build goes on."""
+    """The same from its file, if a build goes on."""
     row = kept.rows.get(max((n for n in kept.rows if n < kept.looked), default=-1))
     if row is None:
         return None
@@ -391,11 +391,11 @@ def stored_before(plan: Plan, kept: Kept, out: Path) -> Before | None:
 
 
 def guesses_of(plan: Plan, item: Item, before: Before | None) -> list[_core.Solution]:
-    """The impulses that the same contacts had in the step before, where that was stored.
+    """The impulses that the same contacts had in the step before, if that step was stored.
 
-    Of a step of another engine that engine's own.
+    For a step of another engine they are the impulses of that engine.
 
-    Where the hard ones are selected, what is stored depends on what comes later: none.
+    If the hard problems are selected, later problems decide what is stored; so there are none.
     """
     reaction = getattr(getattr(plan.scene, "family", None), "reaction", None)
     if reaction is not None:
@@ -407,7 +407,7 @@ def guesses_of(plan: Plan, item: Item, before: Before | None) -> list[_core.Solu
 
 
 def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) -> Before | None:
-    """Write a problem's files, remove those that it drives out, and return it."""
+    """Write a problem's files, remove those of problems that it replaces, and return it."""
     is_global = item.problem.kind.startswith("global")
     local = item.problem.condense() if is_global else item.problem
     sweeps = None
@@ -459,13 +459,13 @@ def known_of(
     states: Enumeration | None,
     row: dict[str, Any],
 ) -> tuple[str, dict[str, _core.MatrixInfo]]:
-    """MATH_INFO and MATRIX_INFO of a problem, and into its row what is known of it.
+    """MATH_INFO and MATRIX_INFO of a problem; the known facts also go into its row.
 
-    What is cheap, where references are made; all with Plan.analyze; nothing of problems alone.
+    With references, the cheap facts; with Plan.analyze, all; without both, none.
     """
     if not plan.analyze and not plan.references:
         return "", {}
-    from fclib import analysis  # takes a while
+    from fclib import analysis  # the import takes a while
 
     if plan.analyze:
         whole = analysis.analyze(problem, tol=TOLERANCE)
@@ -483,7 +483,7 @@ def known_of(
 
 
 def states_of_contacts(plan: Plan, problem: Any) -> Enumeration | None:
-    """What the states of all contacts say, of a family with several solutions or a few contacts."""
+    """All solutions by contact states, for a family with several, or for a few contacts."""
     family = getattr(plan.scene, "family", None)
     if not plan.references or not (getattr(family, "several", False) or is_small(problem)):
         return None
@@ -493,7 +493,7 @@ def states_of_contacts(plan: Plan, problem: Any) -> Enumeration | None:
 
 
 def is_small(problem: Any) -> bool:
-    """Whether the states of all contacts cost less than the solve: a tenth of a second."""
+    """Whether trying all contact states is cheaper than the solve: a tenth of a second."""
     most = SMALL_PLANAR if problem.spacedim == 2 else 1
     return bool(problem.nc <= most and problem.n + problem.p <= SMALL_UNKNOWNS)
 
@@ -505,7 +505,7 @@ def solutions_of(states: Enumeration | None) -> list[_core.Solution]:
 
 
 def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
-    """The row of a problem: all but its solution and its files."""
+    """The row of a problem, without its solution and its files."""
     return {
         "id": f"{plan.name}/{number:04d}",
         "collection": plan.collection,
@@ -526,7 +526,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
 
 
 def facts_of(problem: Any) -> dict[str, Any]:
-    """What a row says of a problem's data, wherever it is from."""
+    """The columns of a row on a problem's data, whatever its origin."""
     mu = np.asarray(problem.mu)
     return {
         "title": problem.info.title,
@@ -545,15 +545,15 @@ def facts_of(problem: Any) -> dict[str, Any]:
 
 
 def nnz(matrix: Any) -> int:
-    """Entries of a sparse or dense matrix."""
+    """The number of entries of a sparse or dense matrix."""
     return int(getattr(matrix, "nnz", np.size(matrix)))
 
 
 def write_checkpoint(folder: Path, kept: Kept, out: Path, *, last: bool = False) -> None:
-    """Store where to go on: the problems that were looked at, and what was kept of them.
+    """Store a checkpoint: the problems looked at, and those kept.
 
-    The catalogue has them too from then on; of a large collection it is written less often, but for
-    the last time.
+    From then on the catalogue has them too. The catalogue of a large collection is written less
+    often, but always at the end.
     """
     _core.sync_files(folder)
     known = json.dumps({"looked": kept.looked, "rows": list(kept.rows.values())})
@@ -566,7 +566,7 @@ def write_checkpoint(folder: Path, kept: Kept, out: Path, *, last: bool = False)
 
 
 def read_checkpoint(folder: Path, kept: Kept) -> None:
-    """Take what was stored, if anything was."""
+    """Read the checkpoint, if there is one."""
     path = folder / catalog.KEPT
     if path.is_file():
         known = json.loads(path.read_text(encoding="utf-8"))

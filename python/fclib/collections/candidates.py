@@ -1,13 +1,13 @@
-"""Candidates: states of all families, of which the set `standard` is chosen.
+"""Candidates: states of all families, from which the set `standard` is chosen.
 
-Of each family some steps are kept, at equal distances among its problems. Where the states of a
-family are stored, they are taken from there, and so are those of `COSTLY` families, which a list
-has; else it is simulated, as `SIMULATION` says, into
+Some steps of each family are kept, at equal distances among its problems. If the states of a family
+are stored, they are taken from there. The states of `COSTLY` families are taken from a list. Any
+other family is simulated, as `SIMULATION` says, into
 
     FOLDER/SET/FAMILY-KEY.trajectory
 
-KEY is a hash of the scene and of how it was simulated: a family that has changed is simulated
-anew, another one is not.
+KEY is a hash of the scene and of the settings of its simulation. So a family is simulated anew only
+if it has changed.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ from fclib.collections import known, trajectory
 from fclib.collections.plan import Plan, Simulation, families
 from fclib.collections.record import record
 
-SIMULATION = Simulation(tol=1e-10)  # of each step; to 1e-12 thirty of LowWall take hours
-KEPT = 48  # problems of a family, at most
-# families whose simulation takes minutes, and the list and version that has some of their states
+# tolerance of each step; with 1e-12 thirty steps of LowWall take hours
+SIMULATION = Simulation(tol=1e-10)
+KEPT = 48  # largest number of problems of a family
+# families whose simulation takes minutes, with the list and version that has some of their states
 COSTLY = dict.fromkeys(("Chute1000", "Chute4000", "SpheresBox"), ("hard", "6"))
 
 Progress = Callable[[str, int, int], None]
@@ -58,9 +59,9 @@ class Candidates:
 def candidates(
     folder: Path, names: Sequence[str] = (), kept: int = KEPT, progress: Progress | None = None
 ) -> Iterator[Candidates]:
-    """The candidates of families, all by default; simulated into the folder where they are not.
+    """The candidates of families, all by default; simulated into the folder if needed.
 
-    Goes on after a kill. Raises as `record` and `known.plan_of`.
+    It goes on after a kill. It raises as `record` and `known.plan_of` do.
     """
     for name, family in families().items():
         if names and name not in names:
@@ -79,7 +80,7 @@ def candidates(
 
 
 def drawn(plan: Plan, kept: int) -> Candidates:
-    """The candidates of a plan whose states are there, or which needs none."""
+    """The candidates of a plan whose states are stored, or which needs none."""
     if plan.trajectory is None:
         return Candidates(plan, spread(plan.total, kept), None)
     states = trajectory.read(plan.trajectory)
@@ -94,7 +95,7 @@ def spread(total: int, kept: int) -> tuple[int, ...]:
 
 
 def key(plan: Plan) -> str:
-    """Of a scene as it is, of what is kept and of how it is simulated."""
+    """The hash of a scene as it is, of the steps kept and of the settings of the simulation."""
     assert isinstance(plan.scene, scenes.Scene)
     said = [trajectory.record(plan.scene), plan.simulation.record(), plan.chosen]
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:12]

@@ -18,10 +18,10 @@ from fclib import _core
 
 FILE = "catalog.parquet"
 PROVEN = "infeasible"  # the status of a solve that has proved that there is no solution
-# of a family while it is built: where to go on, and in it the rows that are there already
+# folder of a family while it is built: a checkpoint, and in it the rows made so far
 STATE = ".state"
 KEPT = "kept.json"
-# in a family's own part: what it was built by, as JSON
+# key in a family's own part: the plan that built it, as JSON
 FINGERPRINT = b"fclib.plan"
 
 # column, type of Arrow, meaning
@@ -71,13 +71,13 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("citation", "string", "how to name the data; null where nobody said"),
 )
 
-# of the files' paths and SHA-256
+# columns of the files' paths and SHA-256
 FILES = ("global_file", "global_sha256", "local_file", "local_sha256")
 
 # columns that become parts of paths
 FOLDERS = ("collection", "family", "global_file", "local_file")
 
-# further columns, of which a build fills what is cheap, or what it was asked to analyze: all;
+# further columns; a build fills the cheap ones, or all of them if it is asked to analyze;
 # docs/analysis.md has their meaning
 ANALYSIS: tuple[str, ...] = (
     "islands",
@@ -99,11 +99,11 @@ ANALYSIS: tuple[str, ...] = (
 
 
 class CatalogError(_core.Error):
-    """A catalogue that is not there, or is not one."""
+    """A catalogue is missing, or is not one."""
 
 
 def arrow() -> Any:
-    """The module pyarrow. ImportError, with what to install, where it is not there."""
+    """The module pyarrow. Without it an ImportError says what to install."""
     try:
         importlib.import_module("pyarrow.parquet")
         return importlib.import_module("pyarrow")
@@ -136,12 +136,12 @@ def write_catalog(
 
 
 def read_catalog(path: str | Path) -> Any:
-    """The catalogue (pyarrow.Table) of a folder or a file. CatalogError where there is none."""
+    """The catalogue (pyarrow.Table) of a folder or a file. CatalogError if there is none."""
     pa = arrow()
     path = Path(path)
     file = path / FILE if path.is_dir() else path
     try:
-        # a file of its own, and no data set: names of folders are no columns
+        # read it as one file, not as a data set: names of folders are not columns
         table = pa.parquet.ParquetFile(file).read()
     except FileNotFoundError:
         raise CatalogError(
@@ -163,7 +163,7 @@ def read_catalog(path: str | Path) -> Any:
                 raise CatalogError(f"{file}: column {name}: is no {kind}") from None
     for name in FOLDERS:
         _require_inside(file, table, name)
-    # an older one lacks what came later
+    # an older catalogue lacks later columns
     for place, (name, kind, _) in enumerate(COLUMNS):
         if name not in table.column_names:
             nothing = pa.nulls(table.num_rows, pa.type_for_alias(kind))
@@ -172,7 +172,7 @@ def read_catalog(path: str | Path) -> Any:
 
 
 def with_copies(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The rows, each of which names the first one with the same data, if that is another one."""
+    """The rows; each names the first row with the same data, if that is another one."""
     first: dict[str, str] = {}
     found = []
     for row in rows:
@@ -187,12 +187,12 @@ def is_proven(row: Mapping[str, Any]) -> bool:
 
 
 def is_answered(row: Mapping[str, Any]) -> bool:
-    """Whether its solution is known, or that there is none."""
+    """Whether its solution is known, or known not to exist."""
     return is_solved(row) or is_proven(row)
 
 
 def is_solved(row: Mapping[str, Any]) -> bool:
-    """Whether its solution is stored; an older catalogue has the word of the solver alone."""
+    """Whether its solution is stored; an older catalogue only has the solver's status."""
     stored = row["has_solution"]
     return bool(row["status"] == "converged" if stored is None else stored)
 
@@ -203,7 +203,7 @@ def distinct(rows: Iterable[Mapping[str, Any]]) -> int:
 
 
 def _require_inside(file: Path, table: Any, name: str) -> None:
-    """CatalogError where a column names files or folders outside of the catalogue's own."""
+    """CatalogError if a column names files or folders outside of the catalogue's own."""
     if name not in table.column_names:
         return
     for path in set(table[name].to_pylist()) - {None}:
@@ -219,7 +219,7 @@ def _require_inside(file: Path, table: Any, name: str) -> None:
 def gather(out: Path) -> Any:
     """Join the catalogues of all families of a folder into its own.
 
-    Of a family whose build goes on, or was cut, it has the problems up to the last checkpoint.
+    If the build of a family goes on, or was cut, it has the problems up to the last checkpoint.
     """
     rows = [
         row for part in sorted(out.glob(f"*/*/{FILE}")) for row in read_catalog(part).to_pylist()
@@ -231,7 +231,7 @@ def gather(out: Path) -> Any:
 
 
 def unfinished(out: Path) -> list[str]:
-    """The families SET/FAMILY of a folder whose build goes on, or was cut."""
+    """The families SET/FAMILY of a folder whose build still goes on, or was cut."""
     return sorted(
         state.parent.relative_to(out).as_posix()
         for state in out.glob(f"*/*/{STATE}")
@@ -250,7 +250,7 @@ def kept_rows(out: Path, family: str) -> list[dict[str, Any]]:
 
 
 def lacking(out: Path, rows: Iterable[Mapping[str, Any]]) -> list[str]:
-    """The files of problems below a folder that rows of its catalogue have not."""
+    """The files of problems below a folder that its catalogue lacks."""
     known = {path for row in rows for path, _ in files_of(row)}
     found = (path.relative_to(out).as_posix() for path in out.glob("*/*/[!.]*.hdf5"))
     return sorted(path for path in found if path not in known)
@@ -276,7 +276,7 @@ def files_of(row: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 
 def sha256(path: Path) -> str:
-    """Of a file, in hexadecimal digits."""
+    """The SHA-256 of a file, in hexadecimal digits."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(1 << 20):

@@ -1,7 +1,7 @@
 """Lists of chosen problems, by rules that anyone can repeat.
 
-hard    from stores of campaigns over a built collection: what most solvers fail on; a list grows by
-        what the stored runs class hard or open in other sets
+hard    from stores of campaigns over a built collection: problems that most solvers fail on. A list
+        grows by problems of other sets that the stored runs class as hard or open
 local   from a built collection: the contacts that one-contact solvers find hardest
 tiny    one problem of each kind, from the list below
 """
@@ -27,7 +27,7 @@ from fclib.collections.record import record
 
 Progress = Callable[[str, int, int], None]
 
-# one problem of each kind: family, parameters, number
+# one problem for each kind: family, parameters, number
 TINY: tuple[tuple[str, dict[str, Any], int], ...] = (
     ("PlanarBlocks", {"courses": 4, "blocks": 3}, 90),  # d = 2
     ("Capsules", {"capsules": 20, "width": 16.0}, 300),  # d = 3
@@ -35,13 +35,13 @@ TINY: tuple[tuple[str, dict[str, Any], int], ...] = (
     ("RollingDiscs", {"discs": 12, "per_row": 4}, 40),  # d = 3, planar rolling
     ("RollingSpheres", {"spheres": 16, "per_layer": 4}, 60),  # d = 5
     ("FourBar", {"linkages": 2}, 150),  # bilateral constraints
-    ("LocalProblems", {}, 0),  # local alone
+    ("LocalProblems", {}, 0),  # only a local form
     ("Wall", {}, 3),  # assembled directly
 )
 
 
 def write_list(path: Path, choices: Iterable[Choice], rule: Mapping[str, Any]) -> None:
-    """Write a list as the package keeps it: by what rule, and the problems."""
+    """Write a list in the package's format: the rule, and the problems."""
     rows = []
     for choice in choices:
         row = asdict(choice)
@@ -61,7 +61,7 @@ def tiny() -> list[Choice]:
 
 
 def choice_of(family: str, parameters: Mapping[str, Any], seed: int, number: int) -> Choice:
-    """A problem by its number, from a simulation. ValueError where the scene has not so many."""
+    """A problem by its number, from a simulation. ValueError if the scene has fewer."""
     scene = source(family, dict(parameters), seed)
     if isinstance(scene, scenes.Assembled):
         digest = _digest.digest(scene.problem(number))
@@ -94,18 +94,19 @@ def hard(
     share: float = 0.5,
     per_family: int = 5,
 ) -> list[Choice]:
-    """What most solvers fail on.
+    """The problems that most solvers fail on.
 
-    A problem that all solvers of the runs were tried on is hard where at least `share` of those
-    that take such problems did not solve it. Of each family the hardest are taken: those that most
-    failed on, of equals those whose fastest solver took most iterations, then the first by name.
+    Only problems count that all solvers of the runs were tried on. Such a problem is hard if at
+    least `share` of the solvers that take it did not solve it. From each family the hardest are
+    taken: first those that most solvers failed on, then those whose fastest solver took most
+    iterations, then the first by name.
 
     Args:
         runs: rows of the view `results` of stores, from campaigns over the folder's global files.
         folder: the collection; its files say what their problems are made from.
         tol: the tolerance of the runs that count.
-        share: of the solvers that must have failed.
-        per_family: problems of a family, at most.
+        share: share of the solvers that must have failed.
+        per_family: largest number of problems of a family.
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -121,13 +122,13 @@ def hard(
         tried[run["hash"]].add(run["solver"])
         if run["status"] == "unsuitable":
             continue
-        # of repeats one that was solved suffices
+        # one solved repeat suffices
         known = solved[run["hash"]]
         known[run["solver"]] = known.get(run["solver"], False) or bool(run["solved"])
         if run["solved"]:
             effort[run["hash"]].append(run["iterations"])
     solvers = set().union(*tried.values())
-    # a campaign that was cut short has problems that only some were tried on
+    # in a campaign that was cut, some problems were tried by only some solvers
     solved = {digest: known for digest, known in solved.items() if tried[digest] == solvers}
     if not solved:
         raise ValueError(f"{folder}: has no problem that all solvers were run on at {tol:g}")
@@ -155,21 +156,21 @@ def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
 def grown(
     kept: Sequence[Choice], names: Iterable[str], version: str, per_family: int = 5
 ) -> tuple[list[Choice], dict[str, Candidates]]:
-    """A list, and beside it what the stored runs class hard or open in other sets.
+    """A list, extended by problems of other sets that the stored runs class as hard or open.
 
-    What the list has stays. Of each family of the sets those come to it that the smallest share of
-    the solvers solved, then the first by name; of a family whose states are stored, or which is
-    assembled directly. Where the list has problems of that name from elsewhere, the family is
-    called FAMILY_SET in it.
+    The problems of the list stay. New problems come from the families of the sets: from each family
+    those that the smallest share of solvers solved, then the first by name. Only families count
+    whose states are stored, or which are assembled directly. If the list has problems of that name
+    from elsewhere, the family is called FAMILY_SET in it.
 
     Args:
-        kept: the list, of the version before where it does not say otherwise.
-        names: of the sets.
-        version: the one of the list that is made.
-        per_family: problems of a family of a set, at most.
+        kept: the list; a problem without a version is of the version before.
+        names: names of the sets.
+        version: version of the new list.
+        per_family: largest number of problems of a family of a set.
 
     Returns:
-        The problems in order, and by their family in the list where states of new ones are.
+        The problems in order; and the folders with the states of new ones, by family in the list.
 
     Raises:
         KeyError: there is no such set.
@@ -183,7 +184,7 @@ def grown(
         wanted: dict[str, list[standing.Standing]] = defaultdict(list)
         there = {choice.digest for choice in chosen}
         for row in rows:
-            # of equal problems the first
+            # take the first of equal problems
             if row.rating in ("hard", "open") and row.digest not in there:
                 there.add(row.digest)
                 wanted[row.id.rpartition("/")[0]].append(row)
@@ -220,13 +221,13 @@ def grown(
 
 # one-contact solvers of nsgs, in the order of the table
 LOCAL_SOLVERS = ("exact", "projection", "diagonal", "alart-curnier", "fischer-burmeister")
-SWEEPS = 100  # of a contact, at most
-LOCAL_TOLERANCE = 1e-10  # tighter ones are a matter of rounding where W is small
+SWEEPS = 100  # largest number for a contact
+LOCAL_TOLERANCE = 1e-10  # if W is small, tighter ones depend on rounding
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A problem of one contact, and the sweeps that each local solver took; SWEEPS + 1: failed."""
+    """A problem of one contact, and the sweeps of each local solver; SWEEPS + 1 means failed."""
 
     problem: Any
     origin: str
@@ -234,12 +235,12 @@ class Contact:
 
     @property
     def difficulty(self) -> tuple[int, int]:
-        """Solvers that failed, then all sweeps."""
+        """Sort key: number of solvers that failed, then sum of sweeps."""
         sweeps = self.sweeps.values()
         return sum(count > SWEEPS for count in sweeps), sum(sweeps)
 
     def record(self) -> dict[str, Any]:
-        """As `local_problems.json` has it."""
+        """The problem in the format of `local_problems.json`."""
         mu_r = getattr(self.problem, "mu_r", None)
         return {
             "spacedim": self.problem.spacedim,
@@ -253,7 +254,7 @@ class Contact:
 
 
 def measure(problem: Any, origin: str) -> Contact:
-    """Let each local solver try a problem of one contact."""
+    """Try each local solver on a problem of one contact."""
     sweeps = {}
     for name in LOCAL_SOLVERS:
         result = _solve.solve(
@@ -278,11 +279,11 @@ def one_contact(W: Any, q: Any, mu: float, mu_r: float | None) -> Any:
 def contacts_of(path: Path) -> Iterator[tuple[int, Any]]:
     """The contacts of a local file that have a reaction: number, and problem at the solution.
 
-    q_c = u_c - W_cc r_c holds what the other contacts and the bilateral constraints do.
+    q_c = u_c - W_cc r_c holds the effect of the other contacts and of the bilateral constraints.
     """
     problem: Any = _core.read(path)
     solution: Any = _core.read_solution(path)
-    if solution is None:  # none is known
+    if solution is None:  # no solution is known
         return
     d = problem.spacedim
     W = problem.W.tocsr() if hasattr(problem.W, "tocsr") else problem.W
@@ -337,17 +338,18 @@ def local(
 ) -> list[Contact]:
     """The hardest contacts of each family of a collection, and of bodies that spin.
 
-    A contact that most local solvers fail on within SWEEPS sweeps is the hardest, then the one that
-    takes them most sweeps together. At most one is taken of a problem, and of those that take every
-    solver the same sweeps; contacts that no local solver solves are left out.
+    The hardest contact is the one that most local solvers fail on within SWEEPS sweeps; among
+    equals, the one with most sweeps in total. At most one contact is taken from a problem, and at
+    most one of those on which every solver takes the same sweeps. A contact that no local solver
+    solves is left out.
 
     Args:
         folder: a built collection, with local forms.
-        sample: problems of each family, evenly spread.
-        per_family: contacts that are taken of each.
-        spins: spinning bodies, drawn by the seeds 0, 1, ...
-        asymmetric: those that are taken of them, half of them with rolling friction.
-        progress: called with SET/FAMILY, problems done and their number.
+        sample: number of problems of each family, evenly spread.
+        per_family: number of contacts taken from each family.
+        spins: number of spinning bodies, drawn with the seeds 0, 1, ...
+        asymmetric: number of contacts taken from them, half with rolling friction.
+        progress: called with SET/FAMILY, problems done and their total.
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -376,10 +378,10 @@ def local(
 
 
 def take(contacts: Sequence[Contact], count: int) -> list[Contact]:
-    """The hardest of those that some local solver solves; of equals the first alone."""
+    """The hardest contacts that some local solver solves; of equals only the first."""
     solvable = [contact for contact in contacts if min(contact.sweeps.values()) <= SWEEPS]
     ranked = sorted(solvable, key=lambda contact: contact.difficulty, reverse=True)
-    # a contact that lasts is much the same in many steps
+    # a lasting contact changes little over many steps
     distinct: dict[tuple[int, ...], Contact] = {}
     for contact in ranked:
         distinct.setdefault(tuple(contact.sweeps.values()), contact)

@@ -1,10 +1,10 @@
-"""What tells problems apart: features of a problem's structure, and of what solvers make of it.
+"""Features of problems: of their structure, and of the behaviour of solvers on them.
 
-The behaviour is that of solvers of different kinds, each given few iterations: what a step of
-Newton's method or a sweep costs is another matter, and another machine gives the same figures.
+The behaviour is that of solvers of different kinds, each with a few iterations. The cost of a step
+of Newton's method or of a sweep does not count, so another machine gives the same figures.
 
-SciPy and the analysis are imported where they are used: the command line names this module whenever
-it shows the commands of `fclib collection`.
+SciPy and the analysis are imported only when they are used: the command line names this module
+whenever it shows the commands of `fclib collection`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ from fclib import _core, _solve, scenes
 Array = npt.NDArray[np.float64]
 
 TOLERANCE: Final = 1e-8
-# a solver of each kind, and its iterations at most: sweeps, steps of a gradient method, Newton's
+# a solver of each kind, and its largest number of iterations: sweeps, steps of a gradient method,
+# Newton's
 SOLVERS: Final[Mapping[str, int]] = {
     "nsgs": 100,
     "apgd": 200,
@@ -30,16 +31,16 @@ SOLVERS: Final[Mapping[str, int]] = {
     "ppa-nsn": 60,
     "auto": 200,
 }
-TIME_LIMIT: Final = 0.5  # [s] of each; large problems end by it
-DENSE: Final = 1500  # contact components of which W's spectrum is found
-NEAR: Final = 1e-3  # of W and of q, relative: below it two problems are nearly the same
+TIME_LIMIT: Final = 0.5  # [s] for each solver; large problems end by it
+DENSE: Final = 1500  # largest number of contact components for which W's spectrum is found
+NEAR: Final = 1e-3  # relative difference of W and of q: below it two problems are nearly the same
 
 
 class Matrix:
-    """W and q of a problem, as they are compared."""
+    """W and q of a problem, in the form that is compared."""
 
     def __init__(self, problem: Any) -> None:
-        """Of a problem of any form."""
+        """Make it from a problem of any form."""
         from fclib.analysis._data import columns
 
         local = problem.condense() if problem.kind.startswith("global") else problem
@@ -50,7 +51,7 @@ class Matrix:
         self.mu = np.asarray(local.mu, dtype=float)
 
     def near(self, other: Matrix, bound: float = NEAR) -> bool:
-        """Whether W and q of both differ by less than `bound` of their norms, and mu does not."""
+        """Whether W and q of both differ by less than `bound` of their norms, and mu is equal."""
         from scipy.sparse.linalg import norm
 
         if self.W.shape != other.W.shape or self.problem.kind != other.problem.kind:
@@ -63,7 +64,7 @@ class Matrix:
 
 
 def thinned(matrices: Iterable[tuple[int, Matrix]]) -> list[tuple[int, Matrix]]:
-    """Those that are not nearly the same as an earlier one."""
+    """The problems that are not nearly the same as an earlier one."""
     kept: list[tuple[int, Matrix]] = []
     for number, matrix in matrices:
         if not any(matrix.near(other) for _, other in kept):
@@ -72,11 +73,11 @@ def thinned(matrices: Iterable[tuple[int, Matrix]]) -> list[tuple[int, Matrix]]:
 
 
 def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
-    """Features of a problem's data; None where they are not known.
+    """Features of a problem's data; None if not known.
 
     Args:
-        matrix: of the problem.
-        source: the scene that it is of, or the family.
+        matrix: W and q of the problem.
+        source: its scene, or its family.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -123,7 +124,7 @@ def structure(matrix: Matrix, source: Any) -> dict[str, float | None]:
 
 
 def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
-    """Rank and conditioning of W, without its bilateral constraints; None where m is large."""
+    """Rank and conditioning of W, without its bilateral constraints; None if m is large."""
     from fclib.analysis._data import Data
     from fclib.analysis._spectrum import spectrum
 
@@ -140,11 +141,11 @@ def spectrum_of(problem: Any, m: int) -> tuple[int | None, float | None]:
 
 
 def behaviour(matrix: Matrix) -> dict[str, float | None]:
-    """What each of SOLVERS reaches, and after how many iterations; None where it takes it not."""
+    """The error and the iterations of each of SOLVERS; None if it does not take the problem."""
     found: dict[str, float | None] = {}
     for name, iterations in SOLVERS.items():
         try:
-            # condensed once for all of them
+            # condensed once for all solvers
             result = _solve.solve(
                 matrix.local,
                 name,
@@ -161,7 +162,7 @@ def behaviour(matrix: Matrix) -> dict[str, float | None]:
     return found
 
 
-# how features are measured against each other: name, whether by logarithm, least value, weight
+# the scale of each feature: name, whether by logarithm, least value, weight
 SCALES: Final[tuple[tuple[str, bool, float, float], ...]] = (
     ("nc", True, 1.0, 2.0),
     ("n", True, 1.0, 1.0),
@@ -188,10 +189,10 @@ SCALES: Final[tuple[tuple[str, bool, float, float], ...]] = (
 
 
 def points(rows: list[dict[str, Any]]) -> Array:
-    """Rows of features as points (rows x features): logarithms, mean 0, deviation its weight.
+    """Rows of features as points (rows x features): logarithms of mean 0, scaled by weight.
 
-    What is not known takes the mean. A solver's features count half each, all together as much as
-    seven of the structure.
+    A value that is not known is set to the mean. Each feature of a solver counts half; all together
+    count as much as seven of the structure.
     """
     made = [column(rows, name, log, least) * weight for name, log, least, weight in SCALES]
     for name in SOLVERS:

@@ -20,7 +20,7 @@ MEASURES = (
 
 
 def draw_scene(model: Model, folder: Path) -> Path | None:
-    """Write scene.png, the state of a model; None where nothing can draw here."""
+    """Write scene.png, the state of a model; None if nothing can draw here."""
     from fclib.simulate import NoRenderer, render
 
     target = folder / "scene.png"
@@ -32,16 +32,16 @@ def draw_scene(model: Model, folder: Path) -> Path | None:
 
 
 def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: str) -> None:
-    """Write distribution.png and .svg: histograms as in RT-0444, problems over each measure.
+    """Write distribution.png and .svg: histograms as in RT-0444, one for each measure.
 
-    Nothing is drawn where Matplotlib is not there.
+    Without Matplotlib nothing is drawn.
     """
     try:
         figure_module = importlib.import_module("matplotlib.figure")
         matplotlib = importlib.import_module("matplotlib")
     except ImportError:
         return
-    # identifiers of an SVG are random otherwise
+    # otherwise the identifiers of an SVG are random
     with matplotlib.rc_context({"svg.hashsalt": "fclib", "font.size": 9}):
         figure = figure_module.Figure(figsize=(9, 2.6), layout="constrained")
         axes = figure.subplots(1, len(MEASURES), sharey=True)
@@ -55,4 +55,4 @@ def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: st
         figure.suptitle(f"{title}: {len(rows)} problems", fontsize=10)
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
             figure.savefig(folder / f"distribution{suffix}", dpi=160, metadata=metadata)
-            figure.set_layout_engine("none")  # the axes stay where they are
+            figure.set_layout_engine("none")  # fixes the place of the axes

@@ -1,4 +1,4 @@
-"""What a solution says of the problem of the next step: the impulses of the same contacts."""
+"""A guess for the problem of the next step: the impulses of the same contacts."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fclib._solve import Given
 
 
 def guess_of(before: Any, solution: Given, problem: Any) -> _core.Solution | None:
-    """What a solution of a problem says of another one's, contact by contact.
+    """A guess for one problem from the solution of another, contact by contact.
 
-    A contact that is new has no reaction, and multipliers stay where there are as many. None where
-    one of the two problems does not name its contacts.
+    A new contact gets no reaction. The multipliers stay if their number is the same. The result is
+    None if one of the two problems does not name its contacts.
 
     Raises:
-        ValueError: the solution is not of the size of its problem.
+        ValueError: the size of the solution does not fit its problem.
     """
     if before.contacts is None or problem.contacts is None or before.spacedim != problem.spacedim:
         return None

@@ -1,14 +1,14 @@
-"""The sets: names that last, versions, and what is in each.
+"""The sets: their permanent names, their versions and their problems.
 
-Every family has the set that it names; its problems are SET/FAMILY/NUMBER. Two kinds are made of
-others:
+Every family names its set; its problems are SET/FAMILY/NUMBER. Two kinds of sets consist of
+problems of others:
 
-extended      all the families that came after RT-0444
-standard, hard, tiny, rr9118    chosen problems, in folders of their own; lists in data/
+extended      all families that are newer than RT-0444
+standard, hard, tiny, rr9118    chosen problems, in folders of their own; data/ has the lists
 
-A version changes when a problem of the set does, or when one comes or goes. Problems of a version
-whose trajectory is stored do not change (`published.py`). A list that has grown says since when it
-has each problem.
+A set gets a new version if a problem changes, comes or goes. If the trajectory of a version is
+stored, its problems never change (`published.py`). A list that has grown notes the version in which
+each problem came.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from fclib.collections import published, trajectory
 from fclib.collections.plan import Plan, evenly, families, source
 
 DATA = Path(__file__).with_name("data")  # lists, and the shipped problems
-SHIPPED = ("tiny",)  # whose problems are there without a build
+SHIPPED = ("tiny",)  # sets whose problems need no build
 
-# name, version, what it is; a set that a family names and that is not here has version 1
+# name, version, description; a set that a family names and that is missing here has version 1
 KNOWN: dict[str, tuple[str, str]] = {
     "rt444": ("5", "the four families of RT-0444"),
     "granular": ("7", "grains that fall, flow and are pressed"),
@@ -59,33 +59,33 @@ EXTENDED = (
 
 @dataclass(frozen=True)
 class Choice:
-    """A problem of a family, by all that decides it."""
+    """A problem of a family, with all values that determine it."""
 
     family: str
     parameters: Mapping[str, Any]
     seed: int
-    number: int  # among the steps with contact
-    step: int  # of the simulation
-    digest: str  # `fclib.digest`; empty where it is not known yet
-    scene: str = ""  # its family's own name, where the list has another one of that name
-    since: str = ""  # the version of the list that it came with, where the list has grown
+    number: int  # its place among the steps with contact
+    step: int  # step of the simulation
+    digest: str  # `fclib.digest`; empty if not known yet
+    scene: str = ""  # the scene's own name, if the list calls the family otherwise
+    since: str = ""  # version of the list in which it came, if the list has grown
 
     @classmethod
     def read(cls, path: Path) -> tuple[Choice, ...]:
-        """The choices of a list. FileNotFoundError, ValueError."""
+        """The choices of a list. Raises FileNotFoundError, ValueError."""
         rows = json.loads(path.read_text(encoding="utf-8"))["problems"]
         return tuple(cls(**row) for row in rows)
 
 
 @functools.cache
 def choices(name: str) -> tuple[Choice, ...]:
-    """The problems of a set that is a list; none for another."""
+    """The problems of a set that is a list; empty for any other set."""
     path = DATA / f"{name}.json"
     return Choice.read(path) if path.is_file() else ()
 
 
 def listed(name: str, version_: str) -> list[Choice]:
-    """The problems of a list in one of its versions; none where the list does not know them."""
+    """The problems of a list in one of its versions; empty if the list does not know them."""
     if version_ == version(name):
         return list(choices(name))
     if not (version_ or "").isdecimal():
@@ -94,36 +94,36 @@ def listed(name: str, version_: str) -> list[Choice]:
 
 
 def kind_of(folder: str) -> str:
-    """Of SET/FAMILY: the family that its scene is of, which a list may call otherwise."""
+    """The family of the scene of SET/FAMILY; a list may call it by another name."""
     name, _, family = folder.rpartition("/")
     return next((c.scene for c in choices(name) if c.family == family and c.scene), family)
 
 
 def version(name: str) -> str:
-    """Of a set: the present one."""
+    """The present version of a set."""
     return KNOWN[name][0] if name in KNOWN else "1"
 
 
 def version_of(folder: str) -> str:
-    """Of SET/FAMILY: the newest that is stored; the set's where none is."""
+    """The newest stored version of SET/FAMILY; if none is stored, that of the set."""
     stored = published.versions(folder)
     return stored[-1] if stored else version(folder.split("/")[0])
 
 
 def stored_version(folder: str, wanted: str | None) -> str:
-    """Of SET/FAMILY in a version of its set: the present one has the newest of each family."""
+    """The version of SET/FAMILY in a version of its set; the present one has the newest."""
     name, family = folder.split("/")
     if wanted is None or wanted == version(name):
         return version_of(folder)
     if any(choice.family == family for choice in listed(name, wanted)):
-        # the newest that there was then
+        # the newest version of that time
         there = [one for one in published.versions(folder) if int(one) <= int(wanted)]
         return there[-1] if there else wanted
     return wanted
 
 
 def problems_of(folder: str) -> int:
-    """How many SET/FAMILY has: those that were chosen or are stored, or as its family says."""
+    """The number of problems of SET/FAMILY: chosen or stored ones, or as its family says."""
     name, _, family = folder.partition("/")
     chosen = sum(choice.family == family for choice in choices(name))
     stored = published.digests(folder, version_of(folder))
@@ -131,7 +131,7 @@ def problems_of(folder: str) -> int:
 
 
 def digests_of(folder: str) -> dict[int, str]:
-    """The digests of SET/FAMILY that are stored, by the problems' numbers; none of a simulation."""
+    """The digests of SET/FAMILY that are stored, by number; empty if it must be simulated."""
     name, _, family = folder.partition("/")
     stored = published.digests(folder, version_of(folder))
     chosen = {c.number: c.digest for c in choices(name) if c.family == family}
@@ -142,9 +142,9 @@ def digests_of(folder: str) -> dict[int, str]:
 
 
 def distinct_of(wanted: Sequence[str]) -> int | None:
-    """How many different problems folders SET/FAMILY have together; None where that is not known.
+    """The number of different problems in folders SET/FAMILY; None if it is not known.
 
-    Of families that would be simulated, or assembled, it is not.
+    It is not known of families that must be simulated or assembled.
     """
     found: set[str] = set()
     for folder in wanted:
@@ -169,14 +169,14 @@ def sets() -> dict[str, list[str]]:
 
 
 def folders(names: Sequence[str], version: str | None = None) -> list[str]:
-    """Names of sets, of families and of families in a set as folders SET/FAMILY, each once.
+    """The folders SET/FAMILY of names of sets, of families, or of families in a set; each once.
 
     Args:
-        names: of these.
-        version: of a list: the families of which it has states, which may be others by now.
+        names: names of these kinds.
+        version: version of a list: its families with states then, which may differ from those now.
 
     Raises:
-        KeyError: a name is none of these.
+        KeyError: a name is of none of these kinds.
     """
     known = sets()
     every = {folder for own in known.values() for folder in own}
@@ -210,14 +210,15 @@ def folders(names: Sequence[str], version: str | None = None) -> list[str]:
 
 
 def numbered(names: Sequence[str], version: str | None = None) -> dict[str, tuple[int, ...]]:
-    """The folders SET/FAMILY of names, with the problems that are named; none where all are.
+    """The folders SET/FAMILY of names, each with the problems named; empty means all.
 
     Args:
-        names: as `folders` takes them, and single problems: SET/FAMILY/NUMBER or FAMILY/NUMBER.
+        names: names for `folders`, and names of single problems: SET/FAMILY/NUMBER or
+            FAMILY/NUMBER.
         version: as for `folders`.
 
     Raises:
-        KeyError: a name is none of these.
+        KeyError: a name is of none of these kinds.
     """
     found: dict[str, set[int] | None] = {}
     for name in names:
@@ -235,16 +236,16 @@ def numbered(names: Sequence[str], version: str | None = None) -> dict[str, tupl
 
 
 def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: Any) -> Plan:
-    """The plan of a folder SET/FAMILY of `folders`; those of a list keep their own seeds.
+    """The plan of a folder SET/FAMILY of `folders`; problems of a list keep their own seeds.
 
-    Its problems are those of the stored trajectory, where there is one of this version and seed:
-    they no longer depend on what the family's file says. Otherwise they are simulated.
+    If a trajectory of this version and seed is stored, the problems are built from its states: they
+    no longer depend on the family's file. Otherwise they are simulated.
 
     Args:
         folder: SET/FAMILY.
-        seed: of the scene.
+        seed: random seed of the scene.
         version: a stored one, or the present one of the set; by default the newest.
-        settings: of the plan.
+        settings: settings of the plan.
 
     Raises:
         VersionError: the version is not stored here.
@@ -266,7 +267,7 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
         frozen, _ = trajectory.read_origin(stored)
         now = any(choice.family == family for choice in choices(plan.collection))
         if choices(plan.collection) and (wanted != version_of(folder) or not now):
-            # the list was another one then
+            # the list had other problems then
             numbers = tuple(published.digests(folder, wanted))
             own: dict[str, Any] = {"chosen": numbers, "problems": numbers[-1] + 1}
             return replace(plan, scene=frozen, trajectory=stored, **own)
@@ -276,11 +277,11 @@ def plan_of(folder: str, seed: int = 0, version: str | None = None, **settings: 
 
 
 def stored_part(plan: Plan) -> Plan:
-    """A plan of those of its problems that its trajectory has, where that keeps some alone."""
+    """The plan for only the problems in its trajectory, if the trajectory has only some."""
     if plan.chosen is not None or plan.trajectory is None:
         return plan
     there = [n for n in trajectory.read_digests(plan.trajectory) if n < plan.total]
-    # all, or too few of a scene that was simulated to its end: the build says so
+    # all are there, or the scene ended too early; then the build says so
     if not there or len(there) == there[-1] + 1:
         return plan
     kept = tuple(there[place] for place in evenly(len(there), plan.count))
@@ -288,10 +289,10 @@ def stored_part(plan: Plan) -> Plan:
 
 
 def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
-    """The plan of a folder SET/FAMILY as its family's file has it now, whatever is stored.
+    """The plan of a folder SET/FAMILY from its family's present file, whatever is stored.
 
     Raises:
-        ValueError: as `plan_of`.
+        ValueError: as `plan_of` raises it.
     """
     name, family = folder.split("/")
     settings = {"collection": name, "version": version_of(folder), **settings}
@@ -309,12 +310,12 @@ def fresh_plan(folder: str, seed: int = 0, **settings: Any) -> Plan:
 
 
 def from_folder(plan: Plan, folder: str | Path) -> Plan:
-    """A plan whose states are those of a trajectory in a folder: the only one of its family there.
+    """A plan whose states come from a folder's trajectory: the only one of its family there.
 
     A family that is assembled directly remains as it is.
 
     Raises:
-        FileNotFoundError: there is none, or there are several versions.
+        FileNotFoundError: the folder has none, or several versions.
         OSError, TrajectoryError: it cannot be read.
     """
     if isinstance(plan.scene, scenes.Assembled):
@@ -328,9 +329,9 @@ def from_folder(plan: Plan, folder: str | Path) -> Plan:
 
 
 def origin_of(row: Mapping[str, Any]) -> str:
-    """What a row of a catalogue is: "published", "differs" from what is, or "yours".
+    """The origin of a row of a catalogue: "published", "differs" from the published, or "yours".
 
-    A problem is published where a trajectory or a list of its version is stored here that has it.
+    A problem is published if a trajectory or list of its version that has it is stored here.
     """
     known = published_digest(row)
     if known is None:
@@ -339,7 +340,7 @@ def origin_of(row: Mapping[str, Any]) -> str:
 
 
 def published_digest(row: Mapping[str, Any]) -> str | None:
-    """The digest that is published under a row's name, version and seed; None where none is."""
+    """The digest published under a row's name, version and seed; None if there is none."""
     folder, number = f"{row['collection']}/{row['family']}", row["number"]
     family = families().get(row["family"])
     if (
@@ -347,7 +348,7 @@ def published_digest(row: Mapping[str, Any]) -> str | None:
         and hasattr(family, "digests")
         and (row["collection"], row["version"]) == (family.collection, version(family.collection))
     ):
-        # of a family that is stored whole
+        # the family is stored whole
         return dict(enumerate(family.digests())).get(number)
     if row["version"] in published.versions(folder):
         if published.seed(folder, row["version"]) != row["seed"]:

@@ -1,4 +1,4 @@
-"""Problems by their names: from the package, or from the user's folder, built or fetched there."""
+"""Problems by their names: from the package, or built or fetched into the user's folder."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fclib._solve import Problem
 from fclib.collections import archives, catalog, known, published
 from fclib.collections.build import Progress, build
 
-FOLDER = "FCLIB_COLLECTION"  # environment: the folder, instead of the user's cache
+FOLDER = "FCLIB_COLLECTION"  # environment variable: the folder, instead of the user's cache
 FORMS = ("global", "local")
-SOURCE = "FCLIB_COLLECTION_URL"  # environment: where published archives lie
+SOURCE = "FCLIB_COLLECTION_URL"  # environment variable: address of the published archives
 
 
 def default_folder() -> Path:
@@ -33,12 +33,12 @@ def is_there(name: str, folder: Path) -> bool:
 
 
 def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
-    """Make SET/FAMILY be there: fetched from FCLIB_COLLECTION_URL, or built; minutes at most.
+    """Fetch SET/FAMILY from FCLIB_COLLECTION_URL, or build it, if it is missing; minutes at most.
 
     Args:
         name: SET/FAMILY.
         folder: of the collection.
-        progress: is told how far a build is, as `build` does.
+        progress: called with the progress of a build, as in `build`.
 
     Raises:
         VersionError: the folder has another version of it.
@@ -46,7 +46,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
     part = folder / name / catalog.FILE
     if part.is_file():
         wanted, found = known.version_of(name), version_in(part)
-        # a version of one's own has a name, and no number that could be older
+        # the version of a user's own set is a name, not a number that could be older
         if found is not None and found.isdecimal() and found != wanted:
             raise published.VersionError(
                 f"{part.parent}: holds version {found} of {name}, and the present one is {wanted}:"
@@ -63,7 +63,7 @@ def ensure(name: str, folder: Path, progress: Progress | None = None) -> None:
 
 
 def folders_in(folder: Path, name: str) -> list[str]:
-    """The folders SET/FAMILY that a collection has of a set, or a family in one, of one's own."""
+    """The folders SET/FAMILY in a collection of the user's own set, or of a family of it."""
     if not re.fullmatch(r"[\w.-]+(/[\w.-]+)?", name):
         return []
     pattern = name if "/" in name else f"{name}/*"
@@ -74,13 +74,13 @@ def folders_in(folder: Path, name: str) -> list[str]:
 
 
 def version_in(part: Path) -> str | None:
-    """The version of a family's part of a catalogue; None where it has none or no problem."""
+    """The version of a family's part of a catalogue; None if it has none or no problem."""
     found: list[str | None] = catalog.read_catalog(part)["version"].to_pylist()
     return found[0] if found else None
 
 
 class Collection(Sequence[Problem]):
-    """The problems of a set or a family, in the order of their names; read when asked for.
+    """The problems of a set or a family, in the order of names; each is read on demand.
 
     >>> problems = fclib.collection("rt444")
     >>> problems[0], problems["rt444/KaplasTower/0100"]
@@ -90,9 +90,9 @@ class Collection(Sequence[Problem]):
     """
 
     def __init__(self, name: str = "rt444", folder: str | Path | None = None) -> None:
-        """KeyError, with the known names, where there is no such set or family."""
+        """If there is no such set or family, a KeyError lists the known names."""
         self.name = name
-        # a set that comes with the package needs nothing that knows of folders
+        # a set in the package needs no module that handles folders
         ours = name.split("/")[0] in known.sets()
         own = [] if ours else folders_in(Path(folder) if folder else default_folder(), name)
         self.folders = own or known.folders([name])
@@ -111,7 +111,7 @@ class Collection(Sequence[Problem]):
 
     @property
     def catalog(self) -> Any:
-        """The rows of these problems (pyarrow.Table); builds what is not there.
+        """The rows of these problems (pyarrow.Table); builds missing ones.
 
         Raises:
             ImportError: pyarrow or MuJoCo is missing.
@@ -131,16 +131,16 @@ class Collection(Sequence[Problem]):
     def filter(
         self, rows: Callable[[Mapping[str, Any]], bool] | None = None, /, **columns: Any
     ) -> Collection:
-        """The problems of certain rows of the catalogue, all that is asked being true.
+        """The problems whose rows of the catalogue meet all conditions.
 
         >>> problems.filter(family="Chain", nc=(10, 20), mu_max=lambda mu: mu < 0.5)
         >>> problems.filter(lambda row: row["slide"] > row["stick"])
 
         Args:
-            rows: is given each row, as a dict by column.
-            columns: of each column a value; bounds (lowest, highest), None where there is none; a
-                list or a set of values; or a function that is true of the values wanted. A row
-                without the value is left out, unless None is asked for.
+            rows: called with each row, as a dict by column.
+            columns: the condition on each column: a value; bounds (lowest, highest), None for no
+                bound; a list or a set of values; or a function that is true for the values wanted.
+                A row without a value is left out, unless None is asked for.
 
         Raises:
             KeyError: the catalogue has no such column.
@@ -167,12 +167,12 @@ class Collection(Sequence[Problem]):
         return found
 
     def to_pandas(self) -> Any:
-        """The catalogue as pandas.DataFrame. ImportError where pandas is not installed."""
+        """The catalogue as pandas.DataFrame. ImportError if pandas is not installed."""
         installed("pandas")
         return self.catalog.to_pandas()
 
     def to_polars(self) -> Any:
-        """The catalogue as polars.DataFrame. ImportError where polars is not installed."""
+        """The catalogue as polars.DataFrame. ImportError if polars is not installed."""
         return installed("polars").from_arrow(self.catalog)
 
     @property
@@ -186,7 +186,7 @@ class Collection(Sequence[Problem]):
         return self._places
 
     def path(self, which: int | str, form: str | None = None) -> Path:
-        """The file of a problem, by its place or its name. IndexError, KeyError.
+        """The file of a problem, by its place or its name. Raises IndexError, KeyError.
 
         The form is "global" or "local"; by default the global one of a problem that has both.
         """
@@ -225,7 +225,7 @@ class Collection(Sequence[Problem]):
 
 
 def is_wanted(value: Any, wanted: Any) -> bool:
-    """Whether a value is what Collection.filter was asked for."""
+    """Whether a value meets a condition of Collection.filter."""
     if callable(wanted):
         return value is not None and bool(wanted(value))
     if isinstance(wanted, tuple):
@@ -240,7 +240,7 @@ def is_wanted(value: Any, wanted: Any) -> bool:
 
 
 def installed(package: str) -> Any:
-    """A package that is no requirement. ImportError, with what to install."""
+    """Import an optional package. Without it an ImportError says what to install."""
     try:
         return importlib.import_module(package)
     except ImportError as error:
@@ -250,17 +250,17 @@ def installed(package: str) -> Any:
 
 
 def load(name: str, form: str | None = None, folder: str | Path | None = None) -> Problem:
-    """One problem by its name, as ``"rt444/KaplasTower/0100"``.
+    """One problem by its name, for example ``"rt444/KaplasTower/0100"``.
 
     Args:
         name: SET/FAMILY/NUMBER.
         form: "global" or "local"; by default the global one of a problem that has both.
-        folder: where the collection lies; by default the user's cache.
+        folder: folder of the collection; by default in the user's cache.
 
     Raises:
-        KeyError: there is no such problem; VersionError, which is one: the folder has it in another
-            version than the present one.
-        ValueError: a form that is neither.
+        KeyError: there is no such problem. If the folder has another version of it, the error is a
+            VersionError, which is a KeyError.
+        ValueError: the form is neither.
     """
     if form not in (None, *FORMS):
         raise ValueError(f'the form is "global" or "local", not {form!r}')
@@ -270,7 +270,7 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
             f"a problem is named SET/FAMILY/NUMBER, not {str(name)!r}; fclib.read reads a file"
         )
     if parts[0] in known.SHIPPED:
-        # needs nothing that reads catalogues
+        # this needs no module that reads catalogues
         for own in (form,) if form else FORMS:
             path = known.DATA / f"{name}-{own}.hdf5"
             if path.is_file():
@@ -285,7 +285,7 @@ def load(name: str, form: str | None = None, folder: str | Path | None = None) -
 
 
 def older_versions(name: str) -> list[str]:
-    """The stored versions of a list that have a problem, where the present one has it not."""
+    """The stored versions of a list that have a problem which the present one lacks."""
     own, _, number = name.rpartition("/")
     listed = known.choices(own.partition("/")[0])
     if not listed or not number.isdecimal():

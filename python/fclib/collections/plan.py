@@ -19,12 +19,13 @@ Form = Literal["global", "local", "both"]
 Selection = Literal["every", "hard"]
 Source: TypeAlias = scenes.Scene | scenes.Assembled
 
-# of the steps of a build without a trajectory: to 1e-12 thirty of LowWall take three times as long
+# tolerance of the steps of a build without a trajectory: 1e-12 takes three times as long for thirty
+# steps of LowWall
 ON_DEMAND = 1e-8
-# a problem's cost to NSGS, where the hard ones are selected
+# limits for a problem's cost to NSGS, if the hard ones are selected
 HARD_TOLERANCE = 1e-6
 HARD_SWEEPS = 2000
-# penetration of a state that is stored, of the smallest body's diameter
+# largest penetration in a stored state, relative to the smallest body's diameter
 DEEPEST = 0.02
 
 
@@ -34,7 +35,7 @@ def families() -> dict[str, type[scenes.Described]]:
 
 
 def source(name: str, parameters: dict[str, Any] | None = None, seed: int = 0) -> Source:
-    """What a family's problems come from: a scene, or the family itself.
+    """The source of a family's problems: a scene, or the family itself.
 
     Raises:
         KeyError: there is no such family.
@@ -47,21 +48,21 @@ def source(name: str, parameters: dict[str, Any] | None = None, seed: int = 0) -
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """How a scene is simulated into a trajectory; by default as one that is to be published."""
+    """The settings of a simulation into a trajectory; by default those for publishing."""
 
     solver: str = "auto"
-    tol: float = 1e-12  # of each step
-    stabilization: float = 0.2  # of `fclib.simulate.simulate`
-    options: dict[str, Any] = field(default_factory=dict)  # its further ones
-    # a state with a deeper penetration is relaxed before it is stored; None: none is
+    tol: float = 1e-12  # tolerance of each step
+    stabilization: float = 0.2  # see `fclib.simulate.simulate`
+    options: dict[str, Any] = field(default_factory=dict)  # its further options
+    # a state with a deeper penetration is relaxed before it is stored; None: never
     deepest: float | None = DEEPEST
-    # what follows a step that is not solved, see `fclib.simulate.simulate`
+    # reaction to a step that is not solved, see `fclib.simulate.simulate`
     unsolved: Literal["best", "stop"] = "best"
     states: str = ""  # FILE.npz or FILE.csv of `fclib.simulate.logged`, instead of a simulation
     control: str = ""  # FILE.csv, FILE.npy or MODULE:FUNCTION of `fclib.simulate.control_of`
 
     def record(self) -> dict[str, Any]:
-        """In JSON's types; of a file of controls also its SHA-256."""
+        """In JSON's types; for a file of controls also its SHA-256."""
         known = asdict(self)
         if self.deepest is None:
             del known["deepest"]
@@ -78,38 +79,42 @@ class Simulation:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is built of one scene, or of a family assembled directly.
+    """The problems to build from one scene, or from a family that is assembled directly.
 
-    The problems of a scene are assembled from a trajectory: a stored one, or one that is simulated
-    first. Solver, tolerance and options are those of the reference solutions, which no problem
-    depends on.
+    The problems of a scene are assembled from a trajectory: a stored one, or a new one that is
+    simulated first. Solver, tolerance and options are for the reference solutions; no problem
+    depends on them.
 
-    With `count` below the number of problems, the rule of selection is
+    If `count` is less than the number of problems, the rule of selection is
 
     every   problems at equal distances, the first and the last among them
     hard    those that take NSGS most sweeps to 1e-6 (2000 at most), the earlier one of two equals
 
-    A plan that names its `numbers` takes those.
+    A plan that names `chosen` numbers takes those.
     """
 
     scene: Source
     collection: str  # the set
-    label: str = ""  # what the set calls the family, where it has another one of the scene's name
+    # the family's name in the set, if the set has another family of the scene's name
+    label: str = ""
     version: str = ""  # of the set
-    problems: int | None  # steps with contact that are looked at; None: as many as `steps` give
-    steps: int | None = None  # at most; None: as many as `problems` need
+    problems: int | None  # number of steps with contact to look at; None: all of the `steps`
+    steps: int | None = None  # largest number of steps; None: as many as `problems` need
     form: Form = "both"
-    count: int | None = None  # problems kept; None: all
+    count: int | None = None  # number of problems kept; None: all
     select: Selection = "every"
-    chosen: tuple[int, ...] | None = None  # the numbers that are kept, in order
-    analyze: bool = False  # also figures of `fclib.analysis.analyze`; a second a problem, or more
+    chosen: tuple[int, ...] | None = None  # numbers of the problems to keep, in order
+    # also store the results of `fclib.analysis.analyze`; a second or more for each problem
+    analyze: bool = False
     trajectory: Path | None = None  # of the scene; None: it is simulated
-    simulation: Simulation = field(default_factory=lambda: Simulation(tol=ON_DEMAND))  # then so
+    # its settings
+    simulation: Simulation = field(default_factory=lambda: Simulation(tol=ON_DEMAND))
     references: bool = True  # whether solutions are found and stored
-    certify: bool = False  # by a second, unrelated algorithm; some seconds a problem
+    # confirm each by a second, unrelated algorithm; some seconds for each problem
+    certify: bool = False
     solver: str = "auto"
-    tol: float = TOLERANCE  # that the solver is asked for; references.py goes on from there
-    options: dict[str, Any] = field(default_factory=dict)  # of `fclib.solve`
+    tol: float = TOLERANCE  # tolerance of the solver; references.py goes on from there
+    options: dict[str, Any] = field(default_factory=dict)  # options of `fclib.solve`
 
     @classmethod
     def of_family(cls, name: str, seed: int = 0, **settings: Any) -> Plan:
@@ -138,32 +143,32 @@ class Plan:
 
     @property
     def name(self) -> str:
-        """SET/FAMILY, also the folder."""
+        """SET/FAMILY; it is also the folder."""
         return f"{self.collection}/{self.family}"
 
     @property
     def family(self) -> str:
-        """What the set calls it."""
+        """The family's name in the set."""
         return self.label or self.scene.name
 
     @property
     def total(self) -> int:
-        """Problems that are looked at, at most."""
+        """The largest number of problems to look at."""
         return min(n for n in (self.problems, self.steps) if n is not None)
 
     @property
     def forms(self) -> tuple[str, ...]:
-        """The forms that are written, of a problem that has both."""
+        """The forms written for a problem that has both."""
         return ("global", "local") if self.form == "both" else (self.form,)
 
     def numbers(self) -> npt.NDArray[np.int64]:
-        """The numbers kept by the rule `every`, or chosen."""
+        """The numbers that the rule `every` keeps, or those chosen."""
         if self.chosen is not None:
             return np.array(self.chosen, dtype=np.int64)
         return evenly(self.total, self.count)
 
     def only(self, numbers: Sequence[int]) -> Plan:
-        """The plan of some of its problems alone. ValueError where it has one of them not."""
+        """The plan for only some of its problems. ValueError if it lacks one of them."""
         own = np.arange(self.total) if self.chosen is None else np.array(self.chosen)
         missing = sorted(set(numbers) - set(own.tolist()))
         if missing:
@@ -172,7 +177,7 @@ class Plan:
         return replace(self, chosen=tuple(sorted(numbers)), count=None, select="every")
 
     def fingerprint(self) -> str:
-        """All that decides what is built, as JSON."""
+        """All settings that decide the built problems, as JSON."""
         return json.dumps(
             {
                 "fclib": _core.version,
@@ -196,7 +201,7 @@ class Plan:
         )
 
     def _states(self) -> dict[str, Any]:
-        """Where the states are from: a file, by its content, or a simulation."""
+        """The origin of the states: a file, by its content, or a simulation."""
         if isinstance(self.scene, scenes.Assembled):
             return {}
         if self.trajectory is None:
@@ -205,17 +210,17 @@ class Plan:
 
 
 def evenly(total: int, count: int | None) -> npt.NDArray[np.int64]:
-    """Of 0, ..., total - 1 so many at equal distances, the first and the last among them."""
+    """`count` of the numbers 0, ..., total - 1 at equal distances, with the first and the last."""
     count = total if count is None else min(count, total)
     return np.unique(np.rint(np.linspace(0, total - 1, count)).astype(np.int64))
 
 
 def origin(scene: Source) -> dict[str, Any]:
-    """What decides a source's problems, in JSON's types."""
+    """The values that decide a source's problems, in JSON's types."""
     known = {"scene": scene.name, "parameters": dict(scene.parameters), "seed": scene.seed}
     if isinstance(scene, scenes.Assembled):
         return known
-    # the version, hence the numbers, of what simulates
+    # the version of the simulator decides the numbers
     from fclib.simulate import engine
 
     return known | {

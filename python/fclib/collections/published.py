@@ -3,7 +3,7 @@
     SET/FAMILY-VERSION.trajectory
 
 They lie in the package `fclib-collection`, installed beside this one, or in `collection/` of a
-checkout. Versions are counted 1, 2, ...; the newest one is meant where none is named.
+checkout. Versions are counted 1, 2, ...; without a version the newest one is used.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ FOLDER = "trajectories"
 
 
 class VersionError(KeyError):
-    """A version of a problem that is not the one asked for, or not stored here."""
+    """The version of a problem is not the one asked for, or is not stored here."""
 
     def __str__(self) -> str:
         return str(self.args[0])
 
 
 def root() -> Path | None:
-    """The folder of the published trajectories; None where the package is not installed."""
+    """The folder of the published trajectories; None if the package is not installed."""
     if IN_PLACE.is_dir():
         return IN_PLACE / FOLDER
     spec = importlib.util.find_spec(PACKAGE)
@@ -37,7 +37,7 @@ def root() -> Path | None:
 
 
 def folders(name: str) -> list[str]:
-    """The folders SET/FAMILY of a set of which any version is stored."""
+    """The folders SET/FAMILY of a set that have any stored version."""
     base = root()
     found = sorted((base / name).glob(f"*-*{trajectory.SUFFIX}")) if base is not None else []
     return list(dict.fromkeys(f"{name}/{path.stem.rpartition('-')[0]}" for path in found))
@@ -57,18 +57,18 @@ def versions(folder: str) -> list[str]:
 
 
 def path_of(folder: str, version: str) -> Path | None:
-    """The file of a version of SET/FAMILY; None where it is not stored here."""
+    """The file of a version of SET/FAMILY; None if it is not stored here."""
     base = root()
     return base / file_name(folder, version) if version in versions(folder) and base else None
 
 
 def file_name(folder: str, version: str) -> str:
-    """Of a version of SET/FAMILY, below a folder of trajectories."""
+    """The file of a version of SET/FAMILY, below a folder of trajectories."""
     return f"{folder}-{version}{trajectory.SUFFIX}"
 
 
 def digests(folder: str, version: str) -> dict[int, str]:
-    """The digest of each problem of a version of SET/FAMILY; none where it is not stored here."""
+    """The digest of each problem of a version of SET/FAMILY; empty if it is not stored here."""
     path = path_of(folder, version)
     return _digests(path) if path is not None else {}
 
@@ -79,7 +79,7 @@ def versions_with(folder: str, number: int) -> list[str]:
 
 
 def seed(folder: str, version: str) -> int | None:
-    """Of the scene of a version that is stored here."""
+    """The seed of the scene of a version that is stored here."""
     path = path_of(folder, version)
     return _origin(path)[0].seed if path is not None else None
 

@@ -1,9 +1,9 @@
-"""A simulation into a trajectory: the act that makes new problems.
+"""Simulate a scene into a trajectory. Only this makes new problems.
 
-Each step is solved to go on to the next one, as precisely as the plan says. What is stored is the
-state at its start, relaxed where bodies are too deep in each other, and rounded, where the problem
-that is assembled from that state has a contact: that problem, and no other one, is of the family.
-The simulation itself goes on from what it reached.
+Each step is solved as precisely as the plan says, to go on to the next one. A state is stored if
+the problem assembled from it has a contact. It is the state at the start of the step, relaxed if
+bodies are too deep in each other, and rounded. That problem, and no other, belongs to the family.
+The simulation itself goes on from the unrounded state that it reached.
 """
 
 from __future__ import annotations
@@ -28,15 +28,16 @@ if TYPE_CHECKING:
 
 CHECKPOINT = 5.0  # seconds between two checkpoints
 
-Progress = Callable[[str, int, int], None]  # name, problems looked at, of how many
+Progress = Callable[[str, int, int], None]  # name, problems looked at, their number
 
 
 @dataclass
 class Recorded:
-    """The states that are kept, and how many problems were looked at."""
+    """The states kept, and the number of problems looked at."""
 
     looked: int = 0
-    unsolved: list[int] = field(default_factory=list)  # steps of the simulation
+    # steps of the simulation that were not solved
+    unsolved: list[int] = field(default_factory=list)
     number: list[int] = field(default_factory=list)
     step: list[int] = field(default_factory=list)
     position: list[Any] = field(default_factory=list)
@@ -57,21 +58,23 @@ class Recorded:
 
 
 def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None = None) -> None:
-    """Simulate the scene of a plan, and write its trajectory; go on where a kill interrupted it.
+    """Simulate the scene of a plan, and write its trajectory; go on if a kill interrupted it.
 
     Args:
-        plan: a scene, how many problems, and how it is simulated.
-        target: the file that is written. It must not be there.
+        plan: the scene, the number of problems, and the settings of the simulation.
+        target: the file to write. It must not exist.
         checkpoint: a file to go on from; removed at the end.
-        report: called with the plan's name, the problems that were looked at and their number.
+        report: called with the plan's name, the problems looked at and their number.
 
-    A simulation that cannot go on ends a plan that says how many steps there are: what came before
-    is stored, and `stopped` of the trajectory's origin says why. A plan of so many problems fails.
+    If the simulation cannot go on, and the plan gives a number of steps, the plan ends: the states
+    before are stored, and `stopped` in the trajectory's origin says why. If the plan gives a
+    number of problems, it fails.
 
     Raises:
-        TypeError: the plan is of a family that is assembled directly, which has no states.
-        FileExistsError, OSError: the file is there already, or cannot be written.
-        ValueError, FloatingPointError, MemoryError, ImportError: as `fclib.simulate.simulate`.
+        TypeError: the family is assembled directly, and so has no states.
+        FileExistsError, OSError: the file exists already, or cannot be written.
+        ValueError, FloatingPointError, MemoryError, ImportError: as `fclib.simulate.simulate`
+            raises them.
     """
     if isinstance(plan.scene, scenes.Assembled):
         raise TypeError(f"{plan.name} is assembled directly: there is nothing to simulate")
@@ -88,14 +91,14 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
     )
 
     way = plan.simulation
-    # the states are assembled by a model of their own, as they are from the file
+    # a second model assembles the states, as later from the file
     model = model_of(plan.scene)
     scheme = scheme_of(model, way.stabilization)
     exponent = trajectory.exponent_of(model)
     kept, start = read_checkpoint(checkpoint)
-    # a scene that never touches anything would go on for ever
+    # a scene without any contact would go on for ever
     most = plan.steps if plan.steps is not None else max(20 * plan.total, 5000)
-    # the last step that starts before counts not, whatever the last digits of its time
+    # a step that starts at the end does not count, whatever the last digits of its time
     first = math.ceil(plan.scene.begin / scheme.h - 1e-6)
     done = start.index if start is not None else 0
     last = time.monotonic()
@@ -165,7 +168,7 @@ def record(plan: Plan, target: Path, checkpoint: Path, report: Progress | None =
             exponent=exponent,
             number=np.array(kept.number, dtype=np.int64),
             step=np.array(kept.step, dtype=np.int64),
-            # of a state, controls and all
+            # the whole state, with controls
             position=np.reshape(kept.position, (count, -1) if count else (0, len(model.position))),
             velocity=np.reshape(kept.velocity, (count, len(model.velocity))),
             digest=tuple(kept.digest),
@@ -186,7 +189,7 @@ class At:
 
 
 def logged_ones(model: Any, path: Path, most: int, done: int) -> Iterator[At]:
-    """The states of a file that come after so many: nothing is solved."""
+    """The states of a file after the first `done` ones; nothing is solved."""
     from fclib.simulate import State, logged
 
     none = np.zeros((0, 2), dtype=np.int64), np.zeros((0, 3, 3)), np.zeros((0, 3))
@@ -197,7 +200,7 @@ def logged_ones(model: Any, path: Path, most: int, done: int) -> Iterator[At]:
 
 
 def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
-    """Store where to go on: the start of a step, and what was kept before it."""
+    """Store a checkpoint: the start of a step, and the states kept before it."""
     known = {name: getattr(kept, name) for name in ("looked", "unsolved", "number", "step")}
     known |= {name: getattr(kept, name) for name in ("digest", "structure")}
     arrays: dict[str, Any] = {
@@ -211,7 +214,7 @@ def write_checkpoint(path: Path, kept: Recorded, start: State) -> None:
 
 
 def read_checkpoint(path: Path) -> tuple[Recorded, State | None]:
-    """What was kept, and where to go on; nothing and None for the scene's start."""
+    """The states kept, and the step to go on from; empty and None at the scene's start."""
     if not path.is_file():
         return Recorded(), None
     from fclib.simulate import State

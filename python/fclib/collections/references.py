@@ -1,15 +1,15 @@
-"""Reference solutions: found from the problem alone, judged by both maps, put into files.
+"""Reference solutions: found from the problem alone, judged by both maps, and stored in files.
 
-    /solution       there only if it is a solution: its error by both maps is at most TOLERANCE
+    /solution       exists only if its error by both maps is at most TOLERANCE
                     attributes: error, merit, natural, scaled_natural, solver, status, ends, date,
                     fclib
-    /solutions      all that are known, of a problem with several
-    /guesses/K      the best iterate, as the last guess, if no solution is known: attributes alike
-    /fclib_*/info   attribute `solution`: why there is none
+    /solutions      all known ones, if a problem has several
+    /guesses/K      if no solution is known: the best iterate, as the last guess, with the same
+    attributes /fclib_*/info   attribute `solution`: the reason if there is none
 
-A solver works to the tolerance that was asked for. FINISH then goes on from what it found, to
-TARGET. Near a solution Newton's methods take a few iterations, and all others take many. If they do
-not come nearer, as with elastic bodies, `auto` does.
+A solver works to the tolerance asked for. FINISH then goes on from its result, to TARGET. Near a
+solution Newton's methods take a few iterations, and all others take many. If FINISH comes no
+nearer, for example with elastic bodies, `auto` goes on.
 """
 
 from __future__ import annotations
@@ -25,27 +25,28 @@ from fclib import _core, _solve
 from fclib._judge import MARK, TOLERANCE, Judgement, judge
 from fclib.collections.catalog import PROVEN
 
-# the best that doubles allow of most problems: rounding of a product W r is 1e-14 of its terms
+# the best that doubles allow for most problems: a product W r is rounded by 1e-14 of its terms
 TARGET: Final = 1e-12
 REACHED: Final = f"{TARGET:g} is reached"
-# who goes on, and iterations at most; no time, so that all machines end at the same solution
+# the solver that goes on, and its largest number of iterations; without a time limit, so that all
+# machines end at the same solution
 FINISH: Final = (("nsn-jm", 30), ("auto", 3000))
 AUTO: Final = "auto"
-CONVERGED: Final = "converged"  # the status of what is a solution by both maps
-EPOCH: Final = "SOURCE_DATE_EPOCH"  # environment: the time that files are to carry, in seconds
+CONVERGED: Final = "converged"  # status of a solution by both maps
+EPOCH: Final = "SOURCE_DATE_EPOCH"  # environment variable: the time stamp for files, in seconds
 
 
 @dataclass(frozen=True)
 class Found:
-    """The best that is known of a problem: a solution, or an iterate."""
+    """The best known result for a problem: a solution, or an iterate."""
 
     solution: _core.Solution
     judgement: Judgement
     solver: str
-    status: str  # what the solver said
-    ends: str  # why there are no more digits, in words
-    date: str = ""  # when it was found; empty: today
-    # what `fclib.analysis.reference` says of it, if that was asked for
+    status: str  # status of the solver
+    ends: str  # reason why there are no more digits, in words
+    date: str = ""  # day on which it was found; empty: today
+    # verdict of `fclib.analysis.reference`, if that was asked for
     certificate: Mapping[str, float | str] = field(default_factory=dict)
 
     @property
@@ -55,7 +56,7 @@ class Found:
 
     @property
     def error(self) -> float:
-        """By both maps."""
+        """The error by both maps."""
         return self.judgement.error
 
     @property
@@ -65,7 +66,7 @@ class Found:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """What a file says of it."""
+        """The attributes of it in a file."""
         merit = self.judgement.merit
         return {
             **self.certificate,
@@ -82,7 +83,7 @@ class Found:
 
     @property
     def row(self) -> dict[str, Any]:
-        """What a catalogue says of it."""
+        """The columns of it in a catalogue."""
         merit = self.judgement.merit
         return {
             "open": merit.open,
@@ -96,14 +97,14 @@ class Found:
 
 
 def today() -> str:
-    """The day of a reference; that of SOURCE_DATE_EPOCH, for files that do not tell the day."""
+    """The day of a reference; SOURCE_DATE_EPOCH, if set, so that files are equal."""
     told = os.environ.get(EPOCH)
     now = datetime.now(timezone.utc)
     return (datetime.fromtimestamp(int(told), timezone.utc) if told else now).date().isoformat()
 
 
 def find(problem: Any, solver: str, tol: float, **options: Any) -> Found:
-    """Solve a problem from nothing, and go on to TARGET.
+    """Solve a problem from a zero start, and go on to TARGET.
 
     Raises as `fclib.solve` does.
     """
@@ -119,10 +120,10 @@ def find(problem: Any, solver: str, tol: float, **options: Any) -> Found:
 
 
 def finished(problem: Any, found: Found) -> Found:
-    """The same to TARGET, or to the last digit that FINISH reaches from it."""
+    """Improve a reference to TARGET, or to the last digit that FINISH reaches."""
     tried = []
     for name, iterations in FINISH:
-        # what was no solution for `auto` is none the second time
+        # if `auto` found no solution, a second try finds none either
         if found.error <= TARGET or (name == AUTO and not found.ok):
             break
         try:
@@ -155,11 +156,11 @@ def finished(problem: Any, found: Found) -> Found:
 
 
 def certified(problem: Any, found: Found) -> Found:
-    """The solution that two unrelated algorithms agree on; else the same, and why it is not one.
+    """The solution on which two unrelated algorithms agree; else the old one, with the reason.
 
     Raises as `fclib.analysis.reference` does.
     """
-    from fclib import analysis  # takes a while
+    from fclib import analysis  # the import takes a while
 
     known = analysis.reference(problem)
     if known.solution is None or not known.error <= TARGET:
@@ -176,29 +177,29 @@ def certified(problem: Any, found: Found) -> Found:
 
 
 def given(problem: Any, solution: _core.Solution, solver: str, date: str = "") -> Found:
-    """A solution that is there already, and who found it."""
+    """A reference from an existing solution, and who found it."""
     judgement = judge(problem, solution)
     status = CONVERGED if judgement.ok else "inaccurate"
     return Found(solution, judgement, solver, status, "as it was given", date)
 
 
 def carried(found: Found, local: Any) -> Found:
-    """Of a global problem, as that of its local form, which is another one by rounding."""
+    """The reference of a global problem from that of its local form, which rounding changes."""
     whole = found.solution
     own = _core.Solution(r=whole.r, u=whole.u, l=whole.l)
     judgement = judge(local, own)
     if not judgement.ok:
-        own = _core.Solution(r=whole.r, l=whole.l)  # u follows
+        own = _core.Solution(r=whole.r, l=whole.l)  # u follows from r
         judgement = judge(local, own)
-    # what a certificate says is of the global form
+    # a certificate is about the global form
     proof = {name: value for name, value in found.certificate.items() if name[:6] != "merit_"}
     mine = replace(found, solution=own, judgement=judgement, certificate=proof)
-    # its own digits end elsewhere
+    # the local form reaches other digits
     return finished(local, replace(mine, ends="")) if found.ok else mine
 
 
 def best_first(found: Found, problem: Any, several: Sequence[_core.Solution]) -> Found:
-    """Of several known solutions one that has reactions, if the solver found that without any."""
+    """One of several known solutions that has reactions, if the solver's own has none."""
     if not several or found.solution.r.any():
         return found
     own = [given(problem, one, "enumeration") for one in several if one.r.any()]
@@ -213,15 +214,15 @@ def write(
     several: Sequence[_core.Solution] = (),
     **settings: Any,
 ) -> None:
-    """Write a problem with what is known of it.
+    """Write a problem with the facts known of it.
 
     Args:
-        path: of the file.
-        problem: what it is.
-        found: the best that is known; None: nothing was looked for.
-        guesses: of other origin.
+        path: path of the file.
+        problem: the problem.
+        found: the best known result; None: none was looked for.
+        guesses: guesses of other origin.
         several: all known solutions, if there are more than one.
-        settings: of `fclib.write`.
+        settings: settings of `fclib.write`.
     """
     own = list(guesses)
     solution = found.solution if found is not None and found.ok else None
@@ -242,7 +243,7 @@ def write(
 
 
 def why_none(found: Found, guess: int) -> str:
-    """Why a file has no solution, in words."""
+    """The reason why a file has no solution, in words."""
     if found.refuted:
         return "there is none, by a checked proof (Farkas' lemma)"
     return (

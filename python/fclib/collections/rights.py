@@ -1,4 +1,4 @@
-"""What a file and a catalogue say of who may use the data, and how to name them."""
+"""License and citation of the data, in files and catalogues."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from fclib import _core
 from fclib.collections.plan import Plan, families
 
-LICENSE = "CC-BY-4.0"  # of the data; the software has another
+LICENSE = "CC-BY-4.0"  # license of the data; the software has another
 CITATION = (
     "V. Acary, M. Bremond, T. Koziara, F. Perignon, FCLIB: a collection of discrete 3D Frictional"
     " Contact problems, Inria RT-0444, 2014; set {set}, version {version}"
@@ -23,7 +23,7 @@ def is_ours(scene: str) -> bool:
 
 
 def of(plan: Plan) -> dict[str, str | None]:
-    """License and citation of a plan's problems; nothing is said of a scene that is not ours."""
+    """License and citation of a plan's problems; both are empty for a scene that is not ours."""
     if not is_ours(plan.scene.name):
         return {"license": None, "citation": None}
     citation = CITATION.format(set=plan.collection, version=plan.version)
@@ -31,9 +31,9 @@ def of(plan: Plan) -> dict[str, str | None]:
 
 
 def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -> _core.ProblemInfo:
-    """The info with all of it in the JSON that ends its description, and the problem's name.
+    """The info; the JSON at the end of its description has these facts and the problem's name.
 
-    The facts are what is known of existence and uniqueness, after what the family says of them.
+    The facts on existence and uniqueness come after those that the family states.
     """
     if facts:
         said = info.math_info.rstrip(". ")

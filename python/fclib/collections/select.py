@@ -1,13 +1,15 @@
 """The set `standard`: problems of all families, few of a kind, chosen by features.
 
 In the manner of MIPLIB 2017 (Gleixner et al., "MIPLIB 2017: data-driven compilation of the 6th
-mixed-integer programming library", 2021): candidates are described by features of their data and of
-what solvers make of them (`features.py`), clustered, and chosen by an integer program. It takes
-problems of as many clusters as it can, few of each, between bounds for each family and for each
-class of sizes; of those that serve alike the ones nearest to their clusters' middles. Where a lower
-bound cannot be met beside the others, as few problems as may be are lacking.
+mixed-integer programming library", 2021): features describe the candidates, those of their data and
+those of the behaviour of solvers (`features.py`). The candidates are clustered, and an integer
+program chooses. It takes problems of as many clusters as it can, few of each, within bounds for
+each family and for each class of sizes. Among equal choices it takes problems nearest to the
+middles of their clusters. If a lower bound cannot be met together with the others, as few problems
+as possible are lacking.
 
-The table of features of all candidates is stored: from it the choice follows, without a problem.
+The table of features of all candidates is stored: the choice follows from it alone, without the
+problems.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ from fclib.collections.known import Choice
 
 Progress = Callable[[str, int, int], None]
 
-# contacts from which a class of sizes begins, and the share of the set that it has
+# number of contacts from which a class of sizes begins, and the class's share of the set
 SIZES: Final = (
     (1, 0.1, 0.25),
     (10, 0.15, 0.3),
@@ -37,23 +39,23 @@ SIZES: Final = (
     (200, 0.15, 0.3),
     (1000, 0.1, 0.15),
 )
-CONTACTS: Final = 20_000  # of a candidate at most
-ENTRIES: Final = 1_000_000  # of its M
+CONTACTS: Final = 20_000  # largest number in a candidate
+ENTRIES: Final = 1_000_000  # largest number of entries of its M
 IDENTITY: Final = ("family", "number", "digest", "nearly_equal")
 
 
 @dataclass(frozen=True)
 class Rule:
-    """How many problems are chosen of what."""
+    """The numbers of problems to choose, by kind."""
 
     problems: int = 240
     clusters: int = 160
-    per_cluster: int = 3  # at most
-    least: int = 3  # of a family, where it has so many
+    per_cluster: int = 3  # largest number from a cluster
+    least: int = 3  # least number from a family, if it has so many
     most: int = 10
 
     def record(self) -> dict[str, Any]:
-        """In JSON's types, with what is fixed in this file."""
+        """The rule in JSON's types, with the constants of this file."""
         return {
             "problems": self.problems,
             "clusters": self.clusters,
@@ -70,7 +72,7 @@ class Rule:
 
 
 def described(found: Candidates, progress: Progress | None = None) -> list[dict[str, Any]]:
-    """A row of features for each candidate of a family that is not nearly the same as another."""
+    """A row of features for each candidate of a family; near copies are left out."""
     name = found.plan.scene.name
 
     def matrices() -> Iterable[tuple[int, features.Matrix]]:
@@ -98,7 +100,7 @@ def described(found: Candidates, progress: Progress | None = None) -> list[dict[
 
 
 def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write rows as a table, figures with six digits: more are noise of the machine's."""
+    """Write rows as a table, numbers with six digits: further digits differ by machine."""
     text = io.StringIO()
     names = list(dict.fromkeys(key for row in rows for key in row))
     writer = csv.DictWriter(text, names, lineterminator="\n")
@@ -112,7 +114,7 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:
-    """Read what `write_table` has written. OSError, ValueError."""
+    """Read a table that `write_table` has written. Raises OSError, ValueError."""
     with path.open(newline="", encoding="utf-8") as file:
         return [
             {
@@ -125,7 +127,7 @@ def read_table(path: Path) -> list[dict[str, Any]]:
 
 
 def describes(rows: Sequence[Mapping[str, Any]], found: Candidates) -> bool:
-    """Whether rows of a table are those of a family's candidates as they are now."""
+    """Whether rows of a table belong to a family's present candidates."""
     if not rows:
         return False
     for row in rows[:: max(1, len(rows) - 1)]:
@@ -146,9 +148,9 @@ def choose(
     """The rows that are chosen, in order.
 
     Args:
-        rows: of the table.
-        rule: how many of what.
-        kept: (family, number) that are taken, and no others of their families.
+        rows: rows of the table.
+        rule: the numbers of problems, by kind.
+        kept: (family, number) that are taken; no others of their families are.
 
     Raises:
         ValueError: no choice is within the bounds.
@@ -165,21 +167,22 @@ def choose(
     family = np.array([str(row["family"]) for row in everything])
     contacts = np.array([float(row["nc"]) for row in everything])
     held = np.array([(str(row["family"]), int(row["number"])) in kept for row in everything])
-    # rows of which nothing is decided any more
+    # rows that are decided already
     settled = held | np.isin(family, [name for name, _ in kept])
-    # who counts, how many are wanted, and how many there may be
+    # for each bound: the rows that count, the least and the largest number
     kinds = [(family == name, rule.least, rule.most) for name in np.unique(family)]
     edges = [least for least, *_ in SIZES] + [np.inf]
     for k, (least, low, high) in enumerate(SIZES):
         own = (contacts >= least) & (contacts < edges[k + 1])
         kinds.append((own, round(low * rule.problems), round(high * rule.problems)))
 
-    # unknowns: whether a row is taken, whether its cluster is met, and how many of a kind lack
+    # unknowns: whether a row is taken, whether its cluster is met, and how many of a kind are
+    # lacking
     columns = count + groups + len(kinds)
     member = cluster[None, :] == np.arange(groups)[:, None]
 
     def total(own: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
-        """The number of those that are taken of some."""
+        """The number of rows taken from some."""
         return np.concatenate([own, np.zeros(columns - count)]).astype(float)
 
     met = np.hstack([member, -np.eye(groups), np.zeros((groups, len(kinds)))])
@@ -194,7 +197,7 @@ def choose(
         constraints.append(LinearConstraint(lacking.copy(), 0, max(most, held[own].sum())))
         lacking[count + groups + k] = 1
         constraints.append(LinearConstraint(lacking, lb=min(wanted, own.sum())))
-    # what lacks costs as much as a cluster that is not met, and both more than any distance
+    # a lacking problem costs as much as a cluster that is not met; both cost more than any distance
     cost = np.concatenate([distance / (1 + distance.sum()), -np.ones(groups), np.ones(len(kinds))])
     solved = milp(
         cost,
@@ -211,7 +214,7 @@ def choose(
 
 
 def clusters(place: features.Array, most: int) -> npt.NDArray[np.int64]:
-    """The cluster of each point, 0, 1, ...; by Ward's method, which joins what widens least."""
+    """The cluster of each point, 0, 1, ...; by Ward's method, which widens clusters least."""
     from scipy.cluster.hierarchy import fcluster, linkage
 
     if len(place) == 1:
@@ -219,13 +222,13 @@ def clusters(place: features.Array, most: int) -> npt.NDArray[np.int64]:
     return np.asarray(fcluster(linkage(place, "ward"), most, "maxclust") - 1, dtype=np.int64)
 
 
-# ---- what a choice is stored as
+# ---- how a choice is stored
 
 
 def choices_of(
     sources: Mapping[str, Candidates], rows: Sequence[Mapping[str, Any]]
 ) -> list[Choice]:
-    """Rows of the table as a list has them."""
+    """Rows of the table in the format of a list."""
     chosen = []
     for row in rows:
         found, number = sources[row["family"]], int(row["number"])
@@ -239,12 +242,12 @@ def choices_of(
 
 
 def sources_of(folder: Path, names: Collection[str]) -> dict[str, Candidates]:
-    """Where the problems of a built folder are from: of each family its stored states.
+    """The origin of the problems of a built folder: the stored states of each family.
 
     Raises:
         CatalogError: the folder has no catalogue.
         VersionError: the states of a family are not stored here.
-        OSError, TrajectoryError: they cannot be read.
+        OSError, TrajectoryError: the states cannot be read.
     """
     found = {}
     for row in catalog.read_catalog(folder).to_pylist():
@@ -269,7 +272,7 @@ def publish(
 ) -> list[Path]:
     """Store the states of chosen problems as those of a set.
 
-    A family whose problems are stored already, in whatever version, is left as it is. OSError.
+    A family whose problems are stored already, in any version, is left as it is. Raises OSError.
     """
     written = []
     for family, found in sources.items():

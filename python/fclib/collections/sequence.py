@@ -4,7 +4,7 @@
         result = fclib.solve(step.problem, guess=step.guess())          of the stored solutions
         result = fclib.solve(step.problem, guess=step.guess(result))    of one's own
 
-Contacts are linked by what names them (`fclib.Contacts.identity`).
+Contacts are linked by their names (`fclib.Contacts.identity`).
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ class Step:
     step: int  # of the simulation
     problem: Problem
     solution: _core.Solution | None  # the stored one
-    before: Step | None  # None where the step before is not there; it knows of no one before it
+    before: Step | None  # None if the step before is missing; that step has no `before` itself
 
     def guess(self, solution: Given | None = None) -> _core.Solution | None:
         """A guess from a solution (or a result, or reactions) of the step before.
 
-        By default from the stored one.
+        By default it is from the stored one.
 
-        None at the first problem, after a step without a problem, and where the contacts of one of
-        the two have no names.
+        It is None at the first problem, after a step without a problem, and if the contacts of one
+        of the two have no names.
 
         Raises:
             ValueError: the solution is not of the size of the step before.
@@ -52,8 +52,8 @@ def sequence(
     """The problems of a family in the order of their steps, as they are read.
 
     Args:
-        name: a family, or SET/FAMILY; it is built where it is not there.
-        folder: as `collection` has it.
+        name: a family, or SET/FAMILY; it is built if it is missing.
+        folder: as in `collection`.
         form: "global" or "local"; by default the global one of problems that have both.
 
     Raises:
@@ -82,5 +82,5 @@ def _steps(problems: Collection, form: str | None) -> Iterator[Step]:
             before if follows else None,
         )
         yield step
-        # without those before it, or all of them stay in memory
+        # without earlier steps: else all of them would stay in memory
         before = Step(step.id, step.step, step.problem, step.solution, None)

@@ -1,22 +1,22 @@
-"""How problems stand: easy, hard or open, by runs that are stored and solutions that are known.
+"""The class of problems: easy, hard or open, by stored runs and known solutions.
 
 In the data package `fclib-collection`, beside the trajectories:
 
     results/runs.csv                        a row for each run of a campaign, and for each solution
     results/solutions/DIGEST.npz            r and l of the best solution of an open problem
 
-A problem is known by the digest of its data, of which 16 digits are stored, whatever its name is in
-however many sets. Of the runs to TOLERANCE those at one limit of CPU time have a vote, the limit at
-which most runs of the problem's family were done, of the newest version of each solver:
+The digest of its data identifies a problem, whatever its name and however many sets have it; 16 of
+its digits are stored. Only runs to TOLERANCE have a vote, with the newest version of each
+solver, at one limit of CPU time: the limit of most runs of the problem's family.
 
 easy    more than half of the solvers that take such problems solved it
-hard    not so many
-open    no run and no solution that was taken in has an error within TOLERANCE, and no run has
+hard    at most half of them solved it
+open    no run and no accepted solution has an error within TOLERANCE, and no run has
         proved that there is no solution
 
-What solved means, and the class by the number of solvers, is in `fclib._verdicts`.
+`fclib._verdicts` defines "solved", and the class by the number of solvers.
 
-Runs at another limit have no vote; what they solved is no longer open.
+Runs at another limit have no vote, but a problem that they solved is not open.
 """
 
 from __future__ import annotations
@@ -39,34 +39,35 @@ from fclib._verdicts import UNSUITABLE, is_solved, rating
 from fclib.collections import catalog, known, published, trajectory
 
 TOLERANCE: Final = 1e-8
-DIGITS: Final = 16  # of a digest
+DIGITS: Final = 16  # digits of a digest that are stored
 TAKEN: Final = "taken"  # the status of a solution that came from elsewhere
-BETTER: Final = 0.9  # times the best error known: what a new solution must reach
+BETTER: Final = 0.9  # a new solution must reach so many times the best error known
 FOLDER: Final = "results"
-FIRST: Final = "standard"  # the set that most runs are of
+FIRST: Final = "standard"  # the set of most runs
 
 
 class StandingError(ValueError):
-    """A solution that is not taken, and why; or results that cannot be stored."""
+    """A solution is refused, with the reason; or results cannot be stored."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a campaign, or a solution that was taken in; a row of runs.csv."""
+    """A run of a campaign, or an accepted solution; a row of runs.csv."""
 
-    problem: str  # FAMILY/NUMBER, to be read by people
-    digest: str  # of its data
-    solver: str  # or who found the solution, and how
-    version: str  # of the solver; empty for a solution
+    problem: str  # FAMILY/NUMBER, for readers
+    digest: str  # digest of its data
+    solver: str  # or the finder of the solution, and the way
+    version: str  # version of the solver; empty for a solution
     limit: float | None  # [s] of CPU time
-    status: str  # of the bench, or TAKEN
-    error: float | None  # of the tolerance's merits the largest; None: there is no solution
+    status: str  # status of the bench, or TAKEN
+    # largest of the merits that the tolerance bounds; None: there is no solution
+    error: float | None
     cpu: float | None  # [s]
     date: str
 
     @property
     def solved(self) -> bool:
-        """Whether its solver had the answer, in time."""
+        """Whether its solver found the answer in time."""
         return is_solved(self.status)
 
     @property
@@ -77,29 +78,29 @@ class Run:
 
 @dataclass(frozen=True)
 class Standing:
-    """A problem, and what is known of how hard it is."""
+    """A problem, and the known facts of its difficulty."""
 
     id: str
     digest: str
-    rating: str  # easy, hard or open; empty where it was not run
-    solved: int  # by so many
-    voters: int  # of so many solvers
-    limit: float | None  # [s] of CPU time that these had, one for a family; None where none was run
-    best: Run | None  # the one with the least error
-    solution: Path | None  # where it is stored
+    rating: str  # easy, hard or open; empty if it was not run
+    solved: int  # number of solvers that solved it
+    voters: int  # number of solvers with a vote
+    limit: float | None  # [s] CPU time limit of these, one for a family; None if none was run
+    best: Run | None  # the run with the least error
+    solution: Path | None  # file of the best solution
 
 
 @dataclass(frozen=True)
 class Basis:
-    """What the classes of a set rest on."""
+    """The basis of the classes of a set."""
 
-    limits: tuple[float, ...]  # [s] of CPU time, those of its families
-    solvers: tuple[str, ...]  # with a vote
+    limits: tuple[float, ...]  # [s] of CPU time, the limits of its families
+    solvers: tuple[str, ...]  # solvers with a vote
     versions: tuple[str, ...]
-    dates: tuple[str, str]  # the first and the last
+    dates: tuple[str, str]  # first and last day of the runs
 
     def __str__(self) -> str:
-        """In a sentence."""
+        """The basis in one sentence."""
         return (
             f"to {TOLERANCE:g} within {' or '.join(f'{limit:g}' for limit in self.limits)} s of CPU"
             f" a run, by {len(self.solvers)} solvers"
@@ -112,7 +113,7 @@ class Basis:
 
 
 def folder() -> Path:
-    """Where results lie. StandingError where the package of trajectories is not here."""
+    """The folder of results. StandingError if the package of trajectories is missing."""
     root = published.root()
     if root is None:
         raise StandingError(
@@ -122,7 +123,7 @@ def folder() -> Path:
 
 
 def runs() -> tuple[Run, ...]:
-    """All runs that are stored. StandingError, OSError."""
+    """All stored runs. Raises StandingError, OSError."""
     path = folder() / "runs.csv"
     return _read(path, path.stat().st_mtime_ns) if path.is_file() else ()
 
@@ -155,18 +156,18 @@ def write(rows: Iterable[Run]) -> Path:
 
 
 def place_of(run: Run) -> tuple[Any, ...]:
-    """What runs are sorted by: no two of the table are equal in it."""
+    """The sort key of runs: no two of the table have the same."""
     return run.problem, run.digest, run.solver, run.date, run.limit or 0.0, run.version
 
 
 def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> int:
-    """Add the runs of campaigns to the table; how many it has taken.
+    """Add the runs of campaigns to the table. Return the number taken.
 
     A run of the same solver in the same version at the same limit is replaced.
 
     Args:
-        results: rows of the view `results` of stores of the bench.
-        problems: FAMILY/NUMBER by the digest of those that are wanted.
+        results: rows of the view `results` from stores of the bench.
+        problems: FAMILY/NUMBER by digest, for the problems wanted.
     """
     new: dict[tuple[Any, ...], Run] = {}
     for row in results:
@@ -190,7 +191,7 @@ def add(results: Iterable[Mapping[str, Any]], problems: Mapping[str, str]) -> in
 
 
 def identity(run: Run) -> tuple[Any, ...]:
-    """What makes two runs the same."""
+    """Two runs with this key are the same."""
     return run.digest, run.solver, run.version, run.limit
 
 
@@ -200,8 +201,8 @@ def identity(run: Run) -> tuple[Any, ...]:
 def members(name: str) -> dict[str, str]:
     """The digests of the problems of a set, by their names.
 
-    Of a list, of stored states, or of problems that are assembled for it: seconds. A family that
-    would have to be simulated has none.
+    They come from a list, from stored states, or from problems that are assembled here, in seconds.
+    A family that must be simulated has none.
     """
     found = {f"{name}/{c.family}/{c.number:04d}": c.digest for c in known.choices(name)}
     listed = {own.rpartition("/")[0] for own in found}
@@ -212,7 +213,7 @@ def members(name: str) -> dict[str, str]:
 
 
 def digests(own: str) -> dict[int, str]:
-    """Of the problems of SET/FAMILY, by their numbers."""
+    """The digests of the problems of SET/FAMILY, by their numbers."""
     stored = published.digests(own, known.version_of(own))
     scene = None if stored else known.plan_of(own).scene
     if not isinstance(scene, scenes.Assembled):
@@ -223,7 +224,7 @@ def digests(own: str) -> dict[int, str]:
 
 
 def standings(name: str) -> tuple[list[Standing], Basis | None]:
-    """How each problem of a set stands, and what that rests on; None where nothing was run.
+    """The class of each problem of a set, and its basis; None if nothing was run.
 
     Raises:
         KeyError: there is no such set.
@@ -243,9 +244,9 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
         mine = stored[digest[:DIGITS]]
         counts = done[name_.rpartition("/")[0]]
         limit = max(counts, key=lambda value: (counts[value], -value), default=None)
-        # of several versions of a solver the last one has the vote
+        # the last version of a solver has the vote
         last = {run.solver: run for run in sorted(mine, key=when) if run.limit == limit}
-        # a solution that was taken in has no limit, and no vote
+        # an accepted solution has no limit and no vote
         voters = [run for run in last.values() if run.limit and run.status != UNSUITABLE]
         voting += voters
         rows.append(standing(name_, digest, mine, voters))
@@ -262,18 +263,18 @@ def standings(name: str) -> tuple[list[Standing], Basis | None]:
 
 
 def when(run: Run) -> str:
-    """Of runs the later one counts."""
+    """The order of runs: the later one counts."""
     return run.date
 
 
 def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run]) -> Standing:
-    """Of one problem."""
+    """The standing of one problem."""
     solved = sum(run.solved for run in voters)
     judged = [run for run in mine if run.error is not None]
     best = min(judged, key=lambda run: run.error or 0.0, default=None)
     found = rating(solved, len(voters))
     if found == "open" and any(run.settled for run in mine):
-        found = "hard"  # at another limit, or by somebody else
+        found = "hard"  # solved at another limit, or by somebody else
     path = solution_path(digest)
     limit = voters[0].limit if voters else None
     return Standing(
@@ -285,7 +286,7 @@ def standing(name: str, digest: str, mine: Sequence[Run], voters: Sequence[Run])
 
 
 def solution_path(digest: str) -> Path:
-    """Where the best solution of a problem is stored, if it is."""
+    """The file of the best solution of a problem, if it is stored."""
     return folder() / "solutions" / f"{digest[:DIGITS]}.npz"
 
 
@@ -302,7 +303,7 @@ def problem_of(name: str) -> Any:
 
 
 def known_solution(name: str) -> tuple[Any, _core.Solution, dict[str, Any]]:
-    """An open problem, the best solution known, and who found it. StandingError without one."""
+    """An open problem, the best solution known, and its finder. StandingError if there is none."""
     digest = members(name.split("/")[0]).get(name)
     if digest is None:
         raise StandingError(f"{name}: there is no such problem")
@@ -323,26 +324,26 @@ def stored_solution(digest: str) -> tuple[_core.Solution, dict[str, Any]] | None
 
 
 def solution_of(r: Any, multipliers: Any) -> _core.Solution:
-    """Of reactions, and the multipliers of bilateral constraints where there are any."""
+    """A solution from reactions, and from multipliers of bilateral constraints if there are any."""
     return _core.Solution(r=r) if multipliers is None else _core.Solution(r=r, l=multipliers)
 
 
 def take(path: Path, by: str, name: str | None = None) -> tuple[str, float, float]:
     """Verify the solution of an open problem that a file holds, and keep it if it is better.
 
-    It is judged on the collection's own problem, assembled from its state; of the file's problem
-    nothing but the digest is used.
+    It is judged on the collection's own problem, assembled from its state. Of the file's problem
+    only the digest is used.
 
     Args:
         path: an FCLIB file with a problem, in its global or local form, and a solution.
-        by: who found it, and how.
-        name: SET/FAMILY/NUMBER; by default by the digest of the file's problem.
+        by: the finder, and the way.
+        name: SET/FAMILY/NUMBER; by default it is found by the digest of the file's problem.
 
     Returns:
-        The name, the error, and the best one that was known before.
+        The name, the error, and the best error known before.
 
     Raises:
-        StandingError: it is of no open problem, or not better.
+        StandingError: the problem is not open, or the solution is not better.
         fclib.Error, OSError: the file cannot be read, or the results not written.
     """
     problem, solution = _core.read(path), _core.read_solution(path)
@@ -389,10 +390,10 @@ def store_solution(
 
 
 def recognised(path: Path, problem: Any) -> str:
-    """The name of a file's problem in a list, by its digest. StandingError where it has none."""
+    """The name of a file's problem in a list, by its digest. StandingError if it has none."""
     own = _digest.digest(problem)
     lists = [name for name in known.sets() if known.choices(name)]
-    # the set that classes are made for before others
+    # first the set for which classes are made
     for name in sorted(lists, key=lambda name: name != FIRST):
         rows, _ = standings(name)
         for row in rows:

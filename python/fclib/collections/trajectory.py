@@ -2,25 +2,26 @@
 
     problem = trajectory.problem(i).problem     a function of the scene and of state i alone
 
-A state is a configuration q (nq) and a velocity v (n) at the start of a step; q has the time where
-loads or controls change with it. All else that the assembly needs is the scene's, and is in the
-file: the MJCF text or the elastic blocks, time step, law, restitution, activation. Impulses of the
-step before are not needed: they are a guess for a solver and no part of a problem.
+A state is a configuration q (nq) and a velocity v (n) at the start of a step; q has the time if
+loads or controls depend on it. The scene has all else that the assembly needs, and is in the file:
+the MJCF text or the elastic blocks, time step, law, restitution, activation. Impulses of the
+step before are not needed: they are a guess for a solver, not part of a problem.
 
 States are rounded to multiples of a power of 2 (`simulate/rounding.py`), and problems are assembled
 from the rounded ones: nothing adds up, since each problem starts from its own state. Multiples of a
-fixed quantum rather than floats of 32 bits, because a body at rest 100 m above the ground needs the
-same resolution of its gap as one on it, and because what rests is then 0 and takes no room.
+fixed quantum are used, not floats of 32 bits: a body at rest 100 m above the ground needs the same
+resolution of its gap as one on the ground. And values at rest become 0, which takes no room.
 
-The file is a ZIP archive, which any tool opens, compressed by LZMA, which Python's own library has:
+The file is a ZIP archive, which any tool opens. It is compressed by LZMA, which is in Python's own
+library:
 
-    trajectory.json     what is in it, the scene, what simulated it, and the shapes of the arrays
+    trajectory.json     the contents, the scene, the simulator, and the shapes of the arrays
     position.bin        (K x nq) integers of the quantum, see below
     velocity.bin        (K x n)
     number.bin, step.bin            (K) int64, little-endian
     digest.bin, structure.bin       (K x 32) bytes, `fclib.digest` and the digest of the pattern
     sketch.bin          (K x 13 x 2) float64, little-endian: two sums of each matrix's entries with
-                        signs, in the order of `_digest.FIELDS`; NaN where there is no such matrix
+                        signs, in the order of `_digest.FIELDS`; NaN if there is no such matrix
 
 Integers are stored as second differences along K, those of one coordinate one after the other, in
 zigzag order (0, -1, 1, -2, ...), the bytes of equal weight together, the lowest first: 4.5 MB for
@@ -58,34 +59,35 @@ Integers = npt.NDArray[np.int64]
 
 FORMAT: Final = 1
 SUFFIX: Final = ".trajectory"
-OWN: Final = f"states{SUFFIX}"  # beside the problems of a build that simulated it
+OWN: Final = f"states{SUFFIX}"  # name beside the problems of a build that simulated it
 EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # so that equal trajectories make equal files
 LARGEST: Final = 2**53  # integers that a double holds
-DIFFERENCES: Final = 2  # along the steps
-# of a trajectory, with a row for each state
+DIFFERENCES: Final = 2  # order of differences along the steps
+# arrays of a trajectory, with a row for each state
 ARRAYS: Final = ("number", "step", "position", "velocity", "sketch")
 HEXES: Final = ("digest", "structure")
 
 
 class TrajectoryError(ValueError):
-    """A file that is no trajectory, or one that this version cannot read."""
+    """A file is not a trajectory, or this version cannot read it."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trajectory:
-    """K stored states of a scene, and what is known of their problems."""
+    """K stored states of a scene, and known facts of their problems."""
 
     scene: Scene
-    # how it was simulated, in JSON's types: collection (the set), version, and `settings` of the
+    # the settings of its simulation, in JSON's types: collection (the set), version, and `settings`
+    # of the
     # simulation: solver, tol, warm_start, options, stabilization, fclib (its version)
     origin: Mapping[str, Any]
     exponent: int  # states are multiples of 2^exponent
-    number: Integers  # (K) of the problem in its family, increasing
-    step: Integers  # (K) of the simulation
+    number: Integers  # (K) numbers of the problems in their family, increasing
+    step: Integers  # (K) steps of the simulation
     position: Vector  # (K x nq)
     velocity: Vector  # (K x n)
-    digest: tuple[str, ...] = ()  # (K) `fclib.digest` of the problems as they were published
-    structure: tuple[str, ...] = ()  # (K) of their patterns
+    digest: tuple[str, ...] = ()  # (K) `fclib.digest` of the problems at publication
+    structure: tuple[str, ...] = ()  # (K) digests of their patterns
     sketch: Vector = field(default_factory=lambda: np.zeros((0, len(_digest.FIELDS), 2)))
 
     def __len__(self) -> int:
@@ -100,14 +102,14 @@ class Trajectory:
 
     @cached_property
     def scheme(self) -> MoreauJean:
-        """How its steps are made into problems."""
+        """The assembly of its steps into problems."""
         from fclib.simulate import scheme_of
 
         return scheme_of(self.model, self.origin["settings"]["stabilization"])
 
     @cached_property
     def words(self) -> Callable[..., ProblemInfo]:
-        """What gives the info of a problem, by its step and number."""
+        """The function that gives the info of a problem, by its step and number."""
         from fclib.simulate import descriptions
 
         known = {name: self.origin[name] for name in ("collection", "version")}
@@ -115,7 +117,7 @@ class Trajectory:
         return descriptions(self.scene, self.scheme, settings, self.model.left_out)
 
     def index(self, number: int) -> int:
-        """The place of a problem's number. KeyError where there is no such problem."""
+        """The place of a problem's number. KeyError if there is no such problem."""
         place = int(np.searchsorted(self.number, number))
         if place == len(self) or self.number[place] != number:
             name = f"{self.origin['collection']}/{self.scene.name}/{number:04d}"
@@ -123,13 +125,13 @@ class Trajectory:
         return place
 
     def time(self, place: int) -> float:
-        """At the start of a state's step [s]."""
+        """The time at the start of a state's step [s]."""
         return float(self.step[place] * self.model.time_step)
 
     def problem(self, place: int) -> StepProblem:
-        """The problem of a state, by its place 0, 1, ..., K - 1; solves nothing.
+        """The problem of a state, by its place 0, 1, ..., K - 1; nothing is solved.
 
-        Raises as `fclib.simulate.simulate` does where the scene cannot be assembled.
+        If the scene cannot be assembled, it raises as `fclib.simulate.simulate` does.
         """
         from fclib.simulate import geometry_of, problem_at
 
@@ -140,11 +142,11 @@ class Trajectory:
         return replace(part, problem=part.problem.replace(contacts=contacts, bodies=bodies))
 
     def differences(self, place: int, problem: Any) -> dict[str, float]:
-        """How far a problem is from the published one: of each matrix and vector that is not equal.
+        """The distance of a problem from the published one, for each array that differs.
 
         Returns:
             For each ||A - A'|| / ||A|| in the Frobenius norm, estimated from two sums with signs
-            (`_digest.distance`); infinite for all where the pattern is another one.
+            (`_digest.distance`); infinite for all if the pattern differs.
         """
         if _digest.structure(problem) != self.structure[place]:
             return dict.fromkeys(_digest.parts(problem), math.inf)
@@ -152,7 +154,7 @@ class Trajectory:
 
 
 def part(states: Trajectory, numbers: Iterable[int], collection: str, version: str) -> Trajectory:
-    """Some problems of a trajectory, as those of a version of another set. KeyError."""
+    """Some problems of a trajectory, as a version of another set. Raises KeyError."""
     places = [states.index(number) for number in sorted(numbers)]
     values: dict[str, Any] = {name: getattr(states, name)[places] for name in ARRAYS}
     values |= {name: tuple(getattr(states, name)[i] for i in places) for name in HEXES}
@@ -171,9 +173,9 @@ def exponent_of(model: Model) -> int:
 
 
 def rounded(values: Vector, exponent: int) -> Vector:
-    """Values as multiples of 2^exponent; the nearest one, of two the even one.
+    """Values as multiples of 2^exponent; the nearest one; of two, the even one.
 
-    ValueError where a value is not finite, or so large that it has no such multiple.
+    ValueError if a value is not finite, or is too large to have such a multiple.
     """
     integers = np.rint(np.ldexp(values, -exponent))
     if not (np.abs(integers) < LARGEST).all():
@@ -186,7 +188,7 @@ def rounded(values: Vector, exponent: int) -> Vector:
 
 
 def write(path: Path, trajectory: Trajectory) -> None:
-    """Write a trajectory; equal ones make equal files. OSError, FileExistsError.
+    """Write a trajectory; equal ones make equal files. Raises OSError, FileExistsError.
 
     A file is never rewritten: another trajectory is another version, in a file of its own.
     """
@@ -228,7 +230,7 @@ def write(path: Path, trajectory: Trajectory) -> None:
 
 
 def head_of(path: Path, archive: zipfile.ZipFile) -> dict[str, Any]:
-    """What a file says it is."""
+    """The description in a file."""
     head: dict[str, Any] = json.loads(archive.read("trajectory.json"))
     if head["format"] != FORMAT:
         raise TrajectoryError(
@@ -251,7 +253,7 @@ def opened(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def read_origin(path: Path) -> tuple[Scene, dict[str, Any]]:
-    """The scene of a trajectory and where it is from. OSError, TrajectoryError."""
+    """The scene of a trajectory and its origin. OSError, TrajectoryError."""
     with opened(path) as archive:
         head = head_of(path, archive)
         return scene_of(head["scene"]), head["origin"]
@@ -300,7 +302,7 @@ def read(path: Path) -> Trajectory:
 
 
 def packed(values: Vector, exponent: int) -> tuple[bytes, int]:
-    """Multiples of 2^exponent (K x m) as bytes, and how many bytes a number has."""
+    """Multiples of 2^exponent (K x m) as bytes, and the number of bytes for each."""
     integers = np.rint(np.ldexp(values, -exponent)).astype(np.int64)
     for _ in range(DIFFERENCES):
         integers = np.diff(integers, axis=0, prepend=np.zeros((1, integers.shape[1]), np.int64))
@@ -313,7 +315,7 @@ def packed(values: Vector, exponent: int) -> tuple[bytes, int]:
 
 
 def unpacked(data: bytes, *, shape: list[int], bytes: int, exponent: int) -> Vector:
-    """What `packed` has made into bytes (K x m)."""
+    """The multiples (K x m) that `packed` has made into bytes."""
     rows, columns = shape
     planes = np.zeros((8, rows * columns), dtype=np.uint8)
     planes[:bytes] = np.frombuffer(data, np.uint8).reshape(bytes, rows * columns)
@@ -326,7 +328,7 @@ def unpacked(data: bytes, *, shape: list[int], bytes: int, exponent: int) -> Vec
 
 
 def record(scene: Scene) -> dict[str, Any]:
-    """A scene in JSON's types: all of it but the place of its file on this machine."""
+    """A scene in JSON's types: all of it except the path of its file on this machine."""
     known = asdict(replace(scene, parameters=dict(scene.parameters), path=None))
     if not scene.includes:
         del known["includes"]
@@ -341,7 +343,7 @@ def record(scene: Scene) -> dict[str, Any]:
 
 def scene_of(known: Mapping[str, Any]) -> Scene:
     """The scene of a record."""
-    # without one: simulated before there were allowances, or as such a scene
+    # a missing allowance means zero: older scenes had none
     values: dict[str, Any] = {"allowance": False} | {
         name: tuples(value) if name != "parameters" else value for name, value in known.items()
     }
@@ -357,5 +359,5 @@ def scene_of(known: Mapping[str, Any]) -> Scene:
 
 
 def tuples(value: Any) -> Any:
-    """Lists as tuples, which frozen dataclasses have."""
+    """Lists as tuples, as frozen dataclasses need them."""
     return tuple(tuples(item) for item in value) if isinstance(value, list) else value

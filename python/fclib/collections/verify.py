@@ -1,4 +1,4 @@
-"""Whether a folder still holds what its catalogue says."""
+"""Check that a folder still agrees with its catalogue."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from fclib import _core, _digest
 from fclib._judge import Judgement, judge
 from fclib.collections import catalog, known, published, trajectory
 
-LACKING = ("unfinished", "not listed")  # the words on what a catalogue lacks
-ROUNDING = 1e-9  # relative difference of a matrix that another machine may make
+LACKING = ("unfinished", "not listed")  # statuses of entries that a catalogue lacks
+ROUNDING = 1e-9  # relative difference of a matrix that is allowed on another machine
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What was found of one file."""
+    """The result for one file."""
 
-    id: str  # of the problem; of a file or a family that the catalogue lacks its path
+    id: str  # name of the problem; if the catalogue lacks the file or family, its path
     path: str  # from the catalogue's folder
-    status: str  # "ok", or what is wrong: missing, changed, unreadable, ...
+    status: str  # "ok", or the fault: missing, changed, unreadable, ...
     error: float | None  # of the stored solution, by both maps, if it could be judged
     message: str = ""
-    # of the form that the digest is of: "published", "differs" from what is, or "yours"
+    # origin of the form with the digest: "published", "differs" from the published, or "yours"
     origin: str = ""
-    # from the published one: of each matrix that differs, relative; see `distance`
+    # relative difference from the published one, for each matrix that differs; see `distance`
     differences: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ok(self) -> bool:
-        """Whether all is as the catalogue says."""
+        """Whether the file agrees with the catalogue."""
         return self.status == "ok"
 
 
 def verify(folder: str | Path, progress: Callable[[str], None] | None = None) -> Iterator[Verdict]:
     """Hash each file of a folder again, read it, and judge its solutions from the data alone.
 
-    A stored solution must be one, by the same judgement as `fclib check`, and so must each of
-    several. The data of the form that the catalogue describes must have the digest that stands
-    there. A problem that has the name and version of a published one must be that one, up to
-    rounding on another machine (ROUNDING). What the catalogue lacks comes last: families whose
-    build was cut, and files that no row has.
+    A stored solution must be one, by the same judgement as `fclib check`; if there are several,
+    each must be one. The data of the form that the catalogue describes must have the digest in the
+    catalogue. A problem that has the name and version of a published one must be that one, up to
+    rounding on another machine (ROUNDING). Entries that the catalogue lacks come last: families
+    whose build was cut, and files without a row.
 
     Raises:
         CatalogError: the folder has no catalogue.
@@ -64,7 +64,7 @@ def verify(folder: str | Path, progress: Callable[[str], None] | None = None) ->
 
 
 def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, Any]) -> Verdict:
-    """The verdict on one file."""
+    """Check one file."""
     file = folder / path
     if not file.is_file():
         return Verdict(name, path, "missing", None, f"{file}: is not there")
@@ -90,7 +90,7 @@ def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, A
                 )
                 return Verdict(name, path, "not published", None, message, origin, apart)
     if solution is None:
-        # a catalogue of before had no word for what is not a solution
+        # an older catalogue had no status for a vector that is not a solution
         expected = row["has_solution"]
         if expected is None:
             expected = row["solver"] is not None
@@ -113,17 +113,17 @@ def verdict_on(folder: Path, name: str, path: str, digest: str, row: dict[str, A
 
 
 def numbered(several: Sequence[Judgement]) -> list[tuple[str, Judgement]]:
-    """Of all known solutions each with its place in the file."""
+    """All known solutions, each with its place in the file."""
     return [(f"/solutions/{k}", one) for k, one in enumerate(several, 1)]
 
 
 def distance(problem: Any, row: Mapping[str, Any]) -> dict[str, float]:
-    """How far a problem is from the published one of its name, of each matrix that differs.
+    """The distance of a problem from the published one of its name, for each matrix that differs.
 
-    The largest difference of two entries over the largest entry: from the shipped file, or from the
-    problem that the stored state gives here, where that is the published one up to rounding. Else
-    ||A - A'|| / ||A||, as `Trajectory.differences` estimates it. Empty where only its digest is
-    known.
+    It is the largest difference of two entries over the largest entry. The published matrix comes
+    from the shipped file, or from the problem that the stored state gives here, if that agrees with
+    the published one up to rounding. Otherwise it is ||A - A'|| / ||A||, as
+    `Trajectory.differences` estimates it. If only the digest is known, the result is empty.
     """
     folder = f"{row['collection']}/{row['family']}"
     if row["collection"] in known.SHIPPED:
@@ -148,7 +148,7 @@ def distance(problem: Any, row: Mapping[str, Any]) -> dict[str, float]:
     if max(rounding.values(), default=0.0) > ROUNDING:
         return estimate
     apart = _digest.difference(own, problem)
-    # what differs by this machine's rounding alone is known by the sums, which may be equal
+    # the sums tell whether only this machine's rounding differs; they may even be equal
     return apart or rounding or dict.fromkeys(_digest.parts(problem), 0.0)
 
 

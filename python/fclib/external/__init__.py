@@ -1,12 +1,12 @@
 """Solvers of other packages and programs, behind the contract of our own.
 
-One file, one adapter, found by being here. An adapter has
+Each file in this folder is one adapter. An adapter has
 
-    PREFIX       of its solvers' names, ``siconos:``
-    SOLVERS      what it offers, in words
-    missing()    what is to be installed, empty where nothing is
-    version()    of the package, where nothing is missing; empty where it tells none
-    solvers()    its entries, where nothing is missing
+    PREFIX       prefix of its solvers' names, for example ``siconos:``
+    SOLVERS      its solvers, in words
+    missing()    the package to install; empty if nothing is missing
+    version()    version of the package, if nothing is missing; empty if it has none
+    solvers()    its entries, if nothing is missing
     find(name)   the entry of this name, or None
 
 The package is an entry point of ``fclib.solvers``, like a user's own.
@@ -25,19 +25,19 @@ from fclib import _core
 
 
 class Adapter(Protocol):
-    """What a module of this folder has."""
+    """The contents of a module of this folder."""
 
     PREFIX: str
     SOLVERS: str
 
     def missing(self) -> str:
-        """What is to be installed, empty where nothing is."""
+        """The package to install; empty if nothing is missing."""
 
     def version(self) -> str:
-        """The version of the package, where nothing is missing; empty where it tells none."""
+        """The version of the package, if nothing is missing; empty if it has none."""
 
     def solvers(self) -> Sequence[_core.SolverInfo]:
-        """The entries, where nothing is missing."""
+        """The entries, if nothing is missing."""
 
     def find(self, name: str) -> _core.SolverInfo | None:
         """The entry of a name that begins with the prefix."""
@@ -45,7 +45,7 @@ class Adapter(Protocol):
 
 @dataclass(frozen=True)
 class Absent:
-    """Solvers that could be here, and what is missing."""
+    """Solvers that are not installed, and the missing packages."""
 
     solvers: str
     missing: str
@@ -59,18 +59,18 @@ def adapters() -> tuple[Adapter, ...]:
 
 
 def solvers() -> list[_core.SolverInfo]:
-    """Those that can be used here."""
+    """The adapters that can be used here."""
     return [info for adapter in adapters() if not adapter.missing() for info in adapter.solvers()]
 
 
 def absent() -> list[Absent]:
-    """Those that cannot be used here."""
+    """The adapters that cannot be used here."""
     missing = [(adapter.SOLVERS, adapter.missing()) for adapter in adapters()]
     return [Absent(solvers, word) for solvers, word in missing if word]
 
 
 def find(name: str) -> _core.SolverInfo | None:
-    """The solver of this name, where its prefix is that of an adapter.
+    """The solver of this name, if its prefix is that of an adapter.
 
     Raises:
         OptionError: something must be installed for it, or the adapter has no such solver.

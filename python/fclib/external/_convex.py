@@ -1,11 +1,11 @@
-"""The convex problems that conic solvers are given.
+"""The convex problems for conic solvers.
 
 The relaxation is
 
     min 1/2 r^T W r + q^T r   over r in K_mu,
 
-whose solution has u in K* where the frictional one has u^: bodies that slide rise from each other.
-It is the frictional problem where nothing slides. ACLM finds the latter as the fixed point of
+whose solution has u in K*, while the frictional one has u^ in K*: sliding bodies rise from each
+other. If nothing slides, it is the frictional problem. ACLM finds the latter as the fixed point of
 
     s -> mu ||u_T||,   u = W r + q,   r the solution of the relaxation with q + [s, 0, 0].
 
@@ -32,7 +32,8 @@ from fclib.external._words import RELAXATION
 
 Array: TypeAlias = npt.NDArray[np.float64]
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
-PATIENCE = 50  # iterations of ACLM without a better one, which is the accuracy of the inner solver
+# stop after so many iterations of ACLM without a better one: the inner solver limits the accuracy
+PATIENCE = 50
 CITATION = "Acary, Cadoux, Lemarechal & Malick 2011"
 
 
@@ -44,17 +45,17 @@ class Program:
     A: Any  # (rows x m), by columns
     zeros: int
     nonnegatives: int
-    cones: tuple[int, ...]  # their sizes
+    cones: tuple[int, ...]  # sizes of the cones
 
 
 class ConicSolver(Protocol):
     """A solver of one program for several c."""
 
     def solve(self, c: Array, x: Array, time_left: float) -> Array:
-        """The solution, from x or from a point of its own.
+        """The solution, from x, or from the solver's own starting point.
 
         Raises:
-            ArithmeticError: it cannot be looked for with these numbers.
+            ArithmeticError: no solution can be computed with these numbers.
         """
 
 
@@ -65,7 +66,7 @@ class Relaxation:
     """The relaxation of a problem for varying s."""
 
     def __init__(self, problem: Local, make: Make) -> None:
-        """Raises UnsuitableError where W is not symmetric."""
+        """Raises UnsuitableError if W is not symmetric."""
         W = sp.csc_array(problem.W)
         if abs(W - W.T).max() > 1e-10 * abs(W).max():
             raise _core.UnsuitableError("a convex solver takes no asymmetric W")
@@ -161,7 +162,7 @@ def entries(
 
 
 def _relaxation(problem: Local, r: Array, monitor: _core.Monitor, make: Make) -> Array:
-    """One convex problem; what it does not solve is said to be inaccurate."""
+    """One convex problem; a failure is reported as inaccurate."""
     if monitor.stop(r):
         return r
     try:
@@ -175,7 +176,7 @@ def _relaxation(problem: Local, r: Array, monitor: _core.Monitor, make: Make) ->
 
 
 def _aclm(problem: Local, r: Array, monitor: _core.Monitor, make: Make) -> Array:
-    """The fixed point, one convex problem an iteration; the best iterate is returned."""
+    """The fixed point, with one convex problem for each iteration; it returns the best iterate."""
     if monitor.stop(r):
         return r
     convex = Relaxation(problem, make)

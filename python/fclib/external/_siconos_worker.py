@@ -1,6 +1,7 @@
 """Runs solvers of Siconos for fclib.external.siconos, in an interpreter that has siconos.numerics.
 
-Knows nothing of fclib. A line of JSON in, a line of JSON out; what Siconos prints goes nowhere.
+Knows nothing of fclib. It reads a line of JSON and writes a line of JSON; what Siconos prints is
+dropped.
 """
 
 import ctypes
@@ -22,7 +23,7 @@ KINDS = {
 
 
 def solve(sn: Any, np: Any, order: Any) -> Any:
-    """One solve; the time is that of the driver alone."""
+    """One solve; the time is only that of the driver."""
     read, driver = (getattr(sn, name) for name in KINDS[order["kind"]])
     problem = read(order["path"])
     options = sn.SolverOptions(getattr(sn, order["solver"]))
@@ -47,7 +48,7 @@ def solve(sn: Any, np: Any, order: Any) -> Any:
 
 def main() -> None:
     """Answer until the input ends."""
-    # ends with the process that started it, however that ends
+    # it ends together with the process that started it, however that ends
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)
     replies = os.fdopen(os.dup(1), "w")
     nothing = os.open(os.devnull, os.O_WRONLY)

@@ -1,3 +1,3 @@
-"""What several adapters say."""
+"""Texts that several adapters use."""
 
 RELAXATION = "does not solve Coulomb's law, but where nothing slides"

@@ -22,12 +22,12 @@ SOLVERS = "clarabel:aclm, clarabel:relaxation"
 
 
 def missing() -> str:
-    """What is to be installed."""
+    """The package to install."""
     return "" if importlib.util.find_spec("clarabel") else "pip install clarabel"
 
 
 def version() -> str:
-    """Of the package."""
+    """The version of the package."""
     return importlib.metadata.version("clarabel")
 
 
@@ -53,16 +53,17 @@ class Conic:
         self.package = importlib.import_module("clarabel")
         self.settings = self.package.DefaultSettings()
         self.settings.verbose = False
-        self.settings.presolve_enable = False  # which allows no change of c
+        self.settings.presolve_enable = False  # presolve would allow no change of c
         self.settings.max_threads = 1
         self.settings.tol_feas = max(tolerance, 1e-14)
-        # the solution is known to the root of the gap; what cannot be reached is given up soon
+        # the solution is known to the root of the gap; a precision that cannot be reached is given
+        # up soon
         self.settings.tol_gap_abs = self.settings.tol_gap_rel = max(tolerance**2, 1e-20)
         self.program = program
         self.solver: Any = None
 
     def solve(self, c: Any, x: Any, time_left: float) -> Any:
-        """The solution; x is not made use of."""
+        """The solution; x is not used."""
         self.settings.time_limit = max(time_left, 1e-3)
         if self.solver is None:
             program = self.program

@@ -1,20 +1,19 @@
 """Any program that reads an FCLIB file and writes a solution: ``cmd:PROGRAM {input} {output}``.
 
-The words are those of a command line, without a shell. In them stand for
+The words are those of a command line, without a shell. These placeholders are replaced:
 
     {input}           an FCLIB file with the local problem, without bilateral constraints, and with
-                      the starting point as a guess where there is one
-    {output}          a file that does not exist yet
+    the starting point as a guess if there is one {output}          a file that does not exist yet
     {tol}             the tolerance on the relative natural-map error
-    {time_limit}      [s] what is left of the wall clock, "inf" where there is no limit
+    {time_limit}      [s] remaining wall-clock time, "inf" if there is no limit
     {max_iterations}  the caller's limit
 
 The program ends with exit status 0, and leaves /solution in the output, an FCLIB file or a bare
-one, or in the input where there is no {output}. At the time limit it is killed with all that it
-has started. The time of the result is the CPU time of the program and of what it waited for, with
-its start; its iterations are not known, and stated as 0. A program may say both itself, by the
+one, or in the input if there is no {output}. At the time limit it is killed with all that it has
+started. The time of the result is the CPU time of the program and of what it waited for, with its
+start; its iterations are not known, and stated as 0. A program may say both itself, by the
 attributes `cpu_s` [s] and `iterations` of its /solution. The answer is judged like any other; a
-program that is given {tol} is asked again, for more, where it was content too early.
+program that gets {tol} is run again with a smaller one if it stopped too early.
 """
 
 from __future__ import annotations
@@ -38,7 +37,7 @@ from fclib._registry import make_solver
 PREFIX = "cmd:"
 SOLVERS = "cmd:PROGRAM {input} {output}"
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
-reported = False  # whether the program that was run last has said what its solve took
+reported = False  # whether the last program reported the time of its solve
 PLACES = ("input", "output", "tol", "time_limit", "max_iterations")
 
 
@@ -48,7 +47,7 @@ def missing() -> str:
 
 
 def version() -> str:
-    """None: a program is asked for nothing but solutions."""
+    """None: a program has no version."""
     return ""
 
 
@@ -112,11 +111,11 @@ def _solve(words: list[str], problem: Local, r: Any, monitor: _core.Monitor) -> 
         )
     stop = monitor.stop(solution.r)
     monitor.iterations = int(_number(told, "iterations", words[0], 0) or 0)
-    # the bench has looked at the clock itself, and calls less than nothing a lie
+    # the bench measures the time itself, and treats a negative time as a lie
     if (cpu_s := _number(told, "cpu_s", words[0], -(2**62))) is not None:
         monitor.cpu_s, reported = cpu_s, True
     if not stop and not any("{tol}" in word for word in words):
-        monitor.status = "inaccurate"  # it would do the same again
+        monitor.status = "inaccurate"  # a second run would give the same
     return solution.r
 
 
@@ -158,7 +157,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
     Raises:
         SolverError: it cannot be started, or ends with another status than 0.
     """
-    # where it can be had: the program ends with this process, however this one ends
+    # if the system allows it: the program ends with this process, however this one ends
     guard = shutil.which("setpriv")
     prefix = [guard, "--pdeathsig", "KILL", "--"] if guard and sys.platform == "linux" else []
     with tempfile.TemporaryFile() as words:
@@ -198,7 +197,7 @@ def run(command: list[str], time_limit: float) -> tuple[float, bool]:
 
 
 def _last_line(words: IO[bytes]) -> str:
-    """What a program said last on its standard error."""
+    """The last line of a program's standard error."""
     size = words.seek(0, os.SEEK_END)
     words.seek(max(0, size - 2000))
     lines = words.read().decode(errors="replace").strip().splitlines()

@@ -1,16 +1,16 @@
-"""Pinocchio: the ADMM and the PGS that it solves contacts by, a wheel of PyPI (``pin``).
+"""Pinocchio: its ADMM and PGS for contacts, a wheel of PyPI (``pin``).
 
 Carpentier, Le Lidec & Montaut, "From compliant to rigid contact simulation: a unified and efficient
 approach" (2024).
 
 It takes spatial contacts, their normal component last. The numbers are scaled: the mean of the
 diagonal of W and ||q|| become 1. It is called once, with its own defaults and the caller's limit
-of iterations. Its tolerances are on feasibility and complementarity; where they are met before the
+of iterations. Its tolerances are on feasibility and complementarity; if they are met before the
 error is, it runs again from the same point with tighter ones, and time and iterations are those of
 that run. It knows no time limit: iterations are limited to those that W times a vector leaves time
 for, so that none is cut off early; a solve that factorises often ends later than asked.
 
-W is passed dense. Pinocchio copies it to the stack, and ends the process where that is too small:
+W is passed dense. Pinocchio copies it to the stack, and ends the process if that is too small:
 larger problems are refused. A sparse W only ADMM would take, at seconds an iteration.
 """
 
@@ -32,14 +32,14 @@ from fclib._registry import make_solver
 
 PREFIX = "pinocchio:"
 SOLVERS = "pinocchio:admm, pinocchio:pgs"
-SPEED = 2e9  # multiplications a second, more than one thread does
-STACK = 0.75 * 2**23  # bytes that W may take, of the 8 MiB that are usual
-MOST = math.isqrt(int(STACK / 8)) // 3  # contacts
-LEAST = 1e-16  # tolerance
+SPEED = 2e9  # multiplications a second, more than one thread can do
+STACK = 0.75 * 2**23  # [bytes] largest size of W, of the usual stack of 8 MiB
+MOST = math.isqrt(int(STACK / 8)) // 3  # largest number of contacts
+LEAST = 1e-16  # least tolerance
 
 
 def missing() -> str:
-    """What is to be installed."""
+    """The package to install."""
     if importlib.util.find_spec("pinocchio") is None:
         return "pip install pin"
     if not hasattr(importlib.import_module("pinocchio"), "ADMMConstraintSolver"):
@@ -48,7 +48,7 @@ def missing() -> str:
 
 
 def version() -> str:
-    """Of the package."""
+    """The version of the package."""
     return importlib.metadata.version("pin")
 
 
@@ -84,7 +84,7 @@ def _entry(which: str, family: str, title: str) -> _core.SolverInfo:
 
 
 def _solve(which: str, problem: _core.LocalProblem, r: Any, monitor: _core.Monitor) -> Any:
-    """One call, and further ones where its tolerances do not mean the same as the caller's."""
+    """One call, and further ones if its tolerances differ in meaning from the caller's."""
     if monitor.stop(r):
         return r
     import scipy.sparse as sp
@@ -133,7 +133,7 @@ def _solve(which: str, problem: _core.LocalProblem, r: Any, monitor: _core.Monit
             if not met and iterations < limit:
                 monitor.status = "stalled"
             return best
-        # the error is in proportion
+        # the error is proportional to the tolerance
         tolerance = max(0.5 * tolerance * min(monitor.tolerance / error, 0.5), LEAST)
 
 

@@ -1,4 +1,4 @@
-"""Solvers of one's own in C or C++, in a shared object: ``plugin:PATH``, by include/fclib_plugin.h.
+"""A user's own solvers in C or C++, in a shared object: ``plugin:PATH``, by include/fclib_plugin.h.
 
 The core loads and calls it, in the process and the thread of the caller and without Python's lock;
 what it does to that process is its own affair. A campaign runs each solver in processes of its own.
@@ -20,7 +20,7 @@ def missing() -> str:
 
 
 def version() -> str:
-    """None: a shared object is asked for nothing but solutions."""
+    """None: a shared object has no version."""
     return ""
 
 

@@ -24,16 +24,16 @@ from fclib import _core
 
 PREFIX = "scs:"
 SOLVERS = "scs:aclm, scs:relaxation"
-MAX_ITERATIONS = 20_000  # of one convex problem
+MAX_ITERATIONS = 20_000  # largest number for one convex problem
 
 
 def missing() -> str:
-    """What is to be installed."""
+    """The package to install."""
     return "" if importlib.util.find_spec("scs") else "pip install scs"
 
 
 def version() -> str:
-    """Of the package."""
+    """The version of the package."""
     return importlib.metadata.version("scs")
 
 
@@ -51,7 +51,7 @@ def find(name: str) -> _core.SolverInfo | None:
 
 
 class _Others(io.TextIOBase):
-    """What threads print, but for this one: SCS tells of a failure there, whatever it is told."""
+    """Standard output for other threads: SCS always prints failures, so this thread is silenced."""
 
     def __init__(self, stream: Any) -> None:
         self.stream = stream
@@ -67,7 +67,7 @@ class _Others(io.TextIOBase):
             self.stream.flush()
 
 
-_start = threading.Lock()  # standard output is that of one thread at a time
+_start = threading.Lock()  # only one thread at a time may redirect standard output
 
 
 class Conic:
@@ -80,7 +80,7 @@ class Conic:
         self.solver: Any = None
 
     def solve(self, c: Any, x: Any, time_left: float) -> Any:
-        """The solution. Raises ArithmeticError where SCS cannot begin."""
+        """The solution. Raises ArithmeticError if SCS cannot begin."""
         program = self.program
         if self.solver is None:
             data = {"P": program.P, "A": program.A, "b": np.zeros(program.A.shape[0]), "c": c}

@@ -10,7 +10,7 @@ One worker process serves all solves, is killed at the time limit and started an
 those of rolling problems, which take no blocks. The time is the CPU time of its driver alone, with
 one thread.
 
-Siconos' tolerance is relative to max(||q||, ||r||, ||u||). Where the error relative to ||q|| ends
+Siconos' tolerance is relative to max(||q||, ||r||, ||u||). If the error relative to ||q|| ends
 above the tolerance, it runs again from the same point with its tolerance scaled to mean the same,
 and time and iterations are those of that run.
 """
@@ -45,7 +45,7 @@ DEFAULT = "/usr/bin/python3"
 THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 START_LIMIT = 60.0  # [s]
 BIG = 10**6
-# by rows is written in blocks
+# stored by rows, written in blocks
 STORAGES = {"fc2d": "dense", "fc3d": "csr", "rolling_fc3d": "csc"}
 Local: TypeAlias = _core.LocalProblem | _core.LocalRollingProblem
 HUBER = "Acary, Bremond & Huber 2018"
@@ -55,7 +55,7 @@ NEWTON = "newton"
 CONVEX = "optimisation"
 VI = "variational inequality"
 
-# name: family, solver of Siconos, title, citation, iterations where the caller sets none
+# name: family, solver of Siconos, title, citation, iterations if the caller sets none
 Rows: TypeAlias = dict[str, tuple[str, str, str, str, int]]
 FC3D: Rows = {
     "nsgs": (SPLIT, "NSGS", "Nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
@@ -93,7 +93,7 @@ FC2D: Rows = {
     "2d-nsgs": (SPLIT, "NSGS", "Planar nonsmooth Gauss-Seidel", "Jean & Moreau 1992", BIG),
     "2d-cpg": (CONVEX, "CPG", "Planar conjugate projected gradient", "Renouf & Alart 2005", BIG),
 }
-# its solver of one contact, where that is not the default
+# its solver of one contact, if that is not the default
 ONE_CONTACT = {
     "nsgs-quartic": "FRICTION_3D_ONECONTACT_QUARTIC",
     "nsgs-projection": "FRICTION_3D_ONECONTACT_ProjectionOnConeWithLocalIteration",
@@ -123,7 +123,7 @@ def _probe(interpreter: str) -> str:
 
 
 def missing() -> str:
-    """What is to be installed."""
+    """The package to install."""
     return _probe(python())
 
 
@@ -193,7 +193,7 @@ def _entry(
 def _solve(
     kind: str, identifier: str, one_contact: str, problem: Local, r: Any, monitor: _core.Monitor
 ) -> Any:
-    """One solve, or two where the tolerances do not mean the same."""
+    """One solve, or two if the tolerances differ in meaning."""
     if monitor.stop(r) or problem.nc == 0:
         return r
     with tempfile.TemporaryDirectory(prefix="fclib-") as folder:
@@ -225,7 +225,7 @@ def _solve(
 
 
 def _cpu_time(pid: int) -> float:
-    """[s] that a process has spent; the number of its clock is made as Linux does it."""
+    """CPU time [s] of a process; the number of its clock is computed as in Linux."""
     try:
         return time.clock_gettime((~pid << 3) | 2)
     except OSError:
@@ -261,7 +261,7 @@ class Worker:
         process = self._running()
         assert process.stdin is not None
         start = _cpu_time(process.pid)
-        with contextlib.suppress(BrokenPipeError):  # it has ended, which reading finds out
+        with contextlib.suppress(BrokenPipeError):  # it has ended; reading finds out
             process.stdin.write(order + b"\n")
             process.stdin.flush()
         line = self._read_line(time_left)
@@ -272,7 +272,7 @@ class Worker:
         return line
 
     def _read_line(self, time_left: float) -> bytes | None:
-        """A line of the process, or None where there is none in time."""
+        """A line of the process, or None if there is none in time."""
         assert self.process is not None
         assert self.process.stdout is not None
         end = time.monotonic() + time_left
@@ -281,7 +281,7 @@ class Worker:
             left = end - time.monotonic()
             if left <= 0:
                 return None
-            # now and then, so that Ctrl-C is seen
+            # wake up now and then, so that Ctrl-C is noticed
             if not select.select([self.process.stdout], [], [], min(left, 0.5))[0]:
                 continue
             chunk = os.read(self.process.stdout.fileno(), 1 << 20)
@@ -293,7 +293,7 @@ class Worker:
         return line
 
     def _running(self) -> subprocess.Popen[bytes]:
-        """The process, started anew where it has ended or another is wanted."""
+        """The process, started anew if it has ended or another is wanted."""
         wanted = (python(), os.getpid())  # a forked process needs one of its own
         if self.process is not None and (self.process.poll() is not None or self.started != wanted):
             self.end()

@@ -1,16 +1,16 @@
-"""The problems of other simulators' steps: a step of theirs becomes a `GlobalProblem`.
+"""The problems of other simulators' steps: each step becomes a `GlobalProblem`.
 
     recorded = fclib.recorders.drake(plant, context)
     recorded.problem, recorded.guess, recorded.mismatch
     recorded.write("step.hdf5")
 
-_assemble.py   what is common: order of rows, redundant joints, limits, dry friction, compliance
+_assemble.py   common parts: order of rows, redundant joints, limits, dry friction, compliance
 _recorded.py   a recorded step, what is exact in it, and a folder of them
-_scripts.py    steps of somebody's script, while it runs
+_scripts.py    steps of a user's script, while it runs
 _drake.py, _newton.py, _pinocchio.py, _pybullet.py, _siconos.py    one engine each
 _siconos_steps.py  run by the interpreter that has Siconos
 
-An engine is imported where its adapter is called.
+An engine is imported only when its adapter is called.
 """
 
 from fclib.recorders._assemble import (

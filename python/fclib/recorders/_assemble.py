@@ -1,6 +1,6 @@
-"""The problem of a step of any simulator, from what each of them has in some form.
+"""The problem of a step of any simulator, from data that every simulator has in some form.
 
-Unknown are the velocities v (n) at the end of the step; r are impulses over it:
+The unknowns are the velocities v (n) at the end of the step, and the impulses r over it:
 
     M (v - v_free) = H r + G lambda        v_free: the velocity without contacts and constraints
     u = H^T v + w + R r,  K* contains u^, u^ . r = 0, r in K
@@ -23,7 +23,7 @@ from fclib import _core, _solve
 
 Vector = npt.NDArray[np.float64]
 ORDERS: Final = {"NTT": (0, 1, 2), "TTN": (2, 0, 1)}
-RANK: Final = 1e-9  # of a joint's row, relative to the largest
+RANK: Final = 1e-9  # least size of an independent row of a joint, relative to the largest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Contacts:
     point: Vector | None = None  # (nc x 3) in the world [m]
     frame: Vector | None = None  # (nc x 3 x 3) rows N, T1, T2
     bodies: npt.NDArray[np.int64] | None = None  # (nc x 2) N points from the first to the second
-    gap: Vector | None = None  # (nc) the signed distance, where the engine tells it [m]
+    gap: Vector | None = None  # (nc) the signed distance, if the engine gives it [m]
 
     def __len__(self) -> int:
         return len(np.atleast_1d(np.asarray(self.mu, dtype=float)))
@@ -49,7 +49,7 @@ class Joints:
 
     jacobian: Any  # (p x n) J v + b = 0
     b: npt.ArrayLike | None = None  # (p) [m/s]; None: 0
-    rank: float = RANK  # rows smaller than this, after those before, are redundant
+    rank: float = RANK  # a row whose rest after the earlier rows is smaller is redundant
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,12 +70,12 @@ class DryFriction:
 
 @dataclass(frozen=True)
 class Assembled:
-    """A problem, and what was left out of it."""
+    """A problem, and the joint rows left out of it."""
 
-    problem: Any  # a GlobalProblem; a LocalProblem where the engine tells W alone
-    dofs: int  # n; the problem's degrees of freedom after these are auxiliary; of a local one m
+    problem: Any  # a GlobalProblem; a LocalProblem if the engine gives only W
+    dofs: int  # n; further degrees of freedom are auxiliary; for a local problem m
     redundant: tuple[int, ...] = ()  # rows of joints that follow from the others
-    violated: float = 0.0  # by how much at most a redundant row is not that combination [m/s]
+    violated: float = 0.0  # largest deviation of a redundant row from its combination [m/s]
     info: dict[str, Any] = field(default_factory=dict)
 
 
@@ -95,15 +95,15 @@ def assemble(
     The contacts of the problem are `contacts`, then `limits`, then `dry_friction`.
 
     Args:
-        M: (n x n) symmetric, positive definite; what multiplies v - v_free.
+        M: (n x n) symmetric, positive definite; the factor of v - v_free.
         v_free: (n) the velocity after the step without contacts, constraints and dry friction.
         h: length of the step [s].
         contacts: with friction.
         joints: bilateral rows; those that follow from others are left out.
         limits: unilateral rows without friction.
-        dry_friction: of joints.
-        compliance: (3 nc) R of each component of `contacts`, in their order, 0 where it is rigid.
-        info: of the problem.
+        dry_friction: dry friction of joints.
+        compliance: (3 nc) R of each component of `contacts`, in their order, 0 if it is rigid.
+        info: info of the problem.
 
     Raises:
         ValueError: sizes disagree, h or a bound is negative, M is not positive definite.
@@ -142,7 +142,8 @@ def assemble(
         w.append(speed)
         mu.append(np.zeros(len(J)))
 
-    # auxiliary degrees of freedom: z = R r of what yields, the press of dry friction
+    # auxiliary degrees of freedom: z = R r of compliant contacts, and the pressing mass of dry
+    # friction
     soft = np.flatnonzero(R)
     mass = [1 / R[soft]]
     momentum = [np.zeros(len(soft))]
@@ -158,7 +159,7 @@ def assemble(
         rows.append(own)
         w.append(np.zeros(3 * len(J)))
         mu.append(np.ones(len(J)))
-        # the inertia that the row moves
+        # the mass is the inertia that the row moves
         moved = la.solve_triangular(factor, J.T, lower=True)
         inverse = (moved**2).sum(axis=0)
         mass.append(1 / np.where(inverse > 0, inverse, 1.0))
@@ -198,9 +199,9 @@ def assemble(
 def independent(
     factor: Vector, J: Vector, b: Vector, rank: float
 ) -> tuple[npt.NDArray[np.int64], float]:
-    """Rows (of p x n) of which the others are combinations, in their order.
+    """Rows (of p x n), in their order, so that the others are combinations of them.
 
-    Also by how much, at most, a redundant one contradicts them [m/s].
+    Also the largest contradiction of a redundant row to them [m/s].
     """
     if not len(J):
         return np.zeros(0, dtype=np.int64), 0.0
@@ -240,18 +241,18 @@ def associated_error(problem: Any, r: npt.ArrayLike) -> float:
 def solve_associated(problem: Any, tol: float = 1e-8) -> Any:
     """Solve a problem by the associated law, as Drake's and MuJoCo's solvers do.
 
-    The result's own error is that by Coulomb's law; `associated_error` has the one by this law.
+    The result's own error is that by Coulomb's law; `associated_error` gives the one by this law.
 
     Raises:
         OptionError, UnsuitableError: as `fclib.solve`.
     """
-    # a start that Coulomb's law would not take for the solution
+    # a start that Coulomb's law would not accept as a solution
     start = np.zeros((problem.nc, problem.spacedim))
     local = problem.condense() if problem.kind.startswith("global") else problem
     stiffness = float(local.W.diagonal().mean()) if problem.m else 1.0
     start[:, 0] = float(np.linalg.norm(local.q)) / (stiffness or 1.0)
     guess = _core.Solution(r=start.ravel())
-    # its own measure is in other units
+    # the solver's own measure has other units
     for share in (1.0, 1e-2, 1e-4, 1e-6):
         own = max(share * tol, 1e-15)
         result = _solve.solve(problem, "associated", tol=own, guess=guess)
@@ -277,7 +278,7 @@ def filled(values: npt.ArrayLike | None, size: int, name: str) -> Vector:
 
 
 def dense(matrix: Any, name: str, shape: tuple[int | None, int]) -> Vector:
-    """A matrix as an array of finite doubles. ValueError where its shape is another."""
+    """A matrix as an array of finite doubles. ValueError if it has another shape."""
     array = np.asarray(matrix.toarray() if sp.issparse(matrix) else matrix, dtype=float)
     if array.size == 0:
         array = array.reshape((shape[0] or 0, shape[1]))

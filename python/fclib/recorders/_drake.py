@@ -23,7 +23,7 @@ from fclib import _core
 from fclib.recorders._assemble import Contacts, Limits, assemble
 from fclib.recorders._recorded import Recorded
 
-BETA, SIGMA = 1.0, 1e-3  # of near rigid contacts, and of stiction, in SAP
+BETA, SIGMA = 1.0, 1e-3  # SAP's parameters of near rigid contacts, and of stiction
 
 
 def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Recorded:
@@ -31,7 +31,7 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
 
     Args:
         plant: a finalized MultibodyPlant, of doubles, with a time step.
-        context: of the plant, within that of its diagram.
+        context: context of the plant, inside that of its diagram.
         law: "hard" is Coulomb's; "sap" is W + R with the associated cone, Drake's own problem.
 
     Raises:
@@ -60,7 +60,7 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
         joint = plant.get_joint(index)
         where = slice(joint.velocity_start(), joint.velocity_start() + joint.num_velocities())
         damping[where] = joint.GetDampingVector(context)
-    # force elements have the damping of joints too, which the step takes implicitly
+    # force elements also have the damping of joints, which the step treats implicitly
     tau = tau + damping * v0 - plant.CalcBiasTerm(context)
     A = M + h * np.diag(damping)
     v_free = np.linalg.solve(A, M @ v0 + h * tau)
@@ -79,7 +79,7 @@ def drake(plant: Any, context: Any, law: Literal["hard", "sap"] = "hard") -> Rec
         share = 0.5 if not (ka and kb) else ka / (ka + kb)
         point = share * pair.p_WCa + (1 - share) * pair.p_WCb
         normal = np.array(pair.nhat_BA_W)
-        # any two tangents: those of the axis that is least along N
+        # any two tangents will do: take those from the axis that is least along N
         first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
         first /= np.linalg.norm(first)
         frame = np.stack((normal, first, np.cross(normal, first)))
@@ -174,7 +174,7 @@ def _material(inspector: Any, identifier: Any) -> tuple[float, float, float]:
 
 
 def _limits(plant: Any, context: Any, v0: Any, h: float) -> Limits | None:
-    """Of joints with one coordinate that a step at the present velocity would take beyond."""
+    """Limits of joints with one coordinate that a step at the present velocity would exceed."""
     q = plant.GetPositions(context)
     rows, w = [], []
     for index in plant.GetJointIndices():

@@ -1,13 +1,14 @@
-"""Newton: a step of its Kamino solver, in one of its worlds, after the step was taken.
+"""Newton: a step of its Kamino solver, in one of its worlds, recorded after the step.
 
 Kamino's rows are joints (first those with armature, damping or drives, which yield), dry friction
-of joints, limits, contacts; those of a contact are T1, T2, N. Unknown are twists of bodies at their
-centres of mass, in the world. `v_f` and the bounds are scaled by P, as its solver wants them:
+of joints, limits, contacts; the rows of a contact are T1, T2, N. The unknowns are twists of bodies
+at their centres of mass, in the world. `v_f` and the bounds are scaled by P, as its solver needs
+them:
 
     v_f = P (J u_f + w),  w = v_b + e J v,  bound = impulse / P
 
 A row that yields, J v + v_b + lambda / m = 0, is a mass m that moves with it: M + J^T m J. Data are
-of single precision. They are private to the solver: one version of Newton is read, no other.
+of single precision. They are private to the solver, so only one version of Newton is read.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from fclib import _core
 from fclib.recorders._assemble import Contacts, DryFriction, Joints, Limits, Vector, assemble
 from fclib.recorders._recorded import Recorded
 
-VERSION: Final = "1.8"  # of which the private data are known
-RANK: Final = 1e-5  # of a joint's row in single precision
+VERSION: Final = "1.8"  # the version whose private data are known
+RANK: Final = 1e-5  # least size of an independent row of a joint in single precision
 PRECISION: Final = 2.0**-24  # half the last digit of single precision
 
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """What Kamino has of one world's step: n velocities of bodies that move, d rows, nc contacts.
+    """Kamino's data of one world's step: n velocities of bodies that move, d rows, nc contacts.
 
     Rows: `yielding` and `rigid` of joints, `dry`, `limits`, 3 nc of contacts.
     """
@@ -41,7 +42,7 @@ class Step:
     v_free: Vector  # (n)
     velocity: Vector  # (n) after the step
     J: Vector  # (d x n)
-    w: Vector  # (d) [m/s] J v + w is what the laws speak of
+    w: Vector  # (d) [m/s] the laws hold for J v + w
     reaction: Vector  # (d) [N s]
     yielding: int
     rigid: int
@@ -58,7 +59,7 @@ class Step:
 
 
 def newton(solver: Any, world: int = 0) -> Recorded:
-    """The problem of the step that a solver took last.
+    """The problem of a solver's last step.
 
     Args:
         solver: newton.solvers.SolverKamino, after `step`.
@@ -78,7 +79,7 @@ def newton(solver: Any, world: int = 0) -> Recorded:
 
 
 def pinned() -> str:
-    """Newton's version. ImportError where it is not the one whose data are known."""
+    """Newton's version. ImportError if it is not the one whose data are known."""
     importlib.import_module("newton")
     version = importlib.metadata.version("newton")
     if version.split(".")[:2] != VERSION.split("."):
@@ -128,11 +129,11 @@ def recorded(step: Step, version: str) -> Recorded:
     nc = len(contacts)
     r[:nc] = reactions[4].reshape(-1, 3)[:, [2, 0, 1]]
     r[nc : nc + step.limits, 0] = reactions[3]
-    # dry friction is pressed by its bound
+    # the bound presses dry friction
     r[nc + step.limits :, 0], r[nc + step.limits :, 1] = step.bound, reactions[2]
     multipliers = None
     if assembled.problem.p:
-        # those of the rows that are kept do what all of them did
+        # multipliers of the kept rows that have the effect of all
         kept = np.setdiff1d(np.arange(step.rigid), assembled.redundant)
         whole = rigid[0].T @ reactions[1]
         multipliers = np.linalg.lstsq(rigid[0][kept].T, whole, rcond=None)[0]
@@ -154,7 +155,7 @@ def recorded(step: Step, version: str) -> Recorded:
 
 
 def read(kamino: Any, containers: Any, world: int) -> Step:
-    """What Kamino's solver and its contacts have of a step."""
+    """The data of a step in Kamino's solver and its contacts."""
     model, data, dual = kamino._model, kamino._data, kamino.problem_fd
     if model.device.is_capturing:
         raise ValueError("the step is captured in a CUDA graph: record it without wp.ScopedCapture")
@@ -186,10 +187,10 @@ def read(kamino: Any, containers: Any, world: int) -> Step:
         part(array, problem.vio, d) for array in (problem.P, problem.v_f, problem.v_b, problem.v_i)
     )
     u_free = twists(problem.u_f)
-    # bodies without inverse mass move as they are told
+    # bodies without inverse mass have a prescribed motion
     moves = np.repeat(model.bodies.inv_m_i.numpy()[first:last] > 0, 6)
     w = w + J[:, ~moves] @ u_free[~moves]
-    # impacts: Kamino keeps their sum alone
+    # impacts: Kamino keeps only their sum
     w = np.where(e != 0, scaled / P - J[:, moves] @ u_free[moves], w)
     M = np.zeros((n, n))
     mass = np.asarray(model.bodies.m_i.numpy()[first:last], dtype=float)

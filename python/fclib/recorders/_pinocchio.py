@@ -36,7 +36,7 @@ def pinocchio(
         tau: forces of the actuators (n); None: 0.
         h: time step [s].
         mu: coefficient of friction: Pinocchio's geometries have none.
-        margin: pairs that are closer touch [m].
+        margin: pairs closer than this touch [m].
 
     Raises:
         ImportError: pinocchio is not installed.
@@ -46,7 +46,7 @@ def pinocchio(
     q, v = np.asarray(q, dtype=float), np.asarray(v, dtype=float)
     tau = np.zeros(n) if tau is None else np.asarray(tau, dtype=float)
     data, geometries = model.createData(), geometry.createData()
-    # without contacts asked for, normals are NaN
+    # unless contacts are asked for, normals are NaN
     for request in geometries.collisionRequests:
         request.enable_contact = True
         request.security_margin = margin
@@ -123,7 +123,7 @@ def pinocchio(
 
 
 def _jacobian(pin: Any, model: Any, data: Any, joint: int, point: Any) -> Any:
-    """Of a point that moves with a joint's body (3 x n), in the world."""
+    """The Jacobian of a point that moves with a joint's body (3 x n), in the world."""
     J = pin.getJointJacobian(model, data, joint, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
     if joint == 0:
         return np.zeros((3, model.nv))

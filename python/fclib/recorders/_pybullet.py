@@ -22,13 +22,13 @@ def pybullet(client: int, bodies: Sequence[int] | None = None, h: float | None =
     """Take one step, and return its problem.
 
     Args:
-        client: of `pybullet.connect`.
-        bodies: those that move; by default all with a mass.
+        client: result of `pybullet.connect`.
+        bodies: the bodies that move; by default all with a mass.
         h: time step [s]; by default the engine's.
 
     Raises:
         ImportError: pybullet is not installed.
-        ValueError: a body has joints: its Jacobians are not asked yet.
+        ValueError: a body has joints: joints are not supported yet.
     """
     return record(importlib.import_module("pybullet"), client, bodies, h)
 
@@ -36,7 +36,7 @@ def pybullet(client: int, bodies: Sequence[int] | None = None, h: float | None =
 def record(
     p: Any, client: int, bodies: Sequence[int] | None, h: float | None, step: Any = None
 ) -> Recorded:
-    """As `pybullet`, by the module and its function that steps."""
+    """As `pybullet`, for the module and its stepping function."""
     options = {"physicsClientId": client}
     if bodies is None:
         every = [p.getBodyUniqueId(i, **options) for i in range(p.getNumBodies(**options))]
@@ -53,7 +53,7 @@ def record(
             raise ValueError(f"body {body}: has joints, and bodies without joints are recorded")
         known = p.getDynamicsInfo(body, -1, **options)
         inertial = p.getBasePositionAndOrientation(body, **options)
-        # PyBullet tells the frame of the inertia
+        # PyBullet gives the frame of the inertia
         centre[body] = np.array(inertial[0])
         turn = np.reshape(p.getMatrixFromQuaternion(inertial[1]), (3, 3))
         inertia = turn @ np.diag(known[2]) @ turn.T
@@ -72,7 +72,7 @@ def record(
         if a not in place and b not in place:
             continue
         normal, first, second = (np.array(contact[k]) for k in (7, 11, 13))
-        # Bullet's own directions of friction; N x T1 where it tells none
+        # Bullet's own directions of friction; N x T1 if it gives none
         if not first.any():
             first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
             first /= np.linalg.norm(first)

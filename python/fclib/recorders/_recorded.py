@@ -18,18 +18,19 @@ Origin = Literal["exact", "reconstructed"]
 
 @dataclass(frozen=True, kw_only=True)
 class Recorded:
-    """The problem of one step of another engine, and what that made of it."""
+    """The problem of one step of another engine, and that engine's own result."""
 
     assembled: Assembled
-    engine: str  # its name
+    engine: str  # name of the engine
     version: str
     licence: str
-    law: str  # what the engine solves, in words
+    law: str  # the law that the engine solves, in words
     time: float  # at the start of the step [s]
     h: float  # [s]
-    fields: Mapping[str, Origin]  # of M, f, H, w, mu, G, b or W, q: from the engine, or by formulas
+    # origin of M, f, H, w, mu, G, b or W, q: from the engine, or by formulas
+    fields: Mapping[str, Origin]
     guess: _core.Solution | None = None  # the engine's own reaction
-    # (n), of a local problem (m), after the step, as the engine has it; None: it does not tell
+    # (n), of a local problem (m), velocity of the engine after the step; None: unknown
     velocity: Any = None
     contacts: Contacts | None = None
     notes: tuple[str, ...] = ()
@@ -37,9 +38,9 @@ class Recorded:
 
     @property
     def problem(self) -> Any:
-        """With a description whose last line, JSON, says where it is from.
+        """The problem; the last line of its description, in JSON, tells its origin.
 
-        A `GlobalProblem`, or a `LocalProblem` where the engine tells W alone.
+        It is a `GlobalProblem`, or a `LocalProblem` if the engine gives only W.
         """
         origin = {
             "generator": "fclib.recorders",
@@ -78,9 +79,10 @@ class Recorded:
 
     @property
     def mismatch(self) -> float | None:
-        """How far the engine's velocity is from the one that its reaction gives [m/s]; the largest.
+        """The largest difference of the engine's velocity from that of its reaction [m/s].
 
-        The velocity is v, of a local problem u. None where it tells no reaction or no velocity.
+        The velocity is v, or u of a local problem. None if the engine gives no reaction or
+        velocity.
         """
         problem = self.assembled.problem
         if isinstance(problem, _core.LocalProblem):
@@ -110,7 +112,7 @@ class Recorded:
 
 
 class Recording:
-    """A folder into which every so manieth recorded step with contacts is written.
+    """A folder for recorded steps: each `every`-th step with contacts is written.
 
     with Recording("steps", every=10) as recording:
         ...
@@ -118,7 +120,7 @@ class Recording:
     """
 
     def __init__(self, folder: str | Path, every: int = 1) -> None:
-        """ValueError where `every` is below 1, FileExistsError where files are there already."""
+        """ValueError if `every` is below 1, FileExistsError if there are files already."""
         if every < 1:
             raise ValueError(f"every must be at least 1, not {every}")
         self.folder, self.every = Path(folder), every
@@ -134,11 +136,11 @@ class Recording:
 
     @property
     def wanted(self) -> bool:
-        """Whether the next step is one that is kept; others need not be assembled."""
+        """Whether the next step is kept; otherwise it need not be assembled."""
         return self.seen % self.every == 0
 
     def add(self, recorded: Recorded | None) -> None:
-        """Count a step, and write it where it is one of those kept and something touches."""
+        """Count a step, and write it if it is to be kept and something touches."""
         number, kept = self.seen, self.wanted
         self.seen += 1
         if not kept or recorded is None or not recorded.assembled.problem.nc:

@@ -1,4 +1,4 @@
-"""Somebody's script, run as it is, while steps of its engine are recorded."""
+"""Run a user's script unchanged, and record steps of its engine."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _steps_of_newton(recording: Recording) -> Iterator[None]:
 
 
 def _in_this_process(steps: Any, module: str) -> Callable[[Recording, Path, Sequence[str]], None]:
-    """Run a script while the functions of an engine, which is a module, tell of its steps."""
+    """Run a script while the functions of an engine's module report its steps."""
 
     def run(recording: Recording, script: Path, arguments: Sequence[str]) -> None:
         before, path = sys.argv, list(sys.path)
@@ -130,7 +130,7 @@ def record_script(
     every: int = 1,
     arguments: Sequence[str] = (),
 ) -> Recording:
-    """Run a script, and write every so manieth step of its engine that has contacts.
+    """Run a script, and write each `every`-th step of its engine that has contacts.
 
     Raises:
         ValueError: the engine is not one of `ENGINES`, or `every` is below 1.

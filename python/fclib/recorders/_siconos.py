@@ -31,7 +31,7 @@ STEPS = Path(__file__).with_name("_siconos_steps.py")
 def siconos(
     script: str | Path, *, arguments: Sequence[str] = (), every: int = 1
 ) -> Iterator[Recorded]:
-    """Run a script of Siconos, and give every so manieth of its steps that has contacts.
+    """Run a script of Siconos, and give each `every`-th of its steps that has contacts.
 
     The script runs to its end before the first step is given.
 
@@ -51,7 +51,7 @@ def record(recording: Recording, script: Path, arguments: Sequence[str]) -> None
 
 
 def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Recorded | None]:
-    """Each step of a script; None where it is not kept, or nothing touches."""
+    """Each step of a script; None if it is not kept, or nothing touches."""
     if every < 1:
         raise ValueError(f"every must be at least 1, not {every}")
     if not script.is_file():
@@ -62,7 +62,7 @@ def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Record
         command = [installed.python(), str(STEPS), folder, str(every), str(script), *arguments]
         status = subprocess.run(command, check=False).returncode
         end = Path(folder) / "steps.json"
-        told: Any = {"steps": 0}  # it ended before the script began
+        told: Any = {"steps": 0}  # the worker ended before the script began
         if end.is_file():
             told = json.loads(end.read_text(encoding="utf-8"))
         for number in range(told["steps"]):
@@ -75,7 +75,7 @@ def steps(script: Path, arguments: Sequence[str], every: int) -> Iterator[Record
 
 
 def recorded(file: Path, version: str) -> Recorded:
-    """What _siconos_steps.py wrote of a step."""
+    """The data that _siconos_steps.py wrote for a step."""
     with np.load(file) as data:
         known: dict[str, Any] = dict(data)
     dimension, h = int(known["dimension"]), float(known["h"])
@@ -129,7 +129,7 @@ def columns(known: dict[str, Any], name: str) -> Any:
 
 
 def touching(H: Any, bodies: Any, dimension: int) -> Any:
-    """(nc x 2) the numbers of the systems that a contact moves; -1 first where it is one."""
+    """(nc x 2) the numbers of the systems that a contact moves; -1 first if it is only one."""
     pairs = np.full((H.shape[1] // dimension, 2), -1)
     for c, pair in enumerate(pairs):
         rows = H.indices[H.indptr[dimension * c] : H.indptr[dimension * (c + 1)]]

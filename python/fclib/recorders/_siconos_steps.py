@@ -2,9 +2,10 @@
 
     /usr/bin/python3 _siconos_steps.py FOLDER EVERY SCRIPT [ARGUMENT...]
 
-Knows nothing of fclib. FOLDER/STEP.npz has what a kept step with contacts solved, FOLDER/steps.json
-the number of steps and the version. The class of the friction problem that a script finds in
-`siconos.kernel` is one that writes; so are the classes by which `mechanics_run` traces.
+Knows nothing of fclib. FOLDER/STEP.npz has the problem of a kept step with contacts,
+FOLDER/steps.json the number of steps and the version. The friction classes that a script finds in
+`siconos.kernel` are replaced by ones that write; so are the classes by which `mechanics_run`
+traces.
 """
 
 import json
@@ -26,8 +27,9 @@ try:
 except ImportError as error:
     sys.exit(f"{sys.executable}: {error}; to record Siconos it needs siconos, numpy and scipy")
 
-warnings.filterwarnings("ignore", message=".*scipy.sparse.coo")  # of Siconos' own conversions
-NO_INDEX_SET = 999  # of a problem without one, as Siconos numbers it
+# warning of Siconos' own conversions
+warnings.filterwarnings("ignore", message=".*scipy.sparse.coo")
+NO_INDEX_SET = 999  # Siconos' number for a problem without an index set
 
 
 class Steps:
@@ -46,7 +48,7 @@ class Steps:
         return (self.count - 1) % self.every == 0
 
     def write(self, arrays: Any) -> None:
-        """The last problem of a step is the one that stays."""
+        """Write a problem; the last one of a step stays."""
         np.savez(self.folder / f"{self.count - 1:06d}.npz", **arrays)
 
 
@@ -67,7 +69,7 @@ def local(osns: Any) -> Any:
     m = problem.dimension * problem.numberOfContacts
     W = problem.M
     if osns.getMStorageType() == numerics.NM_SPARSE_BLOCK:
-        numerics.NM_clear_not_SBM(W)  # else that of a step before
+        numerics.NM_clear_not_SBM(W)  # otherwise the values of a step before remain
         W = numerics.NM_csc(W)
     else:
         W = np.array(W)[:m, :m]
@@ -90,7 +92,7 @@ def globally(osns: Any) -> Any:
 
 
 def writing(original: Any, told: Any, steps: Steps) -> Any:
-    """A class of friction problems that writes what it solves."""
+    """A class of friction problems that writes the problems that it solves."""
 
     class Shown(original):  # type: ignore[misc]
         def __new__(cls, *arguments: Any, **options: Any) -> Any:
@@ -98,7 +100,7 @@ def writing(original: Any, told: Any, steps: Steps) -> Any:
             return super().__new__(Hidden if cls is Shown else cls)
 
         def __init__(self, *arguments: Any) -> None:
-            super().__init__(*arguments[:2])  # what follows is of a trace
+            super().__init__(*arguments[:2])  # further arguments are for a trace
 
         def compute(self, now: float) -> int:
             kept = steps.next(now)
@@ -137,7 +139,7 @@ def main() -> None:
     steps = Steps(Path(folder), int(every))
     try:
         import siconos.io.mechanics_run as runner
-    except ImportError:  # scripts may do without
+    except ImportError:  # scripts may not need it
         runner = None
     for name, trace, told in (
         ("FrictionContact", "FCTrace", local),

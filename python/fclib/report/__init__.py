@@ -4,20 +4,20 @@
     problem file -> network, solids -> view, picture
 
 All numbers come from the stores of `fclib.bench` and from the catalogue of `fclib.collections`.
-Files of problems are read for their pictures alone: the pattern and the network of contacts.
+Files of problems are read only for their pictures: the pattern and the network of contacts.
 
 site.py        the pages of the site: problems, families, solvers, runs
-runs.py        the runs of stores, as the site needs them, summed by `bench.profiles`
-view.py        what the page of one problem shows, and that page by itself
-network.py     bodies and contacts: places from the file, from H where that is sound, or a graph
-solids.py      shapes of bodies in their places, as the file has them
-picture.py     a small picture of them
-drawn.py       what the site draws of each problem
-taking.py      what one can take of a problem from the site
+runs.py        the runs of stores in the form of the site, summed by `bench.profiles`
+view.py        the content of the page of one problem, and that page by itself
+network.py     bodies and contacts: places from the file, from H if that is safe, or a graph
+solids.py      shapes of bodies at their places, from the file
+picture.py     a small picture of the bodies
+drawn.py       the drawings of each problem on the site
+taking.py      the files of a problem that the site offers
 browser.py     the module with which its pages check and solve problems
-serving.py     a site at an address of this machine
+serving.py     serves a site at an address of this machine
 recipes.py     lines to copy: how to get, read and solve a problem
-citing.py      BibTeX of all that it shows; references.bib has the papers
+citing.py      BibTeX of all that the site shows; references.bib has the papers
 paper.py       figures and tables for a paper
 libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError

@@ -1,6 +1,6 @@
 """The core as a module for browsers, in a site: its pages check and solve what they show.
 
-The module is what `make wasm` builds (docs/browser.md); a site carries a copy of it.
+`make wasm` builds the module (docs/browser.md); a site carries a copy of it.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from pathlib import Path
 
 from fclib.report.error import ReportError
 
-BUILT = Path(__file__).parents[3] / "build" / "wasm" / "fclib"  # of a checkout
+BUILT = Path(__file__).parents[3] / "build" / "wasm" / "fclib"  # in a checkout
 PLACE = "assets/browser"  # in a site
 FILES = (
     *("fclib.js", "fclib-worker.js", "fclib-core.mjs", "fclib-core.wasm"),
     *("fclib-hdf5.js", "fclib-layout.js", "hdf5_hl.js", "hdf5_util.js", "licences/h5wasm.txt"),
 )
-# what the page about the site says of what came with the module
+# text of the page about the site on the parts of the module
 READER = {
     "name": "h5wasm",
     "version": "",
@@ -28,10 +28,10 @@ READER = {
 
 
 def find(folder: Path | None) -> Path | None:
-    """The module's folder: the one that is named, or a checkout's; None where none is built.
+    """The module's folder: the one named, or a checkout's; None if none is built.
 
     Raises:
-        ReportError: the folder that is named is not the module's.
+        ReportError: the folder named is not the module's.
     """
     missing = [name for name in FILES if not ((folder or BUILT) / name).is_file()]
     if folder is not None and missing:
@@ -40,7 +40,7 @@ def find(folder: Path | None) -> Path | None:
 
 
 def size(module: Path) -> int:
-    """What a page loads of it, in bytes."""
+    """The size that a page loads of it, in bytes."""
     return sum((module / name).stat().st_size for name in FILES)
 
 

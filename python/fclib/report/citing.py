@@ -2,7 +2,7 @@
 
 references.bib has the papers, each by its first author and its year, as solvers name them:
 "Alart & Curnier 1991; Acary, Bremond & Huber 2018" is alart1991 and acary2018. An entry has a DOI
-where a second source gives it for that paper: a page without a link is better than a wrong one.
+only if a second source gives it for that paper: a page without a link is better than a wrong one.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def _read(text: str) -> Mapping[str, str]:
 
 
 def keys_of(citation: str) -> list[str]:
-    """The keys of the papers that a solver names; what has no year is no paper."""
+    """The keys of the papers that a solver names; an entry without a year is not a paper."""
     found = []
     for part in citation.split(";"):
         year = re.search(r"\b(1[89]|20)\d\d\b", part)
@@ -56,7 +56,7 @@ def keys_of(citation: str) -> list[str]:
         first = re.split(r",| & | et al| \d", part.strip())[0]
         plain = unicodedata.normalize("NFKD", first).encode("ascii", "ignore").decode()
         key = re.sub("[^a-z]", "", plain.lower()) + year[0]
-        # the paper came out a year after its report
+        # the paper appeared a year after its report
         found.append({"fukushima2002": "fukushima2001"}.get(key, key))
     return found
 
@@ -81,7 +81,7 @@ def papers_of(citation: str) -> list[dict[str, str]]:
 
 
 def software() -> str:
-    """BibTeX of this software, as CITATION.cff has it."""
+    """BibTeX of this software, from CITATION.cff."""
     return SOFTWARE.format(version=_core.version)
 
 
@@ -107,7 +107,7 @@ def problem() -> str:
 
 
 def implementation(name: str, title: str, version: str) -> str:
-    """BibTeX of a solver as it is here, or where it is from."""
+    """BibTeX of a solver: of its version here, or of its origin."""
     return entry(
         "solver", name, f"{title or name}: solver {name}", [version or f"FCLIB {_core.version}"]
     )

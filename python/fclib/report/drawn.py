@@ -1,7 +1,7 @@
-"""What the site draws of each problem: its view, its thumbnail, and the steps of its sequence.
+"""The drawings of each problem on the site: its view, its thumbnail, and the steps of its sequence.
 
     data/views/12.js               patterns, spectrum, bodies and contacts of row 12
-    thumbs/12.webp                 its bodies, or its matrix where the file has none
+    thumbs/12.webp                 its bodies, or its matrix if the file has none
     data/sequences/SET/FAMILY.js   poses of the bodies, step after step
 
 Each file is read once. Large data are compressed: a browser unpacks them without a library.
@@ -29,35 +29,35 @@ from fclib.report import picture
 from fclib.report.solids import Array, Solids, solids_of
 from fclib.report.view import as_json, view_of
 
-PACKED = 4000  # characters from which data are compressed
-STEPS = 120  # of a sequence at most
-POSES = 24_000  # of a sequence, over all of its steps, at most
-FEWEST = 3  # steps of a sequence
-CONDENSED = 200  # contacts up to which W is made for a small picture
-MANY = 200  # problems from which on processes share the work
+PACKED = 4000  # data with more characters are compressed
+STEPS = 120  # largest number of steps of a sequence
+POSES = 24_000  # largest number of poses of a sequence, over all of its steps
+FEWEST = 3  # least number of steps of a sequence
+CONDENSED = 200  # largest number of contacts for which W is made for a small picture
+MANY = 200  # with more problems, several processes share the work
 
 
 @dataclass(frozen=True)
 class Task:
-    """A problem that is to be drawn."""
+    """A problem to draw."""
 
     place: int  # row of the catalogue
     file: Path
-    view: bool  # whether it gets a page with its view, or a thumbnail alone
-    picture: Path | None  # of a large picture
+    view: bool  # whether it gets a page with its view, or only a thumbnail
+    picture: Path | None  # file of a large picture
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What came of it."""
+    """The result of drawing a problem."""
 
     place: int
     view: bool = False
     thumb: bool = False
     bytes: int = 0
     scene: str = ""  # a digest of the shapes: equal for the steps of one scene
-    shapes: tuple[int, ...] = ()  # those that move
-    poses: Array | None = None  # (shapes, 7) place and turn of each
+    shapes: tuple[int, ...] = ()  # the shapes that move
+    poses: Array | None = None  # (shapes, 7) place and rotation of each
 
 
 def put(folder: Path, name: str, value: Any) -> int:
@@ -77,7 +77,7 @@ def put(folder: Path, name: str, value: Any) -> int:
 
 
 def draw(folder: Path, task: Task) -> Drawn:
-    """Draw a problem into a site's folder; nothing where its file cannot be read."""
+    """Draw a problem into a site's folder; nothing if its file cannot be read."""
     try:
         problem: Any = _core.read(task.file)
         solution = (
@@ -85,7 +85,7 @@ def draw(folder: Path, task: Task) -> Drawn:
         )
         record = view_of(problem, solution) if task.view or task.picture else None
     except _core.Error:
-        return Drawn(task.place)  # a file that went away or was damaged; its runs stay
+        return Drawn(task.place)  # the file is gone or damaged; its runs stay
     size = put(folder, f"views/{task.place}", record) if record is not None and task.view else 0
     bodies, contacts = problem.bodies, problem.contacts
     thumb = folder / "thumbs" / f"{task.place}.webp"
@@ -115,30 +115,30 @@ def draw(folder: Path, task: Task) -> Drawn:
         bytes=size + thumb.stat().st_size,
         scene=scene_of(solids),
         shapes=tuple(moving.tolist()),
-        # an elastic body is more than a pose
+        # a pose does not describe an elastic body
         poses=None if solids.strain else poses.astype(np.float32),
     )
 
 
 def matrix_of(problem: Any) -> Any:
-    """What is drawn of a problem without bodies: W, or H where W would take long."""
+    """The matrix drawn for a problem without bodies: W, or H if W would take long."""
     if not hasattr(problem, "H"):
         return problem.W
     return problem.condense().W if problem.nc <= CONDENSED else problem.H
 
 
 def scene_of(solids: Solids) -> str:
-    """A digest of what the steps of one scene have in common: bodies, shapes and their sizes."""
+    """A digest of the common data of the steps of one scene: bodies, shapes and their sizes."""
     digest = hashlib.sha256("\n".join(solids.names).encode())
     moving = solids.moves[solids.body] == 1
-    # how far a plane is drawn differs from step to step
+    # the drawn size of a plane differs from step to step
     for values in (solids.body, solids.kind, np.round(solids.scale[moving], 6)):
         digest.update(np.ascontiguousarray(values).tobytes())
     return digest.hexdigest()[:16]
 
 
 def draw_all(folder: Path, tasks: Sequence[Task], jobs: int | None = None) -> Iterator[Drawn]:
-    """Draw problems, in order; in processes where there are many."""
+    """Draw problems, in order; in several processes if there are many."""
     work: Callable[[Task], Drawn] = partial(draw, folder)
     jobs = jobs or len(os.sched_getaffinity(0))
     if jobs == 1 or len(tasks) < MANY:
@@ -151,10 +151,10 @@ def draw_all(folder: Path, tasks: Sequence[Task], jobs: int | None = None) -> It
 def sequences(
     folder: Path, drawn: Sequence[Drawn], rows: Sequence[dict[str, Any]]
 ) -> tuple[dict[tuple[str, str], list[int]], int]:
-    """Write the steps of each family whose problems are of one scene; their numbers, and the bytes.
+    """Write the steps of each family of one scene. Return their numbers and the bytes.
 
     Args:
-        folder: of the site.
+        folder: folder of the site.
         drawn: the problems.
         rows: the catalogue.
     """

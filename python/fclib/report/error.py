@@ -1,4 +1,4 @@
-"""What can go wrong with a report."""
+"""The error of a report."""
 
 from __future__ import annotations
 
@@ -6,4 +6,4 @@ from fclib import _core
 
 
 class ReportError(_core.Error, ValueError):
-    """There is nothing to report, nowhere to put it, or nothing to draw it with."""
+    """There is nothing to report, no place for it, or no library to draw it."""

@@ -3,8 +3,8 @@
     plotly   plotly.min.js: charts, patterns, bodies and contacts in space
     itables  DataTables with jQuery: tables
 
-Nothing of theirs lies in this repository: their files are copied into a site as it is written, each
-with its licence.
+Nothing of theirs lies in this repository: their files are copied into a site when it is written,
+each with its licence.
 """
 
 from __future__ import annotations
@@ -17,38 +17,38 @@ from pathlib import Path
 
 from fclib.report.error import ReportError
 
-# a module of exports at its end: a browser loads none from a folder of files, but scripts
+# a module that ends in exports: from a folder of files a browser loads scripts, but no modules
 EXPORTS = re.compile(r"export\s*\{([^{}]*)\};?\s*(?=/\*|\Z)")
-# of the parts that a file is bundled from
+# comments on the parts from which a file is bundled
 NOTICES = re.compile(r"^/\*!? *Bundled license information:.*?^\*/", re.DOTALL | re.MULTILINE)
 
 
 @dataclass(frozen=True)
 class Library:
-    """A library as a site carries it."""
+    """A library in a site."""
 
     name: str
     version: str
-    licence: str  # its name
-    package: str  # that ships it, with its version
+    licence: str  # name of the licence
+    package: str  # the package that ships it, with its version
     purpose: str
     files: Mapping[str, str]  # name in the site -> text
-    notices: str  # the text of the licence, and what the file says of its parts
+    notices: str  # the text of the licence, and the file's notes on its parts
 
     @property
     def record(self) -> dict[str, str]:
-        """What the page about the site says of it."""
+        """The entry of the page about the site."""
         keys = ("name", "version", "licence", "package", "purpose")
         return {key: getattr(self, key) for key in keys} | {"text": self.licence_file}
 
     @property
     def licence_file(self) -> str:
-        """Where the site has its licence."""
+        """The place of its licence in the site."""
         return f"assets/licences/{self.name.lower().replace('.', '-')}.txt"
 
 
 def libraries() -> tuple[Library, ...]:
-    """Those of a site.
+    """The libraries of a site.
 
     Raises:
         ReportError: a package is not installed, or holds something else than expected.
@@ -57,7 +57,7 @@ def libraries() -> tuple[Library, ...]:
 
 
 def plotly() -> Library:
-    """Plotly's JavaScript, of the package plotly."""
+    """Plotly's JavaScript, from the package plotly."""
     distribution = _package("plotly")
     script = _text(distribution, "plotly/package_data/plotly.min.js")
     return Library(
@@ -72,7 +72,7 @@ def plotly() -> Library:
 
 
 def datatables() -> Library:
-    """DataTables with its extensions and jQuery, of the package itables."""
+    """DataTables with its extensions and jQuery, from the package itables."""
     distribution = _package("itables")
     module = _text(distribution, "itables/html/dt_bundle.js")
     return Library(
@@ -93,7 +93,7 @@ def as_script(module: str, export: str, name: str) -> str:
     """A module as a classic script that leaves one of its exports in a global variable.
 
     Raises:
-        ReportError: the text does not end in one list of exports, with this one among them.
+        ReportError: the text does not end in one list of exports, with this one in it.
     """
     found = EXPORTS.findall(module)
     names = {}
@@ -136,7 +136,7 @@ def _version(distribution: metadata.Distribution, pattern: str, text: str) -> st
 
 
 def _notices(distribution: metadata.Distribution, text: str) -> str:
-    """The licence in the package, then what the file says of the parts it is bundled from."""
+    """The licence in the package, then the file's notes on its bundled parts."""
     own = [
         file.read_text(encoding="utf-8")
         for file in distribution.files or ()

@@ -1,7 +1,7 @@
-"""The network of contacts of a problem: bodies, contact points, normals, where they are in space.
+"""The network of contacts of a problem: bodies, contact points, normals, their places in space.
 
-A file that has the groups /bodies and /contacts says it. Of another, H holds more than it seems to,
-where bodies are free and rigid: its block of a contact and a body is
+The groups /bodies and /contacts of a file have these. Without them, H gives more than it seems to,
+if bodies are free and rigid: its block of a contact and a body is
 
     H_v = T            (3 x 3), the contact's frame, columns N, T1, T2, in space
     H_w = Q^T [l]x T   (3 x 3), l from the body's centre to the contact point, Q the body's rotation
@@ -14,12 +14,13 @@ x_a + l_a = x_b + l_b, which gives the positions of all bodies that hang togethe
 Groups without a contact between them are set down beside each other, at their heights over
 the ground.
 
-That is sound where M has six rows for each body that is touched, one mass and no more beside its
-inertia, and one rotation Q fits all of its contacts: a node of a mesh, or a body with joints, has
-no such rows. Of what is not sound there is a graph, and nobody is told where a body is.
+This is safe if M has six rows for each touched body, with one mass and the inertia only, and one
+rotation Q fits all of its contacts: a node of a mesh, or a body with joints, has no such rows.
+Otherwise there is only a graph, without the places of bodies.
 
-In a periodic cell x_a + l_a = x_b + l_b + s, with s of whole periods, which the file tells. Where
-contacts make a tree, s may be 0; at the others the positions leave gaps that round to their s.
+In a periodic cell x_a + l_a = x_b + l_b + s, with s of whole periods, which the file gives. For
+contacts that form a tree, s may be 0. At the others the positions leave gaps, which are rounded to
+their s.
 """
 
 from __future__ import annotations
@@ -39,26 +40,28 @@ from fclib._geometry import Bodies, Contacts
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
-FRAME = 1e-6  # what the columns of a frame may lack of orthonormality
-MISFIT = 0.05  # what contact points may be apart, of the size of the levers, to be believed
-RIGID = 1e-6  # what the moments of a rigid body may differ from those of levers, relative
-EDGES = 20_000  # of a graph that pull while it is laid out
-ROUNDING = 1e-12  # what an entry of H may be, of the largest, and stand for nought
-GROUND = 1e-2  # weight of a plane ground against that of shared points
+FRAME = 1e-6  # largest deviation of a frame's columns from orthonormality
+# largest distance of shared contact points, relative to the levers, for a valid result
+MISFIT = 0.05
+RIGID = 1e-6  # largest relative difference of a rigid body's moments from those of levers
+EDGES = 20_000  # largest number of edges of a graph that pull during its layout
+ROUNDING = 1e-12  # an entry of H below this share of the largest counts as zero
+GROUND = 1e-2  # weight of a plane ground, relative to that of shared points
 
 
 @dataclass
 class Network:
     """Bodies that have a contact, and contacts, in space; the ground is body -1."""
 
-    source: str  # of positions: "file", "H", or "graph" where nobody knows them
-    bodies: Array  # (bodies, 3) [m] where placed
+    source: str  # of positions: "file", "H", or "graph" if they are not known
+    bodies: Array  # (bodies, 3) [m] if placed
     points: Array  # (contacts, 3)
     pairs: Indices  # (contacts, 2) bodies of each contact
     frames: Array | None  # (contacts, 3, 3) columns N, T1, T2, pushing the first body
     note: str = ""
     limits: Indices | None = None  # contacts without a place: limits of joints, dry friction
-    # (contacts, 3) from the place at the second body to that at the first; 0 but across a boundary
+    # (contacts, 3) from the place at the second body to that at the first; 0 except across a
+    # boundary
     shifts: Array | None = None
     cell: Array | None = None  # (2, 2) lowest and highest x, y of a periodic cell
 
@@ -83,7 +86,7 @@ def network_of(problem: Any) -> Network:
     if getattr(problem, "H", None) is None:
         return _of_local(problem)
     H = sp.csc_array(problem.H, copy=True)
-    # what is rounding in H ties no body to a contact
+    # entries of H that are only rounding tie no body to a contact
     H.data[np.abs(H.data) <= ROUNDING * np.abs(H.data).max(initial=0.0)] = 0.0
     H.eliminate_zeros()
     d = problem.spacedim
@@ -109,7 +112,7 @@ def network_of(problem: Any) -> Network:
 
 
 def given(bodies: Bodies, contacts: Contacts) -> Network:
-    """What a file says: the force of a contact pushes the second of its two bodies."""
+    """The network from a file: the force of a contact pushes the second of its two bodies."""
     pairs = np.asarray(contacts.body[:, ::-1], dtype=np.int64)
     limits = np.flatnonzero((contacts.shape < 0).any(axis=1))
     found = Network(
@@ -122,12 +125,12 @@ def given(bodies: Bodies, contacts: Contacts) -> Network:
     )
     if len(bodies.period):
         period = np.array([*bodies.period, np.inf])
-        # the nearest images of both bodies are meant
+        # take the nearest images of both bodies
         ends = [_whole(contacts.point - bodies.place[pairs[:, side]], period) for side in (0, 1)]
         shifts = ends[1] - ends[0]
         shifts[limits] = 0.0
         found.shifts = shifts
-        # a contact is drawn where the first of its bodies is
+        # a contact is drawn at the first of its bodies
         found.points = found.points - ends[0]
         found.shifts = shifts
     return found
@@ -139,14 +142,14 @@ def _period_of(problem: Any) -> Array | None:
         x, y = json.loads(problem.info.description.splitlines()[-1])["period"]
         return np.array([float(x), float(y), np.inf])
     except (IndexError, KeyError, TypeError, ValueError):
-        return None  # it says nothing of where it was simulated, or there was none
+        return None  # it does not tell its cell, or it has none
 
 
 # ---- bodies
 
 
 def _bodies_of(problem: Any, H: Any) -> list[_Body]:
-    """Blocks of degrees of freedom: what M or G couples, and free rigid bodies six at a time."""
+    """Blocks of degrees of freedom: those that M or G couples, and six for each free rigid body."""
     coupled = abs(sp.csr_array(problem.M))
     G = getattr(problem, "G", None)
     if G is not None and problem.p:
@@ -181,7 +184,7 @@ def _bodies_of(problem: Any, H: Any) -> list[_Body]:
 def _is_free(H: Any, M: Array, d: int, first: int) -> bool:
     """Whether six degrees of freedom are the velocity of a rigid body's centre and its rotation.
 
-    Their mass must be one number and nothing beside, and the first three rows of H frames.
+    Their mass must be a single number, and the first three rows of H must be frames.
     """
     mass = M[0, 0]
     if np.abs(M[:3] - np.eye(3, 6) * mass).max() > FRAME * mass:
@@ -190,7 +193,7 @@ def _is_free(H: Any, M: Array, d: int, first: int) -> bool:
     contacts = np.unique(block.indices // d)
     if not contacts.size:
         return True
-    # (3, contacts, 3): the columns of the frames, if they are such
+    # (3, contacts, 3): the columns of the frames, if they are frames
     T = block[:3].toarray().reshape(3, -1, d)[:, contacts, :3]
     return bool(np.abs(np.einsum("ikp,ikq->kpq", T, T) - np.eye(3)).max() < FRAME)
 
@@ -236,7 +239,7 @@ def _place(
     label = _groups(pairs, len(bodies))
     cell = None
     if period is not None and shifts.any():
-        # the cell is about the middle of those that its boundary joins
+        # centre the cell on the bodies that its boundary joins
         inside = label == label[pairs[np.flatnonzero(shifts.any(axis=1))[0], 0]]
         middle = centres[inside].mean(axis=0)
         centres[inside] -= _whole(centres[inside] - middle, period)
@@ -266,7 +269,7 @@ def _place(
 
 
 def _along_a_tree(bodies: list[_Body], pairs: Indices) -> Array:
-    """Centres (bodies, 3) by one contact for each body but the first of its group."""
+    """Centres (bodies, 3) from one contact for each body except the first of its group."""
     contacts = [k for k, pair in enumerate(pairs) if all(b >= 0 and bodies[b].free for b in pair)]
     between = {frozenset(pairs[k].tolist()): k for k in contacts}
     centres = np.zeros((len(bodies), 3))
@@ -285,7 +288,7 @@ def _along_a_tree(bodies: list[_Body], pairs: Indices) -> Array:
 
 
 def _shifts(bodies: list[_Body], pairs: Indices, centres: Array, period: Array) -> Array:
-    """Whole periods (contacts, 3) that are between the places of each contact at its bodies."""
+    """Whole periods (contacts, 3) between the places of each contact at its two bodies."""
     found = np.zeros((len(pairs), 3))
     for contact, (a, b) in enumerate(pairs.tolist()):
         if min(a, b) >= 0 and bodies[a].free and bodies[b].free:
@@ -295,7 +298,7 @@ def _shifts(bodies: list[_Body], pairs: Indices, centres: Array, period: Array) 
 
 
 def _whole(x: Array, period: Array) -> Array:
-    """The whole periods in x (..., 3), to the nearest; none where a period is infinite."""
+    """The whole periods in x (..., 3), to the nearest; 0 if a period is infinite."""
     count = np.round(x / period)
     return np.where(count == 0, 0.0, count * np.where(np.isinf(period), 0.0, period))
 
@@ -308,13 +311,13 @@ def _levers(moments: dict[Any, Array], frames: dict[Any, Array]) -> dict[int, Ar
         _, vectors = np.linalg.eigh(0.5 * np.trace(S) * np.eye(3) - S)
         levers[contact] = vectors[:, -1] * np.sqrt(max(0.0, 0.5 * np.trace(S)))
     order = sorted(levers, key=lambda c: -float(np.linalg.norm(levers[c])))
-    # each sign by the one, of those that are settled, that tells most
+    # fix each sign by the settled contact that tells most
     for k, contact in enumerate(order[1:], start=1):
         dots = [0.5 * float(np.sum(moments[contact] * moments[other])) for other in order[:k]]
         best = int(np.argmax(np.abs(dots)))
         if dots[best] * float(levers[contact] @ levers[order[best]]) < 0:
             levers[contact] = -levers[contact]
-    # A = Q^T [l]x, and for -l it would be that of -Q
+    # A = Q^T [l]x, and -l would give -Q
     total = sum(moments[c] @ _cross(levers[c]).T for c in order)
     values = np.linalg.svd(total, compute_uv=False)
     if values[-1] > 1e-9 * max(1e-300, values[0]):
@@ -325,7 +328,7 @@ def _levers(moments: dict[Any, Array], frames: dict[Any, Array]) -> dict[int, Ar
 
 
 def _is_rigid(moments: dict[Any, Array], levers: dict[int, Array]) -> bool:
-    """Whether one rotation Q gives A = Q^T [l]x of all contacts, and not all levers are nought."""
+    """Whether one rotation Q gives A = Q^T [l]x of all contacts, and not all levers are zero."""
     own = [(moments[c], _cross(levers[c])) for c in levers]
     size = max(float(np.abs(A).max()) for A, _ in own)
     if size == 0.0:
@@ -344,7 +347,7 @@ def _cross(x: Array) -> Array:
 def _solve(
     bodies: list[_Body], pairs: Indices, frames: Array, shifts: Array, scale: float
 ) -> tuple[Array, float]:
-    """Centres (bodies, 3) by least squares, and how far shared points are apart, over the scale."""
+    """Centres (bodies, 3) by least squares, and the distance of shared points over the scale."""
     i: list[int] = []
     j: list[int] = []
     x: list[float] = []
@@ -391,18 +394,18 @@ def _graph(pairs: Indices, count: int) -> Any:
 
 
 def _groups(pairs: Indices, count: int) -> Indices:
-    """The number (count) of the group of each body, groups being those that hang together."""
+    """The number (count) of the group of each body, a group is a connected set of bodies."""
     _, label = scipy.sparse.csgraph.connected_components(_graph(pairs, count), directed=False)
     return np.asarray(label)
 
 
 def _set_down(label: Indices, pairs: Indices, centres: Array, points: Array) -> Array:
-    """By how much (groups, 3) to move groups, so that they stand beside each other."""
+    """The displacements (groups, 3) that place groups beside each other."""
     groups = int(label.max()) + 1
     at = label[pairs[:, 0]]
     boxes = []
     for group in range(groups):
-        # a body's other end is as far as its contact is
+        # assume that a body's other end is as far as its contact
         own = points[at == group, :2]
         middle = centres[label == group, :2].mean(axis=0)
         half = np.abs(np.vstack([own, centres[label == group, :2]]) - middle).max(axis=0)
@@ -427,7 +430,7 @@ def _set_down(label: Indices, pairs: Indices, centres: Array, points: Array) -> 
 
 
 def _of_local(problem: Any) -> Network:
-    """A local problem knows contacts and what couples them, and no bodies."""
+    """The graph of a local problem: it has contacts and their coupling, but no bodies."""
     d = problem.spacedim
     W = problem.W
     entries = sp.coo_array(W if sp.issparse(W) else np.asarray(W))
@@ -455,7 +458,7 @@ def _spread(count: int, edges: Indices, rounds: int = 60) -> Array:
     random = np.random.Generator(np.random.PCG64(0))
     side = max(1.0, count ** (1 / 3))
     x = random.uniform(-side, side, (count, 3))
-    # beyond this many, each node is pushed by a sample of the others
+    # with more nodes than this, a sample of the others pushes each node
     sample = min(count, 400)
     if len(edges) > EDGES:
         edges = edges[np.sort(random.choice(len(edges), EDGES, replace=False))]
@@ -476,7 +479,7 @@ def _spread(count: int, edges: Indices, rounds: int = 60) -> Array:
             along = x[edges[:, 1]] - x[edges[:, 0]]
             pull = along * np.linalg.norm(along, axis=1, keepdims=True)
             step += towards @ pull
-        step -= 0.05 * x * side  # keeps groups that do not touch in sight
+        step -= 0.05 * x * side  # keeps groups that do not touch in the picture
         length = np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
         x += step / length * np.minimum(length, 0.4 * side * (1 - k / rounds) + 1e-3)
     return np.asarray(x - x.mean(axis=0))

@@ -53,12 +53,12 @@ def write_paper(campaigns: Campaigns, folder: Path, metric: str = "cpu_s") -> li
 
 
 def _shown(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Rows without the tolerance, which the folder says."""
+    """Rows without the tolerance, which is in the folder's name."""
     return [{key: value for key, value in row.items() if key != "tol"} for row in rows]
 
 
 def latex(rows: Sequence[Mapping[str, Any]]) -> str:
-    """A tabular of booktabs, a column a key."""
+    """A tabular of booktabs, one column for each key."""
     keys = list(rows[0])
     numeric = [isinstance(rows[0][key], (int, float)) for key in keys]
     lines = [

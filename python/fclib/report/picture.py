@@ -1,7 +1,7 @@
 """A problem's bodies as a small picture: from above at an angle, or a plane from the front.
 
-Triangles are painted from the far ones to the near ones, by Pillow. What is fixed is painted
-first, its inside only, so that a box shows what is in it. A long thin scene, a stack or a chain, is
+Triangles are painted from the far ones to the near ones, by Pillow. Fixed bodies are painted first,
+and only their insides, so that a box shows its content. A long thin scene, a stack or a chain, is
 painted twice: whole in a strip, and a part of it large. A problem without bodies is drawn as its
 matrix.
 """
@@ -16,18 +16,18 @@ import scipy.sparse as sp
 
 from fclib.report.solids import PLANE, Array, Solids, unit
 
-FINE = 3  # pixels that are painted for one that is kept, along each side
+FINE = 3  # pixels painted for each pixel kept, along each side
 THUMB, LARGE = (200, 150), (960, 720)
 TURN, TILT = 0.6, 0.3  # [rad] of the eye about z, above the ground
-LONG = 1.5  # over its width and height, of what lies along y
+LONG = 1.5  # length over width and height from which a scene along y counts as long
 MARGIN = 1.12
 THIN = 0.15  # thickness over length of a scene, below which a part of it is shown large
-FEW = 3  # moving bodies of such a scene
-STRIP = 0.2  # of the picture, for the whole of it
-PATCH = 10  # pixels of a triangle that is painted whole
-CUTS = 24  # of a triangle at most
-CELLS = 50  # of a matrix, along a side
-# by body in turn; what is fixed; by status open, stick, slide; as in style.css
+FEW = 3  # least number of moving bodies of such a scene
+STRIP = 0.2  # share of the picture for the whole scene
+PATCH = 10  # largest size in pixels of a triangle that is painted whole
+CUTS = 24  # largest number of cuts of a triangle
+CELLS = 50  # number of cells of a matrix along a side
+# colours of bodies in turn; of fixed bodies; by status open, stick, slide; as in style.css
 TINTS = ((91, 143, 201), (217, 150, 82), (106, 176, 140), (186, 128, 176), (201, 178, 84))
 FIXED = (150, 160, 170)
 STATUSES = ((136, 149, 162), (31, 122, 71), (196, 78, 0))
@@ -47,12 +47,12 @@ def draw(
 
     Args:
         solids: the bodies.
-        path: of the picture.
+        path: path of the picture.
         size: its width and height in pixels.
-        points: (k, 3) of contacts.
+        points: (k, 3) points of contacts.
         forces: (k, 3) at these, drawn as arrows.
-        statuses: of these, digits of open, stick, slide.
-        near: (k, 3) places of which one is in the middle of a part that is shown large.
+        statuses: statuses of these, as digits for open, stick, slide.
+        near: (k, 3) places; one of them is the middle of a part that is shown large.
 
     Raises:
         ImportError: Pillow is not there.
@@ -69,7 +69,7 @@ def draw(
     wide, tall = size[0] * FINE, size[1] * FINE
 
     def paint(window: tuple[Array, Array], wide: int, tall: int, edge: int = 0) -> tuple[Any, Any]:
-        """A picture of what is seen between two corners, and how places become its pixels."""
+        """A picture of the part between two corners, and the map from places to its pixels."""
         low, high = window
         scale, middle = scale_of(window, wide, tall), 0.5 * (low + high)
 
@@ -91,7 +91,7 @@ def draw(
         strip = (round(STRIP * wide), tall) if upright else (wide, round(STRIP * tall))
         rest = (wide - strip[0], tall) if upright else (wide, tall - strip[1])
         picture = Image.new("RGBA", (wide, tall), (255, 255, 255, 0))
-        small, pixels = paint(whole, *strip, 2 * FINE)  # else thinner than a pixel
+        small, pixels = paint(whole, *strip, 2 * FINE)  # otherwise it is thinner than a pixel
         low, high = np.sort(pixels(np.array(part)), axis=0)
         frame = [*(low - 2 * FINE).tolist(), *(high + 2 * FINE).tolist()]
         ImageDraw.Draw(small).rectangle(frame, outline=(*STATUSES[0], 255), width=FINE)
@@ -102,7 +102,7 @@ def draw(
 
 
 def scale_of(window: tuple[Array, Array], wide: int, tall: int) -> float:
-    """Pixels of a unit of length, where all between two corners is to be seen."""
+    """Pixels of a unit of length, if all between two corners must be visible."""
     low, high = window
     span = np.maximum(high - low, 1e-9 * (1 + np.abs(high))) * MARGIN
     return float(min(wide / span[0], tall / span[1]))
@@ -138,7 +138,7 @@ def solid(
     lengths = np.linalg.norm(normals, axis=1)
     normals /= np.maximum(lengths, 1e-300)[:, None]
     front = normals[:, 2] > 0
-    # of what moves the outside, of what is fixed the inside, of a plane what is above
+    # of moving bodies the outside, of fixed ones the inside, of a plane its upper side
     kept = np.where(fixed, np.where(flat, front, ~front), front) & (lengths > 0)
     light = axes @ LIGHT
     shade = 0.62 + 0.38 * np.clip(np.where(fixed & ~flat, -1.0, 1.0) * (normals @ light), -0.3, 1)
@@ -157,7 +157,7 @@ def solid(
 def halved(corners: Array, pixels: Any, chosen: Any, size: tuple[int, int]) -> tuple[Array, Any]:
     """Triangles (t, 3, 3), those chosen cut across their longest edges until these are short.
 
-    Also returns which of the given triangles each is of. What is outside the picture is left out.
+    It also returns the original triangle of each. Parts outside the picture are left out.
     """
     of = np.arange(len(corners))
     done, origins = [corners[~chosen]], [of[~chosen]]
@@ -190,7 +190,7 @@ def marks(
         own = STATUSES[int(statuses[k])] if statuses else STATUSES[0]
         pen.ellipse((x - dot, y - dot, x + dot, y + dot), fill=(*own, 255))
     if forces is not None:
-        # on the body that each lifts, as on the pages
+        # draw each on the body that it lifts, as on the pages
         lifted = forces * np.where(forces[:, 2:] < 0, -1.0, 1.0)
         arrows(pen, at, lifted @ axes.T, longest, statuses)
 
@@ -198,7 +198,7 @@ def marks(
 def draw_matrix(matrix: Any, path: Path, size: tuple[int, int] = THUMB) -> None:
     """Write a picture of a matrix: a colour for each sign, darker for larger entries.
 
-    Of a large one a cell holds the largest entry of several.
+    In a large matrix a cell shows the largest of several entries.
     """
     from PIL import Image
 
@@ -224,7 +224,7 @@ def draw_matrix(matrix: Any, path: Path, size: tuple[int, int] = THUMB) -> None:
 
 
 def saving(path: Path) -> dict[str, Any]:
-    """How a format is written: a small file, the same each time."""
+    """The settings of a format: a small file, the same each time."""
     return {"quality": 70, "method": 4} if path.suffix == ".webp" else {"optimize": True}
 
 
@@ -255,14 +255,14 @@ def eye(solids: Solids) -> Array:
     if moving and not solids.planar:
         x, y, z = np.ptp(np.concatenate([solids.world(k) for k in moving]), axis=0)
         if y > LONG * max(x, z):
-            turn -= np.pi / 2  # what is long along y lies across the picture
+            turn -= np.pi / 2  # a scene that is long along y lies across the picture
     right = np.array([np.cos(turn), np.sin(turn), 0.0])
     back = np.array([np.sin(turn) * np.cos(tilt), -np.cos(turn) * np.cos(tilt), np.sin(tilt)])
     return np.array([right, np.cross(back, right), back])
 
 
 def triangles_in(solids: Solids) -> tuple[Array, Any, Any, Any, Any]:
-    """Vertices (v, 3), triangles (t, 3); of each its body, whether it is fixed, and a plane."""
+    """Vertices (v, 3), triangles (t, 3); of each its body, and whether it is fixed or a plane."""
     vertices, triangles, tint, fixed, flat = [], [], [], [], []
     count = 0
     plane = unit(PLANE, 2, 4)[0]

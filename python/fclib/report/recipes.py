@@ -1,6 +1,6 @@
-"""Lines to copy from the page of a problem: how to get it and solve it, from a shell, Python and C.
+"""Lines to copy from the page of a problem: they get it and solve it, from a shell, Python and C.
 
-`{path}`, `{id}` and `{family}` stand for those of the problem.
+`{path}`, `{id}` and `{family}` stand for the values of the problem.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ H5PY = Path(__file__).with_name("assets") / "h5py.txt"
 
 
 def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
-    """By formulation (RT-0444's abbreviations): `shell`, `python`, `c`, `h5py`.
+    """The lines by formulation (RT-0444's abbreviations): `shell`, `python`, `c`, `h5py`.
 
-    `build` and `load` take the place of the first lines where the problem is of a collection.
+    `build` and `load` replace the first lines if the problem is of a collection.
     """
     return {
         name: {
@@ -55,7 +55,7 @@ def recipes(formulations: Iterable[str]) -> dict[str, dict[str, str]]:
 
 
 def _kind(formulation: str) -> str:
-    """The kind of a problem, as its group in a file is named."""
+    """The kind of a problem, which is the name of its group in a file."""
     whole = "global" if formulation.startswith("G") else "local"
     return whole + ("_rolling" if "R" in formulation else "")
 

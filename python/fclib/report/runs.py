@@ -30,19 +30,19 @@ from fclib.bench.table import Table, object_in
 from fclib.report.error import ReportError
 from fclib.report.view import rounded
 
-DIGITS = 6  # of costs on the site
+DIGITS = 6  # significant digits of costs on the site
 WEIGH: profiles.Weigh = "families"  # so that a large family decides no figure of a site
-EXTREMES = 8  # problems on which a solver is best, and worst
+EXTREMES = 8  # number of problems shown as a solver's best, and worst
 REPORTS = 80  # points of a convergence curve
-BANDED = 20_000  # costs up to which the curves of a headline have bands
+BANDED = 20_000  # with more costs the curves of a headline have no bands
 TAUS = 160  # points of a headline's curve
-CODES = "0123456789abcdefghijklmnopqrstuvwxyz"  # of statuses; "." where nothing was run
+CODES = "0123456789abcdefghijklmnopqrstuvwxyz"  # of statuses; "." if nothing was run
 NOT_RUN = "."
 
 
 @dataclass(frozen=True)
 class Bench:
-    """What was run at one tolerance: a row an instance, a column a solver."""
+    """The runs at one tolerance: a row for each instance, a column for each solver."""
 
     tol: float
     instances: tuple[Instance, ...]
@@ -66,16 +66,16 @@ class Campaigns:
             stores: files of `fclib bench`.
             machine: only the runs of this node.
             campaign: only the runs of this campaign.
-            merit: only the runs whose tolerance bounds this.
+            merit: only the runs whose tolerance bounds this merit.
 
         Raises:
-            StoreError: a file is no store.
+            StoreError: a file is not a store.
             ProfileError: no run is left, or they are of several machines or merits.
         """
         self._folder = tempfile.TemporaryDirectory(prefix="fclib-report-")
         try:
             self.store = self._merged(stores)
-            # from nothing; runs that start from a step before are in `along` alone
+            # cold runs; runs that start from a step before are only in `along`
             self.rows = profiles.load(
                 self.store,
                 machine=machine,
@@ -94,7 +94,7 @@ class Campaigns:
         if not len(self.rows):
             self._folder.cleanup()
             raise ReportError("no problem of these runs could be read")
-        # what all figures and tables are of: as fclib profile has it
+        # the compared costs of all figures and tables, as in fclib profile
         self.every = profiles.gather(self.rows)
         self.costs = compared(self.every)
         # the most run first, then by name
@@ -122,7 +122,7 @@ class Campaigns:
         return self.rows.where(numbers_in(self.rows, "tol") == tol)
 
     def problems(self) -> dict[str, dict[str, Any]]:
-        """What the stores know of each problem that was run, by its hash; its main form first."""
+        """The facts in the stores on each problem run, by its hash; its main form first."""
         _, first = self.rows.numbers("hash")
         names = ("hash", "problem", "family", "formulation", "spacedim", "n", "p", "nc", "nnz")
         found = {}
@@ -132,7 +132,7 @@ class Campaigns:
         return dict(sorted(found.items(), key=lambda item: bool(item[1]["same_as"])))
 
     def overview(self) -> dict[str, Any]:
-        """What was run, where, and by whom it was asked for."""
+        """The campaigns, the machine and the versions of the runs."""
         with Store(self.store, create=False) as store:
             campaigns = [
                 {"name": s.name, "planned": s.planned, "done": s.done, "ended": s.ended is not None}
@@ -170,7 +170,7 @@ class Campaigns:
         return Bench(tol, found.instances, costs, self._statuses(rows, found))
 
     def _statuses(self, rows: Table, found: Costs) -> tuple[str, ...]:
-        """Of each cell the most frequent status of its repeats; of what is not taken that word."""
+        """The most frequent status of the repeats in each cell; "unsuitable" if it is not taken."""
         code = dict(zip(STATUSES, CODES, strict=False))
         cells = np.full(found.values.shape, NOT_RUN, dtype="<U1")
         own = found.own()
@@ -179,7 +179,7 @@ class Campaigns:
         words = words_in(runs, "status")
         seen = (place * len(found.solvers) + column) * len(words.values) + words.codes
         pairs, count = np.unique(seen, return_counts=True)
-        # the most frequent comes last, and stays
+        # the most frequent status comes last, and stays
         for pair in pairs[np.argsort(count, kind="stable")].tolist():
             cell, status = divmod(pair, len(words.values))
             cells.flat[cell] = code[words.values[status]]
@@ -230,7 +230,7 @@ class Campaigns:
     # ---- one problem
 
     def by_problem(self) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-        """The runs of each problem, its hash first, with their convergence where it was stored."""
+        """The runs of each problem, its hash first, with their convergence if it was stored."""
         groups: dict[str, list[dict[str, Any]]] = defaultdict(list)
         for row in self.rows:
             groups[row["hash"]].append(row)
@@ -253,7 +253,7 @@ class Campaigns:
 
 
 def _proof(record: Mapping[str, Any]) -> dict[str, Any]:
-    """A certificate for a page: what a solver found are doubles, and they keep all their digits."""
+    """A certificate for a page: a solver's result is in doubles, and these keep all digits."""
     numbers = {
         name: {key: float(Fraction(value)) for key, value in record[name].items()} for name in "yz"
     }
@@ -265,7 +265,7 @@ def _thinned(
 ) -> list[list[float]]:
     """Iteration, least error so far and time of some reports, evenly on a logarithmic axis.
 
-    The last one is there too. The time [s] is of CPU, as that of the tables.
+    The last report is included. The time [s] is CPU time, as in the tables.
     """
     times, errors = profiles.least_errors(history, cpu_s)
     count = len(history)
@@ -277,7 +277,7 @@ def _thinned(
 
 
 def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
-    """For each solver the problems that it is best and worst on, beside the best of the others."""
+    """For each solver: its best and worst problems, with the best of the other solvers."""
     found = {}
     count = len(costs.solvers)
     for k, name in enumerate(costs.solvers):
@@ -295,14 +295,14 @@ def _extremes(costs: Costs, places: Mapping[str, int]) -> dict[str, Any]:
         def entry(
             i: int, own: Any = own, best: Any = best, rival: Any = rival, names: Any = names
         ) -> list[Any]:
-            # problem, own cost, that of the best of the others, which that is
+            # problem, own cost, cost of the best other solver, name of that solver
             other = names[rival[i]] if names and np.isfinite(best[i]) else None
             return [places[costs.instances[i].hash], own[i], best[i], other]
 
         known = np.flatnonzero(~np.isnan(ratio))
         order = known[np.argsort(ratio[known], kind="stable")]
         won = [i for i in order if ratio[i] <= 1][:EXTREMES]
-        # failures first, those that were the easiest for another before
+        # failures first, and among them those that were easiest for another solver
         lost = sorted((i for i in order if ratio[i] > 1), key=lambda i: (-ratio[i], best[i]))
         found[name] = rounded(
             {

@@ -1,4 +1,4 @@
-"""Pages at an address of this machine: a browser loads modules from there, not from a folder."""
+"""Pages at an address of this machine: from a folder a browser loads no modules."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fclib.report.error import ReportError
 from fclib.report.site import MARK, described_merits
 from fclib.report.view import write_view
 
-HOST = "127.0.0.1"  # nobody else reaches it
+HOST = "127.0.0.1"  # no other machine reaches it
 
 
 class _Handler(SimpleHTTPRequestHandler):
-    # the system's table, which the library asks, may know other types, or none
+    # the library uses the system's table, which may have other types, or none
     extensions_map = SimpleHTTPRequestHandler.extensions_map | {
         ".js": "text/javascript",
         ".mjs": "text/javascript",
@@ -31,7 +31,7 @@ class _Handler(SimpleHTTPRequestHandler):
     }
 
     def do_GET(self) -> None:
-        """A file; and nothing, without an error, for the icon that browsers ask each server for."""
+        """Send a file; send nothing, without an error, for the icon that browsers ask for."""
         if self.path == "/favicon.ico":
             self.send_response(204)
             self.end_headers()
@@ -41,8 +41,8 @@ class _Handler(SimpleHTTPRequestHandler):
     def send_head(self) -> Any:
         """The head of an answer, and the file: one of the folder, to pages of this address alone.
 
-        A name that leads here from elsewhere is no name of ours: the page of a stranger would read
-        by it what is served. A link out of the folder is followed by nobody.
+        A foreign host name that leads here is refused: through it a stranger's page could read the
+        files. A link out of the folder is not followed.
         """
         port = self.connection.getsockname()[1]
         if self.headers.get("Host") not in {f"{name}:{port}" for name in (HOST, "localhost")}:
@@ -63,10 +63,10 @@ class _Handler(SimpleHTTPRequestHandler):
         self.send_error(HTTPStatus.NOT_FOUND)
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing of what is asked for."""
+        """Log no requests."""
 
     def end_headers(self) -> None:
-        # a site that is built anew is seen anew
+        # a browser must reload a site that was built anew
         self.send_header("Cache-Control", "no-cache")
         super().end_headers()
 
@@ -75,7 +75,7 @@ def server(folder: Path, port: int = 0) -> ThreadingHTTPServer:
     """A server of a folder, not yet running, at a port or at any that is free.
 
     Raises:
-        ReportError: the port is not to be had.
+        ReportError: the port is not available.
     """
     try:
         return ThreadingHTTPServer((HOST, port), partial(_Handler, directory=str(folder)))
@@ -84,10 +84,10 @@ def server(folder: Path, port: int = 0) -> ThreadingHTTPServer:
 
 
 def serve(site: Path, say: Callable[[str], None]) -> None:
-    """Serve a site on this machine until it is interrupted; `say` is told the address.
+    """Serve a site on this machine until it is interrupted; `say` is called with the address.
 
     Raises:
-        ReportError: the folder is no site.
+        ReportError: the folder is not a site.
     """
     if not (site / MARK).is_file():
         raise ReportError(f"{site}: is no site that fclib report has made")
@@ -107,13 +107,13 @@ def _until_interrupted(folder: Path, say: Callable[[str], None]) -> None:
 
 
 def panel_of(file: Path, kind: str, solved: bool, module: Path | None) -> dict[str, Any]:
-    """What the page of a file needs to check and solve its problem.
+    """The data that the page of a file needs to check and solve its problem.
 
     Args:
         file: an FCLIB file.
-        kind: of the problem in it.
+        kind: kind of the problem in it.
         solved: whether the stored solution is of this problem.
-        module: folder of the module, None where there is none.
+        module: folder of the module, None if there is none.
     """
     own: dict[str, Any] = {"what": kind, "path": file.name, "kind": kind, "sha256": sha256(file)}
     own |= {"href": f"files/{quote(file.name)}", "merit": taking.merit_of(file) if solved else None}

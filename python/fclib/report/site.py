@@ -1,14 +1,14 @@
-"""The site: pages that need no server, and data in files that they load when they are asked for.
+"""The site: pages that need no server, and data in files, which they load on demand.
 
     index.html  assets/           the pages and the libraries, the same for every site
-    data/site.js                  what the first page shows, the solvers, the families
-    data/catalogue.js             a column each of what is known of the problems
-    data/files/1.js               digests, files and how to name them, of rows 100 to 199
+    data/site.js                  content of the first page, the solvers, the families
+    data/catalogue.js             facts on the problems, in columns
+    data/files/1.js               digests, files and citations of rows 100 to 199
     data/t0.js  data/t0-cpu_s.js  statuses, and costs by a metric, at the first tolerance
     data/problems/12.js           the runs of the problem in row 12 of the catalogue
     data/views/  thumbs/          pictures; drawn.py
     pictures/SET/FAMILY/          of the catalogue
-    files/                        the problems themselves, where that is asked for
+    files/                        the problems themselves, if that is asked for
     assets/browser/               the core that checks and solves them on a page; browser.py
 
 A data file calls `Fclib.put(name, value)`: a script loads from a folder of files, JSON does not.
@@ -43,7 +43,7 @@ from fclib.report.recipes import recipes
 from fclib.report.runs import CODES, DIGITS, NOT_RUN, STATUSES, WEIGH, Bench, Campaigns
 from fclib.report.view import ASSETS, rounded
 
-MARK = "data/site.js"  # by which a folder is known to be a site
+MARK = "data/site.js"  # file by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
 PAGES = (
     *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
@@ -113,9 +113,9 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("thumb", "picture", "whether there is a small picture of it"),
     ("collection", "set", "the set of families"),
 )
-# what solvers say of themselves: `fclib.bench.campaign.described`
+# descriptions of solvers: `fclib.bench.campaign.described`
 ABOUT = {"title": str, "citation": str, "dimensions": list, "rolling": list, "options": list}
-# of a catalogue, and of no use on a page
+# columns of a catalogue that are of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
 HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
 
@@ -138,28 +138,28 @@ def build_site(
     jobs: int | None = 1,
     progress: Callable[[str, int, int], None] = _no_progress,
 ) -> dict[str, int]:
-    """Write the site, whole, in the place of an older one.
+    """Write the whole site; it replaces an older one.
 
     Args:
-        campaigns: the runs; None for a catalogue alone.
+        campaigns: the runs; None: only a catalogue.
         out: the folder of the site.
         catalogue: a collection's folder.
-        views: so many problems get a picture to turn, those with runs first, spread over families;
-            None: all. A small picture has each.
-        title: of the site.
+        views: number of problems with a picture to turn, those with runs first, spread over
+            families; None: all. Every problem has a small picture.
+        title: title of the site.
         with_files: copy the problems into the site, with their reference solutions and pictures.
         files_at: an address where the folder of the collection is served, for links to it.
         docs: an address where the documentation is served, for links to it.
         module: the folder of the module for browsers, with which the pages of a site that has its
-            files compute; None: that of a checkout, where it is built.
-        jobs: processes that draw; None: one a core.
-        progress: is told what is done, how far, of how many.
+            files compute; None: that of a checkout, if it is built.
+        jobs: number of processes that draw; None: one for each core.
+        progress: called with the name of the work, the number done and the total.
 
     Returns:
-        How many problems, runs, views and bytes the site holds, and the bytes of the module.
+        The numbers of problems, runs, views and bytes in the site, and the bytes of the module.
 
     Raises:
-        ReportError: there is nothing to show, `out` holds something else, or a library is not
+        ReportError: there is nothing to show, `out` holds other files, or a library is not
             installed.
         fclib.collections.CatalogError: the catalogue cannot be read.
     """
@@ -196,12 +196,12 @@ def build_site(
 
 
 class Problems:
-    """The problems of the catalogue and those of the stores, a row each."""
+    """The problems of the catalogue and those of the stores, one row each."""
 
     def __init__(self, campaigns: Campaigns | None, catalogue: Path | None) -> None:
-        """CatalogError where the catalogue cannot be read."""
+        """Raises CatalogError if the catalogue cannot be read."""
         self.rows: list[dict[str, Any]] = []
-        self.files: list[Path | None] = []  # where a problem may be read
+        self.files: list[Path | None] = []  # file from which a problem may be read
         self.places: dict[str, int] = {}  # by the hash of a store
         self.folder = None
         if catalogue is not None:
@@ -222,7 +222,7 @@ class Problems:
         self.standings = self._rate()
 
     def _rate(self) -> dict[str, Any]:
-        """The class of each problem that stored runs say, and what that rests on, by set."""
+        """The class of each problem from stored runs, and its basis, by set."""
         found: dict[str, Any] = {}
         rated: dict[str, standing.Standing] = {}
         named = {str(row.get("collection")) for row in self.rows} | {standing.FIRST}
@@ -253,7 +253,7 @@ class Problems:
             path = Path(facts["path"] or "")
             place = self.places.get(facts["same_as"] or "")
             if place is None:
-                # by its file too: at rest two steps may be equal
+                # also by its file: at rest two steps may be equal
                 place = names.get("/".join(path.parts[-3:]))
                 if place is not None and not _is_of(self.rows[place], digest, facts):
                     place = None
@@ -271,7 +271,7 @@ class Problems:
             self.places[digest] = place
 
     def columns(self) -> list[dict[str, Any]]:
-        """Those that hold something, with the values of all rows."""
+        """The nonempty columns, with the values of all rows."""
         known = {name for name, *_ in COLUMNS}
         more = sorted({key for row in self.rows for key in row} - known - HIDDEN)
         more = [
@@ -292,10 +292,10 @@ class Problems:
 
 
 def _is_of(row: Mapping[str, Any], digest: str, facts: Mapping[str, Any]) -> bool:
-    """Whether what was run is a problem of a catalogue, where its file lies at the same place.
+    """Whether the problem of a run is one of a catalogue whose file is at the same place.
 
-    A global form has the digest that the catalogue has. A local form has none there, and is told by
-    its family and its sizes.
+    A global form is known by its digest in the catalogue. A local form has none there, and is known
+    by its family and sizes.
     """
     if row["digest"] == digest:
         return True
@@ -304,7 +304,7 @@ def _is_of(row: Mapping[str, Any], digest: str, facts: Mapping[str, Any]) -> boo
 
 
 def _packed(values: Sequence[Any]) -> dict[str, Any]:
-    """A column; words that come again are stored once."""
+    """A column; repeated words are stored once."""
     if any(isinstance(value, str) for value in values):
         words = list(dict.fromkeys(value for value in values if value is not None))
         if len(words) < len(values) / 2:
@@ -421,7 +421,7 @@ class _Writer:
             bench = campaigns.bench(tol)
             self._put_bench(t, bench)
             headlines.append(campaigns.headline(tol, self.problems.places))
-            # tolerances fall: what a smaller one tells takes the place
+            # tolerances fall: the result at a smaller one replaces the former
             best |= self._best(bench, campaigns.solvers)
         self.progress("tolerances", total, total)
         self._rate(campaigns)
@@ -436,7 +436,7 @@ class _Writer:
             solved = sum(is_solved(run["status"]) for run in runs)
             self.problems.rows[place] |= {"runs": len(runs), "solved": solved}
         self.progress("problems", len(by_place), len(by_place))
-        # of a solver that was run before stores knew what it is, and after, the later
+        # if a solver also ran before stores kept descriptions, take the later one
         _, places = campaigns.rows.numbers("solver", "about")
         kinds = list(campaigns.rows.where(places))
         first = {row["solver"]: row for row in kinds if row["about"]}
@@ -456,7 +456,7 @@ class _Writer:
         places = [self.problems.places[instance.hash] for instance in bench.instances]
         limits = [rounded(instance.limit) for instance in bench.instances]
         statuses = list(bench.statuses)
-        absent = [NOT_RUN, CODES[list(STATUSES).index(UNSUITABLE)]]  # no cell is there
+        absent = [NOT_RUN, CODES[list(STATUSES).index(UNSUITABLE)]]  # there is no such cell
         known = {"problems": places, "limits": limits, "statuses": statuses, "absent": absent}
         self.put(f"t{t}", known)
         for metric, columns in bench.costs.items():
@@ -475,7 +475,7 @@ class _Writer:
         return found
 
     def _rate(self, campaigns: Campaigns) -> None:
-        """The class, by these runs at the smallest tolerance, of what stored runs do not tell."""
+        """The class of problems without stored runs, by these runs at the smallest tolerance."""
         costs = campaigns.every.at(campaigns.tolerances[-1])
         solved, voters = costs.solved.sum(axis=1), costs.there.sum(axis=1)
         for k, instance in enumerate(costs.instances):
@@ -485,7 +485,7 @@ class _Writer:
                 row["solved_by"] = float(solved[k] / voters[k])
 
     def _views(self) -> tuple[int, dict[tuple[str, str], list[int]]]:
-        """Draw all problems; how many have a view, and the steps of each family."""
+        """Draw all problems. Return the number of views, and the steps of each family."""
         rows, files = self.problems.rows, self.problems.files
         there = [k for k, file in enumerate(files) if file is not None and file.is_file()]
         chosen = set(there if self.views is None else _spread(there, rows, self.views))
@@ -509,7 +509,7 @@ class _Writer:
         groups: dict[tuple[str, str], list[int]] = defaultdict(list)
         for k, row in enumerate(self.problems.rows):
             groups[row.get("collection") or "", row["family"]].append(k)
-        # runs of a problem that the catalogue has not are beside its family there
+        # a problem that the catalogue lacks is placed beside its family
         for _, name in [key for key in groups if not key[0]]:
             others = [key for key in groups if key[0] and key[1] == name]
             if others:
@@ -550,12 +550,12 @@ class _Writer:
 
 
 def described_merits() -> list[list[str | None]]:
-    """The names of all merits, and what they are."""
+    """The names of all merits, and their meanings."""
     return [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS]
 
 
 def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What the page of classes shows, by set."""
+    """The content of the page of classes, by set."""
     found = []
     for name, (rows, basis) in known.items():
         counts: dict[str, dict[str, int]] = {}
@@ -580,7 +580,7 @@ def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _spread(there: Sequence[int], rows: Sequence[Mapping[str, Any]], count: int) -> list[int]:
-    """So many of the rows, those with runs first, evenly over their families and within each."""
+    """A number of the rows: those with runs first, evenly over and within families."""
     chosen: list[int] = []
     for wanted in (True, False):
         families: dict[str, list[int]] = defaultdict(list)
@@ -597,7 +597,7 @@ def _spread(there: Sequence[int], rows: Sequence[Mapping[str, Any]], count: int)
 
 
 def _family(family: Any) -> dict[str, Any]:
-    """What a family of scenes says of itself."""
+    """The description of a family of scenes."""
     return {
         "title": family.title,
         "description": family.description,
@@ -613,10 +613,10 @@ def _family(family: Any) -> dict[str, Any]:
 
 
 def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """What is known of a solver, by what it said where it was run: no name is looked up here."""
+    """The facts on a solver from its description in the store: no name is looked up here."""
     about = object_in(row["about"])
     if not all(isinstance(about.get(key), kind) for key, kind in ABOUT.items()):
-        about = {}  # of a store that was made before solvers said it, or was edited
+        about = {}  # the store was made before solvers had descriptions, or was edited
     name, title = row["solver_name"], about.get("title", "")
     found: dict[str, Any] = {"label": label, "name": name}
     found |= {key: row[key] for key in ("options", "version", "origin")}
@@ -631,7 +631,7 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _own(info: _core.SolverInfo) -> dict[str, Any]:
-    """What a solver that is here says of itself, as if it had been run."""
+    """The description of an installed solver, as if it had been run."""
     return _solver(
         info.name,
         {

@@ -1,4 +1,4 @@
-"""Bodies as a file has them: shapes and poses of its groups /bodies and /contacts.
+"""The bodies of a file: shapes and poses from its groups /bodies and /contacts.
 
 Each kind of shape is a mesh of size one. A shape scales it, and a capsule pulls its halves apart:
 
@@ -23,14 +23,14 @@ Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
 
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(len(KINDS))
-ACCURACY = 1e-7  # of the smallest body, to which its place is kept
-# from so many round shapes on: latitudes and longitudes of each
+ACCURACY = 1e-7  # precision of places, relative to the smallest body
+# least number of round shapes: latitudes and longitudes of each
 DETAIL = ((0, 10, 20), (100, 7, 12), (600, 5, 8), (3000, 3, 6))
 
 
 @dataclass(frozen=True)
 class Solids:
-    """Shapes of bodies and where they are."""
+    """Shapes of bodies, and their places."""
 
     names: list[str]  # of the bodies
     moves: Indices  # (bodies)
@@ -40,7 +40,7 @@ class Solids:
     place: Array  # (shapes, 3) in the world
     turn: Array  # (shapes, 4) quaternions w, x, y, z
     meshes: list[tuple[Array, Indices]]  # vertices (k, 4), triangles (f, 3)
-    strain: dict[int, Array]  # mesh -> how far (k) each vertex is from where it has no stress
+    strain: dict[int, Array]  # mesh -> distance (k) of each vertex from its place without stress
     centre: Array  # (bodies, 3) of their frames
     period: Array  # (2), or none
     planar: bool
@@ -48,7 +48,7 @@ class Solids:
 
     @property
     def size(self) -> float:
-        """Half the extent of the smallest body that moves."""
+        """Half the extent of the smallest moving body."""
         reach = [self.reach(k) for k in np.flatnonzero(self.moves[self.body] == 1).tolist()]
         return min((x for x in reach if x > 0), default=1.0)
 
@@ -71,7 +71,7 @@ class Solids:
 
 
 def solids_of(bodies: Bodies, contacts: Contacts | None) -> Solids:
-    """Of the tables of a file; contacts say how far a plane without an end is drawn."""
+    """Make them from the tables of a file; contacts decide the drawn size of an infinite plane."""
     place, _ = bodies.poses()
     turn = multiplied(bodies.turn[bodies.shape_body], bodies.shape_turn)
     kinds = np.asarray(bodies.shape_kind, dtype=np.int64)
@@ -128,7 +128,7 @@ def solids_of(bodies: Bodies, contacts: Contacts | None) -> Solids:
 
 
 def record_of(solids: Solids) -> dict[str, Any]:
-    """In JSON's types, places to a tenth of a millionth of the smallest body."""
+    """The solids in JSON's types; places have a precision of 1e-7 of the smallest body."""
     decimals = math.ceil(-math.log10(ACCURACY * solids.size))
 
     def fixed(values: Array, digits: int = decimals) -> Any:
@@ -157,7 +157,7 @@ def record_of(solids: Solids) -> dict[str, Any]:
 
 
 def extent(bodies: Bodies, place: Array, contacts: Contacts | None) -> float:
-    """How far a plane without an end is drawn: beyond all that moves."""
+    """The drawn size of an infinite plane: beyond all moving bodies."""
     points = [place[np.isin(bodies.shape_body, np.flatnonzero(bodies.moves))]]
     if contacts is not None:
         points.append(contacts.point[(contacts.shape >= 0).all(axis=1)])
@@ -197,7 +197,7 @@ def unit(kind: int, latitudes: int, longitudes: int) -> tuple[Array, Indices]:
         sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
         return corners, triangles_of(sides)
     if kind == CYLINDER:
-        # rings of the bottom's middle, the edges, the top's middle
+        # rings: the bottom's middle, the edges, the top's middle
         rings = [(0.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0)]
     else:
         half = latitudes // 2 + 1

@@ -1,4 +1,4 @@
-"""What one can take of a problem from the site: files with their SHA-256, and how to name them."""
+"""The files of a problem that the site offers, with their SHA-256 and citation."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fclib._solve import MERITS
 from fclib.collections.catalog import sha256
 from fclib.report.error import ReportError
 
-CHUNK = 100  # problems of one data file
+CHUNK = 100  # number of problems in one data file
 FORMS = ("global", "local")
 
 
@@ -23,7 +23,7 @@ class Taking:
     """The files of a site: copies, links to a published address, or none."""
 
     def __init__(self, site: Path, source: Path | None, with_files: bool, address: str) -> None:
-        """ReportError where files are wanted and there is no catalogue."""
+        """Raises ReportError if files are wanted without a catalogue."""
         if (with_files or address) and source is None:
             raise ReportError("files are those of a catalogue: name one by --catalog")
         self.site = site
@@ -33,18 +33,18 @@ class Taking:
 
     @property
     def kind(self) -> str:
-        """What the pages offer: "here", an address, or nothing."""
+        """The offer of the pages: "here", an address, or nothing."""
         return "here" if self.with_files else self.address
 
     def picture(self, row: Mapping[str, Any]) -> Path | None:
-        """Where the picture of a problem is to be drawn; None where it is not asked for."""
+        """The file for the picture of a problem; None if it is not asked for."""
         file = row.get("global_file") or row.get("local_file")
         if not self.with_files or not file:
             return None
         return self.site / "files" / stem(file, "picture.png")
 
     def record(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """Digest, version and files of a problem; the files are copied where that is asked for.
+        """Digest, version and files of a problem; the files are copied if that is asked for.
 
         Raises:
             ReportError: a file is not the one of the catalogue.
@@ -108,7 +108,7 @@ def stem(file: str, ending: str) -> str:
 
 
 def write_reference(file: Path, target: Path) -> bool:
-    """Write the solution of a file as arrays of NumPy; False where it has none."""
+    """Write the solution of a file as arrays of NumPy; False if it has none."""
     solution = _core.read_solution(file)
     if solution is None:
         return False
@@ -120,9 +120,9 @@ def write_reference(file: Path, target: Path) -> bool:
 
 
 def merit_of(file: Path) -> dict[str, float | None] | None:
-    """All merits of the solution in a file, to their last digit; None where it has none.
+    """All merits of the solution in a file, to their last digit; None if it has none.
 
-    What is not finite is None: JSON knows no such number.
+    A value that is not finite becomes None: JSON has no such number.
     """
     if "solution" not in _core.contents(file):
         return None

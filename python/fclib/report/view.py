@@ -19,18 +19,19 @@ from fclib.report.network import Network, network_of
 from fclib.report.solids import record_of, solids_of
 
 ASSETS = Path(__file__).with_name("assets")
-DIGITS = 5  # of positions and reactions in a picture
-CELLS = 128  # of a pattern, along its longer side
-CONDENSED = 2000  # contacts up to which W is made of a global problem, for its pattern
-SPECTRUM = 750  # rows of W up to which its eigenvalues are computed
+DIGITS = 5  # significant digits of positions and reactions in a picture
+CELLS = 128  # cells of a pattern, along its longer side
+# largest number of contacts of a global problem for which W is made, for its pattern
+CONDENSED = 2000
+SPECTRUM = 750  # largest number of rows of W for its eigenvalues
 SCRIPTS = ("table.js", "plot.js", "scene.js")
-PANEL = ("live.js", "whatif.js", "compute.js")  # what checks and solves
+PANEL = ("live.js", "whatif.js", "compute.js")  # the scripts that check and solve
 STATUS = ("open", "stick", "slide")
 END = re.compile("</script", re.IGNORECASE)
 
 
 def rounded(values: Any, digits: int = DIGITS) -> Any:
-    """Nested lists of numbers with so many significant digits; what is not finite is None."""
+    """Nested lists of numbers with so many significant digits; None if not finite."""
     if isinstance(values, float):
         if not math.isfinite(values):
             return None
@@ -48,17 +49,17 @@ def rounded(values: Any, digits: int = DIGITS) -> Any:
 
 
 def as_json(value: Any) -> str:
-    """Compact JSON that may stand in a script: no `<`, and no number that JSON does not know."""
+    """Compact JSON that may stand in a script: no `<`, and no number that JSON does not have."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
-    """What the picture of a problem is drawn from, in JSON's types.
+    """The data for the picture of a problem, in JSON's types.
 
     Args:
         problem: in any formulation.
-        solution: of it; without one there are no reactions.
+        solution: its solution; without one there are no reactions.
     """
     record: dict[str, Any] = {
         "title": problem.info.title,
@@ -104,7 +105,7 @@ def view_of(problem: Any, solution: Any = None) -> dict[str, Any]:
     if network.frames is not None:
         record["network"]["normals"] = rounded(network.frames[:, :, 0])
         if network.source == "H":
-            # a page turns reactions of its own into forces; a file's contacts say them
+            # a page turns its own reactions into forces; for a file, its contacts give the forces
             record["network"]["tangents"] = rounded(network.frames[:, :, 1])
     if solution is not None:
         record.update(_solved(problem, solution, network))
@@ -116,7 +117,7 @@ def hulls_of(network: Network) -> list[list[int]]:
 
     Returns:
         (triangles, 3) numbers of corners: first the bodies' centres, then the contact points, then
-        the images at their second bodies of those that have one.
+        for contacts that have one, the image at the second body.
     """
     count = len(network.bodies)
     corners = np.concatenate([network.bodies, network.points])
@@ -137,7 +138,7 @@ def hulls_of(network: Network) -> list[list[int]]:
             # joggled, since contact points are often in one plane
             hull = ConvexHull(corners[chosen], qhull_options="QJ Pp")
         except QhullError:
-            continue  # in one place: the lines from the centre show them
+            continue  # all at one place: the lines from the centre show them
         found += chosen[hull.simplices].tolist()
     return found
 
@@ -145,7 +146,7 @@ def hulls_of(network: Network) -> list[list[int]]:
 def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
     d, nc = problem.spacedim, problem.nc
     r = np.asarray(solution.r).reshape(nc, d)
-    # the first components are those of a force, also where friction rolls
+    # the first components are those of a force, also with rolling friction
     tangential = 1 if d == 2 or (d == 3 and hasattr(problem, "mu_r")) else 2
     force = r[:, : 1 + tangential]
     each = _core.contact_merits(problem, solution)
@@ -168,9 +169,9 @@ def _solved(problem: Any, solution: Any, network: Network) -> dict[str, Any]:
 
 
 def spectrum_of(W: Any) -> dict[str, Any]:
-    """The eigenvalues of W, the largest first, those that are rounding left out.
+    """The eigenvalues of W, the largest first, without those that are only rounding.
 
-    What counts as rounding is what NumPy's matrix_rank takes for it, max(shape) eps sigma_1.
+    The bound of rounding is that of NumPy's matrix_rank, max(shape) eps sigma_1.
     """
     size = W.shape[0]
     if size > SPECTRUM:
@@ -189,11 +190,11 @@ def spectrum_of(W: Any) -> dict[str, Any]:
 
 
 def patterns_of(problem: Any, W: Any) -> list[dict[str, Any]]:
-    """Of each matrix its shape, its entries, and how many lie in each cell of a coarse grid.
+    """For each matrix: its shape, its entries, and their number in each cell of a coarse grid.
 
     Args:
         problem: in any formulation.
-        W: of the problem itself, or of its condensed form; None is left out.
+        W: W of the problem itself, or of its condensed form; None: left out.
     """
     found = []
     for name in ("W", "M", "H", "G", "V", "R"):
@@ -239,13 +240,13 @@ def write_view(
     title: str = "",
     compute: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write a page that holds all it needs; it is whole, or the old one.
+    """Write a page that holds all it needs; the file is whole, or stays the old one.
 
     Args:
-        record: of `view_of`.
+        record: result of `view_of`.
         path: of the page.
         title: name of the problem's file.
-        compute: what `serving.served` says of the file and the module, for a panel that checks and
+        compute: result of `serving.served` for the file and the module, for a panel that checks and
             solves the problem.
 
     Raises:
@@ -263,7 +264,7 @@ def write_view(
     known += (compute or {}).get("libraries", [])
     shown = dict(record, file=title, libraries=known, compute=compute)
     scripts.append(f"Fclib.view({as_json(shown)});")
-    # an end of a script in a string of it would be one of the element
+    # "</script" inside a string would end the script element
     elements = ["<script>\n" + END.sub(r"<\\/script", text) + "\n</script>" for text in scripts]
     page = asset("view.html")
     for mark, text in {
@@ -272,6 +273,6 @@ def write_view(
     }.items():
         page = page.replace(mark, text)
     part = path.with_name(f".{path.name}.part")
-    # the name of a file may be no text
+    # the name of a file may not be valid text
     part.write_text(page, encoding="utf-8", errors="replace")
     part.replace(path)

@@ -63,7 +63,7 @@ def found() -> tuple[tuple[str, Any], ...]:
 
 
 def get(name: str) -> type[Family]:
-    """The family of scenes called `name`. KeyError, with the known names, where there is none."""
+    """The family of scenes called `name`. If there is none, a KeyError has the known names."""
     known = families()
     if name not in known:
         raise KeyError(

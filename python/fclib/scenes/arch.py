@@ -15,11 +15,11 @@ class Arch:
     """Equal voussoirs laid to a circular arch on two abutments; the right one moves away.
 
     Every joint has four contacts, one in each corner: three suffice to hold a stone, so that the
-    reactions are far from unique. Under its own weight a semicircular arch stands where its
-    thickness is more than 0.107 of the radius of its middle line (P. Couplet 1730, M. Milankovitch
-    1907; 0.106 in J. Heyman, The safety of masonry arches, International Journal of Mechanical
-    Sciences 11, 1969), if the friction keeps it from sliding. A spread of the abutments, however
-    small, opens three hinges; the arch stands on them until it has become too flat.
+    reactions are far from unique. Under its own weight a semicircular arch stands if its thickness
+    is more than 0.107 of the radius of its middle line (P. Couplet 1730, M. Milankovitch 1907;
+    0.106 in J. Heyman, The safety of masonry arches, International Journal of Mechanical Sciences
+    11, 1969), if the friction keeps it from sliding. A spread of the abutments, however small,
+    opens three hinges; the arch stands on them until it has become too flat.
     """
 
     title: ClassVar[str] = "Masonry arch"

@@ -16,7 +16,7 @@ class BouncingPile:
     """Equal spheres that fall into an open box and bounce, by Newton's law of impact.
 
     The right-hand side has e u_N^- at each contact, which is 0 in families with e = 0. Newton's law
-    with friction may gain energy where an impact slides and stops (Kane and Levinson, 1985): the
+    with friction may gain energy if an impact slides and stops (Kane and Levinson, 1985): the
     sets keep such steps as they are.
     """
 

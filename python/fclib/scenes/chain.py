@@ -22,8 +22,8 @@ class Chain:
     """Links that hang one in another, the first one held, the lower end set in motion.
 
     A link is a loop of straight rods, all links alike: two sides, and two ends that follow a half
-    circle. Where the number of an end's rods is even, the neighbour may find its place in the
-    corner of two; four contacts where both are even, close to each other and most of them
+    circle. If the number of an end's rods is even, the neighbour may find its place in the
+    corner of two; four contacts if both are even, close to each other and most of them
     redundant. At the start the links touch beside these corners, each in one point, but for the
     lowest ones, which fall. Problems count from `begin` on, when no joint above them is open.
 
@@ -150,11 +150,11 @@ class Chain:
         return ends[0], ends[1]
 
     def _height(self, pitch: float, along: float, across: float) -> float:
-        """How far below a link the next one's middle is where they just touch (< 0) [m].
+        """The height of the next link's middle relative to this one's if they just touch (< 0) [m].
 
         The next link lies `along` the ends of this one, beside its middle, and this one lies
         `across` beside the middle of the next. Of two rods with the slopes a and b, seen from above
-        at a right angle, the axes are D sqrt(1 + a^2 + b^2) apart along the vertical where the
+        at a right angle, the axes are D sqrt(1 + a^2 + b^2) apart along the vertical if the
         distance is D. Each end is the envelope of its rods.
         """
         above, below = self._ends(pitch)

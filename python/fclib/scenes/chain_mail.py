@@ -60,7 +60,7 @@ class ChainMail:
             raise ValueError(f"ChainMail: wire must be at most {bound:g}, not {self.wire}")
 
     def scene(self, seed: int = 0) -> Scene:
-        """The scene; the seed draws how the rings are turned, and where the ball falls."""
+        """The scene; the seed draws how the rings are turned, and the place of the ball."""
         random = np.random.Generator(np.random.PCG64(seed))
         flat, upright = 0.4 * self.spacing, 0.27 * self.spacing
         middle = 0.5 * (self.across - 1)

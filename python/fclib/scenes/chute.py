@@ -107,7 +107,7 @@ class Chute:
         for i, (kind, size, shape) in enumerate(draws.tolist()):
             row, cell = divmod(i, self.across * self.layers)
             layer, column = divmod(cell, self.across)
-            # the lowest row begins where its lower layers are above the floor
+            # the lowest row begins at the height at which its lower layers are above the floor
             place = pitch * (row + 1 + self.layers / math.tan(self.slope)) * up
             place += pitch * (layer + 0.5) * away
             place[1] = pitch * (column + 0.5) - 0.5 * width

@@ -68,7 +68,7 @@ class FourBar:
         random = np.random.Generator(np.random.PCG64(seed))
         draws = random.uniform(-1, 1, size=(self.linkages, 1 + self.blocks))
 
-        # where the leg's foot is over a turn of the crank; blocks stand in the middle of its way
+        # places of the leg's foot over a turn of the crank; blocks stand in the middle of its way
         turn = np.linspace(-math.pi, math.pi, 361)
         foot = np.array([self._foot(angle) for angle in turn.tolist()])
         back = turn[foot.argmin()].item()
@@ -119,7 +119,7 @@ class FourBar:
 
     @property
     def _radius(self) -> float:
-        """Of all rods [m]."""
+        """The radius of all rods [m]."""
         return 0.1 * self.crank
 
     @property

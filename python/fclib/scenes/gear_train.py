@@ -23,7 +23,7 @@ class GearTrain:
 
     Worth having: few degrees of freedom and many contacts. One to two pairs of teeth mesh at a
     time, and the load jumps from one to two and back; with the pins each gear is held by three to
-    five contacts, which come and go. A tooth changes flank where the play is passed, with an impact
+    five contacts, which come and go. A tooth changes flank when the play is passed, with an impact
     that runs through the whole train.
 
     The first gear is driven by a motor, the last one turns against a damper. Without friction the

@@ -66,12 +66,12 @@ class Gripper:
 
     @property
     def mass(self) -> float:
-        """Of the row [kg]."""
+        """The mass of the row [kg]."""
         return self.blocks * self.density * self.thickness * self.height**2
 
     @property
     def force(self) -> float:
-        """Of a jaw [N]."""
+        """The force of a jaw [N]."""
         return self.squeeze * self.mass * self.gravity / (2 * self.mu)
 
     def scene(self, seed: int = 0) -> Scene:

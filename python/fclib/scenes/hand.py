@@ -75,13 +75,13 @@ class Hand:
 
     @property
     def mass(self) -> float:
-        """Of the object [kg]."""
+        """The mass of the object [kg]."""
         area = self.fingers * self.size**2 * math.tan(math.pi / self.fingers)
         return self.density * area * self.height
 
     @property
     def force(self) -> float:
-        """Of a tip [N], level."""
+        """The horizontal force of a tip [N]."""
         return self.squeeze * self.mass * self.gravity / (self.fingers * self.mu)
 
     def scene(self, seed: int = 0) -> Scene:

@@ -205,11 +205,11 @@ class Humanoid:
 
     @property
     def _way(self) -> float:
-        """How far the body goes ahead [m]."""
+        """The distance that the body goes ahead [m]."""
         return 0.0
 
     def _drive(self, hips: float, places: Sequence[Triple]) -> list[str]:
-        """Motors and a start; hips at a height [m], and where the other free bodies are."""
+        """Motors and a start; hips at a height [m], and the places of the other free bodies."""
         return []
 
     def _bar(self, place: Triple) -> str:
@@ -223,7 +223,7 @@ class Humanoid:
 
     @property
     def _scale(self) -> float:
-        """Of lengths, against a body of 1.7 m."""
+        """The scale of lengths, relative to a body of 1.7 m."""
         return self.height / 1.7
 
     def _numbers(self, *lengths: float) -> str:
@@ -240,7 +240,7 @@ class Humanoid:
         )
 
     def _limbs(self, parent: str) -> str:
-        """What hangs on a part of the body."""
+        """The limbs that hang on a part of the body."""
         return "".join(
             f'<body name="{limb.name}" pos="{self._numbers(*limb.at)}">'
             f"{self._joints(limb)}{self._shape(limb, 1 + i)}{self._limbs(limb.name)}</body>"
@@ -257,7 +257,7 @@ class Humanoid:
         )
 
     def _held(self, limb: Limb, rest: float) -> str:
-        """What holds a joint of a limb; the springs rest at an angle [rad]."""
+        """The spring and damper of a joint of a limb; the spring rests at an angle [rad]."""
         return f'springref="{rest!r}" stiffness="{self.stiffness!r}" damping="{self.damping!r}"'
 
     def _shape(self, limb: Limb, index: int) -> str:

@@ -91,7 +91,7 @@ class PlanarBlocks:
                     f'{look} rgba="0.35 0.37 0.42 1"',
                 )
             )
-            # thrown so high that it comes down to where it set out
+            # thrown so high that it comes down at the place of its start
             up = 0.5 * self.gravity * self.delay
             velocity = np.vstack((velocity, [self.disc_speed, up, 0.0]))
         return Scene.of(

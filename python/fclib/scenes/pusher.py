@@ -119,15 +119,15 @@ class Pusher:
 
     @property
     def _thickness(self) -> float:
-        """Of the blade [m]."""
+        """The thickness of the blade [m]."""
         return 0.4 * self.edge
 
     def _reach(self, share: float) -> float:
-        """Of the blade from the shoulder [m], a share of its way out."""
+        """The reach of the blade from the shoulder [m], at a share of its way out."""
         return 2 * self.arm * (NEAR + (FAR - NEAR) * share)
 
     def _plan(self) -> list[tuple[float, float]]:
-        """Times [s], and the share of its way where the blade is."""
+        """Times [s], and the place of the blade as a share of its way."""
         ahead = [
             (REST + (PUSHED - REST) * k / KEYS, 0.5 - 0.5 * math.cos(math.pi * k / KEYS))
             for k in range(KEYS + 1)
@@ -141,7 +141,7 @@ class Pusher:
         return [(time * self.period, share) for time, share in shares]
 
     def _angles(self, reach: float) -> tuple[float, float, float]:
-        """Of shoulder, elbow and wrist [rad]; the blade is at (reach, 0) and looks along x."""
+        """The angles of shoulder, elbow, wrist [rad]; the blade is at (reach, 0), along x."""
         elbow = math.acos(0.5 * (reach / self.arm) ** 2 - 1)
         return -0.5 * elbow, elbow, -0.5 * elbow
 

@@ -20,7 +20,7 @@ COUPLER = 1.64
 ROCKER = 1.45
 FOOT = (1.04, -3.74)
 STRIDE = 1.4  # middle of the foot's way, ahead of the crank's pivot
-LIFTED = math.radians(80)  # angle of the crank where the foot is highest
+LIFTED = math.radians(80)  # angle of the crank at which the foot is highest
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +71,7 @@ class Quadruped:
         """The scene; the seed draws the heights of the ground."""
         random = np.random.Generator(np.random.PCG64(seed))
         a = self.crank
-        # where a foot is lowest, over a turn
+        # lowest place of a foot, over a turn
         lowest = min(self._foot(angle)[1] for angle in np.linspace(-math.pi, math.pi, 361).tolist())
         height = self.roughness + self._radius - lowest + 2e-3
         axles, legs, loops, motors = "", "", [], []
@@ -130,7 +130,7 @@ class Quadruped:
 
     @property
     def _radius(self) -> float:
-        """Of a foot [m]."""
+        """The radius of a foot [m]."""
         return 0.3 * self.crank
 
     def _angles(self, angle: float) -> tuple[Pair, float, float]:
@@ -146,7 +146,7 @@ class Quadruped:
         return end, slope - inner, slope + math.pi + outer
 
     def _foot(self, angle: float) -> Pair:
-        """Where the foot is, from the crank's pivot (x, z) [m]."""
+        """The place of the foot, from the crank's pivot (x, z) [m]."""
         (x, z), coupler, _ = self._angles(angle)
         along, across = self.crank * FOOT[0], self.crank * FOOT[1]
         return (

@@ -50,7 +50,7 @@ class RockingBlock:
 
     @property
     def slenderness(self) -> float:
-        """Angle alpha of the diagonal to the vertical [rad]: where the block tips over."""
+        """Angle alpha of the diagonal to the vertical [rad]: beyond it the block tips over."""
         return math.atan2(self.width, self.height)
 
     def scene(self, seed: int = 0) -> Scene:

@@ -23,7 +23,7 @@ class Rover:
     On each side a rocker turns about the hull; it has the front wheel, and a bogie with the two
     others. A differential turns one rocker as far down as the other goes up, which holds the hull
     level between them. So all six wheels touch uneven ground. A motor turns each wheel, and lets it
-    slip where friction does not suffice. On even ground the wheels carry the weight by the lever
+    slip if friction does not suffice. On even ground the wheels carry the weight by the lever
     rule.
 
     Worth having: a mechanism with joints and a closed loop stands on free bodies that are not at
@@ -79,7 +79,7 @@ class Rover:
         radii = self.stone * random.uniform(0.6, 1.0, size=self.stones)
         pitch = 2.02 * self.stone
         angles = 2 * math.pi * (np.arange(SIDES) + 0.5) / SIDES
-        # a wheel is as high as its radius says where it stands on a flat side
+        # if a wheel stands on a flat side, its height follows from its radius
         rim = (
             self.wheel
             / math.cos(math.pi / SIDES)

@@ -74,7 +74,7 @@ class ShearBox:
 
     @property
     def weight(self) -> float:
-        """Of all discs, were all of the mean radius [N]."""
+        """The weight of all discs, if all had the mean radius [N]."""
         r = self.radius * (1 - 0.5 * self.spread)
         return self.gravity * self.density * math.pi * r**2 * self.across * self.layers
 

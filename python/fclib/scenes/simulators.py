@@ -55,7 +55,7 @@ class SiconosBoxes(Recorded):
 
     Siconos made all data of each step by Moreau and Jean's scheme, with the law that is FCLIB's
     own; Bullet found the contacts. The boxes have edges of 1 m, and spins are in their own frames.
-    T1 is not at right angles to N where a contact is tilted about two axes: so Siconos solved it. A
+    If a contact is tilted about two axes, T1 is not at right angles to N: so Siconos solved it. A
     file has the reaction of Siconos' nonsmooth Gauss-Seidel as its guess; it has no points.
     """
 

@@ -19,7 +19,7 @@ class SliderCrank:
     The rods move in their planes with all three degrees of freedom: at the big end a bilateral
     constraint closes the loop on the crank, at the small end the contacts of pin and bore alone
     do. The bore is a regular polygon about its circle; the pin touches one face or two, each at
-    both of its ends, a redundant pair. It flies from one side of the bore to the other where the
+    both of its ends, a redundant pair. It flies from one side of the bore to the other when the
     slider slows down; the steps are short, so that its penetration stays far below the clearance.
 
     The mechanism with clearance is that of P. Flores, J. Ambrosio, J. C. P. Claro and H. M.
@@ -120,12 +120,12 @@ class SliderCrank:
 
     @property
     def _height(self) -> float:
-        """Of the shaft above the floor [m]."""
+        """The height of the shaft above the floor [m]."""
         return 2 * self.crank + 5 * self.pin
 
     @property
     def _reach(self) -> float:
-        """Of a pin from the shaft, at most [m]."""
+        """The largest distance of a pin from the shaft [m]."""
         return self.crank + self.rod + 4 * self.pin
 
     @property

@@ -19,10 +19,10 @@ MARGINS = (1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)  # in speeds of the walls
 class Squeezed:
     """A cubic lattice of spheres in a closed box whose walls along x come together, or part.
 
-    A row of spheres along x is k + 1 contacts between two walls that cannot move: the sum of its
-    normal velocities is what the walls give, -s where they come together by s. All of them have to
-    be >= 0: no solution exists, with or without friction, and normal reactions y = 1 along the row,
-    which move nothing (H y = 0, w^T y = -s), prove it. With s < 0 there is one.
+    A row of spheres along x is k + 1 contacts between two walls that cannot move: the walls fix the
+    sum of its normal velocities, to -s if they come together by s. All of them have to be >= 0: no
+    solution exists, with or without friction, and normal reactions y = 1 along the row, which move
+    nothing (H y = 0, w^T y = -s), prove it. With s < 0 there is one.
 
     Of each size the margin s goes from 1 to 1e-12 of the speed, each without and with a solution.
     """

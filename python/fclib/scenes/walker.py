@@ -100,7 +100,7 @@ class Walker(Humanoid):
         return x * self.stride - self.lean, -self.trunk(time), up - down
 
     def angles(self, side: int, time: float) -> list[float]:
-        """Of the joints of a leg from the hip down, where the sole is level [rad]."""
+        """The angles of a leg's joints from the hip down, with a level sole [rad]."""
         x, y, z = self.ankle(side, time)
         thigh, shin = self._scale * THIGH, self._scale * SHIN
         down = math.hypot(y, z)
@@ -150,7 +150,7 @@ class Walker(Humanoid):
         ]
 
     def _controls(self, time: float) -> list[float]:
-        """Of all servos, left leg first."""
+        """The controls of all servos, left leg first."""
         return [*self.angles(1, time), *self.angles(-1, time)]
 
     def _held(self, limb: Limb, rest: float) -> str:

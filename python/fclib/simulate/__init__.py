@@ -7,23 +7,23 @@
                           ^                                                                   │
                           └──────────────────── integrate(h, v) ──────────────────────────────┘
 
-arrays.py         what a step needs of sparse matrices, on their arrays
-moreau_jean.py    the scheme: the system at an instant becomes a problem. Knows no MuJoCo.
+arrays.py         the operations on sparse matrices that a step needs, on their arrays
+moreau_jean.py    the scheme: a system at an instant becomes a problem. Needs no MuJoCo.
 mujoco_model.py   the model: kinematics, inertia, forces and collisions of an MJCF scene
-equalities.py     MuJoCo's equalities: which follow from others, which contradict them
-mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and what it asks too much
+equalities.py     MuJoCo's equalities: rows that follow from others, rows that contradict them
+mujoco_scene.py   MuJoCo's model of an MJCF scene, its gait, and its unsupported features
 deformable.py     the model of elastic blocks, by finite elements, with contacts between meshes
 plane.py          contacts of bodies that move in a plane
-periodic.py       a cell that repeats itself: ghosts of bodies, and their part of H
-relax.py          a state whose bodies are deep in each other, with these moved apart
+periodic.py       a periodic cell: ghosts of bodies, and their part of H
+relax.py          moves bodies apart that are deep in each other
 control.py        controls from outside: a file's rows, a function of time and state
 logged.py         states from outside: a file's rows
-simulation.py     the loop, warm starts, and what each problem says of its origin
-geometry.py       what a file says of contacts and bodies: identities, frames, shapes, poses
-faces.py          the corners of flat faces, of which MuJoCo keeps four
-terrain.py        all contacts of height fields, of which MuJoCo keeps 50 a pair
-servos.py         actuators that feed back, and the limits of their forces
-rounding.py       how states are rounded where they are stored
+simulation.py     the loop, warm starts, and the origin stored in each problem
+geometry.py       contacts and bodies for files: identities, frames, shapes, poses
+faces.py          the corners of flat faces; MuJoCo keeps only four
+terrain.py        all contacts of height fields; MuJoCo keeps only 50 for each pair
+servos.py         actuators with feedback, and the limits of their forces
+rounding.py       the rounding of stored states
 render.py         a picture of a state with its reactions
 
 Importing this package needs MuJoCo, in the version that `_mujoco.py` pins; deformable scenes need

@@ -14,7 +14,7 @@ VERSION = "4.0.0"
 
 
 def load() -> Any:
-    """The module `mujoco`. ImportError, with what to install, where it is not version 4.0.0."""
+    """The module `mujoco`. If it is not version 4.0.0, an ImportError says what to install."""
     remedy = f"install it with: pip install mujoco=={VERSION} (Python 3.11 or later)"
     try:
         mujoco = importlib.import_module("mujoco")

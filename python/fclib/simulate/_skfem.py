@@ -1,6 +1,6 @@
 """scikit-fem, in the one version that reproduces the deformable families.
 
-It is loaded when a deformable model is made, and by nothing else.
+Only making a deformable model loads it.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ VERSION = "12.0.2"
 
 
 def load() -> Any:
-    """The module `skfem`. ImportError, with what to install, where it is not this version."""
+    """The module `skfem`. If it is not this version, an ImportError says what to install."""
     remedy = f"install it with: pip install scikit-fem=={VERSION}"
     try:
         skfem = importlib.import_module("skfem")

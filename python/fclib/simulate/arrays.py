@@ -1,8 +1,8 @@
 """The few operations on sparse matrices that a step needs, on their arrays.
 
-SciPy checks and copies at every operation: tens of microseconds each, more than the entries of a
-robot take. Sums are taken in the order in which SciPy takes them, entry after entry, so
-that problems are the same to the last bit.
+SciPy checks and copies at every operation. This takes tens of microseconds, more than the entries
+of a robot take. Sums are taken in SciPy's order, entry after entry, so that problems are the same
+to the last bit.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ def empty(shape: tuple[int, int]) -> Sparse:
 
 
 def by_columns(data: Vector, rows: Index, starts: Index, shape: tuple[int, int]) -> Sparse:
-    """A matrix by columns of arrays that are known to fit, which are not copied."""
+    """A matrix by columns from arrays that are known to fit; they are not copied."""
     matrix = sp.csc_array.__new__(sp.csc_array)
-    # faster than copy.copy, and than SciPy's own check of what is known to fit
+    # faster than copy.copy, and than SciPy's check of arrays that are known to fit
     matrix.__dict__.update(empty(shape).__dict__)
     matrix.data, matrix.indices, matrix.indptr = data, rows, starts
     return matrix
@@ -56,7 +56,7 @@ def times(matrix: Sparse, x: Vector) -> Vector:
     """A x."""
     weights = matrix.data * x.repeat(lengths_of(matrix.indptr))
     sums = np.bincount(matrix.indices, weights, matrix.shape[0])
-    return np.asarray(sums, dtype=float)  # of no entries NumPy's are integers
+    return np.asarray(sums, dtype=float)  # without entries, NumPy's sums are integers
 
 
 def transposed_times(matrix: Sparse, x: Vector) -> Vector:
@@ -67,12 +67,12 @@ def transposed_times(matrix: Sparse, x: Vector) -> Vector:
 
 
 def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
-    """The columns of these numbers; -1 is one without entries. `rows`: the new number of each row.
+    """The columns of these numbers; -1 means an empty one. `rows` has the new number of each row.
 
-    Entries all lie in rows that have a number.
+    All entries must lie in rows that have a number.
     """
     first = matrix.indptr.take(columns)
-    # that of -1 is the pointer past the end
+    # for -1 it is the pointer past the end
     lengths = np.maximum(matrix.indptr.take(columns + 1) - first, 0)
     starts = pointers(lengths)
     entries = (first - starts[:-1]).repeat(lengths) + np.arange(starts[-1])
@@ -84,7 +84,7 @@ def take(matrix: Sparse, columns: Index, rows: Index | None = None) -> Sparse:
 
 
 def without_zeros(data: Vector, rows: Index, starts: Index, shape: tuple[int, int]) -> Sparse:
-    """A matrix by columns of arrays, which are copied; zeros are dropped."""
+    """A matrix by columns from arrays, which are copied; zeros are dropped."""
     kept = data.nonzero()[0]
     if len(kept) == len(data):
         starts = starts.astype(np.int32, copy=False)
@@ -102,7 +102,7 @@ def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
     if len(others) <= n and (other.indices == others).all():
         at = (matrix.indices == columns).nonzero()[0]
         if len(at) == n:
-            # a diagonal onto one that is there
+            # adds a diagonal to an existing one
             sums = matrix.data.copy()
             sums[at.take(others)] += factor * other.data
             if sums.all():
@@ -113,7 +113,7 @@ def added(matrix: Sparse, factor: float, other: Sparse) -> Sparse:
 
 
 def summed(values: Vector, places: Index, shape: tuple[int, int]) -> Sparse:
-    """A matrix of entries at places column * rows + row, those of one place added up in order."""
+    """A matrix of entries at places column * rows + row, those of one place are added in order."""
     unique, inverse = np.unique(places, return_inverse=True)
     sums: Vector = np.asarray(
         np.bincount(inverse.ravel(), values, minlength=len(unique)), dtype=float

@@ -16,11 +16,12 @@ FILES = (".csv", ".npy")
 
 
 def control_of(source: str) -> Control:
-    """The controls that a name says: FILE.csv, FILE.npy or MODULE:FUNCTION.
+    """The controls of a name: FILE.csv, FILE.npy or MODULE:FUNCTION.
 
     Raises:
         OSError: the file cannot be read.
-        ValueError: it is no table of numbers, or there is no such function; later, if it raises.
+        ValueError: it is not a table of numbers, or there is no such function. Later: the function
+            raises.
     """
     if Path(source).suffix in FILES:
         return control_of_rows(read_rows(Path(source)))
@@ -28,7 +29,7 @@ def control_of(source: str) -> Control:
 
 
 def control_of_rows(rows: np.ndarray) -> Control:
-    """Row k (steps x nu) in step k; the last one goes on."""
+    """Row k (steps x nu) in step k; the last row stays in force."""
 
     def control(time: float, state: State) -> np.ndarray:
         chosen: np.ndarray = rows[min(state.index, len(rows) - 1)]
@@ -38,7 +39,7 @@ def control_of_rows(rows: np.ndarray) -> Control:
 
 
 def read_rows(path: Path) -> np.ndarray:
-    """The table (steps x nu) of a file: one step a line. OSError, ValueError."""
+    """The table (steps x nu) of a file: one line for each step. Raises OSError, ValueError."""
     try:
         if path.suffix == ".npy":
             rows = np.atleast_2d(np.asarray(np.load(path, allow_pickle=False), dtype=float))
@@ -54,9 +55,9 @@ def read_rows(path: Path) -> np.ndarray:
 
 
 def policy_of(name: str) -> Control:
-    """The function MODULE:FUNCTION; a module may lie in the current folder. ValueError.
+    """The function MODULE:FUNCTION; a module may lie in the current folder. Raises ValueError.
 
-    It may be given by its file, too, whose folder is looked in first then.
+    The module may also be a file; then the file's folder is searched first.
     """
     module, _, function = name.rpartition(":")
     if not function or not module:
@@ -99,13 +100,13 @@ def policy_of(name: str) -> Control:
 
 
 def raised(error: Exception) -> str:
-    """What code of others raised, and where, in a line."""
+    """The error of foreign code and its place, in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}{place_of(error)}"
 
 
 def place_of(error: Exception) -> str:
-    """The last line of code of others that an error went through, in words; empty if none did."""
-    # what cannot be called, or read, has no line of its own
+    """The last line of foreign code that an error passed through; empty if it passed none."""
+    # an object that cannot be called or read has no line of its own
     ours = (__file__, importlib.__file__)
     theirs = [
         frame

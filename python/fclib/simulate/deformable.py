@@ -8,16 +8,16 @@ The degrees of freedom of the system are the velocities of the nodes [m/s], 3 a 
 body; its configuration q is (u, t), so that loads may change with time. M is consistent, hence not
 diagonal, M + h theta C + h^2 theta^2 K constant, and H^T M^-1 H has full rank.
 
-Strains and rotations are taken to be small: K is that of the place where a block begins, while
-contacts follow the nodes. That is right where blocks are pressed, sheared and pushed a little, and
-wrong where one tips over; blocks may slide and fall as far as they like.
+Strains and rotations are assumed small: K belongs to the first position of a block, while contacts
+follow the nodes. This is right if blocks are pressed, sheared and pushed a little, and wrong if one
+tips over. Blocks may slide and fall as far as they like.
 
 Contacts are between a node of one surface, the slave, and a face of another, the master. The node
-is projected on the bilinear face, x = sum_j N_j(xi, eta) x_j, N is the face's outward normal there,
-and u = v_slave - sum_j N_j v_j in the frame N, T1, T2. Nodes of the later of two blocks are slaves
-of the earlier one's faces; a face's own nodes may enter the later block between its nodes. At an
-edge the horizontal face takes the node: with contacts of all nodes of a block with its neighbour
-and with what both stand on, W would lose its full rank.
+is projected onto the bilinear face, x = sum_j N_j(xi, eta) x_j, N is the face's outward normal
+there, and u = v_slave - sum_j N_j v_j in the frame N, T1, T2. The nodes of the later of two blocks
+are slaves of the earlier block's faces. The nodes of a master face may enter the later block
+between its nodes. At an edge the horizontal face takes the node: if all nodes of a block had
+contacts with its neighbour and with the support of both, W would lose its full rank.
 
 A contact's pair is the master, 0 for the floor and 1 + b for block b, and the slave's node.
 
@@ -49,33 +49,34 @@ from fclib.simulate.rounding import ELASTIC
 Indices = npt.NDArray[np.int64]
 
 FACES: Final = ("x-", "x+", "y-", "y+", "z-", "z+")
-OPPOSED: Final = -0.9  # scalar product of the normals of two faces that look at each other
-OUTSIDE: Final = 1e-3  # how far beyond its edges a face is touched, in its half width
+OPPOSED: Final = -0.9  # scalar product of the normals of two faces that count as facing each other
+OUTSIDE: Final = 1e-3  # distance beyond its edges at which a face is still touched, in half widths
 PROJECTIONS: Final = 8  # Gauss-Newton steps of a projection; the first is exact on a parallelogram
-# in edges of the smallest element: gaps that count as contact in any case, and the deepest one
+# in edges of the smallest element: gaps that always count as contact, and the deepest gap
 SKIN: Final = 1e-3
 DEPTH: Final = 0.1
 ROUNDING: Final = 1e-12  # a shape function this small is 0
-# integral of N_i N_j over a rectangle, nodes in a ring, for an area of 36
+# integrals of N_i N_j over a rectangle of area 36, with its nodes in a ring
 FACE_MASS: Final = np.array([[4, 2, 1, 2], [2, 4, 2, 1], [1, 2, 4, 2], [2, 1, 2, 4]]) / 36.0
 _CORNERS: Final = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
 
 
 @dataclass(frozen=True)
 class Mesh:
-    """A block's mesh where it begins, its nodes numbered from the system's first."""
+    """A block's mesh at its first position; nodes are numbered in the whole system."""
 
     x: Vector  # (k x 3) nodes [m]
     elements: Indices  # (8 x elements) nodes
-    quads: dict[str, Indices]  # of each face: (quads x 4) nodes, in a ring about the outward normal
-    normals: dict[str, Vector]  # of each face: (3)
+    # for each face: (quads x 4) nodes, in a ring about the outward normal
+    quads: dict[str, Indices]
+    normals: dict[str, Vector]  # for each face: (3)
 
 
 class DeformableModel:
     """A `ContactModel` made of the elastic blocks of a scene."""
 
     def __init__(self, scene: Scene) -> None:
-        """ImportError without scikit-fem, ValueError where the scene has no blocks or no step."""
+        """ImportError without scikit-fem, ValueError if the scene has no blocks or no step."""
         if scene.solids is None or not scene.solids.blocks:
             raise ValueError(f"{scene.name}: has no elastic blocks")
         if scene.time_step is None:
@@ -136,11 +137,11 @@ class DeformableModel:
 
     @property
     def smallest_size(self) -> float | None:
-        """None: displacements are small beside any body."""
+        """None: displacements are small compared to any body."""
         return None
 
     def places(self, position: Vector | None = None) -> Vector:
-        """Where the nodes are (nodes x 3) [m], in a configuration or now."""
+        """The places of the nodes (nodes x 3) [m], in a configuration or now."""
         u = self._u if position is None else position[:-1]
         x: Vector = self.reference + u.reshape(-1, 3)
         return x
@@ -158,7 +159,7 @@ class DeformableModel:
     def assemble(self, h: float, *, shared_speed: bool = False) -> System:
         """The system at (q, v), loads in the middle of the step, contacts that may close within h.
 
-        Nodes share their speed in any case: what hits one moves the next.
+        Nodes always share their speed: an impact on one moves the next.
         """
         u, v = self._u, self._v
         force = self.weight + self.loads(self._time + 0.5 * h) - self.K @ u - self.C @ v
@@ -206,7 +207,7 @@ class DeformableModel:
         touched = x[slave] - np.einsum("cj,cji->ci", shape, x[quad])
         gap = np.einsum("ci,ci->c", normal, touched)
         kept = np.flatnonzero((outside <= OUTSIDE) & (gap <= reach) & (gap >= -DEPTH * self._edge))
-        # of the faces of a block the one that has the node furthest inside, or the first of equals
+        # among the faces of a block, take the one with the node deepest inside; of equals the first
         order = np.lexsort((np.maximum(outside[kept], 0.0), self.body[quad[kept, 0]], slave[kept]))
         kept = kept[order]
         key = np.column_stack((slave[kept], self.body[quad[kept, 0]]))
@@ -235,12 +236,12 @@ class DeformableModel:
         return columns(nodes, weights, frame, len(self._v)), contacts
 
     def energy(self) -> float:
-        """Kinetic, elastic and potential energy [J] at (q, v), the loads' left out."""
+        """Kinetic, elastic and potential energy [J] at (q, v), without that of the loads."""
         u, v = self._u, self._v
         return float(0.5 * v @ (self.M @ v) + 0.5 * u @ (self.K @ u) - self.weight @ u)
 
     def drawing(self, position: Vector) -> tuple[Any, Any]:
-        """An MjModel and an MjData of the deformed blocks, their elements outlined."""
+        """An MjModel and an MjData of the deformed blocks, with their elements outlined."""
         m = mujoco.MjModel.from_xml_string(picture(self, self.places(position)))
         return m, mujoco.MjData(m)
 
@@ -249,7 +250,7 @@ class DeformableModel:
 
 
 def rotation(yaw: float) -> Vector:
-    """The rotation (3 x 3) about the vertical; exact where there is none."""
+    """The rotation (3 x 3) about the vertical; exact if the angle is 0."""
     c, s = (np.cos(yaw), np.sin(yaw)) if yaw else (1.0, 0.0)
     return np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
 
@@ -285,9 +286,9 @@ def element_matrices(
     poisson: float,
     density: float,
 ) -> tuple[Vector, Vector]:
-    """Consistent mass and stiffness (24 x 24) of one element of a block, in which all are equal.
+    """Consistent mass and stiffness (24 x 24) of an element; all elements of a block are equal.
 
-    Not to be changed: models share them, for scikit-fem takes longer than all else of a model.
+    Do not change them: models share them, because scikit-fem takes longer than all the rest.
     """
     skfem = _skfem.load()
     elasticity = importlib.import_module("skfem.models.elasticity")
@@ -312,7 +313,7 @@ def assembled(mesh: Mesh, first: int, element: Vector) -> Sparse:
 
 
 def face_mass(x: Vector, mesh: Mesh, face: str) -> Sparse:
-    """The integral of N_i N_j over a block's face (nodes x nodes) [m^2], of all blocks' nodes."""
+    """The integral of N_i N_j over a block's face (nodes x nodes) [m^2], for all nodes."""
     quads = mesh.quads[face]
     corners = x[quads]
     areas = np.linalg.norm(
@@ -324,7 +325,7 @@ def face_mass(x: Vector, mesh: Mesh, face: str) -> Sparse:
 
 
 def load_mass(model: DeformableModel, load: Load) -> Sparse:
-    """What takes a traction at the nodes to their forces (nodes x nodes) [m^2]."""
+    """The matrix from tractions at the nodes to their forces (nodes x nodes) [m^2]."""
     x, meshes = model.reference, model.meshes
     return sum(
         (face_mass(x, meshes[block], load.face) for block in load.blocks),
@@ -346,14 +347,14 @@ def wave(load: Load, x: Vector, time: float) -> Vector:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Nodes, and faces of other blocks that they may touch."""
+    """Nodes, each with a face of another block that it may touch."""
 
     slave: Indices  # (k)
     quad: Indices  # (k x 4)
 
 
 def slaves_of(mesh: Mesh, face: str) -> Indices:
-    """The nodes of a face that make contacts with it: at an edge the horizontal one has them."""
+    """The nodes of a face that make contacts; nodes at an edge belong to the horizontal face."""
     nodes = np.unique(mesh.quads[face])
     if face[0] != "z":
         nodes = np.setdiff1d(nodes, np.concatenate((mesh.quads["z-"], mesh.quads["z+"])))
@@ -368,7 +369,7 @@ def floor_nodes(meshes: list[Mesh], solids: Solids) -> Indices:
 
 
 def candidates(meshes: list[Mesh], reach: float) -> Candidates:
-    """All nodes of a face with all quads of the faces that it looks at, nearer than `reach` [m]."""
+    """All nodes of a face with all quads of the faces opposite to it, nearer than `reach` [m]."""
     found = list(_candidates(meshes, reach))
     slave = [np.repeat(nodes, len(quads)) for nodes, quads in found]
     quad = [np.tile(quads, (len(nodes), 1)) for nodes, quads in found]
@@ -401,8 +402,8 @@ def project(points: Vector, corners: Vector) -> tuple[Vector, Vector, Vector]:
     """The nearest points of bilinear quads (k x 4 x 3) to points (k x 3).
 
     Returns:
-        The shape functions there (k x 4), the unit normals (k x 3), and how far outside of it
-        the projection lies, in half widths of the quad (k); <= 0 is inside.
+        The shape functions there (k x 4), the unit normals (k x 3), and the distance of the
+        projection outside of the quad, in its half widths (k); <= 0 is inside.
     """
     local = np.zeros((len(points), 2))
     for _ in range(PROJECTIONS):
@@ -413,7 +414,7 @@ def project(points: Vector, corners: Vector) -> tuple[Vector, Vector, Vector]:
         local = local + np.linalg.solve(metric, np.einsum("cai,ci->ca", tangents, rest)[..., None])[
             ..., 0
         ].clip(-2, 2)
-        # what has gone astray is far outside, and stays there
+        # a diverged projection is far outside, and stays there
         local = local.clip(-3, 3)
     outside = np.abs(local).max(axis=1, initial=0.0) - 1
     shape, along = shapes(local.clip(-1, 1))
@@ -441,7 +442,7 @@ def frames(normal: Vector) -> Vector:
 
 
 def columns(nodes: Indices, weights: Vector, frame: Vector, n: int) -> Sparse:
-    """H (n x 3 nc): of each contact its nodes (nc x k), their weights (nc x k) and the frame."""
+    """H (n x 3 nc): from the nodes (nc x k) of contacts, their weights (nc x k) and frames."""
     nc = len(nodes)
     entries = weights[:, :, None, None] * frame.transpose(0, 2, 1)[:, None]  # nc, k, dof, column
     rows = np.broadcast_to(3 * nodes[:, :, None, None] + np.arange(3)[:, None], entries.shape)

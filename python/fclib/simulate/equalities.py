@@ -1,9 +1,9 @@
-"""MuJoCo's equalities as bilateral rows: which vanish, which follow from others, what rounding is.
+"""MuJoCo's equalities as bilateral rows: vanishing rows, dependent rows, rounding errors.
 
-A row that follows from others must agree with them: a loop in an inclined plane has three rows of
-which two are independent, and where the positions are exact but for rounding, the third contradicts
-the others by all that the violations are. How much that can be follows from the lengths and angles
-that MuJoCo adds up, so that the size of a mechanism and its place do not matter.
+A row that follows from others must agree with them: a loop in an inclined plane has three rows, and
+two are independent. If the positions are exact up to rounding, the violations are only rounding,
+and the third row contradicts the others by them. The bound on this rounding follows from the
+lengths and angles that MuJoCo adds. So the size and the place of a mechanism do not matter.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from fclib.simulate.arrays import (
     without_zeros,
 )
 
-# benchmarks/loop_rounding.py chose these, docs/results/loop-rounding.csv has what it found
-RANK: Final = 1e-9  # what is left of a row, of length one, after others that it follows from
-OWN: Final = 1e-3  # a row of which more is left is one of its own
-ROUNDING: Final = 2.0  # units in the last place of all that is added that a gap may be
-TURNED: Final = 8.0  # times the angle by which a loop is open, what may be left of a row
-SINGULAR: Final = 1e-6  # singular values that A^T A tells from zero: its rounding is below 1e-13
-FEW: Final = 48  # columns whose products are faster as those of a full matrix
-SEEN: Final = 1e-13  # solvers see that a row follows which does to this: 1e-12 in eliminate.cpp
+# benchmarks/loop_rounding.py chose these, docs/results/loop-rounding.csv has its results
+RANK: Final = 1e-9  # rest of a row of length one, after the rows from which it follows
+OWN: Final = 1e-3  # a row with a larger rest is independent
+ROUNDING: Final = 2.0  # a gap may be so many units in the last place of all terms added
+TURNED: Final = 8.0  # the rest of a row may be so many times the angle by which a loop is open
+SINGULAR: Final = 1e-6  # A^T A tells larger singular values from zero: its rounding is below 1e-13
+FEW: Final = 48  # up to so many columns, products are faster with a full matrix
+SEEN: Final = 1e-13  # solvers see that a row follows if its rest is below 1e-12 (eliminate.cpp)
 
 CONNECT, WELD, JOINT, TENDON = (
     int(getattr(mujoco.mjtEq, f"mjEQ_{name}")) for name in ("CONNECT", "WELD", "JOINT", "TENDON")
@@ -46,14 +46,14 @@ class Equalities:
 
     def __init__(self, m: Any) -> None:
         self.model = m
-        # how many bodies that are not the world lead to each, itself among them
+        # number of bodies on the way from the world to each, with the body itself
         depth = np.zeros(m.nbody)
         for body in range(1, m.nbody):
             depth[body] = depth[m.body_parentid[body]] + 1
-        # (neq x nbody) how often each is on the way to what an equality ties
+        # (neq x nbody) how often each body is on the way to the bodies that an equality ties
         self.on_the_way = np.zeros((m.neq, m.nbody))
         self.depth = np.zeros(m.neq)
-        self.arms = np.zeros(m.neq)  # of the points that are tied, in their bodies
+        self.arms = np.zeros(m.neq)  # lever arms of the tied points in their bodies
         for i in range(m.neq):
             for body, point in ends_of(m, i):
                 self.depth[i] += depth[body]
@@ -61,13 +61,13 @@ class Equalities:
                 while body:
                     self.on_the_way[i, body] += 1
                     body = m.body_parentid[body]
-        # each turns what comes after it
+        # each turns all bodies after it
         self.turned = self.on_the_way * np.maximum(depth - 1, 0)
 
     def columns(self, d: Any, rows: Sparse) -> tuple[Sparse, Vector]:
         """G (n x p) and the violation (p), without rows that vanish.
 
-        A loop in a plane has one out of it, which says 0 = 0.
+        A loop in a plane has a row normal to the plane, which says 0 = 0.
         """
         if not d.ne:
             return empty((rows.shape[0], 0)), np.zeros(0)
@@ -77,31 +77,31 @@ class Equalities:
         return consistent(G, d.efc_pos[: d.ne][kept], self.rounding(d)[kept])
 
     def kept(self, d: Any, gradients: Sparse) -> npt.NDArray[np.intp]:
-        """Which rows do not vanish beside others of their equality, by their gradients (n x ne)."""
+        """Which rows are not zero beside others of their equality, by their gradients (n x ne)."""
         sizes = np.sqrt(np.bincount(columns_of(gradients), gradients.data**2, minlength=d.ne))
         group = 2 * d.efc_id[: d.ne] + self.of_turns(d)
         largest = np.zeros(2 * self.model.neq)
         np.maximum.at(largest, group, sizes)
         vanish = (sizes <= RANK * largest[group]) | (
-            # an equality of what cannot move
+            # an equality of bodies that cannot move
             (sizes <= RANK * sizes.max(initial=0.0)) & (sizes <= self.rounding(d))
         )
         return np.flatnonzero(~vanish)
 
     def of_turns(self, d: Any) -> npt.NDArray[np.bool_]:
-        """Which rows (ne) are of angles of a weld: the last three of its six."""
+        """Which rows (ne) are angles of a weld: the last three of its six."""
         number = d.efc_id[: d.ne]
         place = np.arange(d.ne) - np.searchsorted(number, number)
         found: npt.NDArray[np.bool_] = place >= 3
         return found
 
     def rounding(self, d: Any) -> Vector:
-        """What rounding may make of the violation of each row (ne) [m, rad]."""
+        """The largest rounding error of the violation of each row (ne) [m, rad]."""
         m = self.model
         lengths = np.linalg.norm(d.xpos, axis=1)
         steps = np.linalg.norm(d.xpos - d.xpos[m.body_parentid], axis=1)
         place = self.on_the_way @ lengths + self.turned @ steps + (self.depth + 2) * self.arms
-        # of a weld an angle is multiplied by a length
+        # an angle of a weld is multiplied by a length
         turn = m.eq_data[:, 10] * (self.depth + 2)
         for i in np.flatnonzero((m.eq_type == JOINT) | (m.eq_type == TENDON)):
             place[i] = terms(m, d, int(i))
@@ -110,12 +110,12 @@ class Equalities:
         return ROUNDING * np.finfo(float).eps * sizes
 
     def of_columns(self, d: Any, rows: Sparse) -> tuple[list[str], Vector]:
-        """Of each column of G the name of its equality, and what rounding may make of it."""
+        """The name of the equality of each column of G, and its largest rounding error."""
         kept = self.kept(d, take(rows, np.arange(d.ne)))
         return [self.name(i) for i in d.efc_id[: d.ne][kept]], self.rounding(d)[kept]
 
     def name(self, i: int) -> str:
-        """Of an equality: its own, or what it joins."""
+        """The name of an equality: its own, or the names that it joins."""
         m = self.model
         kind = mujoco.mjtEq(m.eq_type[i])
         word = kind.name.removeprefix("mjEQ_").lower()
@@ -132,7 +132,7 @@ class Equalities:
 
 
 def ends_of(m: Any, i: int) -> list[tuple[int, Vector]]:
-    """The two bodies that a connect or a weld ties, and where; none of other equalities."""
+    """The two bodies that a connect or a weld ties, and the points; empty for other equalities."""
     if m.eq_type[i] not in (CONNECT, WELD):
         return []
     ends = [int(m.eq_obj1id[i]), int(m.eq_obj2id[i])]
@@ -143,14 +143,14 @@ def ends_of(m: Any, i: int) -> list[tuple[int, Vector]]:
 
 
 def terms(m: Any, d: Any, i: int) -> float:
-    """The sum of the sizes of what makes the violation of an equality of joints or tendons."""
+    """The sum of the sizes of the terms in the violation of an equality of joints or tendons."""
     ends = [int(k) for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0]
     if m.eq_type[i] == JOINT:
         places = m.jnt_qposadr[ends]
         now, before, added = d.qpos[places], m.qpos0[places], 0.0
     else:
         now, before = d.ten_length[ends], m.tendon_length0[ends]
-        # lengths between points of bodies
+        # a tendon adds lengths between points of bodies
         points = float(np.sum(m.tendon_num[ends]))
         added = points * float(np.linalg.norm(d.site_xpos, axis=1).max(initial=0.0))
     sizes = np.abs(now) + np.abs(before)
@@ -159,10 +159,10 @@ def terms(m: Any, d: Any, i: int) -> float:
 
 
 def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, Vector]:
-    """G (n x p) and the violation (p) without what rounding (p) makes of rows that follow.
+    """G (n x p) and the violation (p), without the effect of rounding (p) on dependent rows.
 
-    They become the combinations of others that they are but for rounding, which would ask for
-    multipliers as large as it is small.
+    Such rows are replaced by the exact combinations of the others. Otherwise the small rounding
+    would need very large multipliers.
     """
     if are_independent(G, violation, rounding):
         return G, violation
@@ -188,10 +188,11 @@ def consistent(G: Sparse, violation: Vector, rounding: Vector) -> tuple[Sparse, 
 
 
 def are_independent(G: Sparse, violation: Vector, rounding: Vector) -> bool:
-    """Whether `dependence` finds that no column of G (n x p) follows from others, in less time.
+    """Whether no column of G (n x p) follows from others; faster than `dependence`.
 
-    What is left of a column of length one, after others, is at least the smallest singular value of
-    all: more than a bound where A^T A less its square on the diagonal has a Cholesky factor.
+    The rest of a column of length one, after others, is at least the smallest singular value of
+    all. That is above a bound if A^T A minus the bound's square on the diagonal has a Cholesky
+    factor.
     """
     n, p = G.shape
     sizes = np.sqrt(np.bincount(columns_of(G), G.data * G.data, p))
@@ -209,10 +210,10 @@ def are_independent(G: Sparse, violation: Vector, rounding: Vector) -> bool:
 
 
 def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vector:
-    """What may be left (p) of columns that follow from others, of length one each.
+    """The largest rest (p) of columns that follow from others, each of length one.
 
-    RANK, what rounding (p) makes of them, whose arms are differences of the same positions, and
-    what the violation (p) does: rows of a closed loop turn as it opens.
+    It is the sum of RANK, of the effect of rounding (p), as lever arms are differences of the same
+    positions, and of the effect of the violation (p): rows of a closed loop turn as it opens.
     """
     blur = rounding / sizes + TURNED * opening(violation, sizes)
     bounds: Vector = np.clip(blur, RANK, OWN)
@@ -220,7 +221,7 @@ def left_of_followers(sizes: Vector, violation: Vector, rounding: Vector) -> Vec
 
 
 def dense_gram(A: Sparse) -> Vector:
-    """A^T A (p x p); of many columns by their entries, which are few."""
+    """A^T A (p x p); many columns are multiplied by their few entries."""
     if A.shape[1] <= FEW:
         columns = A.toarray()
         few: Vector = columns.T @ columns
@@ -235,42 +236,43 @@ def gaps_of(
     rounding: Vector,
     found: tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Vector],
 ) -> tuple[Vector, Vector]:
-    """By how much rows that follow from others contradict them, and beside what they may.
+    """By how much dependent rows contradict the others, and by how much they may.
 
-    They may by rounding, and to second order in how far the loop is open: rows that follow where it
-    is closed are then off by the first.
+    Two effects are allowed: rounding, and a second-order effect of the opening of the loop. Rows
+    that follow if the loop is closed are then off to first order.
 
-    found   by `dependence`, of which the second are those rows
+    found   the result of `dependence`; its second entry has those rows
     """
     first, others, share = found
     sizes = sizes_of(columns)
     gaps = np.abs(violation[others] - share.T @ violation[first])
     opened = opening(violation, sizes)
     turned = TURNED * opened
-    bent = sizes[others] * opened * turned / (1 + turned)  # less than what opens the loop itself
+    # less than the opening of the loop itself
+    bent = sizes[others] * opened * turned / (1 + turned)
     return gaps, gaps / (rounding[others] + np.abs(share).T @ rounding[first] + bent)
 
 
 def sizes_of(columns: Vector) -> Vector:
-    """The lengths (p) of columns (n x p), 1 of those that are zero."""
+    """The lengths (p) of columns (n x p); 1 for a zero column."""
     sizes: Vector = np.linalg.norm(columns, axis=0)
     return np.where(sizes > 0, sizes, 1.0)
 
 
 def opening(violation: Vector, sizes: Vector) -> float:
-    """How far a configuration is from one without a violation (p), as an angle."""
+    """The distance of a configuration from one without a violation (p), as an angle."""
     return float((np.abs(violation) / sizes).max(initial=0.0))
 
 
 def dependence(
     columns: Vector, violation: Vector, rounding: Vector
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], Vector]:
-    """Independent ones of the columns (n x p), the others, and these as combinations of those.
+    """Independent columns of (n x p), the other columns, and these as combinations of the former.
 
-    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, but for what
-    `left_of_followers` says.
+    The last is (rank x (p - rank)): columns[:, others] = columns[:, independent] @ it, up to the
+    rest in `left_of_followers`.
     """
-    import scipy.linalg as la  # takes a while
+    import scipy.linalg as la  # the import takes a while
 
     sizes = sizes_of(columns)
     scaled = columns / sizes

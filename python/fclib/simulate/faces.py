@@ -1,9 +1,9 @@
-"""The corners where two flat faces meet, of which MuJoCo keeps four at most.
+"""The corners where two flat faces meet; MuJoCo keeps at most four.
 
-Where edges lie on each other, as those of equal stones do, rounding makes points on the edges, and
-the four that are kept may be these instead of corners: the stones lose their hold. Pairs with four
-points are looked at again: one face is cut by the other in the plane between them. The scheme takes
-of the corners those that are not between others.
+If edges lie on each other, as with equal stones, rounding makes points on the edges. MuJoCo may
+then keep these instead of corners, and the stones lose their hold. So pairs with four points are
+treated again: one face is cut by the other in the plane between them. Of the corners the scheme
+takes those that are not between others.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from fclib.simulate.arrays import Vector
 from fclib.simulate.terrain import replace_contacts
 
 KEPT: Final = 4  # points of two faces that MuJoCo keeps
-SAME: Final = 1e-9  # what normals of one face may differ by
-PARALLEL: Final = 1e-6  # 1 - cos of the angle of two faces that have points all over
+SAME: Final = 1e-9  # largest difference of normals of one face
+PARALLEL: Final = 1e-6  # 1 - cos of the angle between two faces that touch as a whole
 MESH, BOX = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("MESH", "BOX"))
 
 
 def complete_faces(m: Any, d: Any) -> None:
-    """Right after `mj_collision`: all corners of two faces, of which one is a mesh's."""
+    """To be called after `mj_collision`: add all corners of two faces if one is a mesh's."""
     contact = d.contact
     if len(contact.dist) < KEPT:
         return
@@ -52,7 +52,7 @@ def complete_faces(m: Any, d: Any) -> None:
 
 
 def corners_of(m: Any, d: Any, one: int, other: int, contact: Any) -> list[Any]:
-    """Contacts like a given one in the corners that two faces have in common; none: no faces."""
+    """Contacts like a given one in the common corners of two faces; empty: there are no faces."""
     frame = contact.frame.reshape(3, 3)
     faces = [face_of(m, d, one, frame[0]), face_of(m, d, other, -frame[0])]
     if any(face is None for face in faces):
@@ -105,7 +105,7 @@ def height(face: Vector, corner: Vector) -> float:
 
 
 def cut(polygon: Vector, other: Vector) -> Vector:
-    """The corners that two convex polygons (k x 2) have in common, in a ring."""
+    """The corners of the intersection of two convex polygons (k x 2), in a ring."""
     if area(other) < 0:
         other = other[::-1]
     for start, end in zip(other, np.roll(other, -1, axis=0), strict=True):

@@ -1,14 +1,14 @@
-"""What a file says of its contacts and bodies: /contacts and /bodies of a simulated problem.
+"""The tables /contacts and /bodies of a simulated problem, for its file.
 
     contacts, bodies = geometry_of(model, part.contacts)    right after `problem_at`
 
-The identity of a contact follows from the state alone, like the problem: its two shapes, and its
-feature. Of rigid bodies that is where on the two shapes it lies, each axis of the box of a shape in
-three parts; of elastic ones the node. A shape that is round about an axis is divided along it
-alone, a sphere not at all: they may roll.
+The identity of a contact follows from the state alone, like the problem: from its two shapes and
+its feature. For rigid bodies the feature is the contact's place on the two shapes, each axis of a
+shape's box being divided into three parts. For elastic bodies it is the node. A shape that is round
+about an axis is divided along that axis only, and a sphere not at all, because they may roll.
 
-Shapes are those that collide, and primitives that are only seen; of a mesh its convex hull, which
-is what collides.
+Shapes are those that collide, and primitives that are only seen. A mesh is given by its convex
+hull, because that is what collides.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from fclib.simulate.rounding import ELASTIC, RIGID
 Integers = npt.NDArray[np.int32]
 Vector = npt.NDArray[np.float64]
 
-PARTS: Final = 3  # of an axis of a shape
+PARTS: Final = 3  # parts of an axis of a shape
 LIMITS: Final = 16  # more than MuJoCo has kinds of constraints
-ROUNDED: Final = 2.0**RIGID  # what is stored is a multiple of it [m], as states are
-DISPLACED: Final = 2.0**ELASTIC  # displacements likewise
+ROUNDED: Final = 2.0**RIGID  # quantum of stored values [m], as for states
+DISPLACED: Final = 2.0**ELASTIC  # the same for displacements
 KIND_OF: Final = {
     int(mujoco.mjtGeom.mjGEOM_PLANE): KINDS.index("plane"),
     int(mujoco.mjtGeom.mjGEOM_SPHERE): KINDS.index("sphere"),
@@ -43,22 +43,22 @@ KIND_OF: Final = {
     int(mujoco.mjtGeom.mjGEOM_MESH): KINDS.index("mesh"),
     int(mujoco.mjtGeom.mjGEOM_HFIELD): KINDS.index("mesh"),
 }
-# axes of a shape along which a contact has a place of its own
+# axes of a shape along which places of contacts are told apart
 AXES: Final = {"capsule": (2,), "cylinder": (2,), "box": (0, 1, 2), "mesh": (0, 1, 2)}
-UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)  # quaternion of no turn
+UPRIGHT: Final = (1.0, 0.0, 0.0, 0.0)  # quaternion of the identity
 
 
 def geometry_of(
     model: MujocoModel | DeformableModel, contacts: moreau_jean.Contacts
 ) -> tuple[Contacts, Bodies]:
-    """The tables of a problem of a model, which is in the state of the problem."""
+    """The tables of a model's problem; the model must be in the state of the problem."""
     if isinstance(model, DeformableModel):
         return elastic(model, contacts)
     return rigid(model, contacts)
 
 
 def rounded(values: Any, quantum: float = ROUNDED) -> Vector:
-    """Multiples of a quantum: a nanometre is enough for a picture, and takes half of the room."""
+    """Multiples of a quantum: a nanometre is enough for a picture, and halves the size."""
     numbers: Vector = np.rint(np.asarray(values, dtype=float) / quantum) * quantum
     return numbers + 0.0  # no -0
 
@@ -66,7 +66,7 @@ def rounded(values: Any, quantum: float = ROUNDED) -> Vector:
 def table_of(
     contacts: moreau_jean.Contacts, body: Any, shape: Any, feature: npt.NDArray[Any]
 ) -> Contacts:
-    """The table of contacts, with what names them (nc x 2), (nc x 2), (nc)."""
+    """The table of contacts, from the arrays of their names (nc x 2), (nc x 2), (nc)."""
     return Contacts(
         body=np.asarray(body, np.int32),
         shape=np.asarray(shape, np.int32),
@@ -95,7 +95,7 @@ def rigid(model: MujocoModel, contacts: moreau_jean.Contacts) -> tuple[Contacts,
     shape, body = np.full(geom.shape, -1), np.zeros(geom.shape, np.int64)
     shape[~limit] = static.shape_of[geom[~limit]]
     body[~limit] = static.body_of[m.geom_bodyid[geom[~limit]]]
-    # of a joint's limit or dry friction the joint's body and its parent; of a tendon's the world
+    # a joint's limit or dry friction has the joint's body and its parent; a tendon's has the world
     kind = -1 - contacts.pair[:, 0]
     number = contacts.pair[:, 1]
     types = mujoco.mjtConstraint
@@ -114,7 +114,7 @@ def rigid(model: MujocoModel, contacts: moreau_jean.Contacts) -> tuple[Contacts,
 
 
 def repeated(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Of equal rows (k x 2) the how manieth each is, from 0."""
+    """The number of each row (k x 2) among equal rows, from 0."""
     seen: dict[tuple[int, ...], int] = {}
     found = np.zeros(len(pair), np.int64)
     for i, row in enumerate(pair.tolist()):
@@ -126,23 +126,23 @@ def repeated(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 def features(
     model: MujocoModel, contacts: moreau_jean.Contacts, geom: npt.NDArray[np.int64]
 ) -> npt.NDArray[np.int64]:
-    """Where on its two shapes (nc x 2) each contact lies, as a number (nc); different in a pair."""
+    """A number (nc) for each contact's place on its two shapes (nc x 2); unique in a pair."""
     count = len(contacts)
     if not model.model.ngeom:
-        # limits and dry friction alone
+        # only limits and dry friction
         return np.zeros(count, np.int64)
-    # both sides at once, the second shapes after the first ones
+    # both sides at once: first the first shapes, then the second ones
     which = geom.T.ravel()
     local = on_shapes(model, contacts, geom).swapaxes(0, 1).reshape(-1, 3)
     box = model.model.geom_aabb[which]
-    # a third of the half width and more is an end of its own
+    # a place beyond a third of the half width belongs to an end
     place = (local - box[:, :3]) / np.maximum(box[:, 3:], 1e-300)
     third = (place > 1 / PARTS) * 2 + (np.abs(place) <= 1 / PARTS)
     part = np.where(shapes_of(model).divided[which], third, 1)
     digits = part[:, 0] + PARTS * part[:, 1] + PARTS**2 * part[:, 2]
     code: npt.NDArray[np.int64] = PARTS**3 * digits[:count] + digits[count:]
     local = local[count:]
-    # several in one part, in the order of their places on the second shape
+    # several in one part are numbered in the order of their places on the second shape
     order = np.lexsort((*np.round(local, 6).T, code, geom[:, 1], geom[:, 0]))
     key = np.column_stack((geom, code))[order]
     number = np.zeros(count, np.int64)
@@ -164,9 +164,9 @@ def on_shapes(
 
 
 def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contacts) -> Vector:
-    """Where contacts lie on their two shapes (nc x 2 x 3) [m], right after they were assembled.
+    """The places of contacts on their two shapes (nc x 2 x 3) [m]; call it after the assembly.
 
-    0 for limits, and for elastic bodies, whose nodes tell contacts apart.
+    It is 0 for limits, and for elastic bodies: there the nodes tell contacts apart.
     """
     places = np.zeros((len(contacts), 2, 3))
     if isinstance(model, MujocoModel):
@@ -178,7 +178,7 @@ def places_of(model: MujocoModel | DeformableModel, contacts: moreau_jean.Contac
 
 
 def repeated_in_order(rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """The same of rows of which equal ones stand together."""
+    """The same, if equal rows stand together."""
     if not len(rows):
         return np.zeros(0, np.int64)
     new = np.append(True, (rows[1:] != rows[:-1]).any(axis=1))
@@ -188,7 +188,7 @@ def repeated_in_order(rows: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
 
 
 class Shapes:
-    """What of a compiled model does not change with its state."""
+    """The parts of a compiled model that do not change with its state."""
 
     def __init__(self, model: MujocoModel) -> None:
         m = model.model
@@ -208,7 +208,7 @@ class Shapes:
             for axis in axes:
                 self.divided[kind == KINDS.index(name), axis] = True
 
-        meshes: dict[tuple[int, int], int] = {}  # kind and number of a mesh or field
+        meshes: dict[tuple[int, int], int] = {}  # by kind and number of a mesh or field
         vertices: list[Vector] = [np.zeros((0, 3))]
         faces: list[npt.NDArray[np.int64]] = [np.zeros((0, 4), np.int64)]
         own = np.full(len(geoms), -1)
@@ -225,7 +225,7 @@ class Shapes:
         size = m.geom_size[geoms].copy()
         size[own >= 0] = 0
         moves = (m.body_weldid != 0) & (m.body_dofnum[m.body_weldid] > 0)
-        # what hangs on what moves does too
+        # a body that hangs on a moving body moves too
         for body in range(1, m.nbody):
             moves[body] |= moves[m.body_parentid[body]]
         first = np.array([[len(v), len(f)] for v, f in zip(vertices, faces, strict=True)])
@@ -264,7 +264,7 @@ def shapes_of(model: MujocoModel) -> Shapes:
 
 
 def hull_of(m: Any, mesh: int) -> tuple[Vector, npt.NDArray[np.int64]]:
-    """Vertices and faces of a mesh's convex hull, or of the mesh where MuJoCo made none."""
+    """Vertices and faces of a mesh's convex hull, or of the mesh if MuJoCo made none."""
     vertex = m.mesh_vert[m.mesh_vertadr[mesh] :][: m.mesh_vertnum[mesh]]
     if m.mesh_graphadr[mesh] < 0:
         face = m.mesh_face[m.mesh_faceadr[mesh] :][: m.mesh_facenum[mesh]]
@@ -308,7 +308,7 @@ def elastic(model: DeformableModel, contacts: moreau_jean.Contacts) -> tuple[Con
         moved.append(displaced[nodes] - model.reference[nodes])
         faces.append(local.reshape(-1, 4))
     first = np.array([[0, 0], *[[len(v), len(f)] for v, f in zip(vertices, faces, strict=True)]])
-    # the floor's shape first, where there is one
+    # first the floor's shape, if there is one
     shapes = int(floor) + count
     kind = np.full(shapes, KINDS.index("mesh"))
     kind[: int(floor)] = KINDS.index("plane")

@@ -1,4 +1,4 @@
-"""States from outside, of a real robot or of another simulator: a file's rows."""
+"""States from a file, recorded on a real robot or by another simulator."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ OPTIONAL: Final = ("act", "ctrl")
 
 
 def logged(path: Path, model: MujocoModel) -> tuple[Vector, Vector]:
-    """The states of a file, as a model's `position` (K x nq) and `velocity` (K x n) are.
+    """The states of a file, in the form of a model's `position` (K x nq) and `velocity` (K x n).
 
     An .npz file has arrays qpos (K x nq), qvel (K x nv) and, if the forces depend on them, ctrl
-    (K x nu) and act (K x na), as MuJoCo's MjData has them. A .csv file has them in columns that are
-    called qpos0, qpos1, ..., qvel0, ... in its first line; others are not read.
+    (K x nu) and act (K x na), as in MuJoCo's MjData. A .csv file has them in columns with the names
+    qpos0, qpos1, ..., qvel0, ... in its first line; other columns are not read.
 
     Raises:
-        OSError: it cannot be read.
-        ValueError: what it has does not fit the model, or is not finite.
+        OSError: the file cannot be read.
+        ValueError: its arrays do not fit the model, or are not finite.
     """
     known = of_columns(path) if path.suffix == ".csv" else of_arrays(path)
     m = model.model
@@ -53,13 +53,13 @@ def logged(path: Path, model: MujocoModel) -> tuple[Vector, Vector]:
     act = known.get("act", np.tile(model.data.act, (rows, 1)))
     parts = [known["qpos"], act]
     if m.nu:
-        # those of the start, if the file has none
+        # the values at the start, if the file has none
         parts.append(known.get("ctrl", np.tile(model.data.ctrl, (rows, 1))))
     return np.hstack(parts), known["qvel"]
 
 
 def of_arrays(path: Path) -> dict[str, Vector]:
-    """The arrays of an .npz file. OSError, ValueError."""
+    """The arrays of an .npz file. Raises OSError, ValueError."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
             return {
@@ -72,7 +72,7 @@ def of_arrays(path: Path) -> dict[str, Vector]:
 
 
 def of_columns(path: Path) -> dict[str, Vector]:
-    """The columns of a .csv file. OSError, ValueError."""
+    """The columns of a .csv file. Raises OSError, ValueError."""
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))
     names = [name.strip() for name in rows[0]] if rows else []

@@ -1,7 +1,7 @@
 """Moreau-Jean time stepping of a mechanical system with contact, Coulomb friction and impacts.
 
-One step of length h, springs and dampers linearised and taken at theta, other forces as the model
-gives them:
+One step of length h, with springs and dampers linearised and taken at theta, and other forces as
+the model gives them:
 
     M (v' - v) = h F(q_t, v_t) + H r + G lambda     dynamics, r and lambda impulses
     u = H^T v' + w                                  local velocities, N, T1, T2 for each contact
@@ -15,33 +15,34 @@ f = (M + h theta C - h^2 theta (1 - theta) K) v + h F(q, v), since F(q_t, v_t) =
 theta C (v' - v) - theta h K v_t. By default theta = 1; theta = 1/2 keeps the energy of springs.
 
     q, v    configuration and velocity at t; v' the velocity at t + h
-    gap     g, signed distance at a contact [m], < 0 where bodies penetrate
+    gap     g, signed distance at a contact [m], < 0 if bodies penetrate
     u_N^-   normal velocity before the step, (H^T v)_N; > 0 separates
 
 Two unilateral laws:
 
 velocity (default)  a contact is active if g + h/2 u_N^- <= a, with Newton's law of impact
-                    u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact, a
-                    penetration (of order h u_N at an impact) is kept and not amplified.
-                    a [m] is the allowance of a contact (`allowances`): what its gap changes by if
-                    each coordinate is off by the rounding of stored states, and by a small share
-                    of its free motion in a step. With a = 0 a held body falls if the last digit of
-                    a gap is positive. Of two geometries that touch in one point so, the others are
-                    active too if g + h/2 u_N^- is at most the activation [m], 0 by default. Of
-                    points in a line, within the allowance, the ends are taken: where edges lie on
-                    each other, rounding says how many others there are and where. Of many points in
-                    a plane, as of a box on a terrain, the corners are.
+                    u_N' + e u_N^- >= 0, that is w_N = e u_N^-, w_T = 0. Restitution is exact. A
+                    penetration (of order h u_N at an impact) is kept, and not amplified.
+                    a [m] is the allowance of a contact (`allowances`). It is the change of the gap
+                    if each coordinate is off by the rounding of stored states, and by a small share
+                    of its free motion in a step. With a = 0 a body at rest falls if the last digit
+                    of a gap is positive. If two geometries touch in one point in this sense, their
+                    other points are active too if g + h/2 u_N^- is at most the activation [m], 0 by
+                    default. Of points in a line, within the allowance, only the ends are taken: if
+                    edges lie on each other, the number and place of other points depend on
+                    rounding. Of many points in a plane, as of a box on a terrain, only the corners
+                    are taken.
 gap                 every contact within reach is active, with g_m + h u_N' >= 0, that is
                     w_N = g_m / h, g_m = g + (1 - theta) h u_N^- the gap in the middle of the
-                    step. Where g_m < 0 only a share of it, the stabilization, is undone in a
-                    step, since all of it would throw the bodies apart. Inelastic: no e.
+                    step. If g_m < 0, only a share of it, the stabilization, is undone in a
+                    step: undoing all of it would throw the bodies apart. Inelastic: no e.
 
 A bilateral constraint with violation c is corrected by the same share: b = stabilization c / h.
 
 With rolling friction a contact has five components, N, T1, T2, R1, R2: the last two are the
 relative angular velocity about T1 and T2 [rad/s], and the rolling moment, ||r_R|| <= mu_r r_N.
 
-Dry friction in a joint, a force of at most F against its velocity s^T v, is a contact too
+Dry friction in a joint, a force of at most F against its velocity s^T v, is also a contact
 (docs/mathematics.md): an auxiliary degree of freedom z of mass a, pressed by F, is its normal
 velocity, the joint's velocity its tangential one, and mu = 1,
 
@@ -49,12 +50,12 @@ velocity, the joint's velocity its tangential one, and mu = 1,
 
 so that z = 0 and r_N = h F at every solution.
 
-In the plane a contact has two, N and T, and with rolling friction a third, R, about the normal of
-the plane.
+In the plane a contact has two components, N and T, and with rolling friction a third one, R, about
+the normal of the plane.
 
-A problem holds what the contacts move: bodies that no chain of contacts, bilateral constraints and
-inertia links to a contact go their own way, M v' = M v + h F + G lambda. With `all_bodies` it holds
-these too.
+A problem holds the bodies that the contacts move. A body that no chain of contacts, bilateral
+constraints and inertia links to a contact moves freely, M v' = M v + h F + G lambda. With
+`all_bodies` the problem holds these bodies too.
 
 J. J. Moreau, Unilateral contact and dry friction in finite freedom dynamics, in Nonsmooth
   Mechanics and Applications, CISM 302, Springer, 1988.
@@ -91,18 +92,19 @@ from fclib.simulate.arrays import (
 
 __all__ = ["Sparse", "Vector"]
 
-LONGEST = 1e9  # [s] of a step: what is made of h^2 stays finite
-# benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has what it found
-ROUNDINGS = 4.0  # roundings of stored states, of each coordinate, that a closed gap may show
-FACE = 16  # points of a pair that may be corners of two faces; of more, the corners are found
-MOTION = 1e-3  # share of the free motion of a step, of each coordinate, that it may show
+LONGEST = 1e9  # longest step [s]: terms in h^2 stay finite
+# benchmarks/held_bodies.py chose these, docs/results/held-bodies.csv has its results
+ROUNDINGS = 4.0  # a closed gap may be off by so many roundings of each stored coordinate
+FACE = 16  # points of a pair that may all be corners; if there are more, the corners are found
+MOTION = 1e-3  # and by this share of each coordinate's free motion in a step
 
 
 @dataclass(frozen=True)
 class Contacts:
     """The geometry of nc contacts, in the order of the problem's blocks."""
 
-    # (nc x 2) the two geometries, N points from the first to the other; or a limit: < 0, see source
+    # (nc x 2) the two geometries, N points from the first to the other; or < 0 for a limit, see
+    # source
     pair: npt.NDArray[np.int64]
     point: Vector  # (nc x 3) in the world [m], midway between the two
     frame: Vector  # (nc x 3 x 3) rows N, T1, T2, in the plane N, T, y, in the world; 0 for a limit
@@ -127,12 +129,12 @@ class Contacts:
 
     @property
     def dimension(self) -> int:
-        """Components of a contact d: 3, in the plane 2; with rolling friction 5, in the plane 3."""
+        """Components d of a contact: 3, or 2 in the plane; with rolling friction 5, or 3."""
         return components(self.planar, rolling=self.mu_r is not None)
 
     @property
     def parts(self) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-        """Force and moment: their components of a contact, and the rows of the frame they go by."""
+        """The components of a contact for force and moment, and their rows of the frame."""
         force, d = 2 if self.planar else 3, self.dimension
         axis = 2 if self.planar else 1
         return (
@@ -149,7 +151,7 @@ class Contacts:
 
 
 def components(planar: bool, *, rolling: bool) -> int:
-    """Components of a contact d."""
+    """Number d of components of a contact."""
     if planar:
         return 3 if rolling else 2
     return 5 if rolling else 3
@@ -157,15 +159,15 @@ def components(planar: bool, *, rolling: bool) -> int:
 
 @dataclass(frozen=True)
 class DryFriction:
-    """Dry friction in k joints and tendons: a force of at most its bound against the velocity."""
+    """Dry friction in k joints and tendons: a force against the velocity, at most the bound."""
 
-    gradient: Sparse  # (n x k) of the joints, their velocities are gradient^T v, none is empty
+    gradient: Sparse  # (n x k) of the joints: their velocities are gradient^T v; no column is empty
     bound: Vector  # (k) F [N], [N m]
     mass: Vector  # (k) a of the auxiliary degrees of freedom, of the size of the joint's inertia
-    pair: npt.NDArray[np.int64]  # (k x 2) < 0, as of a limit: which joint or tendon
+    pair: npt.NDArray[np.int64]  # (k x 2) < 0, as for a limit: the joint or tendon
 
-    # what a step adds to a problem, the same at each: an auxiliary degree of freedom and a contact
-    # for each, of which N is the auxiliary velocity and T1 the joint's
+    # the part that each step adds to a problem: for each joint an auxiliary degree of freedom and a
+    # contact, with N the auxiliary velocity and T1 the joint's
 
     @cached_property
     def contacts(self) -> Contacts:
@@ -175,7 +177,7 @@ class DryFriction:
 
     @cached_property
     def first(self) -> npt.NDArray[np.intp]:
-        """A degree of freedom (k) that each acts on."""
+        """A degree of freedom (k) on which each acts."""
         first: npt.NDArray[np.intp] = self.gradient.indices[self.gradient.indptr[:-1]]
         return first
 
@@ -187,19 +189,19 @@ class DryFriction:
 
     @cached_property
     def ends(self) -> npt.NDArray[np.int32]:
-        """How many entries there are up to the end of each N, and of each T1 (k x 2)."""
+        """The number of entries up to the end of each column N and of each column T1 (k x 2)."""
         lengths = lengths_of(self.gradient.indptr)
         both = np.column_stack((np.ones_like(lengths), lengths))
         return both.cumsum(dtype=np.int32).reshape(both.shape)
 
     @cached_property
     def rows(self) -> npt.NDArray[np.int32]:
-        """Of the columns N and T1 of each, the rows of the entries."""
+        """The rows of the entries in the columns N and T1 of each."""
         return np.insert(self.gradient.indices, self.gradient.indptr[:-1], self.places)
 
     @cached_property
     def values(self) -> Vector:
-        """And the entries."""
+        """The entries in the columns N and T1 of each."""
         return np.insert(self.gradient.data, self.gradient.indptr[:-1], 1.0)
 
 
@@ -208,25 +210,25 @@ class System:
     """The equations of motion at one configuration, and the contacts within reach."""
 
     M: Sparse  # (n x n) mass matrix
-    force: Vector  # (n) F(q, v): all but the reactions, gyroscopic terms included
-    C: Sparse  # (n x n) damping, -dF/dv of the dampers; of gyroscopic terms too where asked for
+    force: Vector  # (n) F(q, v): all forces except the reactions, with gyroscopic terms
+    C: Sparse  # (n x n) damping, -dF/dv of the dampers; also of gyroscopic terms if asked for
     K: Sparse  # (n x n) stiffness, -dF/dq of the springs
     H: Sparse  # (n x d nc) contact directions, d = 2, 3 or 5
     contacts: Contacts  # nc
     G: Sparse  # (n x p) gradients of the bilateral constraints, d violation / dt = G^T v
-    violation: Vector  # (p) of the bilateral constraints
+    violation: Vector  # (p) violation of the bilateral constraints
     tree: npt.NDArray[np.int64]  # (n) the body, or tree of bodies, of each degree of freedom
     dry: DryFriction | None = None
-    rounding: float = 0.0  # of each coordinate, where a state is stored [m], [rad]
-    shape_rounding: Vector | None = None  # of the surface of each geometry [m]; None: exact
+    rounding: float = 0.0  # rounding of each coordinate of a stored state [m], [rad]
+    shape_rounding: Vector | None = None  # rounding of each geometry's surface [m]; None: exact
 
 
 class ContactModel(Protocol):
-    """A mechanical system with contacts: all that the time stepper asks of it."""
+    """A mechanical system with contacts: all that the time stepper needs of it."""
 
     @property
     def position(self) -> Vector:
-        """Configuration q (nq), a copy; nq > n where there are rotations."""
+        """Configuration q (nq), a copy; nq > n if there are rotations."""
         ...
 
     @property
@@ -237,8 +239,8 @@ class ContactModel(Protocol):
     def assemble(self, h: float, *, shared_speed: bool) -> System:
         """The system at (q, v), with every contact that may close within h.
 
-        Each body is taken to move at its own speed, or with `shared_speed` at that of the
-        fastest, since impacts pass speed on.
+        Each body is assumed to move at its own speed, or with `shared_speed` at the fastest body's
+        speed, since impacts pass speed on.
         """
         ...
 
@@ -256,9 +258,10 @@ class MoreauJean:
     law: Law = "velocity"
     stabilization: float = 0.2  # share of a penetration or of a violation undone in a step
     theta: float = 1.0  # 1 is implicit Euler, 1/2 the midpoint
-    activation: float = 0.0  # [m], of the velocity law: points of a pair that touches, within this
-    allowance: bool = True  # of the velocity law: whether gaps within `allowances` are closed
-    all_bodies: bool = False  # whether problems have those that nothing touches too
+    # [m], velocity law: if a pair touches, its points within this are active
+    activation: float = 0.0
+    allowance: bool = True  # velocity law: whether gaps within `allowances` count as closed
+    all_bodies: bool = False  # whether problems also hold bodies that nothing touches
 
     def __post_init__(self) -> None:
         if not 0 < self.h <= LONGEST:
@@ -285,7 +288,7 @@ class MoreauJean:
     def problem(
         self, system: System, v: Vector, info: _core.ProblemInfo | None = None
     ) -> StepProblem:
-        """The problem of the step from velocity v (n): the active contacts and what they move."""
+        """The problem of the step from velocity v (n): the active contacts and bodies they move."""
         h = self.h
         contacts, H = system.contacts, system.H
         d = contacts.dimension
@@ -327,13 +330,13 @@ class MoreauJean:
         else:
             inside, rows = linked(tree, M, H, G)
         whole = len(inside) == len(f) and len(rows) == len(b)
-        # auxiliary degrees of freedom have contacts
+        # all auxiliary degrees of freedom have contacts
         apart = rows[:0] if whole else np.setdiff1d(np.arange(len(v)), inside)
         if not whole:
             place = np.full(len(f), -1, dtype=np.int32)
             place[inside] = np.arange(len(inside), dtype=np.int32)
             all_M, all_G = M, G
-            # nothing couples what is inside to what is not
+            # nothing couples the bodies inside the problem to those outside
             M, G = take(M, inside, place), take(G, rows, place)
             H = take(H, np.arange(H.shape[1]), place)
         fields: dict[str, Any] = {
@@ -367,16 +370,17 @@ class MoreauJean:
 
 @dataclass(frozen=True)
 class StepProblem:
-    """The problem of one step, and what it leaves out."""
+    """The problem of one step, and the part that it leaves out."""
 
     problem: _core.GlobalProblem | _core.GlobalRollingProblem
     contacts: Contacts  # nc, the active ones
-    # (n') degrees of freedom of the system that the problem has; its auxiliary ones come after them
+    # (n') degrees of freedom of the system that the problem has; its auxiliary ones follow
     dofs: npt.NDArray[np.int64]
-    free: Callable[[], Vector]  # (n) velocity after the step of the others, 0 at `dofs`; solves
+    # (n) velocity of the others after the step, 0 at `dofs`; a call solves for it
+    free: Callable[[], Vector]
 
     def after(self, v: Vector | None) -> Vector:
-        """The velocity (n) of the whole system after the step, by that of the problem."""
+        """The velocity (n) of the whole system after the step, from that of the problem."""
         velocity = self.free()
         if v is not None:
             velocity[self.dofs] = v[: len(self.dofs)]
@@ -398,7 +402,7 @@ def with_dry_friction(
     n, d = len(f), contacts.dimension
     k, own = len(dry.bound), dry.contacts
     starts = np.empty((k, d), dtype=np.int32)
-    # N and T1; what comes after has no entries
+    # N and T1; later columns have no entries
     starts[:, :1], starts[:, 1:] = dry.ends[:, :1], dry.ends[:, 1:]
     starts += H.indptr[-1]
     return (
@@ -431,10 +435,10 @@ def with_dry_friction(
 
 
 def allowances(system: System, h: float, v: Vector) -> Vector:
-    """The gaps (nc) [m] that count as closed: what rounding and solvers may leave of gaps of 0.
+    """The gaps (nc) [m] that count as closed: what rounding and solvers may make of gaps of 0.
 
-    Coordinate i is taken to be off by ROUNDINGS of a stored state, and by the share MOTION of its
-    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are a share of that, too. A
+    Coordinate i is assumed to be off by ROUNDINGS of a stored state, and by the share MOTION of its
+    free motion in a step, h (|v_i| + h |F_i| / M_ii). Errors of solvers are also a share of that. A
     surface is off by ROUNDINGS of its own.
     """
     M, H = system.M, system.H
@@ -455,8 +459,8 @@ def closing(
 ) -> npt.NDArray[np.intp]:
     """Which contacts are active, by their gaps in the middle of the step (nc) [m].
 
-    Those that close, a gap of `closed` (nc) or less, and of their pairs (nc x 2) those that are
-    open by the activation at most.
+    A contact is active if its gap is `closed` (nc) or less. In a pair (nc x 2) with such a contact,
+    contacts are also active if they are open by at most the activation.
     """
     touches = middle <= closed
     if activation > 0:
@@ -469,15 +473,15 @@ def closing(
 
 
 def keys(pair: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """A number for each pair (nc x 2), the same for the same: faster to compare than rows."""
+    """A number for each pair (nc x 2), equal for equal pairs: faster to compare than rows."""
     return (pair[:, 0] << 32) + pair[:, 1]
 
 
 def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
     """Which contacts are not between others of their pair, within `off` (nc) [m].
 
-    What reactions there do, reactions at the others do as well. Between two of them, of any pair;
-    of a pair with many points also inside of those that have the same plane.
+    Reactions at the others can replace a reaction between them. Between two contacts counts in any
+    pair. In a pair with many points, inside of those in the same plane counts too.
     """
     kept = contacts.pair[:, 0] < 0
     _, group = np.unique(keys(contacts.pair), return_inverse=True)
@@ -498,7 +502,7 @@ def ends(contacts: Contacts, off: Vector) -> npt.NDArray[np.intp]:
 
 
 def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:
-    """Which of k points (g x k x 3) are not on the way from one to another, within off (g x k)."""
+    """Which of k points (g x k x 3) are not on a line between two others, within off (g x k)."""
     count = x.shape[1]
     there = np.ones(off.shape, dtype=bool)
     first, second = np.triu_indices(count, 1)
@@ -514,11 +518,11 @@ def not_between(x: Vector, off: Vector) -> npt.NDArray[np.bool_]:
 
 
 def corners(x: Vector, normal: Vector, off: float) -> list[npt.NDArray[np.intp]]:
-    """Of points (k x 3) with one normal (k x 3) in one plane, within off [m], the convex hulls."""
-    from scipy.spatial import ConvexHull  # takes a while
+    """The convex hulls of points (k x 3) of one normal (k x 3) and one plane, within off [m]."""
+    from scipy.spatial import ConvexHull  # the import takes a while
 
     size = max(float(np.ptp(x, axis=0).max()), np.finfo(float).tiny)
-    turned = np.rint(normal * size / off)  # a turn by which no point moves further
+    turned = np.rint(normal * size / off)  # a finer turn moves no point further than `off`
     height = np.rint((x * normal).sum(axis=1) / off)
     _, group = np.unique(np.column_stack((turned, height)), axis=0, return_inverse=True)
     found = []
@@ -540,13 +544,13 @@ def linked(
 ) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
     """The degrees of freedom linked to a contact, and the bilateral rows among them.
 
-    Trees of bodies are kept whole, whatever part of them a contact moves. All is there where
-    there is no contact: such a problem says that nothing touches.
+    Trees of bodies are kept whole, whatever part of them a contact moves. Without a contact,
+    everything is kept: such a problem says that nothing touches.
     """
     n, p, trees = H.shape[0], G.shape[1], tree.max(initial=-1) + 1
     if not H.shape[1]:
         return np.arange(n), np.arange(p)
-    # contacts touch trees; inertia and bilateral rows pass it on
+    # mark trees with contacts; inertia and bilateral rows pass the mark on
     touched = np.zeros(trees, dtype=bool)
     touched[tree[H.indices]] = True
     if not p and touched.all():

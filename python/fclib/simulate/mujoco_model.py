@@ -3,15 +3,15 @@
 MuJoCo's rows of the constraint Jacobian are the columns of H and G: the three rows of a contact
 are N, T1, T2 of its frame, N points from its first geometry to its second, and J v is the
 velocity of the second relative to the first. A row of an equality is the rate of the violation
-`efc_pos`. Only MuJoCo's own solver, its soft contacts and its integrator are left aside.
+`efc_pos`. MuJoCo's own solver, its soft contacts and its integrator are not used.
 
 A limit of a joint or a tendon is a contact without friction: its row is N, its tangents are zero,
-and its pair is (-1 - kind, index); of dry friction likewise. Contacts of condim 6 make rolling
-problems; their spin friction, which FCLIB's law does not have, is left out.
+and its pair is (-1 - kind, index); the same holds for dry friction. Contacts of condim 6 make
+rolling problems. FCLIB's law has no spin friction, so theirs is left out.
 
-The configuration is q, then the states of actuators, which MuJoCo's own rates advance, and what the
-forces depend on besides: of a scene with a gait (`mujoco_scene.py`) the time, of one with
-other controls these.
+The configuration is q, then the states of actuators, which MuJoCo's own rates advance, then other
+values on which forces depend: the time if the scene has a gait (`mujoco_scene.py`), or else the
+controls.
 """
 
 from __future__ import annotations
@@ -55,9 +55,9 @@ from fclib.simulate.rounding import exponent_of
 from fclib.simulate.servos import Held, Servos
 from fclib.simulate.terrain import CrowdedPairError, complete
 
-REACH: Final = 1e10  # limits are looked at from any distance [rad] or [m]
-LEAST_MU: Final = 1e-5  # of a contact, mjMINMU: MuJoCo's own solver takes it for 0
-# MuJoCo's numbers; its enumerations are slow to ask
+REACH: Final = 1e10  # limits count at any distance [rad] or [m]
+LEAST_MU: Final = 1e-5  # least friction of a contact, mjMINMU: MuJoCo's own solver uses it for 0
+# MuJoCo's numbers; its enumerations are slow
 FRICTION_DOF, FRICTION_TENDON = (
     int(getattr(mujoco.mjtConstraint, f"mjCNSTR_{name}"))
     for name in ("FRICTION_DOF", "FRICTION_TENDON")
@@ -72,9 +72,9 @@ class MujocoModel:
     """A `ContactModel` made of an MJCF scene."""
 
     def __init__(self, scene: Scene, *, strict: bool = False) -> None:
-        """ValueError where the MJCF is wrong.
+        """ValueError if the MJCF is wrong.
 
-        What no problem can hold is left out, and named in `left_out`; `strict`:
+        Unsupported features are left out, and named in `left_out`. With `strict` they raise
         UnsupportedSceneError.
         """
         self.scene = scene
@@ -82,7 +82,7 @@ class MujocoModel:
         self.model, dropped = compile_scene(scene)
         self.data: Any = mujoco.MjData(self.model)
         self.left_out = (*left_out(scene, self.model), *dropped)
-        self.untouchable = cannot_touch(self.model)  # in words
+        self.untouchable = cannot_touch(self.model)  # the reason, in words
         if strict:
             refuse_unknown(scene, self.left_out)
         if scene.planar:
@@ -93,7 +93,7 @@ class MujocoModel:
         self._margin = m.geom_margin.copy()
         self._pair_margin = m.pair_margin.copy()
         self._gravity = float(np.linalg.norm(m.opt.gravity))
-        # of each geometry
+        # the speed of each geometry
         self._body = m.geom_bodyid.astype(np.intp)
         self._root = m.body_rootid[self._body].astype(np.intp)
         # geometries follow each other body by body
@@ -109,22 +109,22 @@ class MujocoModel:
         self._flat = bool((m.geom_type == mujoco.mjtGeom.mjGEOM_MESH).any())
         self._trees: npt.NDArray[np.int64] = m.dof_treeid.astype(np.int64)
         self._servos = Servos(m)
-        # these change with no configuration if no actuator feeds back
+        # these never change with the configuration if no actuator has feedback
         self._linear = None if self._servos.feed_back else self._servos.linear(self.data)
-        # nor that of joints, alone
+        # nor does that of joints alone
         self._dry: DryFriction | None = None
         self._rubbing_tendons = bool(m.tendon_frictionloss.any())
         self.rolling = has_condim(m, 6)
-        # every contact detected gives rows
+        # make every detected contact give rows
         m.geom_gap[:] = 0
         m.pair_gap[:] = 0
         m.jnt_margin[:] = REACH
         m.tendon_margin[:] = REACH
-        # MuJoCo's own step keeps the controls that came before
+        # MuJoCo's own step keeps the earlier controls
         m.actuator_delay[:] = 0
 
         self._gait = Gait.of(scene, m)
-        self.controlled = False  # from outside: controls are part of the configuration
+        self.controlled = False  # controls come from outside: they are part of the configuration
         self.keyframe = keyframe_of(scene, m)
         if self.keyframe:
             mujoco.mj_resetDataKeyframe(m, self.data, m.key(self.keyframe).id)
@@ -134,14 +134,14 @@ class MujocoModel:
                 f"{scene.name}: a position, a velocity or gravity at the start is not finite"
             )
         if m.na:
-            # of the rates of actuators
+            # MuJoCo's data for the rates of actuators
             m.opt.timestep = self.time_step
         if self._cell:
             self._cell.wrap(m, self.data.qpos)
 
     @property
     def time_step(self) -> float:
-        """Step h [s]: the scene's, or the MJCF file's where the scene names none."""
+        """Step h [s]: the scene's, or the MJCF file's if the scene names none."""
         return float(self.scene.time_step or self.model.opt.timestep)
 
     @property
@@ -157,12 +157,12 @@ class MujocoModel:
 
     @property
     def coordinates(self) -> int:
-        """How many entries of `position` are of bodies; those after them stay as they move."""
+        """The number of entries of `position` of bodies; the later ones stay if bodies move."""
         return int(self.model.nq)
 
     @property
     def has_gait(self) -> bool:
-        """Whether the scene itself says its controls at each time."""
+        """Whether the scene itself gives its controls at each time."""
         return self._gait is not None
 
     @property
@@ -178,7 +178,7 @@ class MujocoModel:
 
     @property
     def smallest_size(self) -> float | None:
-        """Of the geometries that move, the smallest radius about its centre [m]; 1 without any."""
+        """The smallest radius of a moving geometry about its centre [m]; 1 if none moves."""
         m = self.model
         moving = (m.body_weldid[m.geom_bodyid] > 0) & (m.geom_rbound > 0)
         return float(m.geom_rbound[moving].min()) if moving.any() else 1.0
@@ -186,8 +186,8 @@ class MujocoModel:
     def assemble(self, h: float, *, shared_speed: bool = False) -> System:
         """The system at (q, v), with every contact that may close within h.
 
-        MemoryError where MuJoCo's arena is too small, UnsupportedSceneError where a contact of a
-        planar scene leaves the plane.
+        Raises MemoryError if MuJoCo's arena is too small, and UnsupportedSceneError if a contact of
+        a planar scene leaves the plane.
         """
         m, d = self.model, self.data
         if self._cell:
@@ -221,11 +221,11 @@ class MujocoModel:
             except ValueError as error:
                 raise UnsupportedSceneError(f"{self.scene.name}: {error}") from None
         if self._cell:
-            # no limits in such a scene: all pairs are geometries
+            # such a scene has no limits: all pairs are geometries
             contacts = replace(contacts, pair=self._cell.geometry[contacts.pair])
         G, violation = self._ties.columns(d, rows)
         if self._gait:
-            # at the end of the step, where its springs are taken too
+            # at the end of the step, as its springs are
             d.ctrl[:] = self._gait.controls(d.time + h)
         M = self._pattern.fill(d.M)
         force, held = self._force(h, M)
@@ -250,16 +250,16 @@ class MujocoModel:
         )
 
     def equalities(self) -> tuple[list[str], Vector]:
-        """What the columns of G are of, as it was assembled last: names (p), rounding (p) [m, rad].
+        """Names (p) and rounding (p) [m, rad] of the columns of G at the last assembly.
 
-        The second is what rounding may make of each violation.
+        The rounding is the largest rounding error of each violation.
         """
         return self._ties.of_columns(self.data, jacobian(self.model, self.data))
 
     def control(self, values: Any) -> None:
-        """Set the controls (nu) until they are set again.
+        """Set the controls (nu); they stay until they are set again.
 
-        ValueError for another number of them, or where one is not finite.
+        ValueError if their number is wrong, or one is not finite.
         """
         values = np.asarray(values, dtype=float)
         if values.shape != self.data.ctrl.shape:
@@ -299,7 +299,7 @@ class MujocoModel:
             self._cell.wrap(self.model, self.data.qpos)
 
     def drawing(self, position: Vector) -> tuple[Any, Any]:
-        """A copy of the MjModel, whose looks may change, and an MjData with bodies in place."""
+        """A copy of the MjModel, whose looks may change, and an MjData with the bodies in place."""
         m = copy.copy(self.model)
         d = mujoco.MjData(m)
         d.qpos[:] = position[: m.nq]
@@ -328,10 +328,10 @@ class MujocoModel:
         if self._cell:
             speed = speed[self._cell.geometry]
         reach = h * speed + h**2 * self._gravity
-        # half of the activation for each of the two
+        # half of the activation for each of the two geometries
         reach += 0.5 * self.scene.activation
         if self.scene.allowance:
-            # gaps that rounding opens, by the lengths that it turns
+            # gaps that rounding opens, from the lengths that it turns
             reach += ROUNDINGS * (self._rounding * (1 + m.geom_rbound) + self._shape_rounding)
 
         margin = np.maximum(self._margin, reach)
@@ -344,9 +344,9 @@ class MujocoModel:
             m.pair_margin[:] = np.maximum(self._pair_margin, reach[pair].sum(axis=1))
 
     def _force(self, h: float, M: Sparse) -> tuple[Vector, Held | None]:
-        """F (n): passive, actuator and applied forces less the bias c(q, v).
+        """F (n): passive, actuator and applied forces minus the bias c(q, v).
 
-        And the servos that reach a limit within h.
+        Also the servos that reach a limit within h.
         """
         m, d = self.model, self.data
         if m.nu:
@@ -401,10 +401,10 @@ def crossed(a: Vector, b: Vector) -> Vector:
 
 
 def advance_actuators(m: Any, d: Any, h: float) -> None:
-    """The states of actuators after h [s], by the rates that MuJoCo found for their start."""
+    """The states of actuators after h [s], from MuJoCo's rates at their start."""
     kinds = mujoco.mjtDyn
     for i in np.flatnonzero(np.isin(m.actuator_dyntype, DYNAMICS) & (m.actuator_actnum > 0)):
-        # a muscle's or a filter's is the last one of its states
+        # the state of a muscle or a filter is the last one of its states
         k = m.actuator_actadr[i] + m.actuator_actnum[i] - 1
         span = h
         if m.actuator_dyntype[i] == kinds.mjDYN_FILTEREXACT:
@@ -416,7 +416,7 @@ def advance_actuators(m: Any, d: Any, h: float) -> None:
 
 
 def dry_friction(m: Any, d: Any, rows: Sparse) -> DryFriction | None:
-    """Of joints and tendons, by MuJoCo's rows as columns (n x nefc); None: there is none."""
+    """Dry friction of joints and tendons, from MuJoCo's rows as columns (n x nefc); None: none."""
     if not d.nf:
         return None
     kind = d.efc_type[: d.ne + d.nf]
@@ -442,10 +442,11 @@ def gyroscopic(m: Any, d: Any) -> Sparse:
     """Gamma = dc/dv (n x n) of the bias c(q, v), not symmetric; by trees of bodies.
 
     c is quadratic in v, so that half the difference of c(v + e) and c(v - e) is exact. Trees do not
-    act on each other, and one dof of each is moved at a time.
+    act on each other, so one degree of freedom of each tree is moved at a time.
     """
     v, bias = d.qvel.copy(), np.zeros(m.nv)
-    place = np.arange(m.nv) - m.tree_dofadr[m.dof_treeid]  # in its tree
+    # place of each degree of freedom in its tree
+    place = np.arange(m.nv) - m.tree_dofadr[m.dof_treeid]
     rows, columns, values = [], [], []
     for k in range(place.max(initial=-1) + 1):
         derivative = np.zeros(m.nv)
@@ -474,9 +475,9 @@ def frictionless_to_frictional(d: Any) -> None:
 
 @dataclass(frozen=True)
 class MassPattern:
-    """Where the entries of MuJoCo's M lie: it keeps the lower triangle, by rows."""
+    """The places of the entries of MuJoCo's M, which keeps the lower triangle, by rows."""
 
-    entries: npt.NDArray[np.int64]  # (nnz) of MuJoCo's M, the upper triangle's among them
+    entries: npt.NDArray[np.int64]  # (nnz) of MuJoCo's M, with those of the upper triangle
     rows: npt.NDArray[np.int32]  # (nnz) by columns
     pointers: npt.NDArray[np.int32]  # (n + 1) of the columns
 
@@ -508,14 +509,14 @@ def jacobian(m: Any, d: Any) -> Sparse:
 
 
 def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts]:
-    """H (n x d nc) and the contacts that give rows: all but those between bodies that stay.
+    """H (n x d nc) and the contacts that give rows: all except those between fixed bodies.
 
     The limits of joints and tendons come after the contacts.
     """
     data = source.data
     contact = data.contact
     address, geom = contact.efc_address, contact.geom
-    # a body of a mocap, or one whose joints do not move the point, has rows without entries
+    # a mocap body, or a body whose joints do not move the point, has rows without entries
     starts = rows.indptr
     moves = starts.take(address + 3, mode="clip") > starts.take(address, mode="clip")
     given = (address >= 0) & moves
@@ -536,7 +537,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     limits = slice(data.ne + data.nf, data.ne + data.nf + data.nl)
     touching, nc = len(which), len(which) + data.nl
     d = components(planar=False, rolling=source.rolling)
-    # -1 where a component has no row
+    # -1 if a component has no row
     source_row = np.full((nc, d), -1)
     source_row[:touching, :3] = address[:, None] + np.arange(3)
     if source.rolling:
@@ -547,7 +548,7 @@ def contact_columns(source: MujocoModel, rows: Sparse) -> tuple[Sparse, Contacts
     H = take(rows, source_row.ravel())
 
     def with_limits(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Of all, with 0 for the limits."""
+        """The values of all contacts; 0 for the limits."""
         if nc == touching:
             return values
         found = np.zeros((nc, *values.shape[1:]), dtype=values.dtype)

@@ -1,7 +1,7 @@
-"""MuJoCo's model of an MJCF scene, and what of it no problem can hold: it is left out, and said.
+"""MuJoCo's model of an MJCF scene; unsupported features are left out and named.
 
-Keyframes called gait... hold controls at their times: straight between them, the last one's are the
-first one's again, and so on.
+Keyframes called gait... hold controls at their times, with linear interpolation between them. The
+last keyframe's controls are the first one's, and the cycle repeats.
 
 A planar scene moves in a plane y = const: slides along x and z, hinges about y (`plane.py`).
 """
@@ -24,14 +24,14 @@ from fclib.simulate.plane import NORMAL
 MEMORY: Final = 256 * 2**20  # arena for contacts [bytes]; MuJoCo's own default grows to GBs
 FLAT: Final = 1e-9  # sine of the angle of a joint's axis to the plane
 
-KEYFRAMES: Final = ("start", "home", "stand")  # where a scene starts, the first that is there
-# actuators whose state MuJoCo advances by its rate, which is known here
+KEYFRAMES: Final = ("start", "home", "stand")  # start of a scene: the first of these that exists
+# actuators with a state that MuJoCo advances by a rate known here
 DYNAMICS: Final = tuple(
     int(getattr(mujoco.mjtDyn, f"mjDYN_{name}"))
     for name in ("NONE", "INTEGRATOR", "FILTER", "FILTEREXACT", "MUSCLE")
 )
 
-# features that a scene leaves out knowingly, and the flag of MuJoCo that does so, if any
+# features that a scene may leave out on purpose, with MuJoCo's flag for it, if any
 IGNORABLE: Final = {
     "limits": mujoco.mjtDisableBit.mjDSBL_LIMIT,
     "frictionloss": mujoco.mjtDisableBit.mjDSBL_FRICTIONLOSS,
@@ -39,7 +39,7 @@ IGNORABLE: Final = {
     "anisotropy": None,  # two coefficients: their geometric mean
     "activation": None,  # actuators with a state: it stays as it is at the start
 }
-# data of a model that must be finite, those of geometries, bodies, joints, degrees of freedom
+# data of a model that must be finite: of geometries, bodies, joints, degrees of freedom
 NUMBERS: Final = {
     "geom": ("friction", "size", "pos", "quat", "margin", "gap"),
     "body": ("mass", "inertia", "pos", "quat", "ipos", "iquat"),
@@ -55,7 +55,7 @@ class UnsupportedSceneError(ValueError):
 def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
     """The MjModel of a scene, with the options that problems need. ValueError for bad MJCF.
 
-    And what MuJoCo's compiler says that it drops or replaces.
+    Also the messages of MuJoCo's compiler on parts that it drops or replaces.
     """
     unknown = set(scene.ignore) - set(IGNORABLE)
     if unknown:
@@ -69,7 +69,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
 
     m.opt.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     m.opt.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-    # these serve MuJoCo's own step, and override fakes margins, distances and friction
+    # these are for MuJoCo's own step only, and "override" changes margins, distances and friction
     enable = mujoco.mjtEnableBit
     for flag in (
         enable.mjENBL_OVERRIDE,
@@ -86,7 +86,7 @@ def compile_scene(scene: Scene) -> tuple[Any, tuple[str, ...]]:
 
 
 def compiled(scene: Scene) -> Any:
-    """The MjModel of a scene as its text says. ValueError for bad MJCF."""
+    """The MjModel of a scene from its text. ValueError for bad MJCF."""
     try:
         if scene.path is not None and scene.path.read_text(encoding="utf-8") == scene.xml:
             spec = mujoco.MjSpec.from_file(str(scene.path))
@@ -94,7 +94,7 @@ def compiled(scene: Scene) -> Any:
             included = {name: text.encode() for name, text in scene.includes.items()}
             spec = mujoco.MjSpec.from_string(scene.xml, include=included or None)
             if scene.path is not None:
-                # meshes are beside the file, whose text has changed
+                # the text has changed, but meshes lie beside the file
                 spec.modelfiledir = str(scene.path.resolve().parent)
         if scene.period is not None:
             add_ghosts(spec)
@@ -110,7 +110,7 @@ def compiled(scene: Scene) -> Any:
 
 @contextmanager
 def warnings_of() -> Iterator[list[str]]:
-    """MuJoCo's warnings meanwhile, a line each."""
+    """MuJoCo's warnings inside the block, one line each."""
     said: list[str] = []
     usual = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda text: said.append(" ".join(text.split())))
@@ -121,7 +121,7 @@ def warnings_of() -> Iterator[list[str]]:
 
 
 def add_ground(scene: Scene, spec: Any) -> None:
-    """A plane below all that collides at the start, whose friction is that of its contacts."""
+    """Add a plane below all geometries at the start; it sets the friction of its contacts."""
     m = spec.copy().compile()
     d = mujoco.MjData(m)
     keyframe = keyframe_of(scene, m)
@@ -141,7 +141,7 @@ def add_ground(scene: Scene, spec: Any) -> None:
 
 
 def bottom(m: Any, d: Any, geom: int) -> float:
-    """The lowest z of a geometry [m]; of what is round that of its box, of a plane its place."""
+    """The lowest z of a geometry [m]; for a round one that of its box, for a plane its position."""
     turn, place = d.geom_xmat[geom].reshape(3, 3), d.geom_xpos[geom]
     size, kind = m.geom_size[geom], mujoco.mjtGeom(m.geom_type[geom])
     up = turn[2]
@@ -164,7 +164,7 @@ def bottom(m: Any, d: Any, geom: int) -> float:
 
 
 def refuse_no_numbers(scene: Scene, m: Any) -> None:
-    """ValueError that names data of a model that are not finite, if any: MuJoCo takes others."""
+    """Raise ValueError if data of a model are not finite: MuJoCo accepts them."""
     for kind, count in (("geom", m.ngeom), ("body", m.nbody), ("jnt", m.njnt), ("dof", m.nv)):
         for name in NUMBERS[kind]:
             values = np.asarray(getattr(m, f"{kind}_{name}"), dtype=float)
@@ -177,7 +177,7 @@ def refuse_no_numbers(scene: Scene, m: Any) -> None:
 
 
 def refuse(scene: Scene, m: Any, kind: str, i: int, name: str, values: Vector) -> None:
-    """ValueError for a value that is not finite."""
+    """Raise ValueError if a value is not finite."""
     word = {"geom": "geom", "body": "body"}.get(kind, "joint")
     number = int(m.dof_jntid[i]) if kind == "dof" else i
     own = getattr(m, word)(number).name
@@ -188,7 +188,7 @@ def refuse(scene: Scene, m: Any, kind: str, i: int, name: str, values: Vector) -
 
 
 def cannot_touch(m: Any) -> str:
-    """That nothing of a model can touch, in words; empty if something can."""
+    """The reason why nothing in a model can touch, in words; empty if something can."""
     if m.npair:
         return ""
     kinds = np.column_stack(
@@ -222,7 +222,7 @@ def cannot_touch(m: Any) -> str:
 
 
 def periodic_cell(scene: Scene, m: Any) -> PeriodicCell:
-    """The cell of a scene that has a period. ValueError where a body is too large for it."""
+    """The cell of a scene that has a period. ValueError if a body is too large for it."""
     try:
         return PeriodicCell(m, scene.period or (0.0, 0.0))
     except ValueError as error:
@@ -236,7 +236,7 @@ def has_condim(m: Any, condim: int) -> bool:
 
 
 def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
-    """What the scene asks and no problem holds, a line each; not what it ignores knowingly."""
+    """The unsupported features of a scene, one line each, without those it ignores on purpose."""
     lost = []
     collides = (m.geom_contype != 0) | (m.geom_conaffinity != 0)
     spins = (m.geom_condim >= 4) & collides & (m.geom_friction[:, 1] > 0)
@@ -249,7 +249,7 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
         lost.append("anisotropic friction (the mean of two coefficients)")
     if softened(m, collides):
         lost.append("solref and solimp (contacts, limits and equalities are rigid)")
-    # a family whose parameter it is says itself what it is for
+    # a family explains its own parameter
     if widened(m, collides) and "margin" not in scene.parameters:
         lost.append("margins (bodies touch where their surfaces do, limits act where they are)")
     if m.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
@@ -270,7 +270,7 @@ def left_out(scene: Scene, m: Any) -> tuple[str, ...]:
 
 
 def softened(m: Any, collides: Any) -> bool:
-    """Whether a model asks for other compliances than MuJoCo's own."""
+    """Whether a model sets other compliances than MuJoCo's defaults."""
     limited, tied = m.jnt_limited.astype(bool), m.eq_active0.astype(bool)
     rows = (
         np.hstack((m.geom_solref, m.geom_solimp))[collides],
@@ -295,15 +295,15 @@ def widened(m: Any, collides: Any) -> bool:
 
 
 def refuse_unknown(scene: Scene, lost: tuple[str, ...]) -> None:
-    """UnsupportedSceneError that names all that would be left out."""
+    """Raise UnsupportedSceneError, naming all features that would be left out."""
     if lost:
         raise UnsupportedSceneError(f"{scene.name}: not supported: {'; '.join(lost)}")
 
 
 def keyframe_of(scene: Scene, m: Any) -> str:
-    """The keyframe where a scene starts: the one it names, or one of a usual name; empty: none.
+    """The keyframe at which a scene starts: the named one, or one of a usual name; empty: none.
 
-    ValueError where it names one that is not there.
+    ValueError if it names a missing one.
     """
     names = [m.key(i).name for i in range(m.nkey)]
     if scene.keyframe is not None:
@@ -315,7 +315,7 @@ def keyframe_of(scene: Scene, m: Any) -> str:
 
 
 def refuse_out_of_plane(scene: Scene, m: Any, d: Any) -> None:
-    """UnsupportedSceneError where a joint of a planar scene leaves the plane x, z."""
+    """Raise UnsupportedSceneError if a joint of a planar scene leaves the plane x, z."""
     mujoco.mj_kinematics(m, d)
     slide, hinge = int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_HINGE)
     along = np.abs(d.xaxis @ NORMAL)
@@ -330,14 +330,14 @@ def refuse_out_of_plane(scene: Scene, m: Any, d: Any) -> None:
 
 @dataclass(frozen=True)
 class Gait:
-    """Controls that change with time and come back: those of the keyframes gait..., in turn."""
+    """Periodic controls: those of the keyframes gait..., one after the other."""
 
     times: Vector  # (k) from 0, increasing; the last one is the period [s]
     values: Vector  # (k x nu) controls
 
     @classmethod
     def of(cls, scene: Scene, m: Any) -> Gait | None:
-        """The gait of a model, None where it has none. ValueError where it makes no cycle."""
+        """The gait of a model; None if it has none. ValueError if it is not a cycle."""
         keys = [m.key(i) for i in range(m.nkey) if m.key(i).name.startswith("gait")]
         if not keys:
             return None
@@ -356,7 +356,7 @@ class Gait:
         return cls(times, values)
 
     def controls(self, time: float) -> Vector:
-        """At a time [s] (nu)."""
+        """The controls (nu) at a time [s]."""
         time = time % self.times[-1]
         after = min(int(np.searchsorted(self.times, time, side="right")), len(self.times) - 1)
         start, end = self.times[after - 1], self.times[after]

@@ -1,14 +1,14 @@
 """A periodic cell: bodies that leave it on one side come in on the other.
 
 Each body has four ghosts, its images shifted by the periods: (Lx, 0), (0, Ly), (Lx, Ly) and
-(Lx, -Ly). Of two opposite shifts one is there, since i touching j shifted by s is j touching i
-shifted by -s: no contact is found twice. A ghost is a body without degrees of freedom that stands
-where its original says, and touches originals only. For a contact with it MuJoCo gives the rows of
-the other body; those of the original, at the same point of it, are added here:
+(Lx, -Ly). Of two opposite shifts only one is used: "i touches j shifted by s" is the same as
+"j touches i shifted by -s", so no contact is found twice. A ghost is a body without degrees of
+freedom. Its place follows from its original, and it touches originals only. For a contact with it
+MuJoCo gives the rows of the other body. The rows of the original, at the same point, are added:
 
     u = H_i^T v_i + H_j^T v_j,  H_j from the lever arm x - (x_j + s)
 
-so that the cell as a whole feels no force from itself.
+so that the cell as a whole exerts no force on itself.
 """
 
 from __future__ import annotations
@@ -23,26 +23,26 @@ from fclib.simulate._mujoco import mujoco
 from fclib.simulate.moreau_jean import Sparse, Vector
 
 SHIFTS: Final = np.array([(1, 0, 0), (0, 1, 0), (1, 1, 0), (1, -1, 0)])  # in periods
-BIT: Final = 1 << 30  # of contype, which ghosts touch
+BIT: Final = 1 << 30  # bit of contype for bodies that ghosts touch
 
 
 class PeriodicCell:
-    """The ghosts of a compiled model, and where its bodies are wrapped to."""
+    """The ghosts of a compiled model, and the cell into which its bodies are wrapped."""
 
     def __init__(self, m: Any, period: tuple[float, float]) -> None:
-        """The cell of a model that `add_ghosts` made. ValueError where a body is too large."""
+        """The cell of a model that `add_ghosts` made. ValueError if a body is too large."""
         self.period = np.array([*period, 0.0])
         ghosts = np.flatnonzero(m.body_mocapid >= 0)
         # the bodies in their order, then the four ghosts of each
         self._ghost = ghosts.reshape(-1, len(SHIFTS))
         self._body = np.arange(1, 1 + len(self._ghost))
-        self.original = np.arange(m.nbody)  # (nbody) of a ghost its body, of another itself
+        self.original = np.arange(m.nbody)  # (nbody) the body of a ghost, or the body itself
         self.original[self._ghost] = self._body[:, None]
         # (ngeom) likewise; the geometries of a ghost are in the order of its original's
         self.geometry = m.body_geomadr[self.original[m.geom_bodyid]] + (
             np.arange(m.ngeom) - m.body_geomadr[m.geom_bodyid]
         )
-        # compiling turns free bodies to their principal axes, and leaves their ghosts as they were
+        # the compiler turns free bodies to their principal axes, but not their ghosts
         for field in (m.geom_pos, m.geom_quat, m.geom_sameframe):
             field[:] = field[self.geometry]
         size = 2 * (m.geom_rbound + np.linalg.norm(m.geom_pos, axis=1))
@@ -57,14 +57,14 @@ class PeriodicCell:
         q[places] -= L * np.floor(q[places] / L + 0.5)
 
     def place(self, m: Any, d: Any) -> None:
-        """Put the ghosts where the configuration of the data puts their originals."""
+        """Put the ghosts at the shifted places of their originals in the data's configuration."""
         q = m.jnt_qposadr[m.body_jntadr[self._body]]
         mocap = m.body_mocapid[self._ghost]
         d.mocap_pos[mocap] = d.qpos[q[:, None] + np.arange(3)][:, None] + self.period * SHIFTS
         d.mocap_quat[mocap] = d.qpos[q[:, None] + np.arange(3, 7)][:, None]
 
     def rows(self, m: Any, d: Any) -> Sparse:
-        """What the originals of ghosts add to MuJoCo's constraint rows (nefc x n)."""
+        """The part of the ghosts' originals in MuJoCo's constraint rows (nefc x n)."""
         contact = d.contact
         body = m.geom_bodyid[contact.geom.reshape(-1, 2)]
         is_ghost = m.body_mocapid[body] >= 0
@@ -78,7 +78,8 @@ class PeriodicCell:
             arm = contact.pos[which] - d.xpos[ghost]
             turn = d.xmat[ghost].reshape(-1, 3, 3)  # from the body to the world
             frame = contact.frame[which].reshape(-1, 3, 3)
-            # of three forces and three moments along N, T1, T2; MuJoCo's spin is in the body
+            # rows of three forces and three moments along N, T1, T2; MuJoCo's spin is in the body's
+            # frame
             gradient = np.zeros((len(which), 6, 6))
             gradient[:, :3, :3] = frame
             gradient[:, :3, 3:] = np.cross(arm[:, None], frame) @ turn
@@ -93,9 +94,9 @@ class PeriodicCell:
 
 
 def add_ghosts(spec: Any) -> None:
-    """Give each body of a model its ghosts. ValueError where one is not a single free body.
+    """Give each body of a model its ghosts. ValueError if one is not a single free body.
 
-    Across the boundary all geometries touch that touch anything, whatever their bits are.
+    Across the boundary all colliding geometries touch each other, whatever their bits are.
     """
     spec.copy_during_attach = True
     bodies = list(spec.worldbody.bodies)
@@ -116,7 +117,7 @@ def add_ghosts(spec: Any) -> None:
             for geom in ghost.geoms:
                 geom.conaffinity = geom.contype & BIT
                 geom.contype = 0
-                # no weight in the energy, not drawn
+                # no weight in the energy, and not drawn
                 geom.mass = 0
                 geom.rgba = (0, 0, 0, 0)
                 geom.material = ""

@@ -1,8 +1,8 @@
-"""Contacts of bodies that move in a plane: their components in it, each point once.
+"""Contacts of bodies that move in a plane: components in the plane, and each point once.
 
 The plane is x, z. A contact in space whose normal lies in it, with the frame N, T1, T2, becomes one
-with the frame N, T, y: T = y x N, and of rolling friction remains R, about y. The columns of T and
-R are those of T1, T2 and R1, R2, turned.
+with the frame N, T, y: T = y x N. Of rolling friction only R, about y, remains. The columns of T
+and R are those of T1, T2 and R1, R2, turned.
 
 Bodies have a thickness to collide with, so that an edge in the plane touches along a line, and
 gives two points of equal x and z: they are one contact.
@@ -19,8 +19,8 @@ import scipy.sparse as sp
 from fclib.simulate.moreau_jean import Contacts, Sparse, Vector, block_columns
 
 NORMAL: Final = np.array([0.0, 1.0, 0.0])  # of the plane
-SLANT: Final = 1e-6  # sine of the angle of a contact's normal to the plane, at most
-SAME: Final = 1e-6  # distance of two points that are one, in sizes of a body
+SLANT: Final = 1e-6  # sine of the angle of a contact's normal to the plane: largest value
+SAME: Final = 1e-6  # largest distance of two points that count as one, in sizes of a body
 
 
 def in_plane(H: Sparse, contacts: Contacts, sizes: Vector) -> tuple[Sparse, Contacts]:
@@ -46,7 +46,7 @@ def in_plane(H: Sparse, contacts: Contacts, sizes: Vector) -> tuple[Sparse, Cont
     H, contacts = H[:, block_columns(kept, contacts.dimension)], contacts[kept]
 
     tangent = np.cross(NORMAL, contacts.frame[:, 0])
-    # of T along T1 and T2; y is a quarter of a turn further
+    # components of T along T1 and T2; y is a quarter of a turn further
     along = np.einsum("cij,cj->ci", contacts.frame[:, 1:], tangent)
     nc, full = len(contacts), contacts.dimension
     d = 2 if contacts.mu_r is None else 3
@@ -76,7 +76,7 @@ def in_plane(H: Sparse, contacts: Contacts, sizes: Vector) -> tuple[Sparse, Cont
 
 
 def once(contacts: Contacts, sizes: Vector) -> npt.NDArray[np.int64]:
-    """Which contacts remain where of those of a pair with one place in the plane the first does."""
+    """Which contacts remain if a pair keeps only the first contact of each place in the plane."""
     kept: list[int] = []
     of_pair: dict[tuple[int, int], list[int]] = {}
     places = contacts.point[:, [0, 2]]

@@ -1,19 +1,19 @@
-"""A state whose bodies are deep in each other, with these moved apart.
+"""Move bodies apart in a state in which they are deep in each other.
 
-Where fast bodies strike, the law on velocities leaves a penetration of the size of h u. A state is
-configuration and velocity alone, and its problem follows from them, so that it may be mended before
-it is stored: the bodies are moved as little as may be until no contact is deeper than a bound, and
+If fast bodies strike, the law on velocities leaves a penetration of the size of h u. A state is
+only configuration and velocity, and its problem follows from them. So it may be corrected before it
+is stored: the bodies are moved as little as possible until no contact is deeper than a bound, and
 the velocities stay. In each round, with the displacement x (n) of the configuration,
 
     minimise  1/2 x^T M x
     such that g + (H^T x)_N >= -b       nothing is deeper than the bound b [m]
-              g + (H^T x)_N <= a        what touches is a contact afterwards too
-              G^T x = 0                 bilateral constraints keep what they are violated by
+              g + (H^T x)_N <= a        touching bodies still touch afterwards
+              G^T x = 0                 violations of bilateral constraints do not change
 
-These are the conditions of a problem without friction, G3DFC with f = 0 and mu = 0, in which what
-touches is a contact twice, from both sides; `fclib.solve` solves it. No force but those of contacts
-moves the bodies, so that those that touch no support keep their centre of mass. A deep contact is
-opened in several rounds, since its normal turns with the bodies.
+These are the conditions of a problem without friction, G3DFC with f = 0 and mu = 0, in which each
+touching pair is a contact twice, from both sides; `fclib.solve` solves it. Only contact forces move
+the bodies, so that a group without a support keeps its centre of mass. A deep contact is opened in
+several rounds, since its normal turns with the bodies.
 
 The projection of positions is that of
 M. Mueller, B. Heidelberger, M. Hennix, J. Ratcliff, Position based dynamics, Journal of Visual
@@ -34,12 +34,12 @@ from fclib.simulate.moreau_jean import MoreauJean, System, Vector, components
 from fclib.simulate.mujoco_model import MujocoModel
 from fclib.simulate.simulation import Model
 
-ROUNDS: Final = 100  # at most
-PATIENCE: Final = 10  # rounds without a state that is less deep, before it is given up
-AIM: Final = 0.9  # of the bound: what is not linear in the displacement may miss it
-CLOSED: Final = 0.05  # of the bound: how far inside its range a contact stays
-STRIDE: Final = 0.1  # of the smallest radius: a penetration that is undone in a round, at most
-TOLERANCE: Final = 1e-6  # of a round, relative
+ROUNDS: Final = 100  # largest number of rounds
+PATIENCE: Final = 10  # give up after so many rounds without a less deep state
+AIM: Final = 0.9  # share of the bound to aim at: nonlinear terms may miss it
+CLOSED: Final = 0.05  # share of the bound by which a contact stays inside its range
+STRIDE: Final = 0.1  # largest penetration undone in a round, in smallest radii
+TOLERANCE: Final = 1e-6  # relative tolerance of a round
 ITERATIONS: Final = 2000
 
 
@@ -49,15 +49,15 @@ def relaxed(
     """The configuration nearest to q (nq) in which no contact is deeper than a bound.
 
     Args:
-        model: of the bodies; left in another state.
-        scheme: which contacts a step has.
-        position: q (nq), with the states of actuators and what else the forces depend on.
-        velocity: v (n), on which it depends which contacts a step has.
-        deepest: the bound, of the diameter of the smallest body.
+        model: the model of the bodies; its state changes.
+        scheme: it says which contacts a step has.
+        position: q (nq), with the states of actuators and the other values on which forces depend.
+        velocity: v (n); the contacts of a step depend on it.
+        deepest: the bound, in diameters of the smallest body.
 
     Returns:
-        q itself where nothing is deeper, and of elastic bodies, which have no size. Where bodies
-        are wedged so that no state is within the bound, the least deep one that was found.
+        q itself if nothing is deeper, and for elastic bodies, which have no size. If bodies are
+        wedged so that no state is within the bound, the least deep state found.
 
     Raises:
         As `ContactModel.assemble` and `fclib.solve` do.
@@ -96,7 +96,7 @@ def step(
     # a joint's limit gets no worse
     lowest = np.where(bodies, np.minimum(-AIM * bound, gap + stride), np.minimum(gap, 0.0))
 
-    # what is a contact of the step, and can be one within the bound
+    # pairs that are contacts of the step, and can stay so within the bound
     highest = np.zeros(len(contacts))
     if scheme.law == "velocity":
         rate = transposed_times(system.H, velocity)[:: contacts.dimension]

@@ -1,8 +1,8 @@
-"""A picture of a state, with the contact forces as arrows, where a renderer is there.
+"""A picture of a state, with the contact forces as arrows, if a renderer is available.
 
-MuJoCo draws offscreen through OpenGL: EGL (a GPU, or Mesa in software) or OSMesa. Which of them
-works is found out once, in a process of its own: a missing library, a driver that crashes and an
-environment variable read at import all stay there.
+MuJoCo draws offscreen through OpenGL: EGL (a GPU, or Mesa in software) or OSMesa. A separate
+process finds out once which of them works. So a missing library, a driver that crashes and an
+environment variable read at import do no harm here.
 
 On Debian and Ubuntu libosmesa6 suffices; for EGL, libegl1, libopengl0 and libgl1-mesa-dri.
 """
@@ -34,18 +34,18 @@ if TYPE_CHECKING:
 
 BACKENDS: Final = ("egl", "osmesa")
 PROBE_LIMIT: Final = 60.0  # longest wait for a backend's answer [s]
-SUPERSAMPLING: Final = 2  # pixels drawn for one kept, along each axis
+SUPERSAMPLING: Final = 2  # pixels drawn for each pixel kept, along each axis
 UPRIGHT: Final = (960, 1280)  # [pixels]
 LYING: Final = (1280, 800)
-FIELD_OF_VIEW: Final = 30.0  # vertical [deg]; narrow, so that a tower does not lean
+FIELD_OF_VIEW: Final = 30.0  # vertical angle [deg]; narrow, so that a tower does not seem to lean
 VIEW: Final = (125.0, -14.0)  # azimuth and elevation [deg]
 VIEW_OF_PLANE: Final = (90.0, -2.0)  # x to the right
-FILL: Final = 0.86  # share of the picture that the scene takes
-OPACITY: Final = 0.35  # of bodies where forces are drawn inside them
+FILL: Final = 0.86  # share of the picture that the scene fills
+OPACITY: Final = 0.35  # opacity of bodies if forces are drawn inside them
 ARROW: Final = np.array([0.82, 0.12, 0.10, 1.0], dtype=np.float32)
-ARROW_LENGTH: Final = 1.2  # of the largest force, in radii of the mean geometry
-ARROW_WIDTH: Final = 0.05  # of the largest force, in the same radii
-# both, in distances to the nearest other contact: arrows of a mesh would hide each other
+ARROW_LENGTH: Final = 1.2  # length for the largest force, in radii of the mean geometry
+ARROW_WIDTH: Final = 0.05  # width for the largest force, in the same radii
+# limits of both, in distances to the nearest other contact: arrows of a mesh would hide each other
 CROWDED_LENGTH: Final = 3.0
 CROWDED_WIDTH: Final = 0.08
 FAINT: Final = 1e-2  # forces below this share of the largest are not drawn
@@ -74,12 +74,12 @@ def render(
 ) -> None:
     """Write a PNG of a step, or of the present state of a model.
 
-    source     a step is drawn as it was at its start, with the reactions of its solution;
-               a model is drawn as it is, without
+    source     a step is drawn in its state at the start, with the reactions of its solution;
+               a model is drawn in its present state, without reactions
     reactions  (d nc) impulses of a step to draw instead [N s]
     size       width and height in pixels; by default UPRIGHT or LYING, as the scene is
 
-    NoRenderer, in one line, where no OpenGL works; OSError where the file cannot be written.
+    NoRenderer, in one line, if no OpenGL works; OSError if the file cannot be written.
     """
     if isinstance(source, (MujocoModel, DeformableModel)):
         if reactions is not None:
@@ -116,7 +116,8 @@ def render(
         size = LYING if extent[0] > extent[1] else UPRIGHT
     width, height = (SUPERSAMPLING * pixels for pixels in size)
     m.vis.global_.offwidth, m.vis.global_.offheight = width, height
-    m.vis.quality.offsamples = 0  # in software they take longest, and edges are smooth without
+    # they take most time in software, and edges are smooth without them
+    m.vis.quality.offsamples = 0
     m.vis.global_.fovy = FIELD_OF_VIEW
 
     light_up(m, d, points)
@@ -136,7 +137,7 @@ def render(
 
 @functools.cache
 def backend() -> str:
-    """The first of EGL and OSMesa that works, or the one that MUJOCO_GL names. NoRenderer."""
+    """The first of EGL and OSMesa that works, or the one in MUJOCO_GL. Raises NoRenderer."""
     named = os.environ.get("MUJOCO_GL", "").lower().strip()
     candidates = (named,) if named in BACKENDS else BACKENDS
     for candidate in candidates:
@@ -181,7 +182,7 @@ def draw(m: Any, scene: Any, width: int, height: int) -> npt.NDArray[np.uint8]:
 
 
 def corners(m: Any, d: Any, geoms: npt.NDArray[np.intp]) -> Vector:
-    """The corners (8 ngeom x 3) of the geometries' boxes in the world; of all, if none is named."""
+    """The corners (8 ngeom x 3) of boxes of the geometries named, or of all, in the world."""
     if not geoms.size:
         geoms = np.flatnonzero(m.geom_rbound > 0)
     if not geoms.size:
@@ -195,9 +196,9 @@ def corners(m: Any, d: Any, geoms: npt.NDArray[np.intp]) -> Vector:
 
 
 def light_up(m: Any, d: Any, points: Vector) -> None:
-    """Place what the light, the shadow and the haze are measured from around the points (k x 3).
+    """Centre light, shadow and haze on the points (k x 3).
 
-    A directional light casts its shadow from where it stands, as far as the extent says.
+    A directional light casts its shadow from its position, over the length of the extent.
     """
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = max(float(np.linalg.norm(points - middle, axis=1).max()), 1e-3)
@@ -207,7 +208,7 @@ def light_up(m: Any, d: Any, points: Vector) -> None:
 
 
 def axes_of(view: tuple[float, float]) -> Vector:
-    """What is right, up and ahead in a picture (rows, 3 x 3), in the world; view in degrees."""
+    """The right, up and ahead directions of a picture (rows, 3 x 3); view in degrees."""
     azimuth, elevation = np.deg2rad(view)
     ahead = np.array(
         [
@@ -224,7 +225,7 @@ def framing_camera(points: Vector, aspect: float, view: tuple[float, float]) -> 
     """A free camera that sees all the points (k x 3) at the least distance; view in degrees."""
     axes = axes_of(view)
 
-    # look at the middle of what is seen, not of what is there
+    # look at the middle of the visible part, not of the whole
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     seen = (points - middle) @ axes.T
     shift = 0.5 * (seen.min(axis=0) + seen.max(axis=0))
@@ -250,7 +251,7 @@ def draw_arrows(scene: Any, points: Vector, forces: Vector, radius: float) -> No
         return
     apart = spacing(points)
     lengths = min(ARROW_LENGTH * radius, CROWDED_LENGTH * apart) * sizes / largest
-    # thinner than in proportion a small arrow would not be seen
+    # a small arrow in proportion would be too thin to see
     widths = min(ARROW_WIDTH * radius, CROWDED_WIDTH * apart) * np.sqrt(sizes / largest)
     for i in np.flatnonzero(sizes > FAINT * largest):
         if scene.ngeom >= scene.maxgeom:
@@ -262,14 +263,14 @@ def draw_arrows(scene: Any, points: Vector, forces: Vector, radius: float) -> No
         tip = points[i] + forces[i] / sizes[i] * lengths[i]
         mujoco.mjv_connector(arrow, mujoco.mjtGeom.mjGEOM_ARROW, widths[i], points[i], tip)
         arrow.size[2] *= 2  # MuJoCo draws an arrow half as long as its connector
-        # bright, also behind a wall or in the shade
+        # bright, even behind a wall or in the shade
         arrow.emission = 0.4
         arrow.category = mujoco.mjtCatBit.mjCAT_DECOR
         scene.ngeom += 1
 
 
 def spacing(points: Vector) -> float:
-    """The median distance of a point (k x 3) to its nearest other; infinite where all are one."""
+    """The median distance of a point (k x 3) to its nearest other; infinite if all are equal."""
     different = np.unique(points, axis=0)
     if len(different) < 2:
         return math.inf

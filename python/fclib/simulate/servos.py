@@ -1,15 +1,14 @@
-"""Actuators that feed back their own length and speed, and the limits of their forces.
+"""Actuators with feedback of their own length and speed, and the limits of their forces.
 
-A servo's force is linear in q and v, and taken at the end of the step, so it is a spring and a
+A servo's force is linear in q and v, and taken at the end of the step. So it acts as a spring and a
 damper. If it reaches a limit (`forcerange` of the actuator, `actuatorfrcrange` of a joint or of a
 tendon) it is a constant force, without stiffness and damping:
 
     f = clip(f_0 - kp (l' - l) - kv (l'_t - l_t))     l, l_t   length and speed, l', l'_t at the end
 
-Which of them are at a limit at the end of the step is found by the motion without contacts: from
-those that are at the start the step is computed, which shows others, and so on. A servo that
-presses against an obstacle stays at its limit, since the constant force leads nowhere near the end
-of its range.
+The motion without contacts decides which servos are at a limit at the end of the step. The step is
+computed with those at a limit at the start, which gives a new set, and so on. A servo that presses
+against an obstacle stays at its limit: the constant force does not lead near the end of its range.
 """
 
 from __future__ import annotations
@@ -27,15 +26,15 @@ from fclib.simulate.arrays import Sparse, Vector, added, diagonal, summed
 
 Mask = npt.NDArray[np.bool_]
 
-# steps without contacts that are tried: each changes which servos are at a limit. One or two do,
-# but for servos that act on each other
+# largest number of steps without contacts: each changes the set of servos at a limit. One or two
+# suffice, except if servos act on each other
 PASSES: Final = 8
-FEW: Final = 200  # degrees of freedom of which a full matrix is faster
+FEW: Final = 200  # up to so many degrees of freedom a full matrix is faster
 
 
 @dataclass(frozen=True)
 class Held:
-    """What is at a limit, and the forces that this gives."""
+    """The actuators at a limit, and the resulting forces."""
 
     outputs: Mask  # (k) the outputs of actuators
     dofs: Mask  # (n) joints
@@ -43,7 +42,7 @@ class Held:
     joint: Vector  # (n) of the joints, within theirs
 
     def after(self, before: Held) -> Held:
-        """The same, but what was at the other limit before is at none: its range is between."""
+        """The same, but actuators that were at the opposite limit before are now at none."""
         crossed = before.outputs & (np.sign(self.force) != np.sign(before.force))
         passed = before.dofs & (np.sign(self.joint) != np.sign(before.joint))
         return replace(self, outputs=self.outputs & ~crossed, dofs=self.dofs & ~passed)
@@ -64,7 +63,7 @@ class Servos:
     """The actuators of a model."""
 
     def __init__(self, m: Any) -> None:
-        """Limits of what feeds back are taken over from the model, which has none of them then."""
+        """Limits of actuators with feedback are moved here from the model, which then has none."""
         self.model = m
         # the actuator of each output
         owner = np.repeat(np.arange(len(m.actuator_outnum)), m.actuator_outnum)
@@ -75,7 +74,7 @@ class Servos:
         affine &= (off == 0) | (group < 0) | (group > 30)
         if m.opt.disableflags & bits.mjDSBL_ACTUATION:
             affine[:] = False
-        # the bias of an actuator is p0 + p1 length + p2 velocity; what pushes on stays explicit
+        # the bias of an actuator is p0 + p1 length + p2 velocity; positive feedback stays explicit
         bias = m.actuator_biasprm[owner]
         self.stiffness = np.where(affine, np.maximum(-bias[:, 1], 0), 0.0)  # (k) kp
         self.damping = np.where(affine, np.maximum(-bias[:, 2], 0), 0.0)  # (k) kv
@@ -104,13 +103,13 @@ class Servos:
 
     @property
     def feed_back(self) -> bool:
-        """Whether any has a stiffness or a damping, which change with the moments."""
+        """Whether any actuator has a stiffness or a damping; these change with the moments."""
         return bool((self.stiffness + self.damping).any())
 
     def linear(self, d: Any, held: Held | None = None) -> tuple[Sparse, Sparse]:
-        """Damping and stiffness (n x n) of joints and of servos that are at no limit.
+        """Damping and stiffness (n x n) of joints, and of servos at no limit.
 
-        Both symmetric and positive semidefinite. What the scene disables is not there.
+        Both symmetric and positive semidefinite. Parts that the scene disables are left out.
         """
         m, bits = self.model, mujoco.mjtDisableBit
         disabled = m.opt.disableflags
@@ -129,7 +128,7 @@ class Servos:
         )
 
     def _with_servos(self, d: Any, own: Vector, gain: Vector, held: Held | None) -> Sparse:
-        """A diagonal (n), and the outer products of the rows of moments, by their gains (k)."""
+        """A diagonal (n), plus the outer products of the rows of moments times their gains (k)."""
         n = len(own)
         acting = np.flatnonzero(gain if held is None else gain * ~held.outputs)
         places, values = [], []
@@ -146,14 +145,14 @@ class Servos:
         return added(diagonal(own), 1.0, products)
 
     def within_limits(self, d: Any, h: float, M: Sparse, other: Vector) -> tuple[Vector, Held]:
-        """The force (n) of all actuators in a step, and what of them is at a limit.
+        """The force (n) of all actuators in a step, and those of them at a limit.
 
         h       of the step [s]
         other   (n) all other forces
         """
         moment = moment_matrix(d, self.model.nv)
         raw, v = d.actuator_force.copy(), d.qvel
-        # compensation of gravity by actuators
+        # actuators that compensate gravity
         rest = d.qfrc_actuator - moment.T @ raw
         held = self._clipped(raw, moment, rest)
         for _ in range(PASSES):
@@ -170,7 +169,7 @@ class Servos:
         return self._force(raw, held, moment, rest), held
 
     def _clipped(self, raw: Vector, moment: Any, rest: Vector) -> Held:
-        """Forces (k) within their limits: of tendons first, of actuators, then of joints."""
+        """Forces (k) within their limits: of tendons, then actuators, then joints."""
         force, outputs = raw.copy(), np.zeros(len(raw), dtype=bool)
         for own, (low, high) in self._tendons:
             total = force[own].sum()
@@ -186,7 +185,7 @@ class Servos:
         return Held(outputs, (joint <= low) | (joint >= high), force, np.clip(joint, low, high))
 
     def _force(self, raw: Vector, held: Held, moment: Any, rest: Vector) -> Vector:
-        """The force (n) at the start of the step, of those at a limit that limit."""
+        """The force (n) at the start of the step; actuators at a limit have that limit."""
         force = moment.T @ np.where(held.outputs, held.force, raw) + rest
         return np.where(held.dofs, held.joint, force)
 
@@ -207,7 +206,7 @@ def moment_matrix(d: Any, n: int) -> Any:
 
 
 def solved(A: Sparse, b: Vector) -> Vector:
-    """A^-1 b, of a symmetric positive definite matrix."""
+    """A^-1 b for a symmetric positive definite matrix A."""
     x: Any
     if A.shape[0] <= FEW:
         x = la.solve(A.toarray(), b, assume_a="pos", check_finite=False)

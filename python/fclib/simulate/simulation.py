@@ -1,4 +1,4 @@
-"""From a scene to the sequence of its problems, each solved to go on to the next."""
+"""From a scene to the sequence of its problems; each is solved to reach the next."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ Model: TypeAlias = MujocoModel | DeformableModel
 ALLOWANCE: Final = f"{ROUNDINGS:g} roundings of a state and {MOTION:g} of the free motion"
 GYROSCOPIC: Final = " M holds h theta times the derivative of gyroscopic terms;"
 STABILIZATION: Final = 0.2  # share of a violation undone in a step
-# error of an unsolved step, relative, that ends a simulation: reactions of 0 leave as much
+# relative error of an unsolved step that ends a simulation: zero reactions give as much
 NONSENSE: Final = 1.0
-# of states, in roundings of stored ones: doubles hold integers up to here
+# largest state, in quanta of stored ones: doubles hold integers up to here
 LARGEST: Final = 2.0**53
 
-# speed at contacts, of the largest one without reactions, below which bodies are at rest
+# bodies are at rest below this speed at contacts, relative to the largest without reactions
 STILL: Final = 1e-6
-# of the reactions that are nearest to the last ones: the accuracy asked for, and steps towards it
+# for reactions nearest to the last ones: the accuracy asked for, and the number of steps
 EXACT: Final = 1e-14
 MOST: Final = 1000
 
@@ -50,20 +50,21 @@ Unsolved: TypeAlias = Literal["best", "stop"]
 
 
 class StoppedError(FloatingPointError):
-    """A simulation that cannot go on: a step was not solved, or a state makes no sense."""
+    """A simulation that cannot go on: a step was not solved, or a state is senseless."""
 
 
 @dataclass(frozen=True)
 class State:
-    """All that a simulation goes on from: the start of a step, and the last one's impulses."""
+    """All that a simulation needs to go on: the start of a step, and the last impulses."""
 
-    index: int  # of the step
+    index: int  # number of the step
     position: Vector  # q (nq)
     velocity: Vector  # v (n)
-    pair: npt.NDArray[np.int64]  # (nc x 2) of the last step's contacts
+    pair: npt.NDArray[np.int64]  # (nc x 2) pairs of the last step's contacts
     frame: Vector  # (nc x 3 x 3)
     r: Vector  # (nc x d) their impulses [N s]
-    place: Vector = field(default_factory=lambda: np.zeros((0, 2, 3)))  # on their two shapes [m]
+    # their places on their two shapes [m]
+    place: Vector = field(default_factory=lambda: np.zeros((0, 2, 3)))
 
 
 Control: TypeAlias = Callable[[float, State], npt.ArrayLike]
@@ -71,14 +72,15 @@ Control: TypeAlias = Callable[[float, State], npt.ArrayLike]
 
 @dataclass(frozen=True)
 class Step:
-    """One step, from time to time + h: its problem and the solution that carried it on."""
+    """One step, from time to time + h: its problem, and the solution that gave the next state."""
 
     index: int  # 0, 1, ...
     time: float  # at the start of the step [s]
-    problem: _core.GlobalProblem | _core.GlobalRollingProblem  # nc is 0 where nothing touches
+    problem: _core.GlobalProblem | _core.GlobalRollingProblem  # nc is 0 if nothing touches
     result: _core.Result  # its status tells whether the solver reached the tolerance
     velocity: Vector  # v (n) of the whole system after the step
-    dofs: npt.NDArray[np.int64]  # (n') which of them the problem has: those that contacts move
+    # (n') the degrees of freedom in the problem: those that contacts move
+    dofs: npt.NDArray[np.int64]
     contacts: Contacts  # nc, the active ones, at the start of the step
     position: Vector  # q (nq) at the start of the step
     start: State  # from which `simulate` does this step again, and goes on
@@ -102,23 +104,23 @@ def simulate(
     """Yield the steps of a scene, as they are computed.
 
     steps          number of steps
-    start          where to begin, as the `start` of a step that was: what follows is the same, bit
+    start          the state to begin with: the `start` of an earlier step gives the same steps, bit
                    for bit; by default the scene's own start
-    solver, tol    of `fclib.solve`, with its further options
+    solver, tol    as in `fclib.solve`, with its further options
     warm_start     begin from the impulses that contacts of the same shapes and place had before
     stabilization  share of a penetration (gap law) or of a bilateral violation undone in a step
 
     control        called at the start of each step with the time [s] and the state there; returns
                    the controls of the actuators (nu). By default those of the scene
-    strict         refuse a scene that asks for what no problem holds; by default that is left out,
-                   `step.model.left_out` names it, and so does each problem's description
+    strict         refuse a scene with unsupported features; by default they are left out, and named
+                   by `step.model.left_out` and each problem's description
 
-    unsolved       what follows a step whose solver misses the tolerance: "best" goes on with the
-                   best solution that was found, which `step.result` tells and later problems
-                   depend on; "stop" ends the simulation there
+    unsolved       reaction to a step whose solver misses the tolerance: "best" goes on with the
+                   best solution found. `step.result` tells so, and later problems depend on it.
+                   "stop" ends the simulation there
 
-    The tolerance bounds both errors of the merit, as that of `fclib.solve` does; with
-    merit="natural" among the options that of the natural map alone.
+    The tolerance bounds both errors of the merit, as in `fclib.solve`. With merit="natural" among
+    the options it bounds only that of the natural map.
 
     Raises at once ValueError (bad MJCF, bad parameters), UnsupportedSceneError, and ImportError
     if a deformable scene lacks scikit-fem in the pinned version; while stepping, what `fclib.solve`
@@ -152,7 +154,7 @@ def model_of(scene: Scene, *, strict: bool = False) -> Model:
 
 
 def scheme_of(model: Model, stabilization: float = STABILIZATION) -> MoreauJean:
-    """How the scene of a model is stepped. ValueError where a parameter makes no sense."""
+    """The time stepping scheme of a model's scene. ValueError if a parameter is senseless."""
     scene = model.scene
     return MoreauJean(
         h=model.time_step,
@@ -260,14 +262,14 @@ def _march(
 def nearest(
     problem: _core.GlobalProblem | _core.GlobalRollingProblem, solution: _core.Solution, r: Vector
 ) -> Vector | None:
-    """Of the reactions of bodies at rest those nearest to r (m), but for the cones; None: moving.
+    """The reactions nearest to r (m) of bodies at rest, without the cones; None: bodies move.
 
-    Reactions of contacts that stick may change by what moves nothing, H dr = 0. A solver returns
-    any of them, so that the reactions of a body at rest would change from step to step.
+    Reactions of sticking contacts may change by any dr that moves nothing, H dr = 0. A solver
+    returns any of these, so that the reactions of a body at rest would change from step to step.
     """
     d = problem.spacedim
     u = np.abs(np.asarray(_core.contact_merits(problem, solution)["u"])).reshape(-1, d)
-    # velocities without reactions, but for coupled degrees of freedom
+    # velocities without reactions, except for coupled degrees of freedom
     free = np.abs(problem.f) / np.abs(sp.csc_array(problem.M).diagonal())
     closed = solution.r[::d] > 0
     if not closed.any() or u[closed].max() > STILL * free.max():
@@ -275,9 +277,9 @@ def nearest(
     sticks = np.repeat(closed, d)
     H = sp.csc_array(problem.H)[:, sticks]
     if H.shape[1] <= np.count_nonzero(np.diff(sp.csr_array(H).indptr)):
-        return None  # they are as few as the directions that they push
+        return None  # they are unique: as many as the directions that they push
     change = r[sticks] - solution.r[sticks]
-    # the part of the change that moves something
+    # the part of the change that moves bodies
     moving = sp.linalg.lsmr(H, H @ change, atol=EXACT, btol=EXACT, conlim=0, maxiter=MOST)[0]
     found: Vector = np.array(solution.r)
     found[sticks] += change - moving
@@ -285,7 +287,7 @@ def nearest(
 
 
 def in_range(values: Vector, bound: float) -> bool:
-    """Whether all are finite and below a bound, as those of a state that can be stored are."""
+    """Whether all are finite and below a bound, so that the state can be stored."""
     return bool((np.abs(values) < bound).all())
 
 
@@ -320,7 +322,7 @@ def trouble(
 
 
 def contradiction(model: Model, system: System) -> str:
-    """Which equalities of a scene contradict each other, in words; empty where none do."""
+    """The equalities of a scene that contradict each other, in words; empty if there are none."""
     if not isinstance(model, MujocoModel) or not len(system.violation):
         return ""
     names, rounding = model.equalities()
@@ -341,11 +343,11 @@ def contradiction(model: Model, system: System) -> str:
 
 
 def carry_over(state: State, contacts: Contacts, places: Vector) -> Vector:
-    """A guess of r (d nc): the last step's impulses of the same shapes at the same place.
+    """A guess of r (d nc): the last impulses of the same shapes at the same place.
 
     They are carried over in the world and turned into the new frames, forces and moments alike.
 
-    places   (nc x 2 x 3) of the contacts on their shapes, as `places_of` gives them
+    places   (nc x 2 x 3) of the contacts on their shapes, from `places_of`
     """
     limits = contacts.pair[:, 0] < 0
     source = same_contacts(state.pair, state.place, contacts.pair, places)
@@ -358,10 +360,10 @@ def same_contacts(
     now: npt.NDArray[np.int64],
     places: Vector,
 ) -> npt.NDArray[np.intp]:
-    """Which contact of the step before each one is (nc), -1 for none.
+    """The contact of the step before that each one continues (nc); -1 for none.
 
-    Of a pair of shapes that have several, those that are nearest to each other go first. An edge or
-    a corner stays where it is on one of the shapes: the smaller of two distances counts.
+    If a pair of shapes has several, the nearest to each other are matched first. An edge or a
+    corner keeps its place on one of the shapes, so the smaller of two distances counts.
     """
     source = np.full(len(now), -1)
     pairs, group = np.unique(keys(np.concatenate((before, now))), return_inverse=True)
@@ -388,10 +390,11 @@ def same_contacts(
 def descriptions(
     scene: Scene, scheme: MoreauJean, settings: dict[str, Any], left_out: Sequence[str] = ()
 ) -> Callable[..., _core.ProblemInfo]:
-    """What gives the info of each step, by its number and further settings of its own.
+    """The function that gives the info of each step, from its number and its own settings.
 
-    It travels with a problem: its name, its mathematics, and all that regenerates it. The last line
-    of the description is JSON, which `provenance` reads back. Most of it is the same for all steps.
+    The info travels with a problem: its name, its mathematics, and all that is needed to make it
+    again. The last line of the description is JSON, which `provenance` reads back. Most of it is
+    the same for all steps.
     """
     origin = {
         "generator": "fclib.simulate",
@@ -434,7 +437,7 @@ def descriptions(
         "N, T (and R of rolling" if scene.planar else "N, T1, T2 (and R1, R2 of rolling"
     )
     title = f"{scene.title or scene.name}, step "
-    # the JSON of each is that of one dictionary, in this order
+    # the JSON of each step is that of one dictionary, in this order
     before = "\n".join([*words, json.dumps(origin, default=str)]).lstrip()[:-1]
     after = json.dumps({"units": units})[1:]
     math_info = (
@@ -460,14 +463,14 @@ def descriptions(
 
 
 def engine(scene: Scene) -> dict[str, str]:
-    """What simulates a scene, in the version that its numbers depend on."""
+    """The simulator of a scene, with the version on which its numbers depend."""
     if scene.solids is None:
         return {"mujoco": _mujoco.VERSION}
     return {"scikit-fem": _skfem.VERSION}
 
 
 def provenance(info: _core.ProblemInfo) -> dict[str, Any]:
-    """What a simulated problem's info says of its origin. ValueError where it says nothing."""
+    """The origin of a simulated problem, from its info. ValueError if the info has none."""
     lines = info.description.splitlines()
     try:
         origin = json.loads(lines[-1])

@@ -1,9 +1,9 @@
-"""All contacts of a height field: MuJoCo keeps the first 50 of a pair of geometries.
+"""All contacts of a height field: MuJoCo keeps only the first 50 of a pair of geometries.
 
-A body that lies on more cells than that has contacts under one of its edges alone, and falls. Here
-such a pair is looked at again, window by window of the field. A window is the field itself for a
-moment, with fewer rows and columns and its middle where that of the window is: its cells, hence its
-contacts, are those of the field.
+A body on more cells than that has contacts under only one of its edges, and falls. So such a pair
+is treated again, window by window of the field. For a moment the field has only the rows and
+columns of the window, and the window's centre. Its cells, hence its contacts, are those of the
+field.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import numpy as np
 from fclib.simulate._mujoco import mujoco
 
 MOST: Final = int(mujoco.mjMAXCONPAIR)  # contacts of a pair that MuJoCo keeps
-WINDOW: Final = 4  # cells along a side: two prisms each, with a contact each, are below MOST
+# cells along a side: each has two prisms with a contact each, in total below MOST
+WINDOW: Final = 4
 FIELD: Final = int(mujoco.mjtGeom.mjGEOM_HFIELD)
 
 
@@ -27,9 +28,9 @@ class CrowdedPairError(ValueError):
 
 
 def complete(m: Any, d: Any) -> None:
-    """Right after `mj_collision`: give crowded pairs with a height field all their contacts.
+    """To be called after `mj_collision`: give crowded pairs with a height field all contacts.
 
-    CrowdedPairError if a pair of others is crowded.
+    CrowdedPairError if another pair is crowded.
     """
     if d.ncon < MOST:
         return
@@ -41,7 +42,7 @@ def complete(m: Any, d: Any) -> None:
 
 
 def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) -> None:
-    """Give pairs of geometries other contacts, in the place of those that they have."""
+    """Replace the contacts of pairs of geometries."""
     contacts: list[Any] = []
     done = set()
     for contact, pair in zip(d.contact, d.contact.geom.tolist(), strict=True):
@@ -60,7 +61,7 @@ def replace_contacts(m: Any, d: Any, of_pair: dict[tuple[int, int], list[Any]]) 
 
 
 def contacts_of(m: Any, d: Any, field: int, other: int) -> list[Any]:
-    """All contacts of two geometries, of which the first is a height field."""
+    """All contacts of two geometries, the first is a height field."""
     if m.geom_type[field] != FIELD:
         names = " and ".join(m.geom(g).name or f"geom {g}" for g in (field, other))
         raise CrowdedPairError(
@@ -85,7 +86,7 @@ def contacts_of(m: Any, d: Any, field: int, other: int) -> list[Any]:
 
 @contextmanager
 def colliding(m: Any, geoms: list[int]) -> Iterator[None]:
-    """No other geometries collide meanwhile."""
+    """Inside the block no other geometries collide."""
     kinds = m.geom_contype.copy(), m.geom_conaffinity.copy()
     for own, kept in zip((m.geom_contype, m.geom_conaffinity), kinds, strict=True):
         own[:] = 0
@@ -121,7 +122,7 @@ def windows(m: Any, d: Any, field: int, other: int) -> Iterator[Any]:
 def window(
     m: Any, d: Any, field: int, start: tuple[int, int], end: tuple[int, int]
 ) -> Iterator[None]:
-    """The field with the rows and columns from `start` to `end`, both included, alone."""
+    """Only the rows and columns of the field from `start` to `end`, both included."""
     number = int(m.geom_dataid[field])
     rows, columns = int(m.hfield_nrow[number]), int(m.hfield_ncol[number])
     first = int(m.hfield_adr[number])

@@ -26,9 +26,9 @@ Vector: TypeAlias = npt.NDArray[np.float64]
 
 GRAVITY = 9.81  # [m/s^2]
 STEP = 5e-3  # h [s]
-# numbers of contacts of a ladder, about
+# approximate numbers of contacts of a ladder
 SIZES = (10, 30, 100, 300, 1000, 3000, 10000, 30000, 100000)
-ROUNDING = 1e-15  # entries of H below are none
+ROUNDING = 1e-15  # smaller entries of H count as zero
 LENGTH_NAMES: Final = {1e-3: "mm", 1.0: "m", 1e3: "km"}
 MASS_NAMES: Final = {1e-3: "g", 1.0: "kg", 1e3: "t"}
 
@@ -49,7 +49,7 @@ def exponentials(x: Vector) -> Vector:
 
 
 def as_published(name: str, exact: Vector) -> Vector:
-    """The same numbers, where some were published with another last digit: by their name."""
+    """The same numbers, with the published last digit if that was another one: by their name."""
     found = exact.copy()
     for side, places in _last_digits().get(name, {}).items():
         found[places] = np.nextafter(exact[places], -np.inf if side == "below" else np.inf)
@@ -58,14 +58,14 @@ def as_published(name: str, exact: Vector) -> Vector:
 
 @functools.cache
 def _last_digits() -> dict[str, dict[str, list[int]]]:
-    """By FAMILY/SIZE: places of numbers one unit in the last place below, or above."""
+    """By FAMILY/SIZE: places of numbers that are one unit in the last place below, or above."""
     text = Path(__file__).with_name("last_digits.json").read_text(encoding="utf-8")
     return dict(json.loads(text))
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """n free rigid bodies with nc contacts, and what pushes them besides gravity."""
+    """n free rigid bodies with nc contacts, and the impulses on them besides gravity."""
 
     masses: Vector  # (n) [kg]
     inertias: Vector  # (n x 3) about the axes of the world [kg m^2]
@@ -76,10 +76,10 @@ class Bodies:
     points: Vector  # (nc x 3) [m]
     impulses: Vector  # (n x 3) [N s]
     sizes: Vector  # (n x 3) half edges of a box, or radii of a sphere [m]
-    # (k x 6) a point [m] and the outward normal of each plane that the ground consists of
+    # (k x 6) a point [m] and the outward normal of each plane of the ground
     planes: Vector
-    kind: str = "box"  # or sphere
-    gaps: Any = 0.0  # (nc), or of all contacts [m]
+    kind: str = "box"  # "box" or "sphere"
+    gaps: Any = 0.0  # (nc), or one number for all contacts [m]
     gravity: float = GRAVITY  # [m/s^2]
     length: float = 1.0  # unit of all lengths here [m]
     mass: float = 1.0  # unit of all masses here [kg]
@@ -129,7 +129,7 @@ class Bodies:
         return np.stack([self.normals, t1, np.cross(self.normals, t1)], axis=1)
 
     def _contacts(self) -> Contacts:
-        """Where the contacts are: body 0 is the ground; features count the contacts of a pair."""
+        """The table of contacts: body 0 is the ground; features count the contacts of a pair."""
         body = 1 + np.column_stack((self.first, self.second))
         # the ground's shapes come first: the plane in which the contact lies
         arms = self.points[:, None] - self.planes[:, :3]
@@ -151,10 +151,10 @@ class Bodies:
         )
 
     def _table(self) -> BodyTable:
-        """The bodies, the ground before them."""
+        """The table of bodies, with the ground first."""
         count, planes = len(self.masses), len(self.planes)
         upright = (1.0, 0.0, 0.0, 0.0)
-        # the turn that takes z to a plane's normal
+        # the rotation that takes z to a plane's normal
         normal = self.planes[:, 3:]
         turn = np.column_stack((1 + normal[:, 2], -normal[:, 1], normal[:, 0], np.zeros(planes)))
         turn[normal[:, 2] == -1] = (0.0, 1.0, 0.0, 0.0)
@@ -178,7 +178,7 @@ class Bodies:
         )
 
     def in_units(self, length: float, mass: float) -> Bodies:
-        """The same, measured in units of so many m and kg."""
+        """The same, measured in units of so many m and so many kg."""
         return replace(
             self,
             masses=self.masses / mass,
@@ -195,7 +195,7 @@ class Bodies:
         )
 
     def repeated(self, times: int) -> Bodies:
-        """The same with so many copies of each contact, one beside the other."""
+        """The same with so many copies of each contact, side by side."""
         which = np.repeat(np.arange(len(self.normals)), times)
         return replace(
             self,
@@ -231,11 +231,11 @@ def running_bond(
     """A wall of blocks, 2 x 1 x 1 m and 1000 kg, about twice as long as high, on the ground.
 
     Args:
-        contacts: about so many; four for each pair of faces.
-        seed: of the masses.
+        contacts: approximate number of contacts; four for each pair of faces.
+        seed: random seed of the masses.
         push: horizontal impulse on the end of the top course, in weights of all blocks.
-        ratio: of the mass of the top course to that of the lowest, courses between in proportion.
-        spread: masses differ by this share.
+        ratio: mass of the top course over that of the lowest; courses between are in proportion.
+        spread: masses vary randomly by this share.
     """
     random = np.random.Generator(np.random.PCG64(seed))
     high = max(1, round(np.sqrt(contacts / 16)))

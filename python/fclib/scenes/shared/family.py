@@ -1,4 +1,4 @@
-"""What a family is, and what it makes: a scene to simulate, or problems assembled directly."""
+"""The base of families, and their products: scenes to simulate, or problems made directly."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Law = Literal["velocity", "gap"]
 
 @dataclass(frozen=True, kw_only=True)
 class Scene:
-    """A mechanical scene, ready to be simulated: what is in it, and how to step it.
+    """A mechanical scene, ready to be simulated: its contents, and its time stepping.
 
     In an MJCF model a keyframe gives the initial positions, velocities and controls: the one that
-    the scene names, or the first of ``start``, ``home`` and ``stand`` that is there; without one
-    the scene starts at rest in the positions of the model. Keyframes whose
-    names begin with ``gait`` give controls at times, from 0 on, which repeat after the last.
+    the scene names, or the first of ``start``, ``home`` and ``stand`` that exists; without one the
+    scene starts at rest in the positions of the model. Keyframes whose names begin with ``gait``
+    give controls at times, from 0 on, which repeat after the last.
 
-    To solve a problem of a scene again, one needs what is here and nothing else.
+    A problem of a scene can be made again from these fields alone.
     """
 
     name: str
@@ -39,34 +39,37 @@ class Scene:
     restitution: float = 0.0  # Newton's coefficient e, in [0, 1]
     law: Law = "velocity"  # unilateral law, see `fclib.simulate.MoreauJean`
     activation: float = 0.0  # [m], of the velocity law, see `fclib.simulate.MoreauJean`
-    allowance: bool = True  # of the velocity law, see there: gaps that rounding explains are closed
-    begin: float = 0.0  # [s], of the steps that count: those before only lead to a state
+    allowance: bool = True  # velocity law: gaps that rounding explains count as closed
+    begin: float = 0.0  # [s], start of the steps that count; earlier steps only lead to a state
     theta: float = 1.0  # of the theta scheme, in [1/2, 1]
-    gyroscopic: bool = False  # their derivative is part of M, which is then not symmetric
-    all_bodies: bool = False  # its problems have those that nothing touches too
-    parameters: Mapping[str, Any] = field(default_factory=dict)  # of the family, JSON types
+    # whether the derivative of gyroscopic terms is part of M, which is then not symmetric
+    gyroscopic: bool = False
+    all_bodies: bool = False  # whether problems also have the bodies that nothing touches
+    # parameters of the family, in JSON's types
+    parameters: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
     title: str = ""
     description: str = ""
     application: str = ""  # field of application
-    authors: str = ""  # of the original
+    authors: str = ""  # authors of the original
     friction: str = ""  # the law of friction, in words
-    # what a picture shows: centre and radius [m]; None: all that moves
+    # part shown in a picture: centre and radius [m]; None: all that moves
     focus: tuple[float, float, float, float] | None = None
-    # where it is seen from: azimuth and elevation [deg]; None: as all others
+    # direction of view: azimuth and elevation [deg]; None: as all others
     view: tuple[float, float] | None = None
-    keyframe: str | None = None  # of the MJCF, where it starts; None: start, home or stand
+    keyframe: str | None = None  # of the MJCF, its start; None: start, home or stand
     ground: float | None = None  # mu of a plane below all at the start; None: there is none
     planar: bool = False  # moves in a plane y = const, contacts have two components
-    ignore: tuple[str, ...] = ()  # features of the MJCF left out knowingly: limits, frictionloss
-    # the scene repeats itself along x and y, its bodies all free ones [m]; None: it does not
+    # features of the MJCF left out on purpose, for example limits, frictionloss
+    ignore: tuple[str, ...] = ()
+    # periods along x and y [m], with only free bodies; None: not periodic
     period: tuple[float, float] | None = None
-    path: Path | None = None  # where the MJCF file lies, if it refers to meshes beside it
+    path: Path | None = None  # path of the MJCF file, if it refers to meshes beside it
     includes: Mapping[str, str] = field(default_factory=dict)  # texts of MJCF files in it, by path
 
     @classmethod
     def of(cls, family: Any, seed: int, xml: str = "", **more: Any) -> Scene:
-        """The scene of a family: its parameters and all that it says of itself."""
+        """The scene of a family: its parameters and its facts."""
         return cls(
             name=type(family).__name__,
             xml=xml,
@@ -103,25 +106,26 @@ class Scene:
         floating: bool = False,
         ground: float | None = None,
     ) -> Scene:
-        """The scene of an MJCF file, or of a URDF file. OSError where it cannot be read.
+        """The scene of an MJCF file, or of a URDF file. OSError if it cannot be read.
 
-        Its parameters hold the SHA-256 of the file and of all that it refers to.
+        Its parameters hold the SHA-256 of the file and of all files to which it refers.
 
         Args:
-            path: of the file.
+            path: path of the file.
             time_step: h [s]; None: that of the file.
             restitution: Newton's coefficient e.
             law: the unilateral law.
             planar: whether it moves in the plane x, z.
-            keyframe: where it starts, by name; None: start, home or stand where there is one.
+            keyframe: name of the keyframe of its start; None: start, home or stand, if there is
+                one.
             packages: folders of the names in package://NAME/... of a URDF file.
             ignore: features that are left out.
             activation: [m] of the velocity law, see `fclib.simulate.MoreauJean`.
-            floating: of a URDF file, whose root is welded to the world otherwise.
+            floating: whether the root of a URDF file moves freely; else it is welded to the world.
             ground: coefficient of friction of a plane below all at the start; None: no plane.
 
         Raises:
-            OSError: it cannot be read.
+            OSError: the file cannot be read.
             ValueError: a package is not known, or nothing can float.
             ImportError: it refers to files, and MuJoCo is missing.
         """
@@ -150,7 +154,7 @@ class Scene:
             ignore=tuple(ignore),
             activation=activation,
             ground=ground,
-            # the text tells all where packages were resolved
+            # if packages were resolved, the text tells all
             path=path if resolved == xml else None,
             includes=includes,
         )
@@ -159,7 +163,7 @@ class Scene:
 def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]:
     """SHA-256 of the files that a model refers to, and the texts of the MJCF among them.
 
-    Both by their paths from the model's folder. What is not there is left to the compiler to name.
+    Both by their paths from the model's folder. The compiler reports missing files.
     """
     if "file=" not in xml and "filename=" not in xml:
         return {}, {}
@@ -168,7 +172,7 @@ def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]
         module: Any = importlib.import_module("mujoco")
         try:
             names = module.mju_getXMLDependencies(str(path.resolve()))
-        except (ValueError, module.FatalError):  # bad MJCF, which the compiler says better
+        except (ValueError, module.FatalError):  # bad MJCF: the compiler reports it better
             return {}, {}
     else:
         names = re.findall(r"""filename=["']([^"']+)""", xml)
@@ -186,7 +190,7 @@ def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]
 def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) -> str:
     """A URDF text with the folders of its package://NAME/... in their places.
 
-    ValueError where one is not known: by the argument, or as a folder of ROS_PACKAGE_PATH.
+    ValueError if one is known neither from the argument nor as a folder of ROS_PACKAGE_PATH.
     """
     asked = sorted(set(re.findall(r"package://([^/\"'<>]+)", xml)))
     if not asked:
@@ -203,7 +207,7 @@ def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) ->
             )
         xml = xml.replace(f"package://{package}/", f"{found.resolve()}/")
     if "<mujoco" not in xml:
-        # MuJoCo drops folders from the names of a URDF file's meshes unless it is told not to
+        # MuJoCo drops folders from the names of a URDF file's meshes unless an option forbids it
         xml = re.sub(
             r"(<robot\b[^>]*>)", r'\1<mujoco><compiler strippath="false"/></mujoco>', xml, count=1
         )
@@ -211,7 +215,7 @@ def resolve_packages(name: str, xml: str, packages: Mapping[str, str | Path]) ->
 
 
 def floated(name: str, xml: str) -> str:
-    """A URDF text whose root moves freely. ValueError if it is none, or its root is the world."""
+    """A URDF text whose root moves freely. ValueError: it is not URDF, or its root is the world."""
     try:
         robot = ElementTree.fromstring(xml.encode())
     except ElementTree.ParseError as error:
@@ -246,21 +250,21 @@ class Assembled:
 
     @property
     def name(self) -> str:
-        """Of the family."""
+        """The name of the family."""
         return type(self.family).__name__
 
     @property
     def title(self) -> str:
-        """Of the family."""
+        """The title of the family."""
         return self.family.title
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """Of the family."""
+        """The parameters of the family."""
         return asdict(self.family)
 
     def problem(self, number: int) -> Any:
-        """Problem 0, 1, ...; the last line of its description is JSON and says where it is from.
+        """Problem 0, 1, ...; the last line of its description is JSON and tells its origin.
 
         Raises:
             ValueError: the number is negative, or there are not so many problems.
@@ -277,7 +281,7 @@ class Assembled:
             "seed": self.seed,
             "step": number,
             "units": units_of(problem),
-            # what a family says of one problem, as JSON
+            # the facts of one problem, as JSON
             **json.loads(problem.info.description or "{}"),
         }
         words = [
@@ -295,14 +299,14 @@ class Assembled:
 
 
 def units_of(problem: Any) -> dict[str, str]:
-    """The units of a problem of bodies, as its file says them; SI elsewhere."""
+    """The units of a problem of bodies, from its file; SI if it has none."""
     length = problem.bodies.unit if problem.bodies is not None else ""
     mass = problem.bodies.mass_unit if problem.bodies is not None else ""
     return {"length": length or "m", "mass": mass or "kg", "time": "s"}
 
 
 class Described(Protocol):
-    """What every family says of itself: a frozen dataclass whose fields, all with defaults, are its
+    """The base of every family: a frozen dataclass whose fields, all with defaults, are its
     parameters.
     """
 
@@ -312,7 +316,7 @@ class Described(Protocol):
     authors: ClassVar[str]  # of the original family
     friction: ClassVar[str]  # the law of friction, in words
     collection: ClassVar[str]  # the set that it belongs to
-    problems: ClassVar[int]  # that the set takes; of a scene, steps with contact
+    problems: ClassVar[int]  # number of problems in the set; for a scene, steps with contact
     __dataclass_fields__: ClassVar[dict[str, Any]]
 
     def __init__(self, **parameters: Any) -> None: ...
@@ -324,7 +328,7 @@ class Assembly(Described, Protocol):
     def problem(self, number: int, seed: int = 0) -> Any:
         """Problem `number`; the same number and seed give the same data, bit for bit.
 
-        The title of its info tells it from the others of the family.
+        The title of its info identifies it in the family.
         """
         ...
 
@@ -332,11 +336,11 @@ class Assembly(Described, Protocol):
 class Family(Described, Protocol):
     """A family that makes scenes. Among its parameters are `restitution` and `time_step` [s].
 
-    Where it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
+    If it has parameters `activation` [m], `begin` [s], `gyroscopic` and `all_bodies`, they are
     those of its scenes.
     A published family sets `allowance` to False, since its states were simulated without.
 
-    Where the default scene takes long, `small` holds parameters of a quick one of the kind.
+    If the default scene takes long, `small` holds parameters of a quick one of the kind.
     """
 
     restitution: float
@@ -348,5 +352,5 @@ class Family(Described, Protocol):
 
 
 def parameter(default: Any, unit: str, doc: str) -> Any:
-    """A dataclass field that carries its unit ("1" where it has none) and its meaning."""
+    """A dataclass field that carries its unit ("1" if it has none) and its meaning."""
     return field(default=default, metadata={"unit": unit, "doc": doc})

@@ -1,7 +1,7 @@
 """Stones laid without mortar, as MJCF: prisms of any convex outline, and supports that move.
 
 Every stone is a mesh: two flat faces touch in the corners of their overlap, also when the joint
-opens about an edge, where the box primitive would change its points.
+opens about an edge. The box primitive would then change its points.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class Masonry:
 
         It does not collide with the floor, nor with another support.
 
-        To be set after the stones, whose weight says how strong the drive must be.
+        Set it after the stones: their weight decides the strength of the drive.
         """
         joint = ""
         if speed:
@@ -102,7 +102,7 @@ class Masonry:
             corners = [mjcf.numbers(a, side * reach, b) for side in (-1, 1) for a, b in shape]
             mesh = f"{name}.{i}" if i else name
             self.assets.append(f'<mesh name="{mesh}" vertex="{"  ".join(corners)}"/>')
-            # the mesh is drawn where its vertices say
+            # the mesh is drawn at the places of its vertices
             shapes += (
                 f'<geom type="mesh" mesh="{mesh}" condim="3" density="{self.density!r}"'
                 f' friction="{self.mu!r}" material="solid" rgba="{colour}"/>'
@@ -188,12 +188,12 @@ class Arcade:
 
     @property
     def centres(self) -> list[float]:
-        """Of the rings, along x [m]."""
+        """The centres of the rings, along x [m]."""
         return [self.pitch * (i - 0.5 * (self.spans - 1)) for i in range(self.spans)]
 
     @property
     def end(self) -> float:
-        """Where the right wall begins, x [m]; the left one is its mirror."""
+        """The place at which the right wall begins, x [m]; the left one is its mirror."""
         return 0.5 * self.pitch * self.spans
 
     def stones(self) -> list[tuple[str, list[Point]]]:
@@ -222,7 +222,7 @@ class Arcade:
         for i, (one, other) in enumerate(zip(left, right, strict=True)):
 
             def edge(j: int, one: float | None = one, other: float | None = other) -> Point:
-                """From where to where the masonry goes at the height of corner j."""
+                """The two ends of the masonry at the height of corner j."""
                 return (
                     -self.end if one is None else one + corners[j][0],
                     self.end if other is None else other - corners[j][0],
@@ -263,11 +263,11 @@ class Arcade:
         return [[(-a, b) for a, b in reversed(piece)] for piece in pieces]
 
     def pier(self, i: int) -> tuple[float, float]:
-        """From where to where the pier between arches i and i + 1 goes, x [m]."""
+        """The two ends of the pier between arches i and i + 1, x [m]."""
         return self.centres[i] + self.inner, self.centres[i + 1] - self.inner
 
 
-BACKED = math.radians(50)  # where the backing of a ring ends, above the horizontal
+BACKED = math.radians(50)  # angle above the horizontal at which the backing of a ring ends
 
 
 def on_circle(radius: float, angle: float, centre: Point = (0, 0)) -> Point:
@@ -276,7 +276,7 @@ def on_circle(radius: float, angle: float, centre: Point = (0, 0)) -> Point:
 
 
 def area(outline: Sequence[Point]) -> float:
-    """The area [m^2] of an outline, positive where it runs counterclockwise."""
+    """The area [m^2] of an outline, positive if it runs counterclockwise."""
     total = 0.0
     for (a, b), (c, d) in zip(outline, [*outline[1:], outline[0]], strict=True):
         total += 0.5 * (a * d - b * c)

@@ -165,7 +165,7 @@ def on_a_face(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 
 
 def polyhedron_mesh(name: str, corners: npt.NDArray[np.float64]) -> str:
-    """The convex hull of corners (k x 3) [m], its origin where the coordinates have theirs."""
+    """The convex hull of corners (k x 3) [m], with the origin of the coordinates."""
     return f'<mesh name="{name}" vertex="{"  ".join(numbers(*corner) for corner in corners)}"/>'
 
 
@@ -341,7 +341,7 @@ def check(
     non_negative: Iterable[str] = (),
     at_least: Mapping[str, float] = MappingProxyType({}),
 ) -> None:
-    """ValueError where a parameter of a family is out of its range."""
+    """Raise ValueError if a parameter of a family is out of its range."""
     bounds = [(name, ">", 0.0) for name in positive] + [(name, ">=", 0.0) for name in non_negative]
     bounds += [(name, ">=", bound) for name, bound in at_least.items()]
     for name, relation, bound in bounds:

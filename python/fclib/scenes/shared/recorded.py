@@ -2,7 +2,7 @@
 
 The file is an .npz. `about` is JSON: engine, law, notes, of each field whether it is the engine's
 or follows from a formula, and the problems' digests. `half` has the half edges of the boxes. Of any
-other array the steps come one after another, and `NAME_ends` says where each ends.
+other array the steps come one after another, and `NAME_ends` has the end of each.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Step:
     mu: Vector  # (nc)
     reaction: Vector  # (3 nc) the engine's own [N s]
     velocity: Vector  # (n) the engine's own, after the step
-    # where contacts and boxes are, of engines that tell it
+    # places of contacts and boxes, if the engine gives them
     body: Any = None  # (nc x 2) N points to the second; 0 is the ground
     point: Any = None  # (nc x 3) [m]
     normal: Any = None  # (nc x 3)
@@ -54,7 +54,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class File:
-    """What a file holds."""
+    """The content of a file."""
 
     about: dict[str, Any]
     half: Vector  # (nb x 3) [m]
@@ -86,7 +86,7 @@ def write(path: Path, file: File) -> None:
 
 @functools.cache
 def read(path: Path) -> File:
-    """What `write` stored."""
+    """The content of a file that `write` stored."""
     with np.load(path) as stored:
         arrays = {name: stored[name] for name in stored.files}
     about = json.loads(str(arrays.pop("about")))
@@ -187,7 +187,7 @@ class Recorded:
 
     @classmethod
     def digests(cls) -> tuple[str, ...]:
-        """Of the problems as they were stored."""
+        """The digests of the problems as they were stored."""
         return cls.file().digests
 
     @classmethod

@@ -17,7 +17,7 @@ Face = Literal["x-", "x+", "y-", "y+", "z-", "z+"]
 
 @dataclass(frozen=True, kw_only=True)
 class Block:
-    """A homogeneous elastic box, without stress where it stands."""
+    """A homogeneous elastic box, without stress at its first place."""
 
     centre: Triple  # [m]
     size: Triple  # edges [m]
@@ -33,7 +33,7 @@ class Block:
 class Load:
     """A traction on a face of some blocks, that grows evenly from nothing until `rise`.
 
-    Where it has a width it is a wave cos^2 of that length along x, whose middle goes from `start`
+    If it has a width, it is a wave cos^2 of that length along x, whose middle goes from `start`
     at some speed.
     """
 
@@ -47,7 +47,7 @@ class Load:
     speed: float = 0.0  # [m/s]
 
     def share(self, time: float) -> float:
-        """Of the full traction."""
+        """The share of the full traction at a time [s]."""
         if time <= self.begin:
             return 0.0
         return 1.0 if time >= self.begin + self.rise else (time - self.begin) / self.rise
@@ -64,7 +64,7 @@ class Bed:
 
 @dataclass(frozen=True, kw_only=True)
 class Solids:
-    """Blocks in contact with each other, and with a rigid floor z = 0 where there is one.
+    """Blocks in contact with each other, and with a rigid floor z = 0, if there is one.
 
     Of two blocks the later one's nodes are held against the earlier one's faces: put the lower
     first. Faces touch that look at each other, and are no further apart than `reach` at the start.

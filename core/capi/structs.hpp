@@ -26,6 +26,9 @@ struct Member {
   std::string_view name;
   Type Struct::* pointer;
 };
+// clang before 17 deduces no arguments of an aggregate by itself
+template <class Struct, class Type>
+Member(std::string_view, Type Struct::*) -> Member<Struct, Type>;
 
 /// The core's struct for a C struct, and the members of the latter.
 template <class Struct>

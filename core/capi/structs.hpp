@@ -12,9 +12,13 @@
 #include "problem.hpp"
 
 // all else is hidden
+#ifdef __GNUC__
 #pragma GCC visibility push(default)
+#endif
 #include <fclib.h>
+#ifdef __GNUC__
 #pragma GCC visibility pop
+#endif
 
 /// The formulations by their names in C: each has the functions and the structs of its name.
 #define FCLIB_FOR_EACH_KIND(of) of(global) of(local) of(global_rolling) of(local_rolling)

@@ -181,7 +181,7 @@ $(VENV)/.installed: $(VENV)/.build-tools CMakeLists.txt pyproject.toml $(if $(wi
 	@echo "== building fclib and installing it into $(VENV) (minutes of CPU time the first time)"
 	@$(BIN)/pip install --no-build-isolation \
 	  --config-settings=build-dir=$(BUILD) --config-settings=cmake.define.FCLIB_TESTS=ON \
-	  --editable '.[analysis,collection,bench,report,solvers]'
+	  --editable '.[simulate,analysis,collection,bench,report,solvers]'
 	@touch $@
 
 no-build:

@@ -10,6 +10,7 @@
 #include <map>
 
 #include "io/hdf5/library.hpp"
+#include "linalg/extended.hpp"
 #include "linalg/fronts.hpp"
 #include "version.hpp"
 
@@ -32,6 +33,7 @@ NB_MODULE(_core, m) {
             {"hdf5", hdf5_loaded_version()},
             {"hdf5_compiled", hdf5_compiled_version()},
             {"hdf5_bundled", hdf5_bundled ? "yes" : ""},
+            {"judge", std::string(real_name) + ", " + std::to_string(real_bits) + " bits"},
             {"metis", has_nested_dissection() ? "yes" : ""},
             {"nanobind", dotted(NB_VERSION_MAJOR, NB_VERSION_MINOR, NB_VERSION_PATCH)}};
       },

@@ -81,10 +81,11 @@ fclib_report* solve_with(const C* c, const fclib_options* options) {
     static const std::vector<OptionInfo> own = describe_options<Asked>();
     OptionValues ours;
     OptionValues of_solver;
-    for (const auto& [name, value] : options->values) {
-      const bool known = std::any_of(own.begin(), own.end(),
-                                     [&](const OptionInfo& info) { return info.name == name; });
-      (known ? ours : of_solver)[name] = value;
+    for (const auto& given : options->values) {
+      const bool known = std::any_of(own.begin(), own.end(), [&](const OptionInfo& info) {
+        return info.name == given.first;
+      });
+      (known ? ours : of_solver).insert(given);
     }
     const Asked asked = parse_options<Asked>(ours);
     Settings settings;

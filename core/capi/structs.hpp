@@ -11,10 +11,14 @@
 
 #include "problem.hpp"
 
-// all the rest is hidden
+// all else is hidden
+#ifdef __GNUC__
 #pragma GCC visibility push(default)
+#endif
 #include <fclib.h>
+#ifdef __GNUC__
 #pragma GCC visibility pop
+#endif
 
 /// The formulations by their names in C: each has the functions and the structs of its name.
 #define FCLIB_FOR_EACH_KIND(of) of(global) of(local) of(global_rolling) of(local_rolling)
@@ -26,6 +30,9 @@ struct Member {
   std::string_view name;
   Type Struct::* pointer;
 };
+// clang before 17 deduces no arguments of an aggregate by itself
+template <class Struct, class Type>
+Member(std::string_view, Type Struct::*) -> Member<Struct, Type>;
 
 /// The core's struct for a C struct, and the members of the latter.
 template <class Struct>

@@ -95,7 +95,10 @@ void free_members(fclib_matrix& a) {
 template <class C>
 C* to_c(RawProblem& problem, bool keep_dense) {
   Owned<C> c(allocate<C>(1));
-  for (auto& [name, value] : problem.members) {
+  for (RawProblem::Member& given : problem.members) {
+    // a lambda takes no structured binding in, for clang before 16
+    auto& name = given.name;
+    auto& value = given.value;
     for_each_member<C>([&]<class Field, class Pointer>(const Field& field, Pointer member) {
       if (field.name != name) return;
       using CType = std::remove_reference_t<decltype((*c).*member)>;

@@ -119,6 +119,7 @@ inline void BlockMatrix::add_blocks(std::size_t first, std::size_t last, const d
   const double* block = values_.data() + std::size_t{D * D} * first;
   for (std::size_t k = first; k < last; ++k, block += D * D) {
     double* target = y + std::ptrdiff_t{D} * row_[k];
+#ifdef __GNUC__
     if constexpr (D == 3) {
       // two rows at once; compilers do not find this by themselves
       using Pair = double __attribute__((vector_size(16), aligned(8), may_alias));
@@ -131,10 +132,11 @@ inline void BlockMatrix::add_blocks(std::size_t first, std::size_t last, const d
       }
       *reinterpret_cast<Pair*>(target) = upper;
       target[2] = lower;
-    } else {
-      for (int r = 0; r < D; ++r) {
-        for (int c = 0; c < D; ++c) target[r] += block[r + D * c] * x[c];
-      }
+      continue;
+    }
+#endif
+    for (int r = 0; r < D; ++r) {
+      for (int c = 0; c < D; ++c) target[r] += block[r + D * c] * x[c];
     }
   }
 }

@@ -1,5 +1,5 @@
-// Numbers of twice the precision of double, as the sum of two doubles. They are used if long double
-// is made in software, as in WebAssembly, where it has quadruple precision.
+// Numbers of twice the precision of double, as the sum of two: for processors that have no format
+// with more bits.
 //
 //   T. J. Dekker, A floating-point technique for extending the available precision, 1971
 //   M. Joldes, J.-M. Muller, V. Popescu, Tight and rigorous error bounds for basic building blocks
@@ -7,9 +7,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cfloat>
 #include <cmath>
 #include <limits>
 #include <type_traits>
+
+static_assert(FLT_EVAL_METHOD == 0, "doubles must be rounded to doubles: x87 keeps more bits");
 
 namespace fclib {
 
@@ -17,6 +20,9 @@ namespace fclib {
 /// Infinity and NaN stay as they are, and their low part is 0.
 class DoubleDouble {
  public:
+  /// Bits of a sum, at least.
+  static constexpr int digits = 2 * std::numeric_limits<double>::digits - 2;
+
   constexpr DoubleDouble() = default;
   template <class Number, std::enable_if_t<std::is_arithmetic_v<Number>, int> = 0>
   // NOLINTNEXTLINE(google-explicit-constructor): as of long double

@@ -49,8 +49,9 @@ SparseColumns mirrored(const SparseColumns& lower) {
   };
   for (Index col = 0; col < n; ++col) {
     for (SparseColumns::InnerIterator entry(lower, col); entry; ++entry) {
-      put(entry.row(), col, entry.value());
-      if (entry.row() != col) put(col, entry.row(), entry.value());
+      const auto row = static_cast<Index>(entry.row());
+      put(row, col, entry.value());
+      if (row != col) put(col, row, entry.value());
     }
   }
   return result;

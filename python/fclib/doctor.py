@@ -32,6 +32,7 @@ State: TypeAlias = Literal["ok", "absent", "broken"]
 LIMIT: Final = 120.0  # [s] of one import
 # the purpose of an extra; extras for developers of fclib are not checked
 PURPOSE: Final = {
+    "simulate": "simulation, in the one version that gives the collection",
     "analysis": "existence and certified solutions",
     "collection": "catalogues, pictures, fetching",
     "bench": "campaigns on a cluster, profiles",
@@ -137,8 +138,6 @@ def check_package(requirement: Requirement) -> Finding:
     name, extras = requirement.package, requirement.extras
     part = "solvers" if "solvers" in extras else "packages"
     purpose = next((PURPOSE[extra] for extra in extras if extra in PURPOSE), "")
-    if name == "mujoco":
-        purpose = "simulation, in the one version that gives the collection"
     if not requirement.applies:
         return Finding(part, name, "absent", "", purpose, "", "use Python 3.11 or later")
     try:
@@ -187,6 +186,7 @@ def check_core() -> Iterator[Finding]:
         remedy="" if built["metis"] else "install libmetis-dev, and build fclib anew",
     )
     yield Finding(part, "compiler", "ok", built["compiler"])
+    yield Finding(part, "judge", "ok", built["judge"], "the precision that errors are computed in")
 
 
 def check_work() -> Finding:

@@ -238,6 +238,43 @@ def test_a_python_takes_the_wheel_of_its_tags(root: Path) -> None:
     assert try_wheels.wheel_for(11, wheels[:1]) is None, "without abi3 it is for one version"
 
 
+# ---- in another project
+
+
+@pytest.mark.skipif(not shutil.which("ninja"), reason="takes cmake and ninja")
+@pytest.mark.parametrize(
+    "taken",
+    [
+        "add_subdirectory({root} fclib)",
+        "include(FetchContent)\n"
+        "FetchContent_Declare(fclib SOURCE_DIR {root})\n"
+        "FetchContent_MakeAvailable(fclib)",
+    ],
+)
+def test_another_project_takes_the_c_library_in(root: Path, tmp_path: Path, taken: str) -> None:
+    cmake = shutil.which("cmake")
+    if cmake is None:
+        pytest.skip("there is no cmake")
+    (tmp_path / "mine.c").write_text("#include <fclib.h>\nint main(void) { return 0; }\n")
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.25)\nproject(mine C CXX)\n"
+        # a Python that has nothing: whoever takes the library in needs none
+        "set(Python_EXECUTABLE /nowhere/python)\n"
+        f"{taken.format(root=root.as_posix())}\n"
+        "add_executable(mine mine.c)\ntarget_link_libraries(mine fclib::fclib)\n"
+    )
+    build = tmp_path / "build"
+    done = subprocess.run(
+        [cmake, "-S", tmp_path, "-B", build, "-G", "Ninja"], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    targets = subprocess.run(
+        ["ninja", "-C", build, "-t", "targets", "all"], capture_output=True, text=True, check=True
+    ).stdout
+    assert re.search(r"libfclib\.(so|a|dylib)", targets)
+    assert "_core_stub" not in targets, "the extension of Python is no part of another's project"
+
+
 # ---- a release
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -55,6 +56,9 @@ def test_what_is_here() -> None:
     assert findings["HDF5"]["found"] == _core.build_info()["hdf5_compiled"]
     assert findings["Eigen"]["found"].startswith("3.")
     assert (findings["METIS"]["state"] == "ok") == (_core.build_info()["metis"] == "yes")
+    judge = re.fullmatch(r"(long double|double-double), (\d+) bits", findings["judge"]["found"])
+    assert judge is not None
+    assert int(judge[2]) >= 64, "a judge needs more digits than a double"
     for name in ("Python", "numpy", "scipy", "trial"):
         assert findings[name]["state"] == "ok", findings[name]
     for name in ("mujoco", "clarabel", "scs", "pyarrow", "matplotlib", "dask", "siconos"):

@@ -98,14 +98,14 @@ def test_versions_agree(root: Path) -> None:
 
 
 def test_the_recipe_asks_for_what_the_package_asks_for(root: Path) -> None:
-    recipe = (root / "recipe" / "recipe.yaml").read_text().replace("mujoco-python", "mujoco")
+    recipe = (root / "recipe" / "recipe.yaml").read_text()
     project = (root / "pyproject.toml").read_text()
     needed = re.search(r"^dependencies = \[(.*?)^\]", project, re.MULTILINE | re.DOTALL)
     built_by = re.search(r"^requires = \[(.*?)\]", project, re.MULTILINE)
     assert needed is not None
     assert built_by is not None
     found = re.findall(r'"([\w-]+)([<>=]=[\d.]+)', needed[1] + built_by[1])
-    assert len(found) >= 7
+    assert len(found) >= 6
     for name, versions in found:
         assert f"- {name} {versions}\n" in recipe, name
 

@@ -27,8 +27,8 @@ double stored_bytes(hid_t dataset) {
   return static_cast<double>(std::min(H5Dget_storage_size(dataset), size_of_file_with(dataset)));
 }
 
-/// Whether the data of a dataset are in one piece in its file. HDF5 adds the size of the user block,
-/// a multiple of 512 bytes or 0, to the place of the data, and to HADDR_UNDEF too.
+/// Whether the data of a dataset are in one piece in its file. HDF5 adds the size of the user
+/// block, a multiple of 512 bytes or 0, to the place of the data, and to HADDR_UNDEF too.
 bool is_in_one_piece(hid_t dataset) {
   constexpr haddr_t unit = 512;
   return H5Dget_offset(dataset) % unit != HADDR_UNDEF % unit;

@@ -15,7 +15,7 @@ VERSION = "4.0.0"
 
 def load() -> Any:
     """The module `mujoco`. If it is not version 4.0.0, an ImportError says what to install."""
-    remedy = f"install it with: pip install mujoco=={VERSION} (Python 3.11 or later)"
+    remedy = "install it with: pip install 'fclib[simulate]' (Python 3.11 or later)"
     try:
         mujoco = importlib.import_module("mujoco")
     except ImportError as error:

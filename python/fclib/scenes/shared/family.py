@@ -169,7 +169,13 @@ def references_of(path: Path, xml: str) -> tuple[dict[str, str], dict[str, str]]
         return {}, {}
     folder = path.resolve().parent
     if "<mujoco" in xml and "<robot" not in xml:
-        module: Any = importlib.import_module("mujoco")
+        try:
+            module: Any = importlib.import_module("mujoco")
+        except ImportError as error:
+            raise ImportError(
+                f"{path.name} refers to files, which MuJoCo finds; it cannot be imported ({error});"
+                " install it with: pip install 'fclib[simulate]' (Python 3.11 or later)"
+            ) from error
         try:
             names = module.mju_getXMLDependencies(str(path.resolve()))
         except (ValueError, module.FatalError):  # bad MJCF: the compiler reports it better

@@ -294,13 +294,13 @@ class Store:
         self._check_tables()
 
     def _refuse_foreign(self) -> None:
-        """StoreError if the file has what runs when it is read or written: triggers, other views."""
+        """StoreError if the file has what runs when it is used: triggers, and other views."""
         for kind, name in self.db.execute("SELECT type, name FROM sqlite_master"):
             ours = kind in ("table", "index") or (kind, name) == ("view", "results")
             if not ours:
                 raise StoreError(
-                    f"{self.path}: has the {kind} {_one_line(str(name))!r}, which no store has: somebody"
-                    " put it there. Do not use the file, and tell whom it is from"
+                    f"{self.path}: has the {kind} {_one_line(str(name))!r}, which no store has: "
+                    "somebody put it there. Do not use the file, and tell whom it is from"
                 )
 
     def _check_tables(self) -> None:

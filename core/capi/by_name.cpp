@@ -82,9 +82,8 @@ fclib_report* solve_with(const C* c, const fclib_options* options) {
     OptionValues ours;
     OptionValues of_solver;
     for (const auto& given : options->values) {
-      const bool known = std::any_of(own.begin(), own.end(), [&](const OptionInfo& info) {
-        return info.name == given.first;
-      });
+      const bool known = std::any_of(
+          own.begin(), own.end(), [&](const OptionInfo& info) { return info.name == given.first; });
       (known ? ours : of_solver).insert(given);
     }
     const Asked asked = parse_options<Asked>(ours);

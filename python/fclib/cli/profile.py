@@ -86,7 +86,7 @@ def command(
     ] = "pdf,svg,png",
     as_json: Json = False,
 ) -> None:
-    """Compare the solvers of a store in tables and pictures.
+    """Compare the solvers of a store.
 
     Prints tables. With --out it draws pictures too.
     """

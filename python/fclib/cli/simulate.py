@@ -117,7 +117,7 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF or a URDF file, and store the problem of each step.
+    """Simulate an MJCF or a URDF file, and store its problems.
 
     What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.

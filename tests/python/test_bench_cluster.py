@@ -326,7 +326,7 @@ def cancelled() -> None:
 
 def preempted() -> None:
     """End them by one that is more urgent, and takes the whole node for a moment."""
-    words = ("--partition=urgent", "--ntasks=8", "--output=/dev/null", "--wrap=sleep 1")
+    words = ("--wait", "--partition=urgent", "--ntasks=8", "--output=/dev/null", "--wrap=sleep 1")
     slurm_says("sbatch", *words)
 
 

@@ -641,8 +641,7 @@ def test_a_view_that_is_served_checks_and_solves(window: Any, tmp_path: Path, mo
     words = ["view", str(file), "--out", str(out), "--browser", str(module)]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 0, done.output
-    (tmp_path / "none").mkdir()
-    with served(tmp_path) as address, opened(window, address + "none/") as page:
+    with served(tmp_path) as address, opened(window, address + out.name) as page:
         page.goto(out.as_uri())
         page.get_by_text(f"fclib view '{file}' --serve").wait_for()
         assert page.get_by_role("button", name="Check it here").count() == 0

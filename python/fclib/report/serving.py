@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import shutil
 import tempfile
@@ -116,7 +117,8 @@ def panel_of(file: Path, kind: str, solved: bool, module: Path | None) -> dict[s
         module: folder of the module, None if there is none.
     """
     own: dict[str, Any] = {"what": kind, "path": file.name, "kind": kind, "sha256": sha256(file)}
-    own |= {"href": f"files/{quote(file.name)}", "merit": taking.merit_of(file) if solved else None}
+    address = f"files/{quote(os.fsencode(file.name))}"  # a name may hold bytes that are no text
+    own |= {"href": address, "merit": taking.merit_of(file) if solved else None}
     return {
         "merits": described_merits(),
         "module": browser.size(module) if module else 0,

@@ -13,6 +13,16 @@ JOBS ?= auto
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings browser include tests examples benchmarks -name '*.[ch]pp' -o -name '*.[ch]')
 
+JS_SOURCES := $(shell find browser tests benchmarks scripts python/fclib/report -name '*.js' -o -name '*.mjs')
+CSS_SOURCES := python/fclib/report/assets/style.css
+# Prettier and ESLint, of the versions in scripts/javascript; the configuration lies beside them,
+# since it imports what npm installs
+JS := $(BUILD)/javascript
+PRETTIER = $(JS)/node_modules/.bin/prettier --config $(JS)/package.json --log-level warn
+ESLINT = $(JS)/node_modules/.bin/eslint --config $(JS)/eslint.config.mjs
+HAS_NPM := $(shell command -v npm)
+NO_NPM := @echo "== there is no npm: JavaScript is not checked (apt-get install npm)"
+
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
         collection-wheel campaigns deb release clean help
 
@@ -27,7 +37,7 @@ help:
 	@echo "make tsan    the C++ tests under the sanitizer of threads"
 	@echo "make coverage  all tests once more, and the lines of C++ and Python that they do not run"
 	@echo "make build-cost  CPU seconds of a whole build, and of touching each header"
-	@echo "make lint    check style and types (ruff, mypy, clang-format)"
+	@echo "make lint    check style and types (ruff, mypy, clang-format; Prettier and ESLint if there is npm)"
 	@echo "make tidy    clang-tidy over the C++ sources, which takes minutes"
 	@echo "make format  put the sources into the style that lint checks"
 	@echo "make layers  fclib.torch, fclib.jax and the recipes, tested in an environment of their own, which is large"
@@ -88,7 +98,7 @@ layers: setup $(VENV)/.test-tools
 build-cost: setup
 	$(BIN)/python scripts/build_cost.py
 
-lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
+lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools $(if $(HAS_NPM),$(JS)/.installed)
 	$(BIN)/ruff check python tests benchmarks examples scripts
 	$(BIN)/ruff format --check python tests benchmarks examples scripts
 	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
@@ -97,11 +107,22 @@ lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
 	$(BIN)/mypy --python-version 3.10 --disable-error-code no-any-return --package fclib
 	$(BIN)/mypy tests benchmarks examples/python scripts/*.py
 	$(BIN)/mypy scripts/site
+ifeq ($(HAS_NPM),)
+	$(NO_NPM)
+else
+	$(PRETTIER) --check $(JS_SOURCES) $(CSS_SOURCES)
+	$(ESLINT) $(JS_SOURCES)
+endif
 
-format: $(VENV)/.lint-tools
+format: $(VENV)/.lint-tools $(if $(HAS_NPM),$(JS)/.installed)
 	$(BIN)/ruff check --fix python tests benchmarks examples scripts
 	$(BIN)/ruff format python tests benchmarks examples scripts
 	$(BIN)/clang-format -i $(CXX_SOURCES)
+ifeq ($(HAS_NPM),)
+	$(NO_NPM)
+else
+	$(PRETTIER) --write $(JS_SOURCES) $(CSS_SOURCES)
+endif
 
 tidy: setup $(VENV)/.lint-tools
 	$(BIN)/python scripts/tidy.py $(BUILD)
@@ -185,6 +206,13 @@ $(VENV)/.installed: $(VENV)/.build-tools CMakeLists.txt pyproject.toml $(if $(wi
 	@touch $@
 
 no-build:
+
+$(JS)/.installed: $(wildcard scripts/javascript/*)
+	@echo "== installing Prettier and ESLint into $(JS)"
+	@mkdir -p $(JS)
+	@cp scripts/javascript/* $(JS)
+	@npm ci --prefix $(JS) --ignore-scripts --no-audit --no-fund --loglevel=error
+	@touch $@
 
 $(VENV)/.%-tools: $(VENV)/.installed pyproject.toml
 	@echo "== installing the tools of make $*"

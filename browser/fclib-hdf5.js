@@ -1,6 +1,6 @@
-// FCLIB files in a browser or in Node: all that core/io/hdf5/read.cpp reads, with its messages. What
-// the data must satisfy the core says (validate). HDF5 is that of h5wasm, of which a page loads
-// four megabytes when it reads its first file.
+// FCLIB files in a browser or in Node: all that core/io/hdf5/read.cpp reads, with its messages.
+// What the data must satisfy the core says (validate). HDF5 is that of h5wasm, of which a page
+// loads four megabytes when it reads its first file.
 
 import { FclibError } from "./fclib.js";
 import { LayoutFile } from "./fclib-layout.js";
@@ -226,7 +226,8 @@ class Group {
       fail(path, "cannot be read (the file is damaged or cut short)");
     }
     if (!ArrayBuffer.isView(values) && !Array.isArray(values)) values = [values];
-    if (!integers) return values instanceof Float64Array ? values : Float64Array.from(values, Number);
+    if (!integers)
+      return values instanceof Float64Array ? values : Float64Array.from(values, Number);
     if (values instanceof Int32Array) return values;
     return Int32Array.from(values, (value, k) => {
       const fits = value >= -largest - 1 && value <= largest;
@@ -353,9 +354,7 @@ function require_counted(x, counted, counter) {
 
 function note_uncounted(x, counted, group, left_out) {
   if (!x.subarray(counted).some((value) => value !== 0)) return;
-  left_out.push(
-    `${group.child("x")}: has ${x.length} entries, of which ${counted} are counted`,
-  );
+  left_out.push(`${group.child("x")}: has ${x.length} entries, of which ${counted} are counted`);
 }
 
 function read_matrix(parent, name, left_out) {
@@ -627,8 +626,8 @@ function check_reads(module) {
 let count = 0;
 
 /**
- * What an FCLIB file holds: { problem, solution, guesses, contacts, bodies, left_out }. The last has
- * a line for each thing that the problem can do without, and that could not be read.
+ * What an FCLIB file holds: { problem, solution, guesses, contacts, bodies, left_out }. The last
+ * has a line for each thing that the problem can do without, and that could not be read.
  */
 export async function read_hdf5(fclib, bytes, kind = "") {
   if (!is_hdf5(bytes)) fail("", "is not an HDF5 file");
@@ -656,7 +655,8 @@ export async function read_hdf5(fclib, bytes, kind = "") {
     const left_out = [];
     const problem = read_problem(fclib, root, kind_to_read(structs, root, kind), left_out);
     // of several problems these are the first one's, which is the global one
-    const own = problem.kind === Object.keys(structs.problems).find((one) => root.has(`fclib_${one}`));
+    const own =
+      problem.kind === Object.keys(structs.problems).find((one) => root.has(`fclib_${one}`));
     const of_own = (otherwise, read) =>
       own ? read_if_possible(left_out, otherwise, () => read(structs, root)) : otherwise;
     const solution = of_own(null, solution_of);

@@ -1,6 +1,6 @@
 // Where an HDF5 file keeps the numbers of a dataset. h5wasm does not tell, so this reads the header
-// of the dataset: after "HDF5 File Format Specification", III.A (B-trees), IV.A (object headers) and
-// VII (indices of chunks).
+// of the dataset: after "HDF5 File Format Specification", III.A (B-trees), IV.A (object headers)
+// and VII (indices of chunks).
 
 const CONTIGUOUS = 1;
 const CHUNKED = 2;
@@ -97,7 +97,7 @@ export class LayoutFile {
     for (let k = 0; k < blocks.length && k < most_blocks; ++k) {
       const [from, size] = blocks[k];
       const head = modern ? (tracked ? 6 : 4) : 8;
-      for (let at = from; at + head <= from + size; ) {
+      for (let at = from; at + head <= from + size;) {
         const cursor = new Cursor(this, at);
         const type = cursor.number(modern ? 1 : 2);
         const length = cursor.number(2);

@@ -1,5 +1,5 @@
-// FCLIB in a worker of the page: all functions of fclib.js, each as a promise, and solves that can be
-// watched and stopped.
+// FCLIB in a worker of the page: all functions of fclib.js, each as a promise, and solves that can
+// be watched and stopped.
 //
 //   import { FclibWorker } from "./fclib-worker.js";
 //   const fclib = new FclibWorker();
@@ -78,8 +78,8 @@ export class FclibWorker {
   }
 
   /**
-   * As Fclib.solve, in the worker. on_report gets the last of the reports of each 30 ms, with `r` as
-   * an array, and in `points` all [iteration, error, time] since the one before. The promise has
+   * As Fclib.solve, in the worker. on_report gets the last of the reports of each 30 ms, with `r`
+   * as an array, and in `points` all [iteration, error, time] since the one before. The promise has
    * stop(): it resolves at once, with the last iterate that was reported, and the status
    * "interrupted".
    */

@@ -81,8 +81,8 @@ function copy(numbers, first, size) {
   return result;
 }
 
-/** What a call takes, in the memory of the core: arrays, and behind them integers that say what they
- * are, in the order of browser/convert.hpp. */
+/** What a call takes, in the memory of the core: arrays, and behind them integers that say what
+ * they are, in the order of browser/convert.hpp. */
 class Block {
   #core;
   #structs;
@@ -242,8 +242,8 @@ export class Fclib {
 
   /**
    * Solves a problem. on_report({ iteration, error, time, stage, r }) is called where the solver
-   * evaluates its error; where it returns false the solver stops. `r` is the iterate, copied when it
-   * is asked for, and undefined where the solver has none at hand.
+   * evaluates its error; where it returns false the solver stops. `r` is the iterate, copied when
+   * it is asked for, and undefined where the solver has none at hand.
    */
   solve(problem, settings = {}, on_report = undefined) {
     const own = complete(settings);
@@ -374,8 +374,8 @@ export class Fclib {
     return this.#call("islands", this.#block(problem).place());
   }
 
-  /** What y (and z) prove: { y, z, gain, distance, bound }, or null. A proof whose bound is Infinity
-   * says that there is no solution, else that there is none of a smaller norm. */
+  /** What y (and z) prove: { y, z, gain, distance, bound }, or null. A proof whose bound is
+   * Infinity says that there is no solution, else that there is none of a smaller norm. */
   check_certificate(problem, y, z = undefined) {
     return this.#call(
       "check_certificate",
@@ -389,9 +389,10 @@ export class Fclib {
   }
 
   /**
-   * What a file holds: { problem, solution, guesses, contacts, bodies, left_out }, null where there is
-   * none. The bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind` is of
-   * the problem where there are several. `left_out` says what could not be read beside the problem.
+   * What a file holds: { problem, solution, guesses, contacts, bodies, left_out }, null where there
+   * is none. The bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind`
+   * is of the problem where there are several. `left_out` says what could not be read beside the
+   * problem.
    */
   async read(bytes, kind = "") {
     const content = bytes instanceof Uint8Array ? bytes : new Uint8Array(bytes);
@@ -400,7 +401,10 @@ export class Fclib {
     if (binary || is_hdf5(content)) return read_hdf5(this, content, kind);
     const text = new TextDecoder().decode(content);
     if (text.startsWith("version https://git-lfs.github.com/spec/")) {
-      throw new FclibError("file", "is a pointer of Git LFS, not the file itself: run 'git lfs pull'");
+      throw new FclibError(
+        "file",
+        "is a pointer of Git LFS, not the file itself: run 'git lfs pull'",
+      );
     }
     const problem = this.read_siconos(text, kind);
     return { problem, solution: null, guesses: [], contacts: null, bodies: null, left_out: [] };
@@ -422,7 +426,8 @@ async function bytes_of(url) {
   return answer.arrayBuffer();
 }
 
-/** Loads the core, once; `wasm` are the bytes of fclib-core.wasm, from beside this file otherwise. */
+/** Loads the core, once; `wasm` are the bytes of fclib-core.wasm, those beside this file if not
+ * given. */
 export async function load({ wasm = undefined } = {}) {
   const { default: createCore } = await import("./fclib-core.mjs");
   const wasmBinary = wasm ?? (await bytes_of(new URL("./fclib-core.wasm", import.meta.url)));

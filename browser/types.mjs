@@ -70,7 +70,8 @@ const options = [...option_types]
   .map(([name, types]) => `  ${name}?: ${[...types].join(" | ")};\n`)
   .join("");
 
-const common = `// fclib ${structs.version}. Made by browser/types.mjs from the core's lists of fields and options.
+const source = "Made by browser/types.mjs from the core's lists of fields and options.";
+const common = `// fclib ${structs.version}. ${source}
 
 /** A matrix: triplet (i rows, p columns), csc (p column pointers), csr (p row pointers), or dense
  * (x by columns, without p and i). */
@@ -340,7 +341,9 @@ export interface Run extends Promise<Result> {
 }
 
 export declare class FclibWorker {
-${declared((result) => (result.startsWith("Promise<") ? result : `Promise<${result}>`))}  solve(problem: Problem, settings?: Settings, on_report?: (reports: Reports) => void): Run;
+${declared((result) =>
+  result.startsWith("Promise<") ? result : `Promise<${result}>`,
+)}  solve(problem: Problem, settings?: Settings, on_report?: (reports: Reports) => void): Run;
   close(): void;
 }
 `;

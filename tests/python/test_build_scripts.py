@@ -335,6 +335,55 @@ def test_a_release_has_checksums_and_a_list_of_parts(
         release.finish(dist)
 
 
+# ---- JavaScript
+
+
+def test_javascript_is_linted_or_it_is_said_that_it_is_not(root: Path) -> None:
+    def dry(*words: str) -> str:
+        done = subprocess.run(
+            ["make", "--dry-run", "lint", *words], cwd=root, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    without, with_npm = dry("HAS_NPM="), dry("HAS_NPM=/usr/bin/npm")
+    assert "there is no npm" in without
+    assert "eslint" not in without
+    assert "there is no npm" not in with_npm
+    for tool in ("prettier", "eslint"):
+        lines = [line for line in with_npm.splitlines() if f"/.bin/{tool} " in line]
+        named = {word for line in lines for word in line.split() if word.endswith((".js", ".mjs"))}
+        kept = set(git("ls-files", "*.js", "*.mjs").split())
+        if not kept:
+            pytest.skip("this is no repository")
+        config = "build/javascript/eslint.config.mjs"
+        assert named - {config} == kept, tool
+
+
+def test_javascript_tools_are_pinned_by_checksums_alone(root: Path) -> None:
+    folder = root / "scripts" / "javascript"
+    wanted = json.loads((folder / "package.json").read_text())["devDependencies"]
+    lock = json.loads((folder / "package-lock.json").read_text())["packages"]
+    assert lock.pop("")["devDependencies"] == wanted
+    assert all(version[0].isdigit() for version in wanted.values())
+    for name, entry in lock.items():
+        assert entry["integrity"].startswith("sha512-"), name
+        assert "resolved" not in entry, name
+
+
+def test_lines_of_javascript_have_at_most_100_characters(root: Path) -> None:
+    files = [root / name for name in git("ls-files", "*.js", "*.mjs").split()]
+    if not files:
+        pytest.skip("this is no repository")
+    long = [
+        f"{path.relative_to(root)}:{number}"
+        for path in files
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if len(line) > 100
+    ]
+    assert not long
+
+
 # ---- what says what there is
 
 

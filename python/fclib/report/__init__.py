@@ -21,7 +21,7 @@ citing.py      BibTeX of all that the site shows; references.bib has the papers
 paper.py       figures and tables for a paper
 libraries.py   JavaScript libraries for the pages, out of Python packages
 error.py       ReportError
-assets/        the pages themselves: HTML, CSS, JavaScript
+assets/        the pages themselves: HTML, CSS, JavaScript; pages/ has a file for each kind of page
 
 site.py needs all others but paper.py; drawn.py needs view.py and picture.py, these two solids.py,
 and view.py network.py; paper.py needs runs.py.

@@ -41,14 +41,16 @@ from fclib.report.error import ReportError
 from fclib.report.libraries import libraries
 from fclib.report.recipes import recipes
 from fclib.report.runs import CODES, DIGITS, NOT_RUN, STATUSES, WEIGH, Bench, Campaigns
-from fclib.report.view import ASSETS, rounded
+from fclib.report.view import ASSETS, asset, rounded
 
 MARK = "data/site.js"  # file by which a folder is known to be a site
 PICTURES = ("scene.png", "distribution.svg")
-PAGES = (
-    *("index.html", "style.css", "core.js", "table.js", "plot.js", "filter.js"),
-    *("scene.js", "compare.js", "take.js", "live.js", "whatif.js", "compute.js", "own.js"),
-    *("choose.js", "pages.js", "site.js"),
+# scripts in the order in which a page loads them, after core.js and DataTables
+SCRIPTS = (
+    *("table.js", "plot.js", "filter.js", "scene.js", "compare.js", "take.js", "live.js"),
+    *("whatif.js", "compute.js", "own.js", "parts.js", "choose.js"),
+    *(f"pages/{path.name}" for path in sorted((ASSETS / "pages").glob("*.js"))),
+    "site.js",
 )
 # column of the catalogue, label, meaning; others of a catalogue follow with their own names
 COLUMNS: tuple[tuple[str, str, str], ...] = (
@@ -346,10 +348,13 @@ class _Writer:
         self.bytes += drawn.put(self.folder, name, value)
 
     def write(self) -> dict[str, int]:
-        (self.folder / "assets").mkdir()
-        for name in PAGES:
-            target = self.folder if name == "index.html" else self.folder / "assets"
-            shutil.copyfile(ASSETS / name, target / name)
+        for name in ("style.css", "core.js", *SCRIPTS):
+            target = self.folder / "assets" / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ASSETS / name, target)
+        scripts = (f'<script src="assets/{name}"></script>' for name in ("tables.js", *SCRIPTS))
+        page = asset("index.html").replace("<!--SCRIPTS-->", "\n".join(scripts))
+        (self.folder / "index.html").write_text(page, encoding="utf-8")
         site: dict[str, Any] = {
             "title": self.title or "Frictional contact problems",
             "version": _core.version,

@@ -7,25 +7,32 @@ const Fclib = { values: {}, waiting: {}, pages: {} };
 Fclib.NotHere = class extends Error {};
 
 // ---- data: a file calls put(), load() gives a promise of what it put
-Fclib.put = (name, value) => { Fclib.values[name] = value; };
+Fclib.put = (name, value) => {
+  Fclib.values[name] = value;
+};
 // large data come compressed
 Fclib.putPacked = (name, text) => {
   const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
-  Fclib.values[name] = new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).json();
+  Fclib.values[name] = new Response(
+    new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")),
+  ).json();
 };
 Fclib.script = (src) => {
   Fclib.waiting[src] ||= new Promise((resolve, reject) => {
     const script = document.createElement("script");
     script.src = src;
     script.onload = resolve;
-    script.onerror = () => { delete Fclib.waiting[src]; reject(new Error(`${script.src} is not there`)); };
+    script.onerror = () => {
+      delete Fclib.waiting[src];
+      reject(new Error(`${script.src} is not there`));
+    };
     document.head.append(script);
   });
   return Fclib.waiting[src];
 };
 Fclib.load = async (name) => {
   if (!(name in Fclib.values)) await Fclib.script(`data/${name}.js`);
-  return Fclib.values[name] = await Fclib.values[name];
+  return (Fclib.values[name] = await Fclib.values[name]);
 };
 // the library that draws is large: pages without pictures do not wait for it
 Fclib.plotly = async () => {
@@ -37,7 +44,9 @@ Fclib.plotly = async () => {
 Fclib.h = (tag, attributes, ...children) => {
   const element = document.createElement(tag);
   Fclib.set(element, attributes || {});
-  element.append(...children.flat(3).filter((child) => child !== null && child !== undefined && child !== false));
+  element.append(
+    ...children.flat(3).filter((child) => child !== null && child !== undefined && child !== false),
+  );
   return element;
 };
 Fclib.set = (element, attributes) => {
@@ -50,31 +59,83 @@ Fclib.set = (element, attributes) => {
 };
 
 // names and what they are, where it is known
-Fclib.facts = (pairs) => Fclib.h("dl", { class: "facts" }, pairs.filter(([, v]) => v !== null && v !== undefined && v !== "").map(([name, v]) => [Fclib.h("dt", {}, name), Fclib.h("dd", {}, v)]));
+Fclib.facts = (pairs) =>
+  Fclib.h(
+    "dl",
+    { class: "facts" },
+    pairs
+      .filter(([, v]) => v !== null && v !== undefined && v !== "")
+      .map(([name, v]) => [Fclib.h("dt", {}, name), Fclib.h("dd", {}, v)]),
+  );
 // `names` of code in a text
-Fclib.prose = (text) => text.split("`").map((part, k) => k % 2 ? Fclib.h("code", {}, part) : part);
+Fclib.prose = (text) =>
+  text.split("`").map((part, k) => (k % 2 ? Fclib.h("code", {}, part) : part));
 
 Fclib.copyable = (text, label) => {
-  const button = Fclib.h("button", { type: "button", "aria-label": label ? `Copy ${label}` : "Copy", onclick: async () => {
-    try { await navigator.clipboard.writeText(text); button.textContent = "copied"; } catch { getSelection().selectAllChildren(code); button.textContent = "selected"; }
-    setTimeout(() => { button.textContent = "copy"; }, 1500);
-  } }, "copy");
+  const button = Fclib.h(
+    "button",
+    {
+      type: "button",
+      "aria-label": label ? `Copy ${label}` : "Copy",
+      onclick: async () => {
+        try {
+          await navigator.clipboard.writeText(text);
+          button.textContent = "copied";
+        } catch {
+          getSelection().selectAllChildren(code);
+          button.textContent = "selected";
+        }
+        setTimeout(() => {
+          button.textContent = "copy";
+        }, 1500);
+      },
+    },
+    "copy",
+  );
   const code = Fclib.h("code", {}, text);
-  return Fclib.h("div", { class: "copy" }, Fclib.h("pre", { tabindex: 0, role: "region", "aria-label": label || `To copy: ${text.split("\n").find((line) => line && !line.startsWith("import") && !line.startsWith("#")) || text}` }, code), button);
+  const first = text
+    .split("\n")
+    .find((line) => line && !line.startsWith("import") && !line.startsWith("#"));
+  return Fclib.h(
+    "div",
+    { class: "copy" },
+    Fclib.h(
+      "pre",
+      {
+        tabindex: 0,
+        role: "region",
+        "aria-label": label || `To copy: ${first || text}`,
+      },
+      code,
+    ),
+    button,
+  );
 };
 // a text as a file to keep
 Fclib.save = (name, text) => {
-  const link = Fclib.h("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
+  const link = Fclib.h("a", {
+    href: URL.createObjectURL(new Blob([text], { type: "text/plain" })),
+    download: name,
+  });
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 };
 
 // ---- addresses: a page, what it is of, its state
 Fclib.to = (page, rest = [], params = {}) => {
-  const query = new URLSearchParams(Object.entries(params).filter(([, v]) => v !== undefined && v !== null && v !== "" && v !== false)).toString();
-  return `#/${[page, ...rest].map((part) => encodeURIComponent(part).replaceAll("%2F", "/")).join("/")}${query ? `?${query}` : ""}`;
+  const query = new URLSearchParams(
+    Object.entries(params).filter(
+      ([, v]) => v !== undefined && v !== null && v !== "" && v !== false,
+    ),
+  ).toString();
+  return (
+    "#/" +
+    `${[page, ...rest].map((part) => encodeURIComponent(part).replaceAll("%2F", "/")).join("/")}` +
+    `${query ? `?${query}` : ""}`
+  );
 };
-Fclib.link = (page, rest, params, text) => Fclib.h("a", { href: Fclib.to(page, rest, params) }, text);
+Fclib.link = (page, rest, params, text) =>
+  Fclib.h("a", { href: Fclib.to(page, rest, params) }, text);
 
 // ---- numbers, as a person reads them
 Fclib.number = (value, digits = 3) => {
@@ -83,7 +144,10 @@ Fclib.number = (value, digits = 3) => {
   if (Number.isInteger(value) && Math.abs(value) < 1e6) return String(value);
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-3 || size >= 1e5)) {
-    return value.toExponential(digits - 2).replace("e+", "e").replace(/\.0+e/, "e");
+    return value
+      .toExponential(digits - 2)
+      .replace("e+", "e")
+      .replace(/\.0+e/, "e");
   }
   return String(Number(value.toPrecision(digits)));
 };
@@ -103,15 +167,33 @@ Fclib.theme = {
   },
   toggle() {
     this.chosen = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
-    try { localStorage.setItem(this.key, this.chosen); } catch { /* this page only */ }
+    try {
+      localStorage.setItem(this.key, this.chosen);
+    } catch {
+      /* this page only */
+    }
     this.apply();
   },
 };
-try { Fclib.theme.chosen = localStorage.getItem(Fclib.theme.key); } catch { /* no storage here */ }
+try {
+  Fclib.theme.chosen = localStorage.getItem(Fclib.theme.key);
+} catch {
+  /* no storage here */
+}
 Fclib.theme.apply();
 Fclib.theme.system.addEventListener("change", () => Fclib.theme.apply());
-Fclib.themeButton = () => Fclib.h("button", {
-  type: "button", class: "quiet", id: "theme", "aria-label": "Light or dark", title: "Light or dark",
-  onclick: () => Fclib.theme.toggle(),
-}, "◐");
-Fclib.colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+Fclib.themeButton = () =>
+  Fclib.h(
+    "button",
+    {
+      type: "button",
+      class: "quiet",
+      id: "theme",
+      "aria-label": "Light or dark",
+      title: "Light or dark",
+      onclick: () => Fclib.theme.toggle(),
+    },
+    "◐",
+  );
+Fclib.colour = (name) =>
+  getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();

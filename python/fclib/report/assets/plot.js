@@ -1,60 +1,151 @@
-// pictures by Plotly, drawn when they come in sight; each with keys, a table of its numbers, and files to keep
+// pictures by Plotly, drawn when they come in sight; each with keys, a table of its numbers, and
+// files to keep
 "use strict";
 (() => {
   const { h, number, colour } = Fclib;
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
   const BANDED = 6; // curves with a band: more hide each other
   const FEWEST = 1000; // values of x up to which each is drawn
-  Fclib.stroke = (k) => ({ color: colour(`c${k % 7}`), dash: DASHES[Math.floor(k / 7) % DASHES.length] });
-  Fclib.swatch = (k) => h("span", { class: "swatch", "aria-hidden": true, "data-symbol": "●■◆✚✖▲▼★⬢⬟"[k % 10], style: `color: var(--c${k % 7}); border-top: 3px ${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]}` });
-  // the buttons of a chart and of a picture in space: these and no others, none that sends data; none for fingers
-  Fclib.BUTTONS = { plane: [["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]], space: [["orbitRotation", "pan3d"], ["resetCameraDefault3d"]] };
+  Fclib.stroke = (k) => ({
+    color: colour(`c${k % 7}`),
+    dash: DASHES[Math.floor(k / 7) % DASHES.length],
+  });
+  Fclib.swatch = (k) =>
+    h("span", {
+      class: "swatch",
+      "aria-hidden": true,
+      "data-symbol": "●■◆✚✖▲▼★⬢⬟"[k % 10],
+      style:
+        `color: var(--c${k % 7}); border-top: 3px ` +
+        `${["solid", "dashed", "dotted", "double"][Math.floor(k / 7) % 4]}`,
+    });
+  // the buttons of a chart and of a picture in space: these and no others, none that sends data;
+  // none for fingers
+  Fclib.BUTTONS = {
+    plane: [
+      ["zoom2d", "pan2d"],
+      ["zoomIn2d", "zoomOut2d", "resetScale2d"],
+    ],
+    space: [["orbitRotation", "pan3d"], ["resetCameraDefault3d"]],
+  };
   Fclib.isTouched = () => matchMedia("(pointer: coarse)").matches;
-  Fclib.SYMBOLS = ["circle", "square", "diamond", "cross", "x", "triangle-up", "triangle-down", "star", "hexagon", "pentagon"];
+  Fclib.SYMBOLS = [
+    "circle",
+    "square",
+    "diamond",
+    "cross",
+    "x",
+    "triangle-up",
+    "triangle-down",
+    "star",
+    "hexagon",
+    "pentagon",
+  ];
   Fclib.isNarrow = () => innerWidth < 600;
 
   /* the value at x of steps: that of the last of them at or before x */
   Fclib.at = (steps, x) => {
-    let low = 0, high = steps.x.length;
-    while (low < high) { const mid = (low + high) >> 1; if (steps.x[mid] <= x) low = mid + 1; else high = mid; }
+    let low = 0;
+    let high = steps.x.length;
+    while (low < high) {
+      const mid = (low + high) >> 1;
+      if (steps.x[mid] <= x) low = mid + 1;
+      else high = mid;
+    }
     return low ? steps.y[low - 1] : null;
   };
 
   const look = () => {
-    const axis = { gridcolor: colour("line"), linecolor: colour("soft"), color: colour("soft"), zeroline: false, showline: true, exponentformat: "power", automargin: true };
+    const axis = {
+      gridcolor: colour("line"),
+      linecolor: colour("soft"),
+      color: colour("soft"),
+      zeroline: false,
+      showline: true,
+      exponentformat: "power",
+      automargin: true,
+    };
     const solid = { ...axis, showbackground: false, showspikes: false };
-    return { layout: {
-      font: { family: "system-ui, sans-serif", size: 13, color: colour("text") }, colorway: [...Array(7)].map((_, k) => colour(`c${k}`)),
-      paper_bgcolor: colour("back"), plot_bgcolor: colour("back"), margin: { l: 62, r: 14, t: 12, b: 58 }, xaxis: { ...axis, title: { standoff: 10 } }, yaxis: axis,
-      scene: { xaxis: solid, yaxis: solid, zaxis: solid }, hoverlabel: { bgcolor: colour("back"), bordercolor: colour("line"), font: { color: colour("text"), size: 12.5 } },
-      legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", font: { size: 12 }, itemwidth: 30 },
-    } };
+    return {
+      layout: {
+        font: { family: "system-ui, sans-serif", size: 13, color: colour("text") },
+        colorway: [...Array(7)].map((_, k) => colour(`c${k}`)),
+        paper_bgcolor: colour("back"),
+        plot_bgcolor: colour("back"),
+        margin: { l: 62, r: 14, t: 12, b: 58 },
+        xaxis: { ...axis, title: { standoff: 10 } },
+        yaxis: axis,
+        scene: { xaxis: solid, yaxis: solid, zaxis: solid },
+        hoverlabel: {
+          bgcolor: colour("back"),
+          bordercolor: colour("line"),
+          font: { color: colour("text"), size: 12.5 },
+        },
+        legend: {
+          orientation: "h",
+          yref: "container",
+          y: 0,
+          yanchor: "bottom",
+          font: { size: 12 },
+          itemwidth: 30,
+        },
+      },
+    };
   };
 
-  /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it knows,
-     keys: {key: act(box)}, href(point), table() -> element, above, note, still: no tools and no table */
+  /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it
+     knows,
+     keys: {key: act(box)}, href(point), table() -> element, above, note, still: no tools and no
+     table */
   Fclib.plot = (options) => {
-    const { title } = options, name = options.name.replaceAll("/", "-");
-    const box = h("div", { class: "plot", tabindex: 0, role: options.still ? "img" : "application", "aria-label": `${title}. ${options.says || ""} A table follows.`, style: `height: ${options.height || 400}px` });
+    const { title } = options;
+    const name = options.name.replaceAll("/", "-");
+    const box = h("div", {
+      class: "plot",
+      tabindex: 0,
+      role: options.still ? "img" : "application",
+      "aria-label": `${title}. ${options.says || ""} A table follows.`,
+      style: `height: ${options.height || 400}px`,
+    });
     const heard = h("p", { class: "unseen", role: "status" });
-    box.say = (text) => { heard.textContent = text; };
+    box.say = (text) => {
+      heard.textContent = text;
+    };
     box.draw = async () => {
       const Plotly = await Fclib.plotly();
       if (!box.isConnected) return;
       const { data, layout } = options.draw();
-      await Plotly.react(box, data, { template: look(), uirevision: "kept", ...layout }, {
-        responsive: true, displaylogo: false, scrollZoom: "gl3d", displayModeBar: options.still || Fclib.isTouched() ? false : "hover",
-        modeBarButtons: Fclib.BUTTONS[options.space ? "space" : "plane"], plotlyServerURL: "", topojsonURL: "none:",
-      });
-      if (options.href && !box.dataset.drawn) box.on("plotly_click", ({ points: [point] }) => { location.hash = options.href(point); });
+      await Plotly.react(
+        box,
+        data,
+        { template: look(), uirevision: "kept", ...layout },
+        {
+          responsive: true,
+          displaylogo: false,
+          scrollZoom: "gl3d",
+          displayModeBar: options.still || Fclib.isTouched() ? false : "hover",
+          modeBarButtons: Fclib.BUTTONS[options.space ? "space" : "plane"],
+          plotlyServerURL: "",
+          topojsonURL: "none:",
+        },
+      );
+      if (options.href && !box.dataset.drawn)
+        box.on("plotly_click", ({ points: [point] }) => {
+          location.hash = options.href(point);
+        });
       box.dataset.drawn = data.length;
     };
-    new IntersectionObserver((seen, watcher) => {
-      if (!seen.some((one) => one.isIntersecting)) return;
-      watcher.disconnect();
-      box.draw();
-    }, { rootMargin: "300px" }).observe(box);
-    document.addEventListener("fclib-theme", () => { if (box.dataset.drawn && box.isConnected) box.draw(); });
+    new IntersectionObserver(
+      (seen, watcher) => {
+        if (!seen.some((one) => one.isIntersecting)) return;
+        watcher.disconnect();
+        box.draw();
+      },
+      { rootMargin: "300px" },
+    ).observe(box);
+    document.addEventListener("fclib-theme", () => {
+      if (box.dataset.drawn && box.isConnected) box.draw();
+    });
     box.addEventListener("keydown", (event) => {
       const act = options.keys && options.keys[event.key];
       if (!act || !box.dataset.drawn) return;
@@ -64,66 +155,197 @@
     const figure = (...parts) => Object.assign(h("figure", {}, ...parts), { plot: box });
     if (options.still) return figure(box, options.note && h("figcaption", {}, options.note));
     const table = h("details", {}, h("summary", {}, "The numbers as a table"));
-    const fill = () => { if (table.children.length === 1) table.append(options.table()); return table.lastChild; };
+    const fill = () => {
+      if (table.children.length === 1) table.append(options.table());
+      return table.lastChild;
+    };
     table.addEventListener("toggle", fill);
     const saved = async (format) => {
       if (!box.dataset.drawn) await box.draw();
       const Plotly = await Fclib.plotly();
       if (!box.isConnected) return null;
-      return Plotly.downloadImage(box, { format, filename: name, width: box.clientWidth, height: box.clientHeight, scale: format === "png" ? 2 : 1 });
+      return Plotly.downloadImage(box, {
+        format,
+        filename: name,
+        width: box.clientWidth,
+        height: box.clientHeight,
+        scale: format === "png" ? 2 : 1,
+      });
     };
     // one picture after another
-    const save = (format) => { Fclib.saving = (Fclib.saving || Promise.resolve()).then(() => saved(format), () => saved(format)); return Fclib.saving; };
-    const tools = [["SVG", () => save("svg")], ["PNG", () => save("png")], ["CSV", () => fill().api.button(0).trigger()]];
-    return figure(options.above, box, heard, options.note && h("figcaption", {}, options.note),
-      h("div", { class: "tools" }, tools.map(([what, act]) => h("button", { type: "button", onclick: act, "aria-label": `Download ${name} as ${what}` }, `↓ ${what}`))), table);
+    const save = (format) => {
+      Fclib.saving = (Fclib.saving || Promise.resolve()).then(
+        () => saved(format),
+        () => saved(format),
+      );
+      return Fclib.saving;
+    };
+    const tools = [
+      ["SVG", () => save("svg")],
+      ["PNG", () => save("png")],
+      ["CSV", () => fill().api.button(0).trigger()],
+    ];
+    return figure(
+      options.above,
+      box,
+      heard,
+      options.note && h("figcaption", {}, options.note),
+      h(
+        "div",
+        { class: "tools" },
+        tools.map(([what, act]) =>
+          h(
+            "button",
+            { type: "button", onclick: act, "aria-label": `Download ${name} as ${what}` },
+            `↓ ${what}`,
+          ),
+        ),
+      ),
+      table,
+    );
   };
 
-  /* curves, all at the same x: where one of them changes, or at so many x that no eye sees the difference
-     options: series [{name, legend, x, y, style}] of steps, xlog, ylog, xrange, yrange, xlabel, ylabel, xname, ypercent, and those of a plot */
+  /* curves, all at the same x: where one of them changes, or at so many x that no eye sees the
+     difference
+     options: series [{name, legend, x, y, style}] of steps, xlog, ylog, xrange, yrange, xlabel,
+     ylabel, xname, ypercent, and those of a plot */
   Fclib.lines = (options) => {
-    const { series, xlog, ylog, xrange: [low, high] } = options;
+    const {
+      series,
+      xlog,
+      ylog,
+      xrange: [low, high],
+    } = options;
     const changes = new Set();
-    for (const s of series) for (const v of s.x) if (v >= low && v <= high && changes.size <= FEWEST) changes.add(v);
+    for (const s of series)
+      for (const v of s.x) if (v >= low && v <= high && changes.size <= FEWEST) changes.add(v);
     let x = [...changes].sort((a, b) => a - b);
-    if (x.length > FEWEST) x = [...Array(FEWEST)].map((_, k) => { const t = k / (FEWEST - 1); return xlog ? low * (high / low) ** t : low + (high - low) * t; });
+    if (x.length > FEWEST)
+      x = [...Array(FEWEST)].map((_, k) => {
+        const t = k / (FEWEST - 1);
+        return xlog ? low * (high / low) ** t : low + (high - low) * t;
+      });
     else if (x[x.length - 1] < high && !options.ends) x.push(high);
     const curves = series.map((s) => ({ ...s, y: x.map((v) => Fclib.at(s, v)) }));
-    const log = (range, on) => on ? range.map(Math.log10) : range;
+    const log = (range, on) => (on ? range.map(Math.log10) : range);
     // the legend: as many columns as the longest name leaves room for
-    const width = options.half && innerWidth > 960 ? Math.min(innerWidth, 1200) / 2 : Math.min(innerWidth, 864);
-    const columns = Math.max(1, Math.min(series.length, Math.floor((width - 90) / (50 + 6.5 * Math.max(...series.map((s) => (s.legend || s.name).length))))));
-    const rows = Math.ceil(series.length / columns), few = series.length < 15;
+    const width =
+      options.half && innerWidth > 960 ? Math.min(innerWidth, 1200) / 2 : Math.min(innerWidth, 864);
+    const columns = Math.max(
+      1,
+      Math.min(
+        series.length,
+        Math.floor(
+          (width - 90) / (50 + 6.5 * Math.max(...series.map((s) => (s.legend || s.name).length))),
+        ),
+      ),
+    );
+    const rows = Math.ceil(series.length / columns);
+    const few = series.length < 15;
     let place = -1;
     const read = (step) => (box) => {
-      place = Math.min(x.length - 1, Math.max(0, place < 0 ? Math.floor(x.length / 2) : place + step));
+      place = Math.min(
+        x.length - 1,
+        Math.max(0, place < 0 ? Math.floor(x.length / 2) : place + step),
+      );
       const there = curves.map((s, k) => [s, k]).filter(([s]) => s.y[place] !== null);
-      Plotly.Fx.hover(box, there.map(([, k]) => ({ curveNumber: k, pointNumber: place })));
-      box.say(`${options.xname} = ${number(x[place])}; ${there.map(([s]) => `${s.name}: ${options.ypercent ? Fclib.percent(s.y[place]) : number(s.y[place])}`).join("; ")}`);
+      Plotly.Fx.hover(
+        box,
+        there.map(([, k]) => ({ curveNumber: k, pointNumber: place })),
+      );
+      const told = options.ypercent ? Fclib.percent : number;
+      const values = there.map(([s]) => `${s.name}: ${told(s.y[place])}`);
+      box.say(`${options.xname} = ${number(x[place])}; ${values.join("; ")}`);
     };
     const stride = Math.ceil(x.length / 60);
     return Fclib.plot({
-      ...options, height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0), says: `${series.length} curves. Left and right arrows read values.`,
-      keys: { ArrowLeft: read(-stride), ArrowRight: read(stride), Escape: (box) => { Plotly.Fx.unhover(box); box.say(""); } },
+      ...options,
+      height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0),
+      says: `${series.length} curves. Left and right arrows read values.`,
+      keys: {
+        ArrowLeft: read(-stride),
+        ArrowRight: read(stride),
+        Escape: (box) => {
+          Plotly.Fx.unhover(box);
+          box.say("");
+        },
+      },
       draw: () => ({
-        data: [...curves.map((s, k) => ({
-          type: "scatter", mode: options.ends || series.length > 1 ? "lines+markers" : "lines", name: s.legend || s.name, x, y: s.y, line: { ...Fclib.stroke(s.style ?? k), width: 2, shape: options.ends ? "linear" : "hv" },
-          ...series.length > 1 ? { marker: { symbol: Fclib.SYMBOLS[(s.style ?? k) % Fclib.SYMBOLS.length], size: 8, maxdisplayed: 9 } } : {},
-          hovertemplate: few ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}` : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
-        })), ...curves.filter((s) => s.band).slice(0, BANDED).flatMap((s, k) => s.band.map((y, side) => ({
-          type: "scatter", mode: "lines", x, y: x.map((v) => Fclib.at({ x: s.x, y }, v)), line: { width: 0, shape: "hv" }, hoverinfo: "skip", showlegend: false,
-          ...side ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` } : {},
-        })))],
+        data: [
+          ...curves.map((s, k) => ({
+            type: "scatter",
+            mode: options.ends || series.length > 1 ? "lines+markers" : "lines",
+            name: s.legend || s.name,
+            x,
+            y: s.y,
+            line: {
+              ...Fclib.stroke(s.style ?? k),
+              width: 2,
+              shape: options.ends ? "linear" : "hv",
+            },
+            ...(series.length > 1
+              ? {
+                  marker: {
+                    symbol: Fclib.SYMBOLS[(s.style ?? k) % Fclib.SYMBOLS.length],
+                    size: 8,
+                    maxdisplayed: 9,
+                  },
+                }
+              : {}),
+            hovertemplate: few
+              ? `%{y:${options.ypercent ? ".1%" : ".3~g"}}`
+              : `%{fullData.name}: %{y:${options.ypercent ? ".1%" : ".3~g"}}<extra></extra>`,
+          })),
+          ...curves
+            .filter((s) => s.band)
+            .slice(0, BANDED)
+            .flatMap((s, k) =>
+              s.band.map((y, side) => ({
+                type: "scatter",
+                mode: "lines",
+                x,
+                y: x.map((v) => Fclib.at({ x: s.x, y }, v)),
+                line: { width: 0, shape: "hv" },
+                hoverinfo: "skip",
+                showlegend: false,
+                ...(side
+                  ? { fill: "tonexty", fillcolor: `${colour(`c${(s.style ?? k) % 7}`)}26` }
+                  : {}),
+              })),
+            ),
+        ],
         layout: {
-          hovermode: few ? "x unified" : "closest", hoverdistance: 40, hoversort: ylog ? "value ascending" : "value descending", showlegend: series.length > 1, legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction", traceorder: "normal" },
-          xaxis: { type: xlog ? "log" : "linear", range: log([low, high], xlog), title: { text: options.xlabel }, unifiedhovertitle: { text: `${options.xname} = %{x:.3~g}` } },
-          yaxis: { type: ylog ? "log" : "linear", range: log(options.yrange, ylog), title: { text: options.ylabel }, tickformat: options.ypercent ? ".0%" : undefined },
+          hovermode: few ? "x unified" : "closest",
+          hoverdistance: 40,
+          hoversort: ylog ? "value ascending" : "value descending",
+          showlegend: series.length > 1,
+          legend: { entrywidth: 0.98 / columns, entrywidthmode: "fraction", traceorder: "normal" },
+          xaxis: {
+            type: xlog ? "log" : "linear",
+            range: log([low, high], xlog),
+            title: { text: options.xlabel },
+            unifiedhovertitle: { text: `${options.xname} = %{x:.3~g}` },
+          },
+          yaxis: {
+            type: ylog ? "log" : "linear",
+            range: log(options.yrange, ylog),
+            title: { text: options.ylabel },
+            tickformat: options.ypercent ? ".0%" : undefined,
+          },
         },
       }),
-      table: () => Fclib.table({
-        caption: options.title, name: options.name, page: 25, rows: x.map((v, k) => [v, ...curves.map((s) => s.y[k])]),
-        columns: [options.xname, ...series.map((s) => s.name)].map((label, k) => ({ key: k, label, type: "number" })),
-      }),
+      table: () =>
+        Fclib.table({
+          caption: options.title,
+          name: options.name,
+          page: 25,
+          rows: x.map((v, k) => [v, ...curves.map((s) => s.y[k])]),
+          columns: [options.xname, ...series.map((s) => s.name)].map((label, k) => ({
+            key: k,
+            label,
+            type: "number",
+          })),
+        }),
     });
   };
 
@@ -132,84 +354,255 @@
   Fclib.work = (options) => {
     const names = [...new Set(options.rows.map((r) => r.solver))];
     return Fclib.plot({
-      ...options, height: (Fclib.isNarrow() ? 330 : 400) + 20 * Math.ceil(names.length / 4), says: `${names.length} solvers.`,
+      ...options,
+      height: (Fclib.isNarrow() ? 330 : 400) + 20 * Math.ceil(names.length / 4),
+      says: `${names.length} solvers.`,
       draw: () => ({
         data: names.map((name) => {
-          const own = options.rows.filter((r) => r.solver === name), k = options.style(name);
-          return { type: "scatter", mode: "lines+markers", name: `${name} ${[...new Set(own.map((r) => `${r.solved} of ${r.of}`))].join(", ")}`, x: own.map((r) => r.mean), y: own.map((r) => r.tol), text: own.map((r) => `${r.solved} of ${r.of} solved`), line: { ...Fclib.stroke(k), width: 2 }, marker: { symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8 }, hovertemplate: "%{fullData.name}, %{y}: %{x:.3~g} s, %{text}<extra></extra>" };
+          const own = options.rows.filter((r) => r.solver === name);
+          const k = options.style(name);
+          return {
+            type: "scatter",
+            mode: "lines+markers",
+            name: `${name} ${[...new Set(own.map((r) => `${r.solved} of ${r.of}`))].join(", ")}`,
+            x: own.map((r) => r.mean),
+            y: own.map((r) => r.tol),
+            text: own.map((r) => `${r.solved} of ${r.of} solved`),
+            line: { ...Fclib.stroke(k), width: 2 },
+            marker: { symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8 },
+            hovertemplate: "%{fullData.name}, %{y}: %{x:.3~g} s, %{text}<extra></extra>",
+          };
         }),
-        layout: { hovermode: "closest", showlegend: true, xaxis: { type: "log", title: { text: options.xlabel } }, yaxis: { type: "log", title: { text: "tolerance" }, autorange: "reversed" } },
+        layout: {
+          hovermode: "closest",
+          showlegend: true,
+          xaxis: { type: "log", title: { text: options.xlabel } },
+          yaxis: { type: "log", title: { text: "tolerance" }, autorange: "reversed" },
+        },
       }),
-      table: () => Fclib.table({ caption: options.title, name: options.name, rows: options.rows, page: 40, columns: [{ key: "solver", label: "solver", head: true }, { key: "tol", label: "tolerance", format: Fclib.tolerance }, { key: "mean", label: "mean CPU time [s]", type: "number" }, { key: "solved", label: "solved" }, { key: "of", label: "of" }] }),
+      table: () =>
+        Fclib.table({
+          caption: options.title,
+          name: options.name,
+          rows: options.rows,
+          page: 40,
+          columns: [
+            { key: "solver", label: "solver", head: true },
+            { key: "tol", label: "tolerance", format: Fclib.tolerance },
+            { key: "mean", label: "mean CPU time [s]", type: "number" },
+            { key: "solved", label: "solved" },
+            { key: "of", label: "of" },
+          ],
+        }),
     });
   };
 
-  /* options: points [{x, y, problem, group}] null where a solver failed, groups, range, xlabel, ylabel, xname, yname, to(problem) */
+  /* options: points [{x, y, problem, group}] null where a solver failed, groups, range, xlabel,
+     ylabel, xname, yname, to(problem) */
   Fclib.scatter = (options) => {
-    const [low, high] = options.range, end = high * (high / low) ** 0.06, far = high * (high / low) ** 0.1;
-    const says = (p) => `${p.problem}<br>${options.xname} ${p.x === null ? "failed" : number(p.x)}<br>${options.yname} ${p.y === null ? "failed" : number(p.y)}`;
+    const [low, high] = options.range;
+    const end = high * (high / low) ** 0.06;
+    const far = high * (high / low) ** 0.1;
+    const says = (p) =>
+      `${p.problem}<br>${options.xname} ${p.x === null ? "failed" : number(p.x)}<br>` +
+      `${options.yname} ${p.y === null ? "failed" : number(p.y)}`;
     const axis = (text) => ({ type: "log", range: [low, far].map(Math.log10), title: { text } });
     const edge = { type: "line", line: { width: 1, color: colour("soft"), dash: "dot" } };
     return Fclib.plot({
-      ...options, height: (Fclib.isNarrow() ? 380 : 480) + 20 * Math.ceil(options.groups.length / 4), says: `${options.points.length} problems.`, href: (point) => options.to(point.customdata),
+      ...options,
+      height: (Fclib.isNarrow() ? 380 : 480) + 20 * Math.ceil(options.groups.length / 4),
+      says: `${options.points.length} problems.`,
+      href: (point) => options.to(point.customdata),
       draw: () => ({
         data: options.groups.map((group, k) => {
           const own = options.points.filter((p) => p.group === k);
           return {
-            type: "scatter", mode: "markers", name: group, x: own.map((p) => p.x ?? end), y: own.map((p) => p.y ?? end), customdata: own.map((p) => p.problem), text: own.map(says),
-            hovertemplate: "%{text}<extra></extra>", marker: { color: colour(`c${k % 7}`), symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length], size: 8, opacity: 0.7 },
+            type: "scatter",
+            mode: "markers",
+            name: group,
+            x: own.map((p) => p.x ?? end),
+            y: own.map((p) => p.y ?? end),
+            customdata: own.map((p) => p.problem),
+            text: own.map(says),
+            hovertemplate: "%{text}<extra></extra>",
+            marker: {
+              color: colour(`c${k % 7}`),
+              symbol: Fclib.SYMBOLS[k % Fclib.SYMBOLS.length],
+              size: 8,
+              opacity: 0.7,
+            },
           };
         }),
         layout: {
-          hovermode: "closest", showlegend: true, xaxis: axis(options.xlabel), yaxis: axis(options.ylabel),
-          shapes: [{ ...edge, x0: low, y0: low, x1: high, y1: high }, { ...edge, x0: high, x1: high, y0: low, y1: far }, { ...edge, x0: low, x1: far, y0: high, y1: high }],
-          annotations: [{ xref: "paper", x: 0.01, y: Math.log10(end), text: "failed ↑", showarrow: false, xanchor: "left" }, { yref: "paper", y: 0.01, x: Math.log10(end), text: "failed →", showarrow: false, xanchor: "right", yanchor: "bottom" }],
+          hovermode: "closest",
+          showlegend: true,
+          xaxis: axis(options.xlabel),
+          yaxis: axis(options.ylabel),
+          shapes: [
+            { ...edge, x0: low, y0: low, x1: high, y1: high },
+            { ...edge, x0: high, x1: high, y0: low, y1: far },
+            { ...edge, x0: low, x1: far, y0: high, y1: high },
+          ],
+          annotations: [
+            {
+              xref: "paper",
+              x: 0.01,
+              y: Math.log10(end),
+              text: "failed ↑",
+              showarrow: false,
+              xanchor: "left",
+            },
+            {
+              yref: "paper",
+              y: 0.01,
+              x: Math.log10(end),
+              text: "failed →",
+              showarrow: false,
+              xanchor: "right",
+              yanchor: "bottom",
+            },
+          ],
         },
       }),
-      table: () => Fclib.table({
-        caption: options.title, name: options.name, page: 25, rows: options.points,
-        columns: [
-          { key: "problem", label: "problem", head: true, cell: (p) => h("a", { href: options.to(p.problem) }, p.problem) },
-          { key: "x", label: options.xname, type: "number" }, { key: "y", label: options.yname, type: "number" },
-          { key: "ratio", label: "ratio", type: "number", value: (p) => p.x && p.y ? p.x / p.y : null }, { key: "group", label: "family", type: "text", value: (p) => options.groups[p.group] },
-        ],
-      }),
+      table: () =>
+        Fclib.table({
+          caption: options.title,
+          name: options.name,
+          page: 25,
+          rows: options.points,
+          columns: [
+            {
+              key: "problem",
+              label: "problem",
+              head: true,
+              cell: (p) => h("a", { href: options.to(p.problem) }, p.problem),
+            },
+            { key: "x", label: options.xname, type: "number" },
+            { key: "y", label: options.yname, type: "number" },
+            {
+              key: "ratio",
+              label: "ratio",
+              type: "number",
+              value: (p) => (p.x && p.y ? p.x / p.y : null),
+            },
+            { key: "group", label: "family", type: "text", value: (p) => options.groups[p.group] },
+          ],
+        }),
     });
   };
 
   /* the eigenvalues of W, the largest first */
-  Fclib.spectrum = ({ values, size, rank, conditioning }, name) => Fclib.lines({
-    name: `spectrum-${name}`, title: `Eigenvalues of W of ${name}`, series: [{ name: "eigenvalue", x: values.map((_, k) => k + 1), y: values, style: 0 }], ends: true,
-    ylog: true, xrange: [0, Math.max(size, 2)], yrange: [values[values.length - 1] / 2, values[0] * 2], xname: "number", xlabel: "number, the largest first", ylabel: "eigenvalue",
-    note: `Rank ${rank} of ${size}${rank < size ? `: ${size - rank} eigenvalues are rounding` : ""}; the largest over the smallest of the others is ${number(conditioning)}.`,
-  });
+  Fclib.spectrum = ({ values, size, rank, conditioning }, name) =>
+    Fclib.lines({
+      name: `spectrum-${name}`,
+      title: `Eigenvalues of W of ${name}`,
+      series: [{ name: "eigenvalue", x: values.map((_, k) => k + 1), y: values, style: 0 }],
+      ends: true,
+      ylog: true,
+      xrange: [0, Math.max(size, 2)],
+      yrange: [values[values.length - 1] / 2, values[0] * 2],
+      xname: "number",
+      xlabel: "number, the largest first",
+      ylabel: "eigenvalue",
+      note:
+        `Rank ${rank} of ${size}` +
+        `${rank < size ? `: ${size - rank} eigenvalues are rounding` : ""}; the largest over ` +
+        `the smallest of the others is ${number(conditioning)}.`,
+    });
 
   /* what the file says of itself */
-  Fclib.texts = (view) => (view.description || view.math_info) && h("details", {}, h("summary", {}, "What the file says of itself"),
-    [view.description, view.math_info].filter(Boolean).map((text) => h("p", { class: "small words" }, text)));
+  Fclib.texts = (view) =>
+    (view.description || view.math_info) &&
+    h(
+      "details",
+      {},
+      h("summary", {}, "What the file says of itself"),
+      [view.description, view.math_info]
+        .filter(Boolean)
+        .map((text) => h("p", { class: "small words" }, text)),
+    );
 
   /* the patterns of matrices: a cell is darker where more of its entries are not zero */
-  Fclib.patterns = (list) => h("div", {}, h("div", { class: "patterns" }, list.map((one) => {
-    const [m, n] = one.shape, cells = one.shape.map((size) => Math.ceil(size / one.cell));
-    const z = [...Array(cells[0])].map(() => Array(cells[1]).fill(null));
-    one.rows.forEach((row, k) => { z[row][one.columns[k]] = one.counts[k]; });
-    const side = 264 / Math.max(...cells), [tall, wide] = cells.map((count) => Math.max(24, side * count));
-    const figure = Fclib.plot({
-      name: `pattern-${one.name}`, title: `Pattern of ${one.name}, ${m} by ${n}, ${one.nnz} entries`, still: true, height: tall + 8,
-      draw: () => ({
-        data: [{ type: "heatmap", z, zmin: -0.5 * Math.max(...one.counts), colorscale: [[0, colour("back")], [1, colour("accent")]], showscale: false, hovertemplate: one.cell > 1 ? `%{z} entries in cell (%{y}, %{x})<extra></extra>` : "(%{y}, %{x})<extra></extra>" }],
-        layout: { margin: { l: 4, r: 4, t: 4, b: 4 }, xaxis: { visible: false, range: [-0.5, cells[1] - 0.5], fixedrange: true }, yaxis: { visible: false, range: [cells[0] - 0.5, -0.5], fixedrange: true } },
-      }),
-      note: [h("b", {}, one.name), ` ${m} × ${n}, ${one.nnz} entries (${number(100 * one.nnz / (m * n), 2)} %)`, one.rank && `, rank ${one.rank}`,
-        one.conditioning && `, condition number ${number(one.conditioning)}`, one.cell > 1 && `; a pixel is ${one.cell} × ${one.cell}`],
-    });
-    figure.firstChild.style.width = `${wide + 8}px`;
-    return figure;
-  })),
-  h("details", {}, h("summary", {}, "As a table"), Fclib.table({
-    caption: "Matrices", rows: list,
-    columns: [{ key: "name", label: "matrix", head: true }, { key: "m", label: "rows", value: (p) => p.shape[0] }, { key: "n", label: "columns", value: (p) => p.shape[1] },
-      { key: "nnz", label: "entries", type: "number" }, { key: "fill", label: "filled", type: "number", value: (p) => p.nnz / (p.shape[0] * p.shape[1]), format: Fclib.percent },
-      ...["rank", "conditioning", "determinant"].filter((key) => list.some((p) => p[key])).map((key) => ({ key, label: key, type: "number" }))],
-  })));
+  Fclib.patterns = (list) =>
+    h(
+      "div",
+      {},
+      h(
+        "div",
+        { class: "patterns" },
+        list.map((one) => {
+          const [m, n] = one.shape;
+          const cells = one.shape.map((size) => Math.ceil(size / one.cell));
+          const z = [...Array(cells[0])].map(() => Array(cells[1]).fill(null));
+          one.rows.forEach((row, k) => {
+            z[row][one.columns[k]] = one.counts[k];
+          });
+          const side = 264 / Math.max(...cells);
+          const [tall, wide] = cells.map((count) => Math.max(24, side * count));
+          const figure = Fclib.plot({
+            name: `pattern-${one.name}`,
+            title: `Pattern of ${one.name}, ${m} by ${n}, ${one.nnz} entries`,
+            still: true,
+            height: tall + 8,
+            draw: () => ({
+              data: [
+                {
+                  type: "heatmap",
+                  z,
+                  zmin: -0.5 * Math.max(...one.counts),
+                  colorscale: [
+                    [0, colour("back")],
+                    [1, colour("accent")],
+                  ],
+                  showscale: false,
+                  hovertemplate:
+                    one.cell > 1
+                      ? `%{z} entries in cell (%{y}, %{x})<extra></extra>`
+                      : "(%{y}, %{x})<extra></extra>",
+                },
+              ],
+              layout: {
+                margin: { l: 4, r: 4, t: 4, b: 4 },
+                xaxis: { visible: false, range: [-0.5, cells[1] - 0.5], fixedrange: true },
+                yaxis: { visible: false, range: [cells[0] - 0.5, -0.5], fixedrange: true },
+              },
+            }),
+            note: [
+              h("b", {}, one.name),
+              ` ${m} × ${n}, ${one.nnz} entries (${number((100 * one.nnz) / (m * n), 2)} %)`,
+              one.rank && `, rank ${one.rank}`,
+              one.conditioning && `, condition number ${number(one.conditioning)}`,
+              one.cell > 1 && `; a pixel is ${one.cell} × ${one.cell}`,
+            ],
+          });
+          figure.firstChild.style.width = `${wide + 8}px`;
+          return figure;
+        }),
+      ),
+      h(
+        "details",
+        {},
+        h("summary", {}, "As a table"),
+        Fclib.table({
+          caption: "Matrices",
+          rows: list,
+          columns: [
+            { key: "name", label: "matrix", head: true },
+            { key: "m", label: "rows", value: (p) => p.shape[0] },
+            { key: "n", label: "columns", value: (p) => p.shape[1] },
+            { key: "nnz", label: "entries", type: "number" },
+            {
+              key: "fill",
+              label: "filled",
+              type: "number",
+              value: (p) => p.nnz / (p.shape[0] * p.shape[1]),
+              format: Fclib.percent,
+            },
+            ...["rank", "conditioning", "determinant"]
+              .filter((key) => list.some((p) => p[key]))
+              .map((key) => ({ key, label: key, type: "number" })),
+          ],
+        }),
+      ),
+    );
 })();

@@ -336,6 +336,7 @@ def test_a_problem_shows_its_runs(go: Opener, site: Path) -> None:
     page = go("#/problem/small/BoxesStack/0010")
     runs = page.get_by_role("region", name="runs")
     assert runs.locator("tbody tr").count() == 6
+    page.get_by_text("Read it and solve it").click()
     assert 'fclib.load("small/BoxesStack/0010")' in page.inner_text("main")
     assert page.locator("h2", has_text="Convergence").count() == 1
     page.get_by_role("link", name="← previous").click()
@@ -548,7 +549,7 @@ def test_a_large_campaign_is_browsed(browser: Any, large: Path) -> None:
     # a filter starts from the first page, and the data of a page come when it is asked for
     page.get_by_label("filter").fill("nc<=10")
     page.wait_for_function("location.hash.includes('q=nc') && !location.hash.includes('page')")
-    assert "19 of 1200 problems" in page.locator("main > div > [role=status]").inner_text()
+    assert "19 of 1200 problems" in page.get_by_role("status").first.inner_text()
     assert page.evaluate("Object.keys(Fclib.values).sort()") == ["catalogue", "site"]
     assert page.evaluate("typeof Plotly") == "undefined"
     page.click("main tbody a >> nth=0")
@@ -600,8 +601,8 @@ def test_what_was_analysed_is_shown(browser: Any, tmp_path: Path) -> None:
     page.wait_for_selector("main[data-page=problem]")
     facts = dict(
         zip(
-            page.locator("main dl.facts dt").all_inner_texts(),
-            page.locator("main dl.facts dd").all_inner_texts(),
+            page.locator(".folded dl.facts dt").all_text_contents(),
+            page.locator(".folded dl.facts dd").all_text_contents(),
             strict=True,
         )
     )
@@ -775,7 +776,7 @@ def test_a_hard_problem_is_found_seen_taken_and_cited(
     with page.expect_download() as saved:
         press(item.get_by_role("link"))
     content = Path(saved.value.path()).read_bytes()
-    assert hashlib.sha256(content).hexdigest() == item.locator("code").inner_text()
+    assert hashlib.sha256(content).hexdigest() == item.locator("code").text_content()
     press(page.get_by_role("link", name="Cite it"))
     press(page.get_by_role("button", name="Copy BibTeX"))
     entry = page.locator("#cite + .copy").inner_text()

@@ -36,6 +36,7 @@ import numpy.typing as npt
 
 from fclib._solve import MeritKind
 from fclib._verdicts import UNSUITABLE, is_solved
+from fclib._words import counted
 from fclib.bench.comparison import (
     METRICS,
     TIMES,
@@ -923,8 +924,7 @@ def caption(
     )
     families = len({one.family for one in costs.instances})
     words = [
-        f"{len(costs.instances)} instances of"
-        f" {families} {'family' if families == 1 else 'families'}",
+        f"{counted(len(costs.instances), 'instance')} of {counted(families, 'family', 'families')}",
         "for each solver those that it has run and takes"
         if own_set
         else f"which all {len(costs.solvers)} solvers have run and take"
@@ -933,14 +933,18 @@ def caption(
         WEIGHED[weigh],
         f"tolerance {', '.join(f'{tol:g}' for tol in costs.tolerances)}",
         f"limit {span(one.limit for one in costs.instances)} s of CPU",
-        f"{failed} of {count} runs failed",
+        f"{failed} of {counted(count, 'run')} failed",
     ]
     if words_in(runs, "start").is_in(["warm"]).any():
         words.insert(1, "warm: each step from a solution of one before it")
     if costs.left_out:
-        words.append(f"{costs.left_out} instances left out, which not all have run or take")
+        words.append(
+            f"{counted(costs.left_out, 'instance')} left out, which not all have run or take"
+        )
     if costs.of_other_forms:
-        words.append(f"{costs.of_other_forms} runs of the other form of a problem left out")
+        words.append(
+            f"{counted(costs.of_other_forms, 'run')} of the other form of a problem left out"
+        )
     words += [f"{said('cpu')} ({said('node')})"]
     words += [days[0] if len(days) == 1 else f"{days[0]} to {days[-1]}"] if days else []
     words += [f"fclib {', '.join(versions)}"] if versions else []

@@ -1,4 +1,8 @@
-"""Pictures of a family: its scene, and how contacts and degrees of freedom are distributed."""
+"""Pictures of a family: its scene, and how contacts and degrees of freedom are distributed.
+
+Contacts and degrees of freedom are whole numbers: their bins have whole widths about them, and the
+axes have whole numbers only.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +11,44 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import numpy.typing as npt
+
+from fclib._words import counted
+
 if TYPE_CHECKING:
     from fclib.simulate import Model
 
-BINS = 40
+BINS = 40  # largest number, as in RT-0444
 # column, label
 MEASURES = (
     ("nc", "contacts"),
     ("n", "degrees of freedom"),
     ("density", "contact components for a degree of freedom"),
 )
+
+
+def bins_of(values: Sequence[float]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """The edges of the bins of a histogram, and the number of values in each.
+
+    Whole numbers get bins of a whole width, whose edges are between them. Equal values get one bin.
+    """
+    own = np.asarray(values, dtype=float)
+    low, high = own.min(), own.max()
+    if is_whole(values):
+        width = max(1, np.ceil((high - low + 1) / BINS))
+        edges = low - 0.5 + width * np.arange(np.ceil((high - low + 1) / width) + 1)
+    elif low == high:
+        half = 0.5 * (abs(low) or 1.0)
+        edges = np.array([low - half, low + half])
+    else:
+        edges = np.linspace(low, high, min(BINS, np.unique(own).size) + 1)
+    return edges, np.histogram(own, edges)[0]
+
+
+def is_whole(values: Sequence[float]) -> bool:
+    """Whether all are whole numbers."""
+    return all(float(value).is_integer() for value in values)
 
 
 def draw_scene(model: Model, folder: Path) -> Path | None:
@@ -43,16 +75,22 @@ def draw_distribution(rows: Sequence[Mapping[str, Any]], folder: Path, title: st
         return
     # otherwise the identifiers of an SVG are random
     with matplotlib.rc_context({"svg.hashsalt": "fclib", "font.size": 9}):
+        whole = importlib.import_module("matplotlib.ticker").MaxNLocator
         figure = figure_module.Figure(figsize=(9, 2.6), layout="constrained")
         axes = figure.subplots(1, len(MEASURES), sharey=True)
         for axis, (column, label) in zip(axes, MEASURES, strict=True):
             # a local problem has no density
             values = [row[column] for row in rows if row[column] is not None]
-            axis.hist(values, bins=BINS, color="#3b6ea5", linewidth=0)
             axis.set_xlabel(label)
+            if values:
+                edges, counts = bins_of(values)
+                axis.bar(edges[:-1], counts, np.diff(edges), align="edge", color="#3b6ea5")
+                if is_whole(values):
+                    axis.xaxis.set_major_locator(whole(nbins=5, integer=True))
             axis.spines[["top", "right"]].set_visible(False)
         axes[0].set_ylabel("problems")
-        figure.suptitle(f"{title}: {len(rows)} problems", fontsize=10)
+        axes[0].yaxis.set_major_locator(whole(nbins=5, integer=True))
+        figure.suptitle(f"{title}: {counted(len(rows), 'problem')}", fontsize=10)
         for suffix, metadata in ((".png", {"Software": None}), (".svg", {"Date": None})):
             figure.savefig(folder / f"distribution{suffix}", dpi=160, metadata=metadata)
             figure.set_layout_engine("none")  # fixes the place of the axes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -228,6 +229,15 @@ class Campaigns:
         }
 
     # ---- one problem
+
+    def least_errors(self) -> dict[str, tuple[float, str]]:
+        """Of each problem the least error of a run at the smallest tolerance, and its solver."""
+        found: dict[str, tuple[float, str]] = {}
+        for row in self.at(self.tolerances[-1]):
+            error = row["error"]
+            if error is not None and error < found.get(row["hash"], (math.inf, ""))[0]:
+                found[row["hash"]] = (error, row["solver"])
+        return found
 
     def by_problem(self) -> Iterator[tuple[str, list[dict[str, Any]]]]:
         """The runs of each problem, its hash first, with their convergence if it was stored."""

@@ -19,22 +19,25 @@ from __future__ import annotations
 import dataclasses
 import inspect
 import math
+import re
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from fclib import _core, _registry
 from fclib._solve import MERITS
 from fclib._verdicts import CLASSES, SOLVED, UNSUITABLE, is_solved, rating
+from fclib._words import counted
 from fclib.bench import profiles
 from fclib.bench.campaign import described
 from fclib.bench.comparison import COMMON
 from fclib.bench.profiles import JUDGED, METRICS, PENALTY, SHIFT
 from fclib.bench.table import object_in
 from fclib.collections import families, read_catalog, sets, standing
+from fclib.collections.figures import MEASURES, bins_of, is_whole
 from fclib.collections.known import kind_of
 from fclib.report import browser, citing, drawn, taking
 from fclib.report.error import ReportError
@@ -44,7 +47,7 @@ from fclib.report.runs import CODES, DIGITS, NOT_RUN, STATUSES, WEIGH, Bench, Ca
 from fclib.report.view import ASSETS, asset, rounded
 
 MARK = "data/site.js"  # file by which a folder is known to be a site
-PICTURES = ("scene.png", "distribution.svg")
+SCENE = "scene.png"  # picture of a family in a catalogue's folder
 # scripts in the order in which a page loads them, after core.js and DataTables
 SCRIPTS = (
     *("table.js", "plot.js", "filter.js", "scene.js", "compare.js", "take.js", "live.js"),
@@ -74,11 +77,11 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("mu_min", "μ min", "smallest coefficient of friction"),
     ("mu_max", "μ max", "largest coefficient of friction"),
     ("nnz_W", "nnz W", "entries of W"),
-    ("open", "open", "contacts without reaction in the reference solution"),
-    ("stick", "stick", "sticking contacts in the reference solution"),
-    ("slide", "slide", "sliding contacts in the reference solution"),
-    ("status", "reference", "status of the reference solution"),
-    ("error", "error", "relative natural-map error of the reference solution"),
+    ("open", "open", "contacts without reaction in the best solution known"),
+    ("stick", "stick", "sticking contacts in the best solution known"),
+    ("slide", "slide", "sliding contacts in the best solution known"),
+    ("status", "best known", "status with which the best solution known was found"),
+    ("error", "error", "relative error of the best solution known, by both natural maps"),
     ("nsgs_sweeps", "NSGS sweeps", "that Gauss-Seidel takes to 1e-6"),
     ("rank_W", "rank W", "numerical rank of W"),
     ("rank_H", "rank H", "numerical rank of H"),
@@ -102,6 +105,7 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
     ("slater", "Slater", "whether a velocity strictly inside K* was found"),
     ("existence", "existence", "of a solution, and by what it is proved"),
     ("uniqueness", "uniqueness", "of the velocity"),
+    ("same_as", "same as", "the first problem with the same data"),
     (
         "best_solver",
         "best solver",
@@ -117,6 +121,13 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
 )
 # descriptions of solvers: `fclib.bench.campaign.described`
 ABOUT = {"title": str, "citation": str, "dimensions": list, "rolling": list, "options": list}
+# columns of the runs of a problem, which its copies share
+OF_RUNS = (
+    *("runs", "solved", "class", "solved_by", "solved_of"),
+    *("best_solver", "best_s", "best_tol"),
+)
+# columns that pages use and that stand in no table
+SILENT = ("title", "number", "tol", "solver", "global_file", "local_file", "solved_of", "rows_W")
 # columns of a catalogue that are of no use on a page
 HIDDEN = {"digest", "global_file", "global_sha256", "local_file", "local_sha256", "number", "nnz_M"}
 HIDDEN |= {"nnz_H", "solver", "tol", "license", "citation", "version"}
@@ -204,6 +215,7 @@ class Problems:
         """Raises CatalogError if the catalogue cannot be read."""
         self.rows: list[dict[str, Any]] = []
         self.files: list[Path | None] = []  # file from which a problem may be read
+        self.digests: list[str] = []  # of the data
         self.places: dict[str, int] = {}  # by the hash of a store
         self.folder = None
         if catalogue is not None:
@@ -211,6 +223,8 @@ class Problems:
             self.rows = read_catalog(catalogue).to_pylist()
             for row in self.rows:
                 self.files.append(self.folder / (row["global_file"] or row["local_file"]))
+                self.digests.append(row["digest"])
+            self._mark_copies()
         if campaigns is not None:
             self._add_runs(campaigns)
         known = families()
@@ -218,32 +232,50 @@ class Problems:
             family = known.get(kind_of(f"{row.get('collection')}/{row['family']}"))
             row["kind"] = family.collection if family else row.get("collection")
             row["application"] = family.application if family else None
+            row["rows_W"] = row["nc"] * row["spacedim"]
             if not row["formulation"].startswith("G"):
                 # a local problem does not know its bodies
                 row |= {"n": None, "density": None}
         self.standings = self._rate()
+
+    def _mark_copies(self) -> None:
+        """Name the first problem with the same data, of each other one."""
+        first: dict[str, str] = {}
+        for row in self.rows:
+            original = first.setdefault(row["digest"], row["id"])
+            row["same_as"] = None if original == row["id"] else original
+
+    def share(self) -> None:
+        """Give what the runs say of a problem to its copies too."""
+        rows = {row["id"]: row for row in self.rows}
+        for row in self.rows:
+            if row.get("same_as"):
+                row |= {key: rows[row["same_as"]].get(key) for key in OF_RUNS}
 
     def _rate(self) -> dict[str, Any]:
         """The class of each problem from stored runs, and its basis, by set."""
         found: dict[str, Any] = {}
         rated: dict[str, standing.Standing] = {}
         named = {str(row.get("collection")) for row in self.rows} | {standing.FIRST}
+        own_digests = set(self.digests)
         for name in sorted(named & set(sets())):
             try:
                 rows, basis = standing.standings(name)
             except (standing.StandingError, OSError):
                 continue  # the package of stored runs is not here
-            if basis is not None:
+            of_here = {row.digest: row for row in rows if row.rating and row.digest in own_digests}
+            if basis is not None and of_here:
                 found[name] = (rows, basis)
-                rated |= {row.digest: row for row in rows if row.rating}
-        for row in self.rows:
-            own = rated.get(row.get("digest") or "")
+                rated |= of_here
+        for row, digest in zip(self.rows, self.digests, strict=True):
+            own = rated.get(digest)
             if own is not None:
-                row |= {"class": own.rating, "solved_by": own.solved / own.voters}
+                row |= rated_by(own.solved, own.voters)
         return found
 
     def _add_runs(self, campaigns: Campaigns) -> None:
-        digests = {row["digest"]: k for k, row in enumerate(self.rows)}
+        # of equal problems the first has the runs of all
+        digests = {row["digest"]: k for k, row in reversed(list(enumerate(self.rows)))}
         names = {
             row[key]: k
             for k, row in enumerate(self.rows)
@@ -259,6 +291,8 @@ class Problems:
                 place = names.get("/".join(path.parts[-3:]))
                 if place is not None and not _is_of(self.rows[place], digest, facts):
                     place = None
+                elif place is not None:
+                    place = digests[self.rows[place]["digest"]]
             if place is None:
                 place = digests.get(digest)
             if place is None:
@@ -270,6 +304,7 @@ class Problems:
                 known = {key: value for key, value in facts.items() if key != "same_as"}
                 self.rows.append({**known, "id": name, "nnz_W": facts["nnz"]})
                 self.files.append(path)
+                self.digests.append(digest)
             self.places[digest] = place
 
     def columns(self) -> list[dict[str, Any]]:
@@ -279,14 +314,14 @@ class Problems:
         more = [
             key
             for key in more
-            if key not in ("problem", "path", "nnz", "step", "time", "seed", "title")
+            if key not in ("problem", "path", "nnz", "step", "time", "seed", *SILENT)
         ]
         found = []
         for name, label, doc in (*COLUMNS, *((key, key.replace("_", " "), "") for key in more)):
             values = [row.get(name) for row in self.rows]
             if any(value not in (None, "", False) for value in values):
                 found.append({"key": name, "label": label, "doc": doc, **_packed(values)})
-        for name in ("title", "number", "tol", "solver", "global_file", "local_file"):
+        for name in SILENT:
             values = [row.get(name) for row in self.rows]
             if any(value is not None for value in values):
                 found.append({"key": name, "hidden": True, **_packed(values)})
@@ -303,6 +338,26 @@ def _is_of(row: Mapping[str, Any], digest: str, facts: Mapping[str, Any]) -> boo
         return True
     same = all(row[key] == facts[key] for key in ("family", "nc", "p", "spacedim"))
     return same and str(row["formulation"]) == f"G{facts['formulation']}"
+
+
+def rated_by(solved: int, voters: int) -> dict[str, Any]:
+    """The class of a problem, and how many of the solvers that take it solve it."""
+    return {
+        "class": rating(solved, voters),
+        "solved_by": solved / voters,
+        "solved_of": f"{solved} of {counted(voters, 'solver')}",
+    }
+
+
+def law_of(formulation: str) -> str:
+    """The law of contact of a formulation (RT-0444's abbreviations), in words."""
+    found = re.fullmatch(r"G?(R?)(M?)([23])DFC", formulation)
+    if found is None:
+        return formulation
+    rolling, mixed, space = found.groups()
+    words = "Coulomb friction" + (" and rolling friction" if rolling else "")
+    place = "in the plane" if space == "2" else "in space"
+    return f"{words} {place}{', with joints' if mixed else ''} ({formulation})"
 
 
 def _packed(values: Sequence[Any]) -> dict[str, Any]:
@@ -355,6 +410,7 @@ class _Writer:
         scripts = (f'<script src="assets/{name}"></script>' for name in ("tables.js", *SCRIPTS))
         page = asset("index.html").replace("<!--SCRIPTS-->", "\n".join(scripts))
         (self.folder / "index.html").write_text(page, encoding="utf-8")
+        formulations = {row["formulation"] for row in self.problems.rows}
         site: dict[str, Any] = {
             "title": self.title or "Frictional contact problems",
             "version": _core.version,
@@ -366,6 +422,7 @@ class _Writer:
             "weigh": WEIGH,
             "merits": described_merits(),
             "charges": {"penalty": PENALTY, "shift": SHIFT},
+            "laws": {name: law_of(name) for name in sorted(formulations)},
             "tolerances": [],
             "headlines": [],
             "solvers": [],
@@ -378,17 +435,10 @@ class _Writer:
         views, steps = self._views()
         site["families"] = self._families(steps)
         site["views"] = views
-        site["standings"] = _standings(self.problems.standings)
-        here = {row["id"] for row in self.problems.rows}
-        site["known"] = [
-            one["problem"]
-            for own in site["standings"]
-            for one in own["open"]
-            if one["problem"] in here
-        ]
+        site["standings"] = _standings(self.problems, self.campaigns)
         site["cite"] = {"collection": citing.collection(), "problem": citing.problem()}
         site["problems"] = len(self.problems.rows)
-        site["recipes"] = recipes(sorted({row["formulation"] for row in self.problems.rows}))
+        site["recipes"] = recipes(sorted(formulations))
         site["files"] = self.taking.kind
         site["module"] = browser.copy(self.module, self.folder) if self.module else 0
         if self.module:
@@ -441,6 +491,7 @@ class _Writer:
             solved = sum(is_solved(run["status"]) for run in runs)
             self.problems.rows[place] |= {"runs": len(runs), "solved": solved}
         self.progress("problems", len(by_place), len(by_place))
+        self.problems.share()
         # if a solver also ran before stores kept descriptions, take the later one
         _, places = campaigns.rows.numbers("solver", "about")
         kinds = list(campaigns.rows.where(places))
@@ -486,14 +537,14 @@ class _Writer:
         for k, instance in enumerate(costs.instances):
             row = self.problems.rows[self.problems.places[instance.hash]]
             if not row.get("class") and voters[k]:
-                row["class"] = rating(int(solved[k]), int(voters[k]))
-                row["solved_by"] = float(solved[k] / voters[k])
+                row |= rated_by(int(solved[k]), int(voters[k]))
 
     def _views(self) -> tuple[int, dict[tuple[str, str], list[int]]]:
         """Draw all problems. Return the number of views, and the steps of each family."""
         rows, files = self.problems.rows, self.problems.files
         there = [k for k, file in enumerate(files) if file is not None and file.is_file()]
-        chosen = set(there if self.views is None else _spread(there, rows, self.views))
+        originals = [k for k in there if not rows[k].get("same_as")]  # copies show theirs
+        chosen = set(there if self.views is None else _spread(originals, rows, self.views))
         tasks = []
         for k in there:
             file = files[k]
@@ -543,12 +594,12 @@ class _Writer:
             if shown:
                 record["thumb"] = f"thumbs/{shown[len(shown) // 2]}.webp"
             source = self.problems.folder / collection / name if self.problems.folder else None
-            for picture in PICTURES:
-                if source and (source / picture).is_file():
-                    target = self.folder / "pictures" / collection / name
-                    target.mkdir(parents=True, exist_ok=True)
-                    shutil.copyfile(source / picture, target / picture)
-                    record[picture.partition(".")[0]] = f"pictures/{collection}/{name}/{picture}"
+            if source and (source / SCENE).is_file():
+                record["scene"] = f"pictures/{collection}/{name}/{SCENE}"
+                target = self.folder / record["scene"]
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(source / SCENE, target)
+            record["histograms"] = _histograms(rows)
             found.append(record)
         # pictures first
         return sorted(found, key=lambda one: "scene" not in one and "thumb" not in one)
@@ -559,29 +610,57 @@ def described_merits() -> list[list[str | None]]:
     return [[name, inspect.getdoc(getattr(_core.Merit, name))] for name in MERITS]
 
 
-def _standings(known: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The content of the page of classes, by set."""
+def _histograms(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """How the measures of a family are distributed over its problems."""
     found = []
-    for name, (rows, basis) in known.items():
-        counts: dict[str, dict[str, int]] = {}
-        for row in rows:
-            own = counts.setdefault(row.id.split("/")[1], dict.fromkeys(CLASSES, 0))
-            if row.rating:
-                own[row.rating] += 1
-        best = [(row.id, row.best) for row in rows if row.rating == "open"]
-        found.append(
-            {
-                "set": name,
-                "basis": str(basis),
-                "families": [{"family": family, **own} for family, own in counts.items()],
-                "open": [
-                    {"problem": id_, "error": run.error, "by": run.solver, "date": run.date}
-                    for id_, run in best
-                    if run is not None
-                ],
-            }
-        )
+    for key, _ in MEASURES:
+        values = [row[key] for row in rows if row.get(key) is not None]
+        if values:
+            edges, counts = bins_of(values)
+            record = {"key": key, "integer": is_whole(values)}
+            found.append(record | {"edges": rounded(edges, DIGITS), "counts": counts.tolist()})
     return found
+
+
+def _standings(problems: Problems, campaigns: Campaigns | None) -> list[dict[str, Any]]:
+    """The content of the page of classes: by set, and of problems that only these runs rate."""
+    found = []
+    places = {digest: k for k, digest in reversed(list(enumerate(problems.digests))) if digest}
+    published: set[int] = set()
+    for name, (rows, basis) in problems.standings.items():
+        here = {places[row.digest]: row for row in rows if row.digest in places and row.rating}
+        published |= here.keys()
+        open_ones = [
+            {"problem": problems.rows[k]["id"], "error": best.error, "by": best.solver}
+            | {"date": best.date}
+            for k, row in here.items()
+            if row.rating == "open" and (best := row.best) is not None
+        ]
+        known = {"set": name, "basis": str(basis), "published": True, "open": open_ones}
+        found.append(known | {"families": _classes(problems, here)})
+    own = [k for k, row in enumerate(problems.rows) if row.get("class") and k not in published]
+    own = [k for k in own if not problems.rows[k].get("same_as")]
+    if own and campaigns is not None:
+        tol = campaigns.tolerances[-1]
+        best = {problems.places[key]: run for key, run in campaigns.least_errors().items()}
+        open_ones = [
+            {"problem": problems.rows[k]["id"], "error": best[k][0], "by": best[k][1]}
+            for k in own
+            if problems.rows[k]["class"] == "open" and k in best
+        ]
+        basis = f"to {tol:g}, by the runs of this report"
+        known = {"set": "this report", "basis": basis, "published": False}
+        found.append(known | {"open": open_ones, "families": _classes(problems, own)})
+    return list(rounded(found, DIGITS))
+
+
+def _classes(problems: Problems, places: Iterable[int]) -> list[dict[str, Any]]:
+    """How many problems of each family are of each class."""
+    counts: dict[str, dict[str, int]] = {}
+    for k in places:
+        row = problems.rows[k]
+        counts.setdefault(row["family"], dict.fromkeys(CLASSES, 0))[row["class"]] += 1
+    return [{"family": family, **own} for family, own in sorted(counts.items())]
 
 
 def _spread(there: Sequence[int], rows: Sequence[Mapping[str, Any]], count: int) -> list[int]:

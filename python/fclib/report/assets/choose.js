@@ -1,8 +1,8 @@
 // which solver for mine: a sentence by the runs of problems like it
 "use strict";
 (() => {
-  const { h, number, load, link, to } = Fclib;
-  const { site, select } = Fclib.parts;
+  const { h, number, load } = Fclib;
+  const { site, catalogue, select, solverLink, tolerances, toleranceOf } = Fclib.parts;
   const SIZES = [
     ["", "any"],
     ["0-10", "up to 10"],
@@ -41,99 +41,106 @@
       .sort((a, b) => a.mean - b.mean);
   };
 
-  Fclib.chooser = (catalogue, params, keep) => {
+  /* which problems are meant: of a set, of a kind, of a size */
+  const meant = ({ set, kind, size }, { read }) => {
+    const [from, end] = size
+      ? size.split("-").map((x) => (x === "" ? Infinity : Number(x)))
+      : [0, Infinity];
+    return (k) =>
+      (!set || read.collection(k) === set) &&
+      (!kind || read.kind(k) === kind) &&
+      read.nc(k) >= from &&
+      read.nc(k) <= end;
+  };
+  const answer = (rows, state) => {
+    const s = site();
+    const name = (r) => s.solvers[r.s].label;
+    const [best, second] = rows;
+    const [low, high] = Fclib.odds(best.solved, best.of);
+    const charge = number(10 ** state.weight);
+    return [
+      "Take ",
+      h("b", {}, solverLink(name(best))),
+      `. It solved ${best.solved} of ${Fclib.count(best.of, "such problem")} to ` +
+        `${Fclib.tolerance(s.tolerances[state.tol])}, and should solve the next one with a ` +
+        `chance of ${Math.round(100 * low)} to ${Math.round(100 * high)} %. Its mean CPU time ` +
+        `is ${number(best.mean)} s, where a failure counts ` +
+        `${charge === "1" ? "as" : `${charge} times`} the limit.`,
+      ...(second
+        ? [
+            " The second is ",
+            solverLink(name(second)),
+            `: ${second.solved} of ${second.of}, ${number(second.mean)} s.`,
+          ]
+        : []),
+    ];
+  };
+  const everyRank = (rows) => {
+    const name = (r) => site().solvers[r.s].label;
+    return h(
+      "details",
+      {},
+      h("summary", {}, "All solvers by this weight"),
+      Fclib.table({
+        caption:
+          "Solvers with enough runs of such problems, the best first; a failure is " +
+          "charged so many times the limit as the weight says",
+        rows,
+        page: 20,
+        sort: { key: "mean", down: false },
+        columns: [
+          {
+            key: "solver",
+            label: "solver",
+            head: true,
+            value: name,
+            cell: (r) => solverLink(name(r)),
+          },
+          { key: "solved", label: "solved" },
+          { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved },
+          { key: "mean", label: "mean [s]", type: "number" },
+        ],
+      }),
+    );
+  };
+
+  /* the panel; changed({tol, narrowed, like, cat, bench, costs}) hears which problems are meant */
+  Fclib.chooser = (params, keep, changed) => {
     const s = site();
     const state = {
+      set: params.get("set") || "",
       kind: params.get("kind") || "",
       size: params.get("size") || "",
-      ctol: Number(params.get("ctol") ?? s.tolerances.length - 1),
+      tol: toleranceOf(params),
       weight: Number(params.get("weight") ?? 1),
     };
     const says = h("p", { role: "status", class: "answer" }, "…");
     const table = h("div", {});
+    let turn = 0;
     const draw = async () => {
+      const own = ++turn;
       const [cat, bench, costs] = await Promise.all([
         catalogue(),
-        load(`t${state.ctol}`),
-        load(`t${state.ctol}-cpu_s`),
+        load(`t${state.tol}`),
+        load(`t${state.tol}-cpu_s`),
       ]);
-      const { read } = cat;
-      const [from, end] = state.size
-        ? state.size.split("-").map((x) => (x === "" ? Infinity : Number(x)))
-        : [0, Infinity];
-      const like = (k) =>
-        (!state.kind || read.kind(k) === state.kind) && read.nc(k) >= from && read.nc(k) <= end;
-      const rows = Fclib.ranked(
-        bench,
-        costs,
-        s.solvers.map((one) => one.label),
-        read.family,
-        like,
-        10 ** state.weight,
-        s,
-      );
-      const name = (r) => s.solvers[r.s].label;
-      const tol = Fclib.tolerance(s.tolerances[state.ctol]);
-      if (!rows.length) {
-        says.replaceChildren(
-          "No problem like that was run to this tolerance by solvers that compare.",
-        );
-        table.replaceChildren();
-        return;
-      }
-      const [best, second] = rows;
-      const [low, high] = Fclib.odds(best.solved, best.of);
+      if (own !== turn) return;
+      const like = meant(state, cat);
+      const names = s.solvers.map((one) => one.label);
+      const rows = Fclib.ranked(bench, costs, names, cat.read.family, like, 10 ** state.weight, s);
       says.replaceChildren(
-        "Take ",
-        h("b", {}, link("solver", [name(best)], {}, name(best))),
-        `. It solved ${best.solved} of ${best.of} such problems to ${tol}, and should solve ` +
-          `the next one with a chance of ${Math.round(100 * low)} to ` +
-          `${Math.round(100 * high)} %. ` +
-          `Its mean CPU time is ${number(best.mean)} s, where a failure counts as ` +
-          `${number(10 ** state.weight)} times the limit.`,
-        ...(second
-          ? [
-              " The second is ",
-              link("solver", [name(second)], {}, name(second)),
-              `: ${second.solved} of ${second.of}, ${number(second.mean)} s.`,
-            ]
-          : []),
-        ` All were compared on the same ${best.of} instances, and each family weighs the same: `,
-        h("a", { href: to("profiles", [], { tol: state.ctol }) }, "the curves"),
-        ".",
+        ...(rows.length
+          ? answer(rows, state)
+          : ["No problem like that was run to this tolerance by solvers that compare."]),
       );
-      table.replaceChildren(
-        h(
-          "details",
-          {},
-          h("summary", {}, "All solvers by this weight"),
-          Fclib.table({
-            caption:
-              "Solvers with enough runs of such problems, the best first; a failure is " +
-              "charged so many times the limit as the weight says",
-            rows,
-            page: 20,
-            sort: { key: "mean", down: false },
-            columns: [
-              {
-                key: "solver",
-                label: "solver",
-                head: true,
-                value: name,
-                cell: (r) => link("solver", [name(r)], {}, name(r)),
-              },
-              { key: "solved", label: "solved" },
-              { key: "failed", label: "failed", type: "number", value: (r) => r.of - r.solved },
-              { key: "mean", label: "mean [s]", type: "number" },
-            ],
-          }),
-        ),
-      );
+      table.replaceChildren(...(rows.length ? [everyRank(rows)] : []));
+      const narrowed = Boolean(state.set || state.kind || state.size);
+      changed({ tol: state.tol, narrowed, like, cat, bench, costs });
     };
     const change = (key) => (value) => {
-      state[key] = ["ctol", "weight"].includes(key) ? Number(value) : value;
+      state[key] = ["tol", "weight"].includes(key) ? Number(value) : value;
       keep({ [key]: value });
-      draw();
+      return draw();
     };
     const weight = h(
       "label",
@@ -149,16 +156,21 @@
         onchange: (e) => change("weight")(e.target.value),
       }),
     );
-    const kinds = h("span", {});
+    const [sets, kinds] = [h("span", {}), h("span", {})];
+    const fill = (place, label, key, values) => {
+      const there = [...new Set(values.filter(Boolean))].sort();
+      if (there.length < 2) {
+        place.remove();
+        return;
+      }
+      const choices = [["", "any"], ...there.map((value) => [value, value])];
+      place.replaceWith(select(label, choices, state[key], change(key)));
+    };
     catalogue().then((cat) => {
-      const values = cat.read.kind
-        ? [...new Set(cat.rows.map((row) => row.kind).filter(Boolean))].sort()
-        : [];
-      if (values.length > 1)
-        kinds.replaceWith(
-          select("kind", [["", "any"], ...values.map((v) => [v, v])], state.kind, change("kind")),
-        );
-      draw();
+      const all = (key) => (cat.read[key] ? cat.rows.map((row) => row[key]) : []);
+      fill(sets, "set", "set", all("collection"));
+      fill(kinds, "kind", "kind", all("kind"));
+      return draw();
     });
     return h(
       "section",
@@ -167,14 +179,10 @@
       h(
         "div",
         { class: "controls" },
+        sets,
         kinds,
         select("contacts", SIZES, state.size, change("size")),
-        select(
-          "tolerance",
-          s.tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]),
-          state.ctol,
-          change("ctol"),
-        ),
+        select("tolerance", tolerances(), state.tol, change("tol")),
         weight,
       ),
       says,

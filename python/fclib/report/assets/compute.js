@@ -292,7 +292,8 @@
             const time = passed();
             drawn.add([[result.iterations, result.error, time]]);
             live.textContent =
-              `${solver}: ${result.status} after ${result.iterations} iterations and ` +
+              `${solver}: ${result.status} after ` +
+              `${Fclib.count(result.iterations, "iteration")} and ` +
               `${number(time, 2)} s`;
             let merit = {};
             let why = null;

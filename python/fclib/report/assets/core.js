@@ -59,13 +59,21 @@ Fclib.set = (element, attributes) => {
 };
 
 // names and what they are, where it is known
-Fclib.facts = (pairs) =>
+Fclib.facts = (pairs, kind = "facts") =>
   Fclib.h(
     "dl",
-    { class: "facts" },
+    { class: kind },
     pairs
       .filter(([, v]) => v !== null && v !== undefined && v !== "")
       .map(([name, v]) => [Fclib.h("dt", {}, name), Fclib.h("dd", {}, v)]),
+  );
+// what is not wanted at once, under a heading that opens it
+Fclib.folded = (title, ...content) =>
+  Fclib.h(
+    "details",
+    { class: "folded" },
+    Fclib.h("summary", {}, Fclib.h("h2", {}, title)),
+    ...content,
   );
 // `names` of code in a text
 Fclib.prose = (text) =>
@@ -151,16 +159,19 @@ Fclib.number = (value, digits = 3) => {
   }
   return String(Number(value.toPrecision(digits)));
 };
-Fclib.percent = (share) => `${Math.round(1000 * share) / 10} %`;
-Fclib.tolerance = (tol) => tol.toExponential().replace("e+", "e");
+Fclib.percent = (share) =>
+  Number.isFinite(share) ? `${Math.round(1000 * share) / 10} %` : Fclib.number(null);
+Fclib.tolerance = (tol) =>
+  Number.isFinite(tol) ? tol.toExponential().replace("e+", "e") : Fclib.number(null);
+// "1 family", "2 families"
+Fclib.count = (number, one, many = `${one}s`) => `${number} ${number === 1 ? one : many}`;
 
 // ---- light and dark: the system's choice until a person makes another
 Fclib.theme = {
   key: "fclib-theme",
   system: matchMedia("(prefers-color-scheme: dark)"),
   chosen: null,
-  apply() {
-    const name = this.chosen || (this.system.matches ? "dark" : "light");
+  apply(name = this.chosen || (this.system.matches ? "dark" : "light")) {
     document.documentElement.dataset.theme = name;
     document.documentElement.classList.toggle("dark", name === "dark");
     document.dispatchEvent(new Event("fclib-theme"));
@@ -182,6 +193,14 @@ try {
 }
 Fclib.theme.apply();
 Fclib.theme.system.addEventListener("change", () => Fclib.theme.apply());
+// paper is white and as wide as style.css says; what follows an event is done before the print
+const paper = (on) => {
+  document.documentElement.classList.toggle("paper", on);
+  Fclib.theme.apply(on ? "light" : undefined);
+  document.dispatchEvent(new Event("fclib-print"));
+};
+addEventListener("beforeprint", () => paper(true));
+addEventListener("afterprint", () => paper(false));
 Fclib.themeButton = () =>
   Fclib.h(
     "button",

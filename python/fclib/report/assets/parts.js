@@ -56,6 +56,11 @@
     );
   const tolerances = () => site().tolerances.map((tol, t) => [t, Fclib.tolerance(tol)]);
   const lastTolerance = () => site().tolerances.length - 1;
+  // an address may be of another report
+  const toleranceOf = (params) => {
+    const tol = Number(params.get("tol") ?? lastTolerance());
+    return Number.isInteger(tol) && tol >= 0 && tol < lastTolerance() ? tol : lastTolerance();
+  };
   const familyChoices = () => [
     ["", "all"],
     ...[...new Set(site().families.map((f) => f.name))].map((name) => [name, name]),
@@ -147,33 +152,6 @@
   const machine = (o) => [o.node, o.cpu].filter(Boolean).join(", ") || "an unknown machine";
   const captionOf = (head) => `${head.caption}; ${site().judged}`;
 
-  const familyCards = (list) =>
-    h(
-      "div",
-      { class: "cards" },
-      list.map((f) =>
-        h(
-          "article",
-          { class: "panel" },
-          f.scene || f.thumb
-            ? h(
-                "a",
-                { href: familyHref(f.set, f.name), tabindex: -1, "aria-hidden": "true" },
-                h("img", { src: f.scene || f.thumb, alt: "", loading: "lazy" }),
-              )
-            : null,
-          h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
-          h("p", { class: "small" }, f.description || ""),
-          h(
-            "p",
-            { class: "small soft" },
-            `${f.problems} problem${f.problems === 1 ? "" : "s"}, ` +
-              `${f.ranges.nc ? range(f.ranges.nc) : "?"} contacts, ${f.formulations.join(", ")}`,
-          ),
-        ),
-      ),
-    );
-
   Fclib.parts = {
     site,
     catalogue,
@@ -183,7 +161,7 @@
     solverLink,
     select,
     tolerances,
-    lastTolerance,
+    toleranceOf,
     familyChoices,
     styleOf,
     range,
@@ -194,6 +172,5 @@
     summaryColumns,
     machine,
     captionOf,
-    familyCards,
   };
 })();

@@ -94,9 +94,8 @@
   };
 
   /* options: name, title, draw() -> {data, layout}, height, says: what it holds and which keys it
-     knows,
-     keys: {key: act(box)}, href(point), table() -> element, above, note, still: no tools and no
-     table */
+     knows, keys: {key: act(box)}, href(point), table() -> element, below: controls, note,
+     still: no tools and no table */
   Fclib.plot = (options) => {
     const { title } = options;
     const name = options.name.replaceAll("/", "-");
@@ -104,7 +103,9 @@
       class: "plot",
       tabindex: 0,
       role: options.still ? "img" : "application",
-      "aria-label": `${title}. ${options.says || ""} A table follows.`,
+      "aria-label": [`${title}.`, options.says, options.still ? null : "A table follows."]
+        .filter(Boolean)
+        .join(" "),
       style: `height: ${options.height || 400}px`,
     });
     const heard = h("p", { class: "unseen", role: "status" });
@@ -146,6 +147,13 @@
     document.addEventListener("fclib-theme", () => {
       if (box.dataset.drawn && box.isConnected) box.draw();
     });
+    // on paper are all charts, also those that were not in sight
+    document.addEventListener("fclib-print", async () => {
+      if (!box.isConnected || !box.clientWidth) return;
+      await box.draw();
+      await window.Plotly.relayout(box, { autosize: true });
+    });
+    (window.requestIdleCallback || setTimeout)(Fclib.plotly);
     box.addEventListener("keydown", (event) => {
       const act = options.keys && options.keys[event.key];
       if (!act || !box.dataset.drawn) return;
@@ -186,10 +194,10 @@
       ["CSV", () => fill().api.button(0).trigger()],
     ];
     return figure(
-      options.above,
       box,
       heard,
       options.note && h("figcaption", {}, options.note),
+      options.below,
       h(
         "div",
         { class: "tools" },
@@ -261,7 +269,7 @@
     return Fclib.plot({
       ...options,
       height: (Fclib.isNarrow() ? 330 : 400) + (series.length > 1 ? 20 * rows : 0),
-      says: `${series.length} curves. Left and right arrows read values.`,
+      says: `${Fclib.count(series.length, "curve")}. Left and right arrows read values.`,
       keys: {
         ArrowLeft: read(-stride),
         ArrowRight: read(stride),
@@ -356,7 +364,7 @@
     return Fclib.plot({
       ...options,
       height: (Fclib.isNarrow() ? 330 : 400) + 20 * Math.ceil(names.length / 4),
-      says: `${names.length} solvers.`,
+      says: `${Fclib.count(names.length, "solver")}.`,
       draw: () => ({
         data: names.map((name) => {
           const own = options.rows.filter((r) => r.solver === name);
@@ -364,7 +372,7 @@
           return {
             type: "scatter",
             mode: "lines+markers",
-            name: `${name} ${[...new Set(own.map((r) => `${r.solved} of ${r.of}`))].join(", ")}`,
+            name,
             x: own.map((r) => r.mean),
             y: own.map((r) => r.tol),
             text: own.map((r) => `${r.solved} of ${r.of} solved`),
@@ -411,7 +419,7 @@
     return Fclib.plot({
       ...options,
       height: (Fclib.isNarrow() ? 380 : 480) + 20 * Math.ceil(options.groups.length / 4),
-      says: `${options.points.length} problems.`,
+      says: `${Fclib.count(options.points.length, "problem")}.`,
       href: (point) => options.to(point.customdata),
       draw: () => ({
         data: options.groups.map((group, k) => {
@@ -491,6 +499,52 @@
     });
   };
 
+  /* whole steps, so that an axis of counts has no half ones */
+  const whole = (span) => Math.max(1, Math.ceil(span / 5));
+  /* a histogram that Python has counted: name, label, edges, counts, integer */
+  Fclib.bars = ({ name, label, edges, counts, integer }) => {
+    const middle = counts.map((_, k) => (edges[k] + edges[k + 1]) / 2);
+    const span = edges[edges.length - 1] - edges[0];
+    const most = Math.max(...counts);
+    return Fclib.plot({
+      name: `histogram-${name}`,
+      title: `Histogram of ${label}`,
+      still: true,
+      height: 220,
+      says: `At most ${Fclib.count(most, "problem")} in a bar.`,
+      draw: () => ({
+        data: [
+          {
+            type: "bar",
+            x: middle,
+            y: counts,
+            width: counts.map((_, k) => edges[k + 1] - edges[k]),
+            marker: { color: colour("c0"), line: { width: 1, color: colour("back") } },
+            hovertemplate: "%{y} at %{x:.3~g}<extra></extra>",
+          },
+        ],
+        layout: {
+          margin: { l: 44, r: 8, t: 8, b: 44 },
+          xaxis: {
+            title: { text: label },
+            fixedrange: true,
+            nticks: 5,
+            // one bar alone does not fill the picture
+            range: counts.length > 1 ? undefined : [edges[0] - span, edges[1] + span],
+            ...(integer && span < 25 ? { dtick: whole(span), tick0: edges[0] + 0.5 } : {}),
+          },
+          yaxis: {
+            title: { text: "problems" },
+            fixedrange: true,
+            range: [0, 1.08 * most],
+            dtick: whole(most),
+            tick0: 0,
+          },
+        },
+      }),
+    });
+  };
+
   /* the eigenvalues of W, the largest first */
   Fclib.spectrum = ({ values, size, rank, conditioning }, name) =>
     Fclib.lines({
@@ -541,7 +595,9 @@
           const [tall, wide] = cells.map((count) => Math.max(24, side * count));
           const figure = Fclib.plot({
             name: `pattern-${one.name}`,
-            title: `Pattern of ${one.name}, ${m} by ${n}, ${one.nnz} entries`,
+            title:
+              `Pattern of ${one.name}, ${m} by ${n}, ` +
+              `${Fclib.count(one.nnz, "entry", "entries")}`,
             still: true,
             height: tall + 8,
             draw: () => ({
@@ -569,7 +625,8 @@
             }),
             note: [
               h("b", {}, one.name),
-              ` ${m} × ${n}, ${one.nnz} entries (${number((100 * one.nnz) / (m * n), 2)} %)`,
+              ` ${m} × ${n}, ${Fclib.count(one.nnz, "entry", "entries")} (` +
+                `${number((100 * one.nnz) / (m * n), 2)} %)`,
               one.rank && `, rank ${one.rank}`,
               one.conditioning && `, condition number ${number(one.conditioning)}`,
               one.cell > 1 && `; a pixel is ${one.cell} × ${one.cell}`,

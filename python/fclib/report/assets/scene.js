@@ -5,6 +5,9 @@
   const { h, number, colour } = Fclib;
   const STATUS = ["open", "stick", "slide"];
   const TINTS = ["t0", "t1", "t2", "t3", "t4"];
+  const VIEW = Math.PI / 4; // [rad] what Plotly's eye sees, from bottom to top
+  const ROUNDS = 3; // of aiming the eye: then the middle moves by no pixel
+  const FILLED = 0.9; // of a picture is the scene; the rest has the numbers of the axes
   const length = (x) => Math.hypot(...x);
   const axes = (points) =>
     Object.fromEntries(["x", "y", "z"].map((name, k) => [name, points.map((p) => p && p[k])]));
@@ -112,7 +115,7 @@
       reactions: solved,
     };
     let scale = 1;
-    let glass = true;
+    let glass = false;
     const names = solids ? solids.names : [];
     const body = (b) => (b < 0 ? "the ground" : names[b] || `body ${b}`);
     const known = pairs.length > 0 && (bodies.length > 0 || names.length > 0);
@@ -436,7 +439,6 @@
       return { from, to, ratios: spans.map((x) => Math.max(0.02, x / span)) };
     };
     const { from, to, ratios } = window3d();
-    const far = Math.max((Fclib.isNarrow() ? 1.4 : 1.1) * length(ratios), 1.6 * ratios[2]);
     const eye = (turn, tilt, distance) => ({
       x: distance * Math.cos(tilt) * Math.sin(turn),
       y: -distance * Math.cos(tilt) * Math.cos(turn),
@@ -445,18 +447,62 @@
     // a long thin scene is shown from near its middle, or no body could be seen; picture.py has the
     // same bound
     const thin = placed && moving.length > 2 && [...ratios].sort((a, b) => b - a)[1] < 0.15;
-    const start = {
-      eye: eye(0.6, placed ? 0.3 : 0.4, thin ? 0.25 * far : far),
-      center: { x: 0, y: 0, z: thin ? 0 : -0.05 },
-      up: { x: 0, y: 0, z: 1 },
+    const [TURN, TILT] = [0.6, placed ? 0.3 : 0.4];
+    // to the right, up and towards the eye, as it is at first
+    const AXES = [
+      [Math.cos(TURN), Math.sin(TURN), 0],
+      [-Math.sin(TILT) * Math.sin(TURN), Math.sin(TILT) * Math.cos(TURN), Math.cos(TILT)],
+      Object.values(eye(TURN, TILT, 1)),
+    ];
+    /* where the eye looks, and from how far, so that a picture of these proportions (wide over
+       tall) is filled */
+    const aimed = (proportions) => {
+      const span = Math.max(...from.map((x, k) => to[k] - x + 2 * pad));
+      const seen = bounds.map((p) => {
+        const place = p.map((value, k) => (value - (from[k] + to[k]) / 2) / span);
+        return AXES.map((axis) => axis.reduce((sum, x, k) => sum + x * place[k], 0));
+      });
+      const reached = FILLED * Math.tan(VIEW / 2);
+      const needed = ([across, up, near], aim) =>
+        near + Math.max(Math.abs(across - aim[0]) / proportions, Math.abs(up - aim[1])) / reached;
+      const least = (aim) => seen.reduce((most, p) => Math.max(most, needed(p, aim)), 0);
+      let aim = [0, 0];
+      // what is near is larger: the middle of what is seen is not that of the scene
+      for (let round = 0; round < ROUNDS; round++) {
+        const far = least(aim);
+        const places = seen.map((p) => aim.map((x, k) => (p[k] - x) / (far - p[2])));
+        aim = aim.map((x, k) => {
+          const list = places.map((place) => place[k]);
+          const [a, b] = [Math.min, Math.max].map((most) => list.reduce((m, v) => most(m, v)));
+          return x + (far * (a + b)) / 2;
+        });
+      }
+      return {
+        far: least(aim),
+        centre: [0, 1, 2].map((k) => aim[0] * AXES[0][k] + aim[1] * AXES[1][k]),
+      };
     };
-    const look = (box, camera) => Plotly.relayout(box, { "scene.camera": camera });
+    const camera = (turn, tilt, far, [x, y, z]) => {
+      const away = eye(turn, tilt, far);
+      return {
+        eye: { x: away.x + x, y: away.y + y, z: away.z + z },
+        center: { x, y, z },
+        up: { x: 0, y: 0, z: 1 },
+      };
+    };
+    const start = (box) => {
+      const { far, centre } = aimed(box.clientWidth / box.clientHeight);
+      return thin ? camera(TURN, TILT, 0.25 * far, [0, 0, 0]) : camera(TURN, TILT, far, centre);
+    };
+    const look = (box, seen) => Plotly.relayout(box, { "scene.camera": seen });
     const move = (turn, tilted, factor) => (box) => {
       const now = box.layout.scene.camera;
-      const { x, y, z } = now.eye;
-      const distance = Math.hypot(x, y, z);
-      const tilt = Math.min(1.55, Math.max(-1.55, Math.asin(z / distance) + tilted));
-      look(box, { ...now, eye: eye(Math.atan2(x, -y) + turn, tilt, distance * factor) });
+      // Plotly leaves out what is its own default
+      const centre = Object.values(now.center || { x: 0, y: 0, z: 0 });
+      const [x, y, z] = Object.values(now.eye).map((value, k) => value - centre[k]);
+      const far = Math.hypot(x, y, z);
+      const tilt = Math.min(1.55, Math.max(-1.55, Math.asin(z / far) + tilted));
+      look(box, camera(Math.atan2(x, -y) + turn, tilt, far * factor, centre));
     };
     const window2d = { xaxis: [from[0] - pad, to[0] + pad], yaxis: [from[2] - pad, to[2] + pad] };
     const zoom = (factor) => (box) =>
@@ -489,7 +535,7 @@
           "+": move(0, 0, 0.85),
           "=": move(0, 0, 0.85),
           "-": move(0, 0, 1 / 0.85),
-          0: (box) => look(box, start),
+          0: (box) => look(box, start(box)),
         };
     // a button may be pressed before the picture is drawn
     const keys = Object.fromEntries(
@@ -533,7 +579,7 @@
         { type: "button", "aria-label": label, onclick: () => keys[key](figure.plot) },
         text,
       );
-    const above = h(
+    const controls = h(
       "div",
       { class: "controls" },
       groups.map((key) =>
@@ -609,13 +655,14 @@
     const figure = Fclib.plot({
       name: `contacts-${name}`,
       title:
-        `${placed ? "Bodies and contacts" : "Contact network"}: ${count} bodies, ` +
-        `${points.length} contacts`,
+        `${placed ? "Bodies and contacts" : "Contact network"}: ` +
+        `${Fclib.count(count, "body", "bodies")}, ` +
+        `${Fclib.count(points.length, "contact")}`,
       says: flat ? "Plus and minus zoom, 0 resets." : "Arrows turn, plus and minus zoom, 0 resets.",
       keys,
-      above: [above, steps].filter(Boolean),
+      below: [controls, steps].filter(Boolean),
       height: Math.round(
-        Math.min(0.7 * innerHeight, 560, Fclib.isNarrow() ? innerWidth : Infinity),
+        Math.min(0.7 * innerHeight, 560, Fclib.isNarrow() ? 0.85 * innerWidth : Infinity),
       ),
       space: !flat,
       picture: true,
@@ -643,7 +690,7 @@
                 showlegend: false,
                 margin: { l: 0, r: 0, t: 0, b: 0 },
                 scene: {
-                  camera: start,
+                  camera: start(figure.plot),
                   aspectmode: "manual",
                   aspectratio: Object.fromEntries(
                     ["x", "y", "z"].map((key, k) => [key, shot.ratios[k]]),
@@ -697,8 +744,8 @@
             : `A network without positions, laid out ${note}.`,
         thin && !flat && " The scene is long and thin: this is its middle, and − shows more of it.",
         limits.length > 0 &&
-          ` ${limits.length} of the contacts are limits of joints or dry friction in them, ` +
-            "which have no place.",
+          ` Of the contacts ${Fclib.count(limits.length, "is a limit", "are limits")} of ` +
+            "joints or dry friction in them, without a place.",
         solved &&
           (view.forces
             ? " An arrow is the force on that body of the two which it lifts; its colour is " +
@@ -794,27 +841,17 @@
     slider.value = Math.max(0, sequence.numbers.indexOf(sequence.number));
   };
 
-  /* all that is drawn of a problem */
-  Fclib.pictures = (view, name, sequence) =>
+  /* what a page shows first: the picture beside the facts, below each other if there is no room */
+  Fclib.stage = (picture, known) =>
+    h("div", { class: "stage" }, picture, Fclib.facts(known, "facts chief"));
+
+  /* what else is drawn of a problem */
+  Fclib.drawings = (view, name) =>
     [
-      ...(view.network
-        ? [
-            h(
-              "h2",
-              {},
-              view.network.source === "graph" ? "Contact network" : "Bodies, contacts and forces",
-            ),
-            Fclib.scene(view, name, sequence),
-          ]
-        : [h("p", {}, "No contact in this problem.")]),
-      view.network &&
-        !view.reactions &&
-        h("p", { class: "soft" }, "The file holds no solution; fclib solve --write stores one."),
-      ...(view.spectrum && view.spectrum.rank > 1
-        ? [h("h2", {}, "Spectrum"), Fclib.spectrum(view.spectrum, name)]
-        : []),
-      h("h2", {}, "Patterns"),
-      Fclib.patterns(view.patterns),
+      view.spectrum &&
+        view.spectrum.rank > 1 &&
+        Fclib.folded("Spectrum of W", Fclib.spectrum(view.spectrum, name)),
+      Fclib.folded("Patterns of the matrices", Fclib.patterns(view.patterns)),
       Fclib.texts(view),
     ].filter(Boolean);
 })();

@@ -31,6 +31,9 @@
           ? a.setAttribute("aria-current", "page")
           : a.removeAttribute("aria-current"),
       );
+    const here = nav.querySelector("[aria-current]");
+    // the list of pages may be wider than a phone
+    if (here) nav.scrollLeft = here.offsetLeft - nav.offsetLeft;
     const target = h("div", { class: "fade" });
     // what a page keeps in its address, without a new entry in the history
     const keep = (changes) => {

@@ -73,6 +73,8 @@
         },
       },
     };
+    // on a phone the rows come first
+    const above = wide && !Fclib.isNarrow();
     const buttons = [
       csv,
       ...(wide
@@ -134,9 +136,9 @@
         },
       },
       layout: {
-        topStart: wide ? { buttons } : null,
+        topStart: above ? { buttons } : null,
         topEnd: search ? "search" : null,
-        bottomStart: !wide && (name || rows.length > 7) ? { buttons } : null,
+        bottomStart: !above && (wide || name || rows.length > 7) ? { buttons } : null,
         bottomEnd: many ? { info: {}, paging: { buttons: 5 } } : null,
       },
     });

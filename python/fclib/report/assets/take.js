@@ -36,8 +36,13 @@
                   },
                   one.path.split("/").pop(),
                 ),
-                ` ${one.what}, ${size(one.bytes)}; SHA-256 `,
-                h("code", { class: "sum" }, one.sha256),
+                ` ${one.what}, ${size(one.bytes)} `,
+                h(
+                  "details",
+                  { class: "small" },
+                  h("summary", {}, "SHA-256"),
+                  h("code", { class: "sum" }, one.sha256),
+                ),
               ),
             ),
           )

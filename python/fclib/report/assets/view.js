@@ -17,9 +17,15 @@ Fclib.view = (view) => {
     .querySelector("main")
     .append(
       h("h1", {}, view.title || view.file),
-      Fclib.facts(Object.entries(known)),
-      ...Fclib.pictures(view, view.file),
+      Fclib.stage(
+        view.network ? Fclib.scene(view, view.file) : h("p", {}, "It has no contact."),
+        Object.entries(known),
+      ),
+      view.network && !view.reactions
+        ? h("p", { class: "soft" }, "The file holds no solution; fclib solve --write stores one.")
+        : "",
       ...(compute ? Fclib.computeIt(compute, view, view.file) : []),
+      ...Fclib.drawings(view, view.file),
     );
   document
     .querySelector("footer")

@@ -236,7 +236,7 @@
           told.textContent =
             STATUS.map((name, s) => `${counts[s]} ${name}${change(more[s])}`).join(", ") +
             `; ${result.converged ? "" : `not solved, ${result.status}: `}error ` +
-            `${number(result.error)}, ${result.iterations} iterations`;
+            `${number(result.error)}, ${Fclib.count(result.iterations, "iteration")}`;
           const solves = count(times.solves);
           if (figure)
             figure.show(shown(result.solution.r, digits, own.mu)).then(() => count(times.pictures));

@@ -22,9 +22,10 @@
     ["class", "class"],
     ["formulation", "form"],
     ["application", "application"],
-    ["status", "reference"],
+    ["status", "best known"],
     ["collection", "set"],
   ];
+  const WIDE = "(min-width: 60rem)"; // a side column fits; style.css has the same
   const SLIDERS = ["nc", "n", "p", "density", "mu_max", "solved_by", "conditioning_W", "best_s"];
   /* two handles over the values of a column, by their ranks, so that each step tells some problems
      apart */
@@ -155,7 +156,7 @@
             .map((part) => part.text);
       says.className = "small soft";
       says.textContent =
-        `${listed.length} of ${cat.size} problems` +
+        `${listed.length} of ${Fclib.count(cat.size, "problem")}` +
         `${lost.length ? `; no problem at all has: ${lost.join(", ")}` : ""}`;
       return listed;
     };
@@ -259,8 +260,36 @@
       ["", "all"],
       ...[...new Set(cat.rows.map((row) => row[key]))].sort().map((v) => [v, v]),
     ];
-    const narrowed = keys.some(
-      (key) => key !== "q" && key !== "family" && key !== "runs" && state[key],
+    const count = keys.filter((key) => key !== "q" && state[key]).length;
+    const filters = h(
+      "details",
+      { class: "filters", open: matchMedia(WIDE).matches },
+      h("summary", {}, count ? `Narrow it down (${count} chosen)` : "Narrow it down"),
+      select("family", values("family"), state.family, change("family")),
+      read.runs &&
+        h(
+          "label",
+          { class: "check" },
+          h("input", {
+            type: "checkbox",
+            checked: Boolean(state.runs),
+            onchange: (e) => change("runs")(e.target.checked),
+          }),
+          "with runs",
+        ),
+      tags.map(chips),
+      h(
+        "div",
+        { class: "ranges" },
+        sliders.map((c) =>
+          slider(
+            c,
+            cat.rows.map((row) => row[c.key]).filter((v) => typeof v === "number"),
+            state,
+            (key, value) => update({ [key]: value }),
+          ),
+        ),
+      ),
     );
     page.append(
       h("h1", {}, "Catalogue"),
@@ -268,39 +297,10 @@
         "div",
         { class: "controls" },
         search("filter", state.q, change("q"), "masonry contacts>50 class=hard"),
-        select("family", values("family"), state.family, change("family")),
-        read.runs &&
-          h(
-            "label",
-            { class: "check" },
-            h("input", {
-              type: "checkbox",
-              checked: Boolean(state.runs),
-              onchange: (e) => change("runs")(e.target.checked),
-            }),
-            "with runs",
-          ),
+        says,
       ),
-      says,
-      h(
-        "details",
-        { open: narrowed || !Fclib.isNarrow() },
-        h("summary", {}, "Narrow it down"),
-        h(
-          "div",
-          { class: "ranges" },
-          sliders.map((c) =>
-            slider(
-              c,
-              cat.rows.map((row) => row[c.key]).filter((v) => typeof v === "number"),
-              state,
-              (key, value) => update({ [key]: value }),
-            ),
-          ),
-        ),
-        tags.map(chips),
-      ),
-      table,
+      h("div", { class: "browse" }, filters, table),
+      Fclib.selection(() => listed),
       h(
         "details",
         {},
@@ -342,6 +342,5 @@
         h("p", { class: "small" }, "The address of this page keeps the filter."),
       ),
     );
-    says.after(Fclib.selection(() => listed));
   };
 })();

@@ -2,7 +2,60 @@
 "use strict";
 (() => {
   const { h, link, facts, prose, copyable } = Fclib;
-  const { site, lastTolerance, range, summaryColumns, familyCards } = Fclib.parts;
+  const { site, toleranceOf, familyHref, range, summaryColumns } = Fclib.parts;
+
+  const familyCards = (list) =>
+    h(
+      "div",
+      { class: "cards" },
+      list.map((f) =>
+        h(
+          "article",
+          { class: "panel" },
+          f.scene || f.thumb
+            ? h(
+                "a",
+                { href: familyHref(f.set, f.name), tabindex: -1, "aria-hidden": "true" },
+                h("img", { src: f.scene || f.thumb, alt: "", loading: "lazy" }),
+              )
+            : null,
+          h("h3", {}, h("a", { href: familyHref(f.set, f.name) }, f.title || f.name)),
+          h("p", { class: "small" }, f.description || ""),
+          h(
+            "p",
+            { class: "small soft" },
+            [
+              Fclib.count(f.problems, "problem"),
+              f.ranges.nc &&
+                `${range(f.ranges.nc)} ${f.ranges.nc[1] === 1 ? "contact" : "contacts"}`,
+              ...f.formulations,
+            ]
+              .filter(Boolean)
+              .join(", "),
+          ),
+        ),
+      ),
+    );
+
+  const MEASURES = { nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" };
+
+  const distribution = (f) => [
+    h("h2", {}, "Distribution"),
+    h(
+      "div",
+      { class: "three" },
+      f.histograms.map((one) =>
+        Fclib.bars({ ...one, label: MEASURES[one.key], name: `${f.name}-${one.key}` }),
+      ),
+    ),
+    h(
+      "p",
+      { class: "small" },
+      "The numbers are in the ",
+      link("catalogue", [], { family: f.name }, "catalogue"),
+      ".",
+    ),
+  ];
 
   Fclib.pages.families = async (page) => {
     const { families: all, problems } = site();
@@ -12,7 +65,7 @@
       h(
         "p",
         {},
-        `${problems} problems in ${all.length} families` +
+        `${Fclib.count(problems, "problem")} in ${Fclib.count(all.length, "family", "families")}` +
           `${sets.length > 1 ? ` of ${sets.length} sets` : ""}.`,
       ),
       ...sets
@@ -36,7 +89,7 @@
       h("h1", {}, f.title || f.name),
       h(
         "div",
-        { class: "two" },
+        { class: "two first" },
         f.scene || f.thumb
           ? h("figure", {}, h("img", { src: f.scene || f.thumb, alt: f.description || f.name }))
           : null,
@@ -52,10 +105,7 @@
             ["friction", f.friction],
             ["original by", f.authors],
             ["formulations", f.formulations.join(", ")],
-            ...Object.entries(f.ranges).map(([key, ends]) => [
-              { nc: "contacts", n: "degrees of freedom", density: "density", mu_max: "μ" }[key],
-              range(ends),
-            ]),
+            ...Object.entries(f.ranges).map(([key, ends]) => [MEASURES[key], range(ends)]),
           ]),
         ),
       ),
@@ -68,27 +118,9 @@
           h("a", { href: `${s.docs}/families/${f.name}.html` }, "This family in the documentation"),
         ),
       );
-    if (f.distribution)
-      page.append(
-        h("h2", {}, "Distribution"),
-        h(
-          "figure",
-          {},
-          h("img", {
-            src: f.distribution,
-            alt: `Histograms of contacts, degrees of freedom and density: ${f.problems} problems`,
-          }),
-          h(
-            "figcaption",
-            {},
-            "The numbers are in the ",
-            link("catalogue", [], { family: f.name }, "catalogue"),
-            ".",
-          ),
-        ),
-      );
+    if (f.histograms.length) page.append(...distribution(f));
     if (s.headlines.some((head) => head && head.tables[f.name])) {
-      const t = Number(params.get("tol") ?? lastTolerance());
+      const t = toleranceOf(params);
       const head = s.headlines[t];
       page.append(
         h("h2", {}, "Solvers on this family"),

@@ -1,12 +1,47 @@
 // which problems are easy, hard and open
 "use strict";
 (() => {
-  const { h, to } = Fclib;
-  const { site } = Fclib.parts;
+  const { h, copyable } = Fclib;
+  const { site, problemLink } = Fclib.parts;
+
+  /* the open problems of a set with the best errors known, or the first of them */
+  Fclib.openProblems = (one, most = Infinity) => {
+    const shown = one.open.slice(0, most);
+    const rest = one.open.length - shown.length;
+    const dated = shown.some((r) => r.date);
+    return Fclib.table({
+      caption:
+        `${Fclib.count(one.open.length, "open problem")} of ${one.set}` +
+        `${rest ? `, the first ${shown.length}` : ""}: the best error known, and by whom`,
+      rows: shown,
+      page: 50,
+      columns: [
+        { key: "problem", label: "problem", head: true, cell: (r) => problemLink(r.problem) },
+        { key: "error", label: "best error", type: "number" },
+        { key: "by", label: "by", wrap: true },
+        ...(dated ? [{ key: "date", label: "date" }] : []),
+      ],
+    });
+  };
+  const better = (one) => {
+    const problem = one.open[0].problem;
+    const steps = [
+      [`fclib collection status ${problem} --out open.hdf5`, "the problem, with the best solution"],
+      ["fclib check open.hdf5", "its error, as it will be judged"],
+      ['fclib collection take yours.hdf5 --by "you, and how"', "taken if it is better by a tenth"],
+    ];
+    const wide = Math.max(...steps.map(([command]) => command.length));
+    return [
+      h("p", {}, "How do you better one of them?"),
+      copyable(
+        steps.map(([command, why]) => `${command.padEnd(wide)}  # ${why}`).join("\n"),
+        "the commands",
+      ),
+    ];
+  };
 
   Fclib.pages.classes = async (page) => {
-    const s = site();
-    const list = s.standings || [];
+    const list = site().standings;
     page.append(
       h("h1", {}, "Easy, hard and open"),
       h(
@@ -22,45 +57,19 @@
         h(
           "p",
           {},
-          "No stored runs came with this report: they are in the package fclib-collection.",
+          "None of these problems has a class: no solver of this report has run them, and they " +
+            "are not among the stored runs of the package fclib-collection.",
         ),
       );
     for (const one of list) {
-      page.append(h("h2", {}, one.set), h("p", { class: "small" }, `Classes ${one.basis}.`));
-      if (one.open.length)
-        page.append(
-          Fclib.table({
-            caption: `Open problems of ${one.set}: the best error known, and by whom`,
-            rows: one.open,
-            page: 50,
-            columns: [
-              {
-                key: "problem",
-                label: "problem",
-                head: true,
-                cell: (r) =>
-                  s.known && s.known.includes(r.problem)
-                    ? h("a", { href: to("problem", r.problem.split("/")) }, r.problem)
-                    : r.problem,
-              },
-              { key: "error", label: "best error", type: "number" },
-              { key: "by", label: "by", wrap: true },
-              { key: "date", label: "date" },
-            ],
-          }),
-          h("p", {}, "Better one of them:"),
-          Fclib.copyable(
-            `fclib collection status ${one.open[0].problem} --out open.hdf5      # the ` +
-              "problem, with the best solution known\nfclib check open.hdf5 " +
-              "                                # its error, as it will be judged\nfclib " +
-              'collection take yours.hdf5 --by "you, and how"  # taken where it is better by a ' +
-              "tenth",
-            "the commands",
-          ),
-        );
+      page.append(h("h2", {}, one.set));
       page.append(
+        one.open.length
+          ? Fclib.openProblems(one)
+          : h("p", {}, "Each of these problems is solved by a solver."),
+        ...(one.open.length && one.published ? better(one) : []),
         Fclib.table({
-          caption: `Classes of ${one.set}, by family`,
+          caption: `Classes of ${one.set}, by family: problems of this report`,
           rows: one.families,
           page: 60,
           columns: [
@@ -70,6 +79,7 @@
             { key: "open", label: "open" },
           ],
         }),
+        h("p", { class: "small soft" }, `Classes ${one.basis}.`),
       );
     }
   };

@@ -1,8 +1,10 @@
 // one problem: its picture, facts, runs, files
 "use strict";
 (() => {
-  const { h, load, facts, copyable } = Fclib;
+  const { h, number, load, facts, copyable } = Fclib;
   const {
+    problemLink,
+    range,
     site,
     catalogue,
     problemHref,
@@ -31,6 +33,106 @@
       ["h5py, SciPy and MATLAB", own.h5py],
     ].map(([title, text]) => [h("h3", {}, title), copyable(filled(text))]);
   };
+  const jump = (place) => (event) => {
+    event.preventDefault();
+    const target = document.getElementById(place);
+    target.scrollIntoView();
+    const button = target.parentElement.querySelector(`#${place} ~ .copy button`);
+    if (button) button.focus({ preventScroll: true });
+  };
+  /* where there is no picture to turn, the small one */
+  const still = (read, row, first) => {
+    const place = [row.k, first].find((k) => read.thumb && read.thumb(k));
+    return h(
+      "figure",
+      { class: "still" },
+      place === undefined ? null : h("img", { src: `thumbs/${place}.webp`, alt: "Its bodies" }),
+      h(
+        "figcaption",
+        {},
+        "This site has no picture of it to turn: ",
+        h("code", {}, "fclib view FILE"),
+        " draws it.",
+      ),
+    );
+  };
+  const merits = (found) =>
+    Fclib.folded(
+      "Error of the stored solution, by parts",
+      site().docs
+        ? h(
+            "p",
+            { class: "small" },
+            h("a", { href: `${site().docs}/mathematics.html` }, "How the error is defined"),
+          )
+        : "",
+      Fclib.table({
+        caption: "Recomputed from the file",
+        rows: site().merits.filter(([name]) => name in found),
+        columns: [
+          { key: 0, label: "part", head: true },
+          { key: "value", label: "value", type: "number", value: ([name]) => found[name] },
+          { key: 1, label: "what it is", wrap: true },
+        ],
+      }),
+    );
+  /* the eight facts that are asked for first */
+  const keyFacts = (row, view) => {
+    const s = site();
+    const unknown = (text) => h("span", { class: "soft" }, text);
+    const rank = row.rank_W ?? (view && view.spectrum ? view.spectrum.rank : undefined);
+    return [
+      ["contacts", number(row.nc)],
+      ["degrees of freedom", row.n === null ? unknown("its bodies are not known") : number(row.n)],
+      ["law", s.laws[row.formulation]],
+      ["μ", row.nc ? range([row.mu_min, row.mu_max]) : unknown("no contact")],
+      ["class", row.class || unknown("nothing was run")],
+      ["solved by", row.solved_of || unknown("nothing was run")],
+      ["rank of W", Number.isFinite(rank) ? `${rank} of ${row.rows_W}` : unknown("not analysed")],
+      [
+        "existence, uniqueness",
+        [row.existence || unknown("existence not proven"), "; "].concat(
+          row.uniqueness ? `velocity ${row.uniqueness}` : unknown("uniqueness not proven"),
+        ),
+      ],
+    ];
+  };
+  /* all that the catalogue says */
+  const everyFact = (cat, row) => {
+    const cells = {
+      best_solver: () => solverLink(row.best_solver),
+      status: () => status(row.status),
+      best_tol: () => Fclib.tolerance(row.best_tol),
+      solved_by: () => Fclib.percent(row.solved_by),
+      same_as: () => problemLink(row.same_as),
+    };
+    const known = cat.columns.filter(
+      (c) =>
+        !c.hidden &&
+        !["id", "family", "view", "thumb"].includes(c.key) &&
+        row[c.key] !== null &&
+        row[c.key] !== undefined,
+    );
+    const value = (c) => (cells[c.key] || (() => yesOrNumber(row[c.key])))();
+    const half = Math.ceil(known.length / 2);
+    return Fclib.folded(
+      "All facts",
+      h(
+        "div",
+        { class: "two" },
+        [known.slice(0, half), known.slice(half)].map((part) =>
+          facts(part.map((c) => [c.label, value(c)])),
+        ),
+      ),
+      h(
+        "details",
+        {},
+        h("summary", {}, "What these are"),
+        facts(known.filter((c) => c.doc).map((c) => [c.label, c.doc])),
+      ),
+    );
+  };
+
   Fclib.pages.problem = async (page, rest, params, keep) => {
     const s = site();
     const cat = await catalogue();
@@ -39,136 +141,61 @@
     if (k === undefined) throw new Fclib.NotHere(`There is no problem ${id} in this catalogue.`);
     const row = cat.rows[k];
     const { read } = cat;
+    // runs are stored once for all copies of a problem, and a picture may be
+    const first = read.same_as && row.same_as ? cat.places.get(row.same_as) : k;
+    const drawn = [k, first].find((place) => read.view && read.view(place));
     const [record, runs, view] = await Promise.all([
       Fclib.fileRecord(k),
-      read.runs && row.runs ? load(`problems/${k}`) : null,
-      read.view && row.view ? load(`views/${k}`) : null,
+      read.runs && row.runs ? load(`problems/${first}`) : null,
+      drawn === undefined ? null : load(`views/${drawn}`),
     ]);
+    const set = read.collection ? row.collection : "";
     const neighbour = (j, text) =>
       j >= 0 && j < cat.size && read.family(j) === row.family
         ? h("a", { href: problemHref(read.id(j)) }, text)
         : null;
+    const ways = [
+      neighbour(k - 1, "← previous"),
+      h("a", { href: familyHref(set, row.family) }, row.family),
+      neighbour(k + 1, "next →"),
+      h("a", { href: "#take", onclick: jump("take") }, "Take it"),
+      h("a", { href: "#cite", onclick: jump("cite") }, "Cite it"),
+    ].filter(Boolean);
+    const f = s.families.find((one) => one.name === row.family && one.set === set);
+    const steps = f &&
+      f.steps && {
+        numbers: f.steps,
+        count: f.steps.length,
+        number: read.number && row.number,
+        load: () => load(`sequences/${f.set}/${f.name}`),
+        href: (n) => problemHref(`${f.set}/${f.name}/${String(n).padStart(4, "0")}`),
+      };
     page.append(
       h("h1", {}, id),
       h(
         "p",
-        { class: "small" },
-        [
-          neighbour(k - 1, "← previous"),
-          h(
-            "a",
-            { href: familyHref(read.collection ? row.collection : "", row.family) },
-            row.family,
-          ),
-          neighbour(k + 1, "next →"),
-        ]
-          .filter(Boolean)
-          .map((a, i) => [i ? " · " : "", a]),
+        { class: "small ways" },
+        ways.map((a, i) => [i ? " · " : "", a]),
+        read.title && row.title && row.title !== id ? ` · ${row.title}` : "",
       ),
-      read.title && row.title && row.title !== id && h("p", {}, row.title),
-    );
-    const labelled = cat.columns
-      .filter((c) => !c.hidden && !["id", "family", "view", "thumb"].includes(c.key))
-      .map((c) => [
-        c.label,
-        row[c.key] === null || row[c.key] === undefined
-          ? null
-          : c.key === "best_solver"
-            ? solverLink(row.best_solver)
-            : c.key === "status"
-              ? status(row.status)
-              : c.key === "best_tol"
-                ? Fclib.tolerance(row.best_tol)
-                : c.key === "solved_by"
-                  ? Fclib.percent(row.solved_by)
-                  : yesOrNumber(row[c.key]),
-      ]);
-    const half = Math.ceil(labelled.length / 2);
-    const docs = cat.columns
-      .filter((c) => !c.hidden && c.doc && row[c.key] !== null && row[c.key] !== undefined)
-      .map((c) => [c.label, c.doc]);
-    page.append(
-      h(
-        "div",
-        { class: "panel" },
-        h("div", { class: "two" }, facts(labelled.slice(0, half)), facts(labelled.slice(half))),
-        h("details", {}, h("summary", {}, "What these are"), facts(docs)),
+      first !== k
+        ? h("p", { class: "copied" }, "The same problem as ", problemLink(row.same_as), ".")
+        : "",
+      Fclib.stage(
+        view && view.network ? Fclib.scene(view, id, steps) : still(read, row, first),
+        keyFacts(row, view),
       ),
+      view && view.network && !view.reactions
+        ? h("p", { class: "soft" }, "The file holds no solution; fclib solve --write stores one.")
+        : "",
     );
-    const buildable = s.families.some(
-      (f) =>
-        f.name === row.family && f.parameters && f.set === (read.collection ? row.collection : ""),
-    );
-    page.append(
-      ...Fclib.takeIt(id, record, buildable && Boolean(record.files)),
-      h(
-        "p",
-        { class: "small" },
-        h(
-          "a",
-          {
-            href: "#cite",
-            onclick: (e) => {
-              e.preventDefault();
-              document.getElementById("cite").scrollIntoView();
-              document.querySelector("#cite + .copy button").focus({ preventScroll: true });
-            },
-          },
-          "Cite it",
-        ),
-      ),
-    );
-    if (view) {
-      const f = s.families.find(
-        (one) => one.name === row.family && one.set === (read.collection ? row.collection : ""),
-      );
-      const own = read.number && row.number;
-      const steps = f &&
-        f.steps && {
-          numbers: f.steps,
-          count: f.steps.length,
-          number: own,
-          load: () => load(`sequences/${f.set}/${f.name}`),
-          href: (n) => problemHref(`${f.set}/${f.name}/${String(n).padStart(4, "0")}`),
-        };
-      page.append(...Fclib.pictures(view, id, steps));
-      if (view.merit)
-        page.append(
-          h("h2", {}, "Merit of the reference solution"),
-          s.docs
-            ? h(
-                "p",
-                { class: "small" },
-                h("a", { href: `${s.docs}/mathematics.html` }, "How the error is defined"),
-              )
-            : "",
-          Fclib.table({
-            caption: "Recomputed from the file",
-            rows: s.merits.filter(([name]) => name in view.merit),
-            columns: [
-              { key: 0, label: "part", head: true },
-              { key: "value", label: "value", type: "number", value: ([name]) => view.merit[name] },
-              { key: 1, label: "what it is", wrap: true },
-            ],
-          }),
-        );
-    } else
-      page.append(
-        h(
-          "p",
-          { class: "soft" },
-          "This site has no picture of this problem: ",
-          h("code", {}, "fclib view FILE"),
-          " draws it.",
-        ),
-      );
     page.append(...Fclib.computeIt(record, view, id, runs));
     if (runs) {
       const several = new Set(runs.map((r) => r.form)).size > 1;
       page.append(
         h("h2", {}, "Runs"),
         Fclib.table({
-          caption: `${runs.length} runs`,
+          caption: Fclib.count(runs.length, "run"),
           rows: runs,
           page: 50,
           sort: { key: "cpu_s", down: false },
@@ -197,7 +224,7 @@
         const tols = [...new Set(curves.map((r) => r.tol))].sort((a, b) => a - b);
         const state = {
           over: params.get("over") || "time",
-          tol: Number(params.get("tol") || tols[0]),
+          tol: tols.find((tol) => tol === Number(params.get("tol"))) ?? tols[0],
         };
         const draw = () => {
           const seen = new Set();
@@ -279,10 +306,14 @@
       }
     } else if (s.overview)
       page.append(h("p", { class: "soft" }, "No run of it in the stores of this report."));
+    const buildable = Boolean(f && f.parameters && record.files);
     page.append(
-      h("h2", {}, "Read it and solve it"),
-      ...recipes(row, read).flat(),
+      ...Fclib.takeIt(id, record, buildable),
       ...Fclib.citeIt("Cite it", Fclib.problemCitation(id, record)),
+      everyFact(cat, row),
+      ...(view && view.merit ? [merits(view.merit)] : []),
+      ...(view ? Fclib.drawings(view, id) : []),
+      Fclib.folded("Read it and solve it", ...recipes(row, read).flat()),
     );
   };
 })();

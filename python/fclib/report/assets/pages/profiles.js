@@ -9,7 +9,7 @@
     solverLink,
     select,
     tolerances,
-    lastTolerance,
+    toleranceOf,
     familyChoices,
   } = Fclib.parts;
 
@@ -19,9 +19,8 @@
     const labels = s.solvers.map((v) => v.label);
     const fair = (t) =>
       ((s.headlines[t] || {}).solvers || labels).map((name) => labels.indexOf(name));
-    const t0 = Math.min(lastTolerance(), Number(params.get("tol") ?? lastTolerance()));
     const state = {
-      tol: t0,
+      tol: toleranceOf(params),
       metric: params.get("metric") || "cpu_s",
       kind: params.get("kind") || "performance",
       family: params.get("family") || "",
@@ -232,7 +231,7 @@
             : metric + (state.kind === "contact" ? " per contact" : ""),
           ylabel: performance ? "instances solved within τ" : "instances solved",
           note:
-            `${instances.length} instances of ${bench.problems.length}: ` +
+            `${Fclib.count(instances.length, "instance")} of ${bench.problems.length}: ` +
             (state.set === "own"
               ? "for each solver those that it has run and takes"
               : "those that all chosen solvers have run and take") +
@@ -324,7 +323,8 @@
               yname: labels[b],
               to: problemHref,
               note:
-                `${points.length} instances that at least one of the two solves (${s.judged}); ` +
+                `${Fclib.count(points.length, "instance")} that at least one of the two ` +
+                `solves (${s.judged}); ` +
                 `${labels[a]} needs less on ${first}, ${labels[b]} on ${second}. Each point ` +
                 "leads to its problem.",
             })

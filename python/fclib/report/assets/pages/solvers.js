@@ -9,7 +9,7 @@
     page.append(
       h("h1", {}, "Solvers"),
       Fclib.table({
-        caption: `${s.solvers.length} solvers${s.overview ? " that were run" : ""}`,
+        caption: `${Fclib.count(s.solvers.length, "solver")}${s.overview ? " that were run" : ""}`,
         rows: s.solvers,
         page: 100,
         columns: [
@@ -32,7 +32,7 @@
     const set = solver.options && solver.options !== "{}" ? solver.options : null;
     page.append(
       h("h1", {}, solver.label),
-      solver.title && h("p", {}, solver.title),
+      solver.title ? h("p", {}, solver.title) : "",
       facts([
         ["name", solver.name],
         ["options set", set && h("code", {}, set)],

@@ -1,0 +1,478 @@
+"""What the first screen of each page of the site has, at two sizes; on paper; and in its words."""
+
+from __future__ import annotations
+
+import io
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fclib.bench import Job, Limits, Record, SolverChoice, Store
+from fclib.collections.figures import bins_of, is_whole
+from fclib.report import Campaigns, build_site
+from helpers_browser import chromium
+from helpers_report import (
+    made_facts,
+    make_collection,
+    make_store,
+    read_data,
+    skip_without_libraries,
+)
+
+pytest.importorskip("mujoco")
+pytest.importorskip("pyarrow")
+skip_without_libraries()
+pytestmark = pytest.mark.slow
+
+DESK = {"width": 1440, "height": 900}
+PHONE = {"width": 390, "height": 844}
+SIZES = {"desk": DESK, "phone": PHONE}
+PROBLEM = "#/problem/small/BoxesStack/0010"
+COPY, ORIGINAL = "small/BoxesStack/0011", "small/BoxesStack/0009"
+# of each kind of page what stands on its first screen, whole: on both sizes, and on a desk alone
+WHOLE: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    "overview": ("#/overview", ("h1", ".answer"), (".first .plot",)),
+    "profiles": ("#/profiles", ("h1", ".choices"), ("figure .plot >> nth=0",)),
+    "catalogue": (
+        "#/catalogue",
+        ("h1", "input[type=search]", "tbody tr >> nth=7"),
+        (".filters fieldset >> nth=0",),
+    ),
+    "families": ("#/families", ("h1", ".cards img >> nth=0"), (".cards article >> nth=0",)),
+    "family": ("#/family/small/BoxesStack", ("h1", ".first img"), (".first dl.facts",)),
+    "problem": (PROBLEM, ("h1", ".scene .plot", "dl.chief"), (".scene .legend",)),
+    "copy": (f"#/problem/{COPY}", ("h1", ".copied a", ".scene .plot", "dl.chief"), ()),
+    "problem without a picture to turn": (
+        "#/problem/small/BoxesStack/0000",
+        ("h1", ".still img", "dl.chief"),
+        (),
+    ),
+    "problem without a picture": ("#/problem/Alone/alone", ("h1", "dl.chief"), ()),
+    "solvers": ("#/solvers", ("h1", "tbody tr >> nth=3"), ()),
+    "solver": ("#/solver/auto", ("h1", "dl.facts", "table >> nth=0"), ()),
+    "classes": ("#/classes", ("h1", "tbody tr >> nth=0"), ()),
+    "about": ("#/about", ("h1", ".copy"), ()),
+}
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_collection(tmp_path_factory.mktemp("collection"))
+
+
+@pytest.fixture(scope="module")
+def site(collection: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("built")
+    store = make_store(folder / "runs.sqlite", collection)
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, folder / "site", collection, views=5)
+    return folder / "site"
+
+
+@pytest.fixture(scope="module")
+def screens() -> Path:
+    """The folder of the pictures of pages, to be looked at."""
+    folder: Path = Path(__file__).parents[2] / "build" / "screens"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def open_page(browser: Any, site: Path, address: str, **settings: Any) -> Any:
+    """A page, when its table or picture is there; what goes wrong on it is an error."""
+    page = browser.new_page(**settings)
+    page.set_default_timeout(60_000)
+    page.on("pageerror", lambda error: pytest.fail(f"{address}: {error}"))
+    page.goto((site / "index.html").as_uri() + address)
+    page.wait_for_selector("main h1")
+    return page
+
+
+# ---- the first screen
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("name", WHOLE)
+def test_the_first_screen_has_what_one_came_for(
+    name: str, size: str, browser: Any, site: Path, screens: Path
+) -> None:
+    address, both, desk = WHOLE[name]
+    page = open_page(browser, site, address, viewport=SIZES[size])
+    for what in (*both, *(desk if size == "desk" else ())):
+        found = page.locator(f"main {what}").first
+        found.wait_for()
+        if ".plot" in what:
+            found.and_(page.locator("[data-drawn]")).wait_for()
+        box = found.bounding_box()
+        assert box is not None, what
+        assert box["width"] > 0, what
+        assert box["y"] >= 0, what
+        assert box["y"] + box["height"] <= SIZES[size]["height"], (what, box)
+    assert page.evaluate("scrollY") == 0
+    assert page.evaluate("document.documentElement.scrollWidth") <= SIZES[size]["width"]
+    shot = page.screenshot(path=screens / f"{name.replace(' ', '-')}-{size}.png")
+    image = pytest.importorskip("PIL.Image")
+    seen = np.asarray(image.open(io.BytesIO(shot)).convert("RGB"))
+    assert len(np.unique(seen.reshape(-1, 3), axis=0)) > 30  # no empty page
+    page.close()
+
+
+def test_the_picture_is_beside_its_facts_or_above_them(browser: Any, site: Path) -> None:
+    for size, viewport in SIZES.items():
+        page = open_page(browser, site, PROBLEM, viewport=viewport)
+        plot = page.locator(".scene .plot").bounding_box()
+        known = page.locator("dl.chief").bounding_box()
+        assert page.locator("dl.chief dt").count() == 8
+        if size == "desk":
+            assert plot["x"] + plot["width"] <= known["x"]
+            assert plot["width"] > 2 * known["width"]
+        else:
+            assert plot["y"] + plot["height"] <= known["y"]
+        page.close()
+
+
+def test_the_eight_facts_are_those_of_the_catalogue(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, PROBLEM)
+    names = page.locator("dl.chief dt").all_inner_texts()
+    values = page.locator("dl.chief dd").all_inner_texts()
+    told = dict(zip(names, values, strict=True))
+    row = row_of(site, PROBLEM.removeprefix("#/problem/"))
+    assert told["contacts"] == str(row["nc"])
+    assert told["degrees of freedom"] == str(row["n"])
+    assert told["law"] == "Coulomb friction in space (G3DFC)"
+    assert float(told["μ"]) == row["mu_min"] == row["mu_max"]
+    assert told["class"] == row["class"]
+    assert told["solved by"] == row["solved_of"]
+    assert re.fullmatch(rf"\d+ of {3 * row['nc']}", told["rank of W"])
+    assert told["existence, uniqueness"]
+
+
+def column_of(site: Path, key: str) -> list[Any]:
+    """A column of numbers of the catalogue of a site."""
+    columns = read_data(site, "catalogue")["columns"]
+    return list(next(c["values"] for c in columns if c["key"] == key))
+
+
+def row_of(site: Path, name: str) -> dict[str, Any]:
+    """A row of the catalogue of a site."""
+    columns = read_data(site, "catalogue")["columns"]
+    ids = next(c["values"] for c in columns if c["key"] == "id")
+    found = {}
+    for c in columns:
+        value = c["values"][ids.index(name)]
+        found[c["key"]] = (c["words"][value] if value >= 0 else None) if "words" in c else value
+    return found
+
+
+def extent(page: Any) -> tuple[float, float]:
+    """How much of a picture in space its coloured bodies span, across and up."""
+    image = pytest.importorskip("PIL.Image")
+    plot = page.locator(".scene .plot")
+    plot.and_(page.locator("[data-drawn]")).wait_for()
+    page.wait_for_timeout(500)  # WebGL draws with the next picture of the screen
+    seen = np.asarray(image.open(io.BytesIO(plot.screenshot())).convert("RGB")).astype(int)
+    rows, columns = np.nonzero(np.ptp(seen, axis=2) > 25)
+    return np.ptp(columns) / seen.shape[1], np.ptp(rows) / seen.shape[0]
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_scene_fills_the_picture_and_is_opaque(size: str, browser: Any, site: Path) -> None:
+    page = open_page(browser, site, PROBLEM, viewport=SIZES[size])
+    across, up = extent(page)
+    assert 0.8 < max(across, up) <= 0.99
+    opacities = page.locator(".scene .plot").evaluate(
+        "plot => plot.data.filter((t) => t.type === 'mesh3d' && t.facecolor).map((t) => t.opacity)"
+    )
+    assert opacities == [1]
+    page.get_by_role("checkbox", name="see-through").check()
+    page.wait_for_function("document.querySelector('.scene .plot').data[0].opacity < 1")
+    page.close()
+
+
+def test_what_is_not_asked_for_first_is_folded(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, PROBLEM, viewport=DESK)
+    heads = page.locator("details.folded > summary").all_inner_texts()
+    assert {"All facts", "Patterns of the matrices", "Read it and solve it"} <= set(heads)
+    assert page.locator("details.folded[open]").count() == 0
+    assert not page.locator("code.sum", has_text=re.compile(r"^[0-9a-f]{64}$")).first.is_hidden()
+    page.get_by_text("All facts").click()
+    assert page.locator("details.folded[open] dt", has_text="contacts").first.is_visible()
+    page.close()
+
+
+# ---- the catalogue
+
+
+def test_filters_are_beside_the_table_and_closed_on_a_phone(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, "#/catalogue?runs=1", viewport=DESK)
+    table, filters = (page.locator(f"main {one}") for one in (".dt-container", ".filters"))
+    assert filters.get_attribute("open") is not None
+    beside = filters.bounding_box()
+    assert beside["x"] + beside["width"] <= table.bounding_box()["x"]
+    page.close()
+    page = open_page(browser, site, "#/catalogue?runs=1", viewport=PHONE)
+    assert filters_closed(page)
+    assert "1 chosen" in page.locator(".filters summary").inner_text()
+    names = page.locator("main tbody th").all_inner_texts()
+    assert len(names) == sum(bool(x) for x in column_of(site, "runs"))
+    page.close()
+
+
+def filters_closed(page: Any) -> bool:
+    return bool(page.locator(".filters").get_attribute("open") is None)
+
+
+# ---- the overview
+
+
+def test_the_profile_is_of_the_chosen_problems(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, "#/overview", viewport=DESK)
+    plot = page.locator(".first .plot")
+    plot.and_(page.locator("[data-drawn]")).wait_for()
+    names = "plot => plot.data.filter((t) => t.name && t.showlegend !== false).map((t) => t.name)"
+    head = read_data(site, "site")["headlines"][-1]
+    ordered = [head["legend"][k] for k in head["order"]]
+    assert plot.evaluate(names) == ordered
+    # one denominator in the legend
+    assert {name.rpartition(" of ")[2] for name in ordered} == {str(head["instances"])}
+    page.get_by_label("contacts").select_option("0-10")
+    page.wait_for_function("/^1 instance /.test(document.querySelector('figcaption').textContent)")
+    plot = page.locator(".first .plot")
+    plot.and_(page.locator("[data-drawn]")).wait_for()
+    assert all(name.endswith(" of 1") for name in plot.evaluate(names))
+    page.locator("label", has_text="tolerance").locator("select").select_option("0")
+    page.wait_for_function("location.hash.includes('tol=0')")
+    # the table below is of the same tolerance
+    tables = read_data(site, "site")["headlines"][0]["tables"][""]
+    last = page.locator("main .dt-container:visible tbody tr").last.locator("th, td")
+    page.wait_for_function(
+        "([cell, text]) => cell.textContent.trim() === text",
+        arg=[last.first.element_handle(), tables[-1]["solver"]],
+    )
+    page.close()
+
+
+def test_the_overview_lists_no_families(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, "#/overview", viewport=PHONE)
+    assert page.locator("main .cards").count() == 0
+    for name in ("All problems", "all families", "all solvers", "what is open"):
+        assert page.get_by_role("link", name=name, exact=True).is_visible()
+    page.close()
+
+
+# ---- copies
+
+
+def test_a_copy_leads_to_its_original_and_shows_its_runs_and_picture(
+    browser: Any, site: Path
+) -> None:
+    copy, original = row_of(site, COPY), row_of(site, ORIGINAL)
+    assert copy["same_as"] == ORIGINAL
+    for key in ("runs", "solved", "class", "solved_by", "best_solver"):
+        assert copy[key] == original[key], key
+    page = open_page(browser, site, f"#/problem/{COPY}", viewport=DESK)
+    table = "main [role=region][aria-label$=runs] tbody"
+    shown = page.locator(table).inner_text()
+    assert len(shown.splitlines()) >= original["runs"]
+    page.locator(".scene .plot[data-drawn]").wait_for()
+    page.locator(".copied a").click()
+    page.wait_for_function(f"document.querySelector('h1').textContent === '{ORIGINAL}'")
+    assert page.locator(table).inner_text() == shown
+    page.close()
+
+
+# ---- classes
+
+
+def store_of(path: Path, errors: dict[int, dict[str, float]], solvers: tuple[str, ...]) -> Path:
+    """Runs of made-up problems: by number and solver the error; without one it is solved."""
+    limits = Limits(time=10.0, wall=20.0, memory=1000.0)
+    machine = {"node": "here", "cpu": "Abacus"}
+    with Store(path) as store:
+        for k, fact in enumerate(made_facts(len(errors))):
+            for label in solvers:
+                error = errors[k].get(label)
+                choice = SolverChoice("nsgs", {}, f"of {label}", "splitting", "fclib", label)
+                record = Record(
+                    status="stalled" if error else "converged",
+                    cpu_s=0.5,
+                    merits={"error": error or 1e-9},
+                    machine=machine,
+                )
+                store.add(Job(fact, choice, 1e-8, limits, 0, 1), record)
+    return path
+
+
+def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_path: Path) -> None:
+    """No class of another set; what no solver of the report solves is open, with its best error."""
+    errors = {0: {"auto": 3e-3, "nsgs": 2e-5}, 1: {"auto": 1e-2}, 2: {}}
+    store = store_of(tmp_path / "runs.sqlite", errors, ("auto", "nsgs"))
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, tmp_path / "site", views=0)
+    (own,) = read_data(tmp_path / "site", "site")["standings"]
+    assert own["set"] == "this report"
+    assert own["families"] == [
+        {"family": f"Family{k}", "easy": int(k == 2), "hard": int(k == 1), "open": int(k == 0)}
+        for k in range(3)
+    ]
+    assert own["open"] == [{"problem": "Family0/00000", "error": 2e-5, "by": "nsgs"}]
+    for address in ("#/classes", "#/overview"):
+        page = open_page(browser, tmp_path / "site", address, viewport=DESK)
+        assert "standard" not in page.inner_text("main")
+        row = page.locator("table", has_text="1 open problem of this report").locator("tbody tr")
+        assert row.locator("th, td").all_inner_texts() == ["Family0/00000", "2e-5", "nsgs"]
+        row.locator("a").first.click()
+        page.wait_for_selector("main[data-page=problem]")
+        page.close()
+
+
+# ---- words and axes
+
+
+def test_pages_say_no_more_and_no_less_than_is_known(
+    browser: Any, site: Path, tmp_path: Path
+) -> None:
+    """Of one problem, one family, one solver and one run; a solver without a description."""
+    small = tmp_path / "small"
+    store = store_of(tmp_path / "one.sqlite", {0: {"mine": 1e-3}}, ("mine",))
+    with Campaigns([store]) as campaigns:
+        build_site(campaigns, small, views=0)
+    sets = {
+        small: [
+            *("overview", "profiles", "catalogue", "families", "family/Family0", "solvers"),
+            *("problem/Family0/00000", "solver/mine", "classes"),
+        ],
+        site: [address.removeprefix("#/") for address, *_ in WHOLE.values()],
+    }
+    for folder, addresses in sets.items():
+        for address in addresses:
+            page = open_page(browser, folder, f"#/{address}", viewport=DESK)
+            page.wait_for_timeout(300)  # what is loaded after the head
+            text = page.locator("body").text_content()
+            for wrong in ("undefined", "NaN", "null", "[object", "Infinity"):
+                assert wrong not in text, (address, wrong)
+            # one thing is not many
+            found = re.search(
+                r"(?<![\d.,])1 (\w+ )?(problems|families|solvers|runs|instances)", text
+            )
+            assert found is None, (address, found)
+            page.close()
+    page = open_page(browser, small, "#/overview", viewport=DESK)
+    assert "1 solver, 1 problem, 1 family, 1 run, 0 % of them solved" in page.inner_text("main")
+    page.close()
+
+
+def test_a_problem_without_a_solution_has_no_reference(
+    browser: Any, collection: Path, tmp_path: Path
+) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    shutil.copytree(collection, tmp_path / "collection")
+    (path,) = (tmp_path / "collection").glob("*.parquet")
+    table = parquet.read_table(path)
+    for name, value in (("has_solution", False), ("status", "stalled")):
+        at = table.column_names.index(name)
+        values = [value, *table.column(name).to_pylist()[1:]]
+        table = table.set_column(at, table.schema.field(name), [values])
+    parquet.write_table(table, path)
+    build_site(None, tmp_path / "site", tmp_path / "collection", views=0)
+    row = row_of(tmp_path / "site", "small/BoxesStack/0000")
+    assert (row["has_solution"], row["status"]) == (False, "stalled")
+    page = open_page(browser, tmp_path / "site", "#/problem/small/BoxesStack/0000", viewport=DESK)
+    assert "stalled" in page.locator("main").text_content()
+    assert "reference" not in page.locator("main").text_content()
+    page.close()
+
+
+HISTOGRAMS: dict[str, list[float]] = {
+    "one": [12],
+    "equal": [7, 7, 7],
+    "whole": [1, 2, 2, 5, 9],
+    "many": list(range(1, 1000, 3)),
+    "parts": [0.5, 0.75, 1.25],
+    "one part": [0.3],
+    "zero": [0.0, 0.0],
+}
+
+
+@pytest.mark.parametrize("name", HISTOGRAMS)
+def test_bins_hold_all_values_once(name: str) -> None:
+    values = HISTOGRAMS[name]
+    edges, counts = bins_of(values)
+    assert counts.sum() == len(values)
+    assert len(edges) == len(counts) + 1
+    assert len(counts) <= 40
+    assert len(counts) <= max(values) - min(values) + 1 or not is_whole(values)
+    widths = np.diff(edges)
+    np.testing.assert_allclose(widths, widths[0])
+    if is_whole(values):
+        # an edge is between two whole numbers, so that none is on it
+        np.testing.assert_array_equal(np.remainder(edges, 1), 0.5)
+    if len(set(values)) == 1:
+        assert len(counts) == 1
+        assert edges.mean() == pytest.approx(values[0])
+
+
+def test_histograms_have_whole_counts_and_follow_the_theme(browser: Any, site: Path) -> None:
+    page = open_page(browser, site, "#/family/small/BoxesStack", viewport=DESK, color_scheme="dark")
+    plots = page.locator(".three .plot")
+    assert plots.count() == 3
+    histograms = read_data(site, "site")["families"]
+    own = next(f for f in histograms if f["name"] == "BoxesStack")["histograms"]
+    colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    for k, one in enumerate(own):
+        plot = plots.nth(k)
+        plot.scroll_into_view_if_needed()
+        plot.and_(page.locator("[data-drawn]")).wait_for()
+        assert plot.evaluate("plot => [...plot.data[0].y]") == one["counts"]
+        paper = "plot => getComputedStyle(plot.querySelector('.main-svg')).backgroundColor"
+        assert plot.evaluate(paper) == colour
+        ticks = plot.locator(".ytick text").all_text_contents()
+        assert len(ticks) > 1
+        assert all(text.isdigit() for text in ticks), ticks
+        assert len(set(ticks)) == len(ticks)
+        if one["integer"]:
+            assert all(text.isdigit() for text in plot.locator(".xtick text").all_text_contents())
+    page.close()
+
+
+# ---- paper
+
+
+@pytest.mark.parametrize("address", ["#/overview", PROBLEM, "#/family/small/BoxesStack"])
+def test_paper_has_the_charts_and_no_menus(address: str, browser: Any, site: Path) -> None:
+    page = open_page(browser, site, address, viewport=DESK, color_scheme="dark")
+    page.wait_for_function("window.Plotly")
+    hidden = page.locator(".plot:not([data-drawn])").count()
+    page.emulate_media(media="print", color_scheme="dark")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    # a print waits for nothing: all is drawn when the event is over
+    state = page.evaluate(
+        """() => [...document.querySelectorAll("main .plot")].filter((p) => p.clientWidth)
+          .map((p) => [Boolean(p.dataset.drawn), p.clientWidth,
+            p.querySelector(".main-svg")?.getBoundingClientRect().width ?? 0])"""
+    )
+    assert state
+    for drawn, wide, svg in state:
+        assert drawn, hidden
+        assert abs(wide - svg) < 5  # the border
+        assert wide < 720  # of A4, within margins
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    for what in ("header.top", "footer", ".controls", ".tools", "summary", ".copy button"):
+        for one in page.locator(what).all():
+            assert not one.is_visible(), what
+    assert page.locator("main h1").is_visible()
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+    page.emulate_media(media="screen", color_scheme="dark")
+    assert page.pdf(format="A4").startswith(b"%PDF")
+    page.close()

@@ -6,6 +6,7 @@
 
 _assemble.py   common parts: order of rows, redundant joints, limits, dry friction, compliance
 _recorded.py   a recorded step, what is exact in it, and a folder of them
+_criteria.py   how far a simulator's reactions are from Coulomb's law
 _scripts.py    steps of a user's script, while it runs
 _drake.py, _mujoco.py, _newton.py, _pinocchio.py, _pybullet.py, _siconos.py    one engine each
 _siconos_steps.py  run by the interpreter that has Siconos
@@ -23,6 +24,7 @@ from fclib.recorders._assemble import (
     associated_error,
     solve_associated,
 )
+from fclib.recorders._criteria import CRITERIA, Judgement, criteria_of, judge, summary
 from fclib.recorders._drake import drake
 from fclib.recorders._mujoco import mujoco
 from fclib.recorders._newton import newton
@@ -33,17 +35,21 @@ from fclib.recorders._scripts import ENGINES, record_script
 from fclib.recorders._siconos import siconos
 
 __all__ = [
+    "CRITERIA",
     "ENGINES",
     "Assembled",
     "Contacts",
     "DryFriction",
     "Joints",
+    "Judgement",
     "Limits",
     "Recorded",
     "Recording",
     "assemble",
     "associated_error",
+    "criteria_of",
     "drake",
+    "judge",
     "mujoco",
     "newton",
     "pinocchio",
@@ -51,4 +57,5 @@ __all__ = [
     "record_script",
     "siconos",
     "solve_associated",
+    "summary",
 ]

@@ -37,6 +37,7 @@ COMMANDS = (
     "solvers",
     "simulate",
     "record",
+    "judge",
     "demo",
     "profile",
     "report",

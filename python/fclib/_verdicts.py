@@ -7,6 +7,17 @@ from typing import Final
 # only these statuses count as solved: the error was recomputed, or the proof was checked
 SOLVED: Final = ("converged", "infeasible")
 UNSUITABLE: Final = "unsuitable"  # the solver does not take such problems
+# what a user may do after a status, said by the command line and by pages
+NEXT: Final = {
+    "infeasible": "there is no solution, and the proof was checked; `fclib analyze` tells it",
+    "stalled": "no solution was found; `fclib analyze` says whether one is known to exist. A larger"
+    " tolerance or another solver may do",
+    "diverged": "this solver does not solve the problem; try the solver auto",
+    "iteration_limit": "the solver used all its iterations; try the solver auto, or a larger"
+    " tolerance",
+    "time_limit": "the time was too short; give a larger time limit or tolerance",
+    "inaccurate": "the solver's own error is smaller than the true one; try the solver auto",
+}
 CLASSES: Final = ("easy", "hard", "open")
 
 

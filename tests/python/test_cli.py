@@ -286,7 +286,7 @@ def test_solve_says_what_to_do_next(tmp_path: Path, files: list[Path]) -> None:
     """A line for each status, not for each file; none after success."""
     done = run("solve", "--solver", "associated", *files)
     assert done.stdout.count("inaccurate") > 1
-    assert done.stderr.count("try --solver auto") == 1
+    assert done.stderr.count("try the solver auto") == 1
     none = fclib.LocalProblem(
         spacedim=2, W=np.zeros((2, 2)), q=np.array([-1.0, 0.0]), mu=np.array([0.5])
     )

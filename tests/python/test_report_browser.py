@@ -601,8 +601,8 @@ def test_what_was_analysed_is_shown(browser: Any, tmp_path: Path) -> None:
     page.wait_for_selector("main[data-page=problem]")
     facts = dict(
         zip(
-            page.locator(".folded dl.facts dt").all_text_contents(),
-            page.locator(".folded dl.facts dd").all_text_contents(),
+            page.locator(".folded .two dl.facts dt").all_text_contents(),
+            page.locator(".folded .two dl.facts dd").all_text_contents(),
             strict=True,
         )
     )

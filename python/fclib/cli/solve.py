@@ -8,6 +8,7 @@ import typer
 
 import fclib
 from fclib import _symmetry, bench
+from fclib._verdicts import NEXT
 from fclib.cli._files import read_owner
 from fclib.cli._output import (
     Files,
@@ -25,17 +26,6 @@ from fclib.cli._output import (
     warn_of,
 )
 
-# what a user may do after a status
-NEXT = {
-    "infeasible": "there is no solution, and the proof was checked; `fclib analyze` tells it",
-    "stalled": "no solution was found; `fclib analyze` says whether one is known to exist. A larger"
-    " --tol or another --solver may do",
-    "diverged": "this solver does not solve the problem; try --solver auto",
-    "iteration_limit": "the solver used all its iterations; try --solver auto or a larger --tol",
-    "time_limit": "the time was too short; give a larger --time-limit or --tol. --verbose shows how"
-    " the error falls",
-    "inaccurate": "the solver's own error is smaller than the true one; try --solver auto",
-}
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from fclib._verdicts import NEXT
 from fclib.collections.catalog import sha256
 from fclib.report import browser, taking
 from fclib.report.error import ReportError
@@ -121,6 +122,7 @@ def panel_of(file: Path, kind: str, solved: bool, module: Path | None) -> dict[s
     own |= {"href": address, "merit": taking.merit_of(file) if solved else None}
     return {
         "merits": described_merits(),
+        "next": dict(NEXT),
         "module": browser.size(module) if module else 0,
         "serve": f"fclib view {shlex.quote(str(file))} --serve",
         "files": [own],

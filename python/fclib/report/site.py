@@ -20,6 +20,7 @@ import dataclasses
 import inspect
 import math
 import re
+import shlex
 import shutil
 import tempfile
 from collections import defaultdict
@@ -29,7 +30,7 @@ from typing import Any
 
 from fclib import _core, _registry
 from fclib._solve import MERITS
-from fclib._verdicts import CLASSES, SOLVED, UNSUITABLE, is_solved, rating
+from fclib._verdicts import CLASSES, NEXT, SOLVED, UNSUITABLE, is_solved, rating
 from fclib._words import counted
 from fclib.bench import profiles
 from fclib.bench.campaign import described
@@ -421,6 +422,7 @@ class _Writer:
             "common": COMMON,
             "weigh": WEIGH,
             "merits": described_merits(),
+            "next": dict(NEXT),
             "charges": {"penalty": PENALTY, "shift": SHIFT},
             "laws": {name: law_of(name) for name in sorted(formulations)},
             "tolerances": [],
@@ -707,11 +709,22 @@ def _solver(label: str, row: Mapping[str, Any]) -> dict[str, Any]:
     found["family"] = row["solver_family"]
     version = f"{found['origin'] or 'fclib'} {found['version'] or _core.version}"
     found["bibtex"] = citing.implementation(name, title, version)
+    found["use"] = _use(name, object_in(row["options"]))
     if not about:
         return found
     found["papers"] = citing.papers_of(about["citation"])
     found |= {key: about[key] for key in ("title", "citation", "dimensions", "rolling")}
     return found | {"known": about["options"]}
+
+
+def _use(name: str, options: Mapping[str, Any]) -> list[str]:
+    """Lines that run a solver with these options, from a shell and from Python."""
+    text = " ".join([name, *(f"{key}={value}" for key, value in options.items())])
+    more = "".join(f", {key}={value!r}" for key, value in options.items())
+    return [
+        f"fclib solve --solver {shlex.quote(text)} FILE",
+        f'result = fclib.solve(problem, solver="{name}", tol=1e-8{more})',
+    ]
 
 
 def _own(info: _core.SolverInfo) -> dict[str, Any]:

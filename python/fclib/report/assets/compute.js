@@ -354,6 +354,8 @@
                 ],
               }),
             );
+            const next = Fclib.values.site.next[result.status];
+            if (next) live.textContent += `. ${next[0].toUpperCase()}${next.slice(1)}.`;
             if (why) throw new Error(`The reactions of ${solver} cannot be judged: ${why.message}`);
           }),
       },

@@ -496,9 +496,9 @@
     };
     const look = (box, seen) => Plotly.relayout(box, { "scene.camera": seen });
     const move = (turn, tilted, factor) => (box) => {
-      const now = box.layout.scene.camera;
-      // Plotly leaves out what is its own default
-      const centre = Object.values(now.center || { x: 0, y: 0, z: 0 });
+      // Plotly's own buttons leave parts of it out
+      const now = { ...start(box), ...box.layout.scene.camera };
+      const centre = Object.values(now.center);
       const [x, y, z] = Object.values(now.eye).map((value, k) => value - centre[k]);
       const far = Math.hypot(x, y, z);
       const tilt = Math.min(1.55, Math.max(-1.55, Math.asin(z / far) + tilted));

@@ -69,7 +69,9 @@
           : h("p", {}, "Each of these problems is solved by a solver."),
         ...(one.open.length && one.published ? better(one) : []),
         Fclib.table({
-          caption: `Classes of ${one.set}, by family: problems of this report`,
+          caption:
+            `Classes of ${one.set}, by family` +
+            (one.published ? ": of the problems in this report" : ""),
           rows: one.families,
           page: 60,
           columns: [

@@ -27,7 +27,11 @@
     const label = rest.join("/");
     const solver =
       s.solvers.find((one) => one.label === label) || s.solvers.find((one) => one.name === label);
-    if (!solver) throw new Fclib.NotHere(`There is no solver ${label} in this report.`);
+    if (!solver)
+      throw new Fclib.NotHere(
+        `There is no solver ${label} in this report. ` +
+          `It has ${s.solvers.map((one) => one.label).join(", ")}.`,
+      );
     const cat = await catalogue();
     const set = solver.options && solver.options !== "{}" ? solver.options : null;
     page.append(
@@ -146,10 +150,6 @@
         solver.papers || [],
       ),
     );
-    page.append(
-      h("h2", {}, "Use it"),
-      copyable(`fclib solve --solver ${solver.name} FILE`),
-      copyable(`result = fclib.solve(problem, solver="${solver.name}", tol=1e-8)`),
-    );
+    page.append(h("h2", {}, "Use it"), ...solver.use.map((line) => copyable(line)));
   };
 })();

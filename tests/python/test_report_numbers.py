@@ -274,3 +274,38 @@ def test_overview_and_profiles_agree(site: Path, page: Any) -> None:
         shares = {row["solver"]: row["share"] for row in head["tables"][""]}
         for name, end in zip(shown, ends, strict=True):
             assert end == pytest.approx(shares[name.partition(" ")[0]], abs=1e-5)
+
+
+def test_the_overview_draws_the_chosen_problems_as_python_does(
+    store: Path, site: Path, page: Any
+) -> None:
+    """Problems of some size, at each tolerance: curves, legend and number of instances."""
+    known = read_data(site, "site")
+    rows = profiles.load(store)
+    for t, tol in enumerate(known["tolerances"]):
+        every = profiles.gather(rows.where(comparison.numbers_in(rows, "tol") == tol))
+        sizes = {one.hash: one.nc for one in every.instances}
+        for size, (low, high) in {"0-10": (0, 10), "10-50": (10, 50)}.items():
+            part = every.of(
+                k for k, one in enumerate(every.instances) if low <= sizes[one.hash] <= high
+            )
+            costs = comparison.compared(part)
+            page.goto((site / "index.html").as_uri() + "#/about")
+            page.wait_for_selector("main[data-page=about]")
+            page.goto((site / "index.html").as_uri() + f"#/overview?tol={t}&size={size}")
+            page.wait_for_selector("main[data-page=overview] .first .plot[data-drawn]")
+            drawn = page.evaluate(
+                "document.querySelector('.first .plot').data.map((one) => "
+                "({ name: one.name, x: [...one.x], y: [...one.y] }))"
+            )
+            legend = [costs.legend(k) for k in range(len(costs.solvers))]
+            assert sorted(one["name"] for one in drawn) == sorted(legend)
+            caption = page.locator(".first figcaption").first.inner_text()
+            assert caption.startswith(f"{len(costs.instances)} instance")
+            values, weights = profiles.ratios(costs.values), costs.weights("families")
+            for one in drawn:
+                k = legend.index(one["name"])
+                bounds = np.array(one["x"]) * (1 + 1e-5)  # costs have six digits
+                inside = bounds < bounds[-1]
+                expected = profiles.share_within(values, bounds, weights)[k]
+                np.testing.assert_allclose(np.array(one["y"])[inside], expected[inside], atol=1e-9)

@@ -178,9 +178,12 @@ def test_the_catalogue_knows_all_problems_and_their_best_solver(
     assert column(site, "nc")[:-1] == [row["nc"] for row in catalogue]
     with Store(store, create=False) as opened:
         rows = opened.results(solved=True)
-    assert sum(x or 0 for x in column(site, "solved")) == len(rows)
+    # a copy shows what its original has
+    originals = column(site, "same_as")
+    solved = [x or 0 for x, own in zip(column(site, "solved"), originals, strict=True) if not own]
+    assert sum(solved) == len(rows)
     for k, best in enumerate(column(site, "best_solver")):
-        name = ids[k].rpartition("/")[2]
+        name = (originals[k] or ids[k]).rpartition("/")[2]
         own = [row for row in rows if row["problem"].rpartition("/")[2].startswith(name)]
         tol = min((row["tol"] for row in own), default=None)
         fastest = min(

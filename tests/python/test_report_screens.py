@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fclib
 from fclib.bench import Job, Limits, Record, SolverChoice, Store
 from fclib.collections.figures import bins_of, is_whole
-from fclib.report import Campaigns, build_site
+from fclib.report import Campaigns, build_site, view_of, write_view
 from helpers_browser import chromium
 from helpers_report import (
     made_facts,
@@ -24,6 +25,9 @@ from helpers_report import (
     skip_without_libraries,
 )
 
+# what they give is of one kind here
+read: Any = fclib.read
+read_solution: Any = fclib.read_solution
 pytest.importorskip("mujoco")
 pytest.importorskip("pyarrow")
 skip_without_libraries()
@@ -161,6 +165,21 @@ def column_of(site: Path, key: str) -> list[Any]:
     """A column of numbers of the catalogue of a site."""
     columns = read_data(site, "catalogue")["columns"]
     return list(next(c["values"] for c in columns if c["key"] == key))
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_page_of_a_file_begins_with_its_picture(
+    size: str, browser: Any, collection: Path, tmp_path: Path
+) -> None:
+    file = sorted(collection.rglob("*-global.hdf5"))[-1]
+    write_view(view_of(read(file), read_solution(file)), tmp_path / "view.html")
+    page = browser.new_page(viewport=SIZES[size])
+    page.goto((tmp_path / "view.html").as_uri())
+    page.locator(".scene .plot[data-drawn]").wait_for()
+    for what in (".scene .plot", "dl.chief"):
+        box = page.locator(what).bounding_box()
+        assert box["y"] + box["height"] <= SIZES[size]["height"], what
+    page.close()
 
 
 def row_of(site: Path, name: str) -> dict[str, Any]:

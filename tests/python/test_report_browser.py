@@ -278,9 +278,9 @@ def test_profiles_follow_what_is_chosen(go: Opener) -> None:
     page.wait_for_function("(document.querySelector('.plot').data || []).length === 2")
     page.get_by_label("axis").select_option("linear")
     page.get_by_label("family").select_option("Alone")
-    page.wait_for_function("/1 instances of [0-9]/.test(document.body.textContent)")
+    page.wait_for_function("/1 instance of [0-9]/.test(document.body.textContent)")
     again = go(page.evaluate("location.hash"))
-    again.wait_for_function("/1 instances of [0-9]/.test(document.body.textContent)")
+    again.wait_for_function("/1 instance of [0-9]/.test(document.body.textContent)")
     assert draw(again).evaluate("plot => plot.data.length") == 2
     assert draw(again).evaluate("plot => plot.layout.xaxis.type") == "linear"
     again.get_by_role("button", name="none").click()

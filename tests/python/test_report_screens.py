@@ -388,6 +388,10 @@ def test_pages_say_no_more_and_no_less_than_is_known(
             assert found is None, (address, found)
             page.close()
     page = open_page(browser, small, "#/overview", viewport=DESK)
+    shown = page.evaluate(
+        "[NaN, undefined, null, 0.125].flatMap((x) => [Fclib.percent(x), Fclib.tolerance(x)])"
+    )
+    assert shown == ["–"] * 6 + ["12.5 %", "1.25e-1"]
     assert "1 solver, 1 problem, 1 family, 1 run, 0 % of them solved" in page.inner_text("main")
     page.close()
 
@@ -442,12 +446,15 @@ def test_bins_hold_all_values_once(name: str) -> None:
         assert edges.mean() == pytest.approx(values[0])
 
 
-def test_histograms_have_whole_counts_and_follow_the_theme(browser: Any, site: Path) -> None:
-    page = open_page(browser, site, "#/family/small/BoxesStack", viewport=DESK, color_scheme="dark")
+# many problems, and one alone, which has its contacts only
+@pytest.mark.parametrize(("family", "measures"), [("BoxesStack", 3), ("Alone", 1)])
+def test_histograms_have_whole_counts_and_follow_the_theme(
+    family: str, measures: int, browser: Any, site: Path
+) -> None:
+    page = open_page(browser, site, f"#/family/{family}", viewport=DESK, color_scheme="dark")
     plots = page.locator(".three .plot")
-    assert plots.count() == 3
-    histograms = read_data(site, "site")["families"]
-    own = next(f for f in histograms if f["name"] == "BoxesStack")["histograms"]
+    own = next(f for f in read_data(site, "site")["families"] if f["name"] == family)["histograms"]
+    assert plots.count() == len(own) == measures
     colour = page.evaluate("getComputedStyle(document.body).backgroundColor")
     for k, one in enumerate(own):
         plot = plots.nth(k)

@@ -40,6 +40,7 @@ COMMANDS = (
     "judge",
     "demo",
     "profile",
+    "results",
     "report",
     "view",
     "doctor",

@@ -34,7 +34,7 @@ class Results:
         path = self.folder / f"{name}.csv"
         if not path.is_file():
             raise ValueError(
-                f"{path}: no such table; a script of benchmarks/ makes it (--results {name})"
+                f"{path}: no such table; a script of workshop/ makes it (--results {name})"
             )
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))

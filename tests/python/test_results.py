@@ -13,6 +13,7 @@ from types import ModuleType
 import pytest
 
 from helpers import git
+from workshop.tables import _results
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -27,9 +28,12 @@ def module(path: str) -> ModuleType:
     return found
 
 
-results = module("scripts/site/results.py")
-_results = module("benchmarks/_results.py")
+def script_of(words: str) -> Path:
+    """The file of a script that a command names: by its path, or as a module."""
+    return ROOT / (words[3:].replace(".", "/") + ".py" if words.startswith("-m ") else words)
 
+
+results = module("scripts/site/results.py")
 
 FOLDER = ROOT / "docs" / "results"
 TABLES = sorted(FOLDER.glob("*.csv"))
@@ -204,8 +208,9 @@ def test_every_table_says_what_made_it_and_is_on_a_page() -> None:
         rows, about = results.Results(FOLDER).load(path.stem)
         assert rows, path
         assert all(about[key] for key in results.ABOUT if key != "note"), path
-        for script in re.findall(r"(?:benchmarks|scripts|tests)/[\w/]+\.py", about["command"]):
-            assert (ROOT / script).is_file(), f"{path.stem}.json names {script}, which is not there"
+        (script,) = re.findall(r" (-m workshop[\w.]+|(?:scripts|tests)/[\w/]+\.py)", about["command"])
+        file = script_of(script)
+        assert file.is_file(), f"{path.stem}.json names {script}, which is not there"
 
 
 def test_every_table_names_a_commit_that_is_there() -> None:
@@ -223,7 +228,7 @@ def test_a_table_goes_from_a_script_to_a_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(_results, "FOLDER", tmp_path / "results")
-    monkeypatch.setattr(sys, "argv", [f"{ROOT}/benchmarks/x.py", "/d/a.hdf5", "/b.hdf5", "--k"])
+    monkeypatch.setattr(sys, "argv", [f"{ROOT}/workshop/tables/x.py", "/d/a.hdf5", "/b.hdf5", "--k"])
     rows = [{"solver": "auto", "mean [ms]": 1.23456}, {"solver": "a|b", "mean [ms]": 2}]
     path = _results.store("times", rows, title="Times", note="Limit 5 s.")
     with path.open(newline="") as file:
@@ -232,7 +237,7 @@ def test_a_table_goes_from_a_script_to_a_page(
             {"solver": "a|b", "mean [ms]": "2"},
         ]
     about = json.loads(path.with_suffix(".json").read_text())
-    assert about["command"] == ".venv/bin/python benchmarks/x.py FILE... --k"
+    assert about["command"] == ".venv/bin/python -m workshop.tables.x FILE... --k"
     assert about["version"]
     assert about["machine"]
 

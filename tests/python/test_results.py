@@ -28,9 +28,11 @@ def module(path: str) -> ModuleType:
     return found
 
 
-def script_of(words: str) -> Path:
-    """The file of a script that a command names: by its path, or as a module."""
-    return ROOT / (words[3:].replace(".", "/") + ".py" if words.startswith("-m ") else words)
+def script_of(command: str) -> Path:
+    """The file of the script that made a table: a module of workshop/, as `called` has it."""
+    _, option, name, *_ = command.split()
+    assert option == "-m", command
+    return ROOT / f"{name.replace('.', '/')}.py"
 
 
 results = module("scripts/site/results.py")
@@ -208,9 +210,8 @@ def test_every_table_says_what_made_it_and_is_on_a_page() -> None:
         rows, about = results.Results(FOLDER).load(path.stem)
         assert rows, path
         assert all(about[key] for key in results.ABOUT if key != "note"), path
-        (script,) = re.findall(r" (-m workshop[\w.]+|(?:scripts|tests)/[\w/]+\.py)", about["command"])
-        file = script_of(script)
-        assert file.is_file(), f"{path.stem}.json names {script}, which is not there"
+        script = script_of(about["command"])
+        assert script.is_file(), f"{path.stem}.json names {script}, which is not there"
 
 
 def test_every_table_names_a_commit_that_is_there() -> None:
@@ -228,7 +229,8 @@ def test_a_table_goes_from_a_script_to_a_page(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(_results, "FOLDER", tmp_path / "results")
-    monkeypatch.setattr(sys, "argv", [f"{ROOT}/workshop/tables/x.py", "/d/a.hdf5", "/b.hdf5", "--k"])
+    script = f"{ROOT}/workshop/tables/x.py"
+    monkeypatch.setattr(sys, "argv", [script, "/d/a.hdf5", "/b.hdf5", "--k"])
     rows = [{"solver": "auto", "mean [ms]": 1.23456}, {"solver": "a|b", "mean [ms]": 2}]
     path = _results.store("times", rows, title="Times", note="Limit 5 s.")
     with path.open(newline="") as file:

@@ -4,10 +4,12 @@
         [--without pivoting "random starts"] [--results planted]
     python -m workshop.tables.planted --each [--count 10000] [--results planted-each]
 
-The problems are those of tests/planted_judge.py: random ones of every formulation (masses over
-twelve decades, redundant joints, blocks of every rank, friction up to 100, rolling, guesses) and
-those that ask for all digits (`digits` there). Left out are problems whose data do not hold their
-own solution to a tenth of the tolerance. CPU time is that of all solves of a kind.
+No campaign can do this: the problems bring guesses, and here the judge of campaigns is judged too,
+in ball arithmetic. The problems are those of tests/planted_judge.py: random ones of every
+formulation (masses over twelve decades, redundant joints, blocks of every rank, friction up to 100,
+rolling, guesses) and those that ask for all digits (`digits` there). Left out are problems whose
+data do not hold their own solution to a tenth of the tolerance. CPU time is that of all solves of a
+kind.
 
 With --each, all built-in solvers in turn get the problems of all regimes of tests/planted_judge.py
 that have a solution, until there are COUNT with rolling friction and COUNT without. Each word is

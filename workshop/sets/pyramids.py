@@ -1,26 +1,23 @@
-"""Pyramids of boxes whose masses differ: how many each solver solves, and with what work.
+"""Pyramids of boxes whose masses differ, as files: the problems of campaigns/pyramids.toml.
 
-    python -m workshop.tables.mass_ratios [--ratios 1 1e2 1e4 1e6 1e8] [--count 40]
-        [--solvers auto nsip] [--results mass-ratios]
+    python -m workshop.sets.pyramids OUT [--ratios 1 1e2 1e4 1e6 1e8] [--count 40]
 
 Boxes of 1 m lie on one another and side by side, with four contacts on each face, so that there are
 more reactions than velocities. Half of the pyramids have two masses, 1 kg and the ratio, the others
-masses from 1 kg to the ratio. One box has a velocity of its own. A row is a ratio and a solver; all
-problems are solvable, because all boxes could be lifted. Not solved, but told, is where the message
-names the digit at which rounding ends the solve.
+masses from 1 kg to the ratio. One box has a velocity of its own. All problems are solvable, because
+all boxes could be lifted. The folder of a problem is the ratio of the heaviest to the lightest box.
 """
 
 from __future__ import annotations
 
 import argparse
-import statistics
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 import fclib
-from workshop.tables import _results
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -89,46 +86,18 @@ def pyramid(seed: int, ratio: float) -> fclib.GlobalProblem:
     return fclib.GlobalProblem(M=np.diag(M), H=H, f=M * v.ravel(), w=np.zeros(3 * nc), mu=mu)
 
 
-def row(ratio: float, count: int, solver: str) -> dict[str, Any]:
-    """Solve the pyramids of a ratio."""
-    results = [fclib.solve(pyramid(seed, ratio), solver, time_limit=20) for seed in range(count)]
-    solved = [result for result in results if result.converged]
-    told = sum("digit" in (result.message or "") for result in results if not result.converged)
-    worst = max((result.error for result in results if not result.converged), default=None)
-    return {
-        "heaviest over lightest": f"{ratio:g}",
-        "solver": solver,
-        "pyramids": count,
-        "solved to 1e-8": len(solved),
-        "not solved, but told": told,
-        "largest error of the others": "" if worst is None else f"{worst:.0e}",
-        "median iterations": round(statistics.median(r.iterations for r in solved))
-        if solved
-        else "",
-        "CPU of all [s]": f"{sum(result.cpu_s for result in results):.3g}",
-    }
-
-
 def main() -> None:
-    """Print a line for each ratio and solver."""
+    """Write the files OUT/RATIO/SEED.hdf5."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
+    parser.add_argument("out", type=Path)
     parser.add_argument("--ratios", type=float, nargs="+", default=[1, 1e2, 1e4, 1e6, 1e8])
     parser.add_argument("--count", type=int, default=40)
-    parser.add_argument("--solvers", nargs="+", default=["auto", "nsip"])
-    _results.add_option(parser)
     arguments = parser.parse_args()
-    table = []
     for ratio in arguments.ratios:
-        for solver in arguments.solvers:
-            table.append(row(ratio, arguments.count, solver))
-            print(", ".join(f"{key}: {value}" for key, value in table[-1].items()), flush=True)
-    if arguments.results:
-        _results.store(
-            arguments.results,
-            table,
-            title="Pyramids of light and heavy boxes",
-            note=f"Seeds 0 to {arguments.count - 1}, 20 s of wall-clock time a solve.",
-        )
+        folder = arguments.out / f"{ratio:g}"
+        folder.mkdir(parents=True, exist_ok=True)
+        for seed in range(arguments.count):
+            fclib.write(folder / f"{seed:03d}.hdf5", pyramid(seed, ratio))
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ results = module("scripts/site/results.py")
 
 FOLDER = ROOT / "docs" / "results"
 TABLES = sorted(FOLDER.glob("*.csv"))
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+PAGES = [*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "workshop").rglob("*.md"))]
 READ_FIRST = [ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CHANGELOG.md")]
 # pages that are about results: no part of them has a figure of its own
 WHOLE = ("choosing.md", "measurement.md", "solvers.md", "speed.md")

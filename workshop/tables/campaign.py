@@ -349,7 +349,7 @@ def ending(kind: str, solver: str, runs: Sequence[Row]) -> Row:
     stages: Counter[str] = Counter()
     times: Counter[str] = Counter()
     for row in runs:
-        name = last_stage(row["stages"])
+        name = last_stage(row)
         stages[name] += row["status"] == "converged"
         times[name] += row["total_cpu_s"]
     return {
@@ -380,12 +380,13 @@ def ending(kind: str, solver: str, runs: Sequence[Row]) -> Row:
     }
 
 
-def last_stage(stages: str | None) -> str:
+def last_stage(row: Row) -> str:
     """The stage of a chain that solved, or that the solve ended in; "" of another solver."""
-    tried: list[Row] = json.loads(stages) if stages else []
-    return str(
-        ([stage for stage in tried if stage["solved"]] or tried or [{"name": ""}])[-1]["name"]
-    )
+    if row["solver_family"] != "chain":
+        return ""
+    tried: list[Row] = json.loads(row["stages"]) if row["stages"] else []
+    solved = [stage for stage in tried if stage["solved"]]
+    return str((solved or tried or [{"name": "none"}])[-1]["name"])
 
 
 def runs(store: Path, _: argparse.Namespace) -> list[Table]:

@@ -163,7 +163,7 @@ def compared(store: Path, _: argparse.Namespace) -> list[Table]:
     every = profiles.gather(rows)
     whole = comparison.compared(every)
     with bench.Store(store, create=False) as opened:
-        (first, *_) = opened.status()
+        first = opened.status()[0]
         runs = opened.table(more=("key",))
     spent = runner.spent(runs, set(runs["key"].values))
     note = (
@@ -397,7 +397,10 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
     for row in sorted(rows, key=lambda row: (row["nc"], row["solver"], -row["tol"])):
         solver = short(row["solver"])
         last = before.get(solver)
-        grown = last is not None and row["nc"] > last["nc"]
+        exponent: float | str = ""
+        if last is not None and row["nc"] > last["nc"]:
+            times = math.log(row["total_cpu_s"] / last["total_cpu_s"])
+            exponent = times / math.log(row["nc"] / last["nc"])
         stages = json.loads(row["stages"]) if row["stages"] else []
         table.append(
             {
@@ -410,10 +413,7 @@ def runs(store: Path, _: argparse.Namespace) -> list[Table]:
                 "factorisations": sum(stage["factorisations"] for stage in stages),
                 "memory [GB]": row["memory_mb"] / 1e3,
                 "load": row["load"],
-                "exponent": math.log(row["total_cpu_s"] / last["total_cpu_s"])
-                / math.log(row["nc"] / last["nc"])
-                if grown
-                else "",
+                "exponent": exponent,
             }
         )
         before[solver] = row

@@ -181,7 +181,7 @@ def answer(
             guess=guess,
             **order["options"],
         )
-        status, message = result.status, ""
+        status, message = result.status, result.message
     except Exception as error:
         status, message = classify(error, foreign(name)), one_line(error)
     say("done")

@@ -16,7 +16,10 @@ import re
 from functools import cache
 from pathlib import Path
 
-TABLE = re.compile(r'^\[Table: ([^\]]+)\]\((?:\.\./\.\./docs/)?results/([\w-]+)\.csv(?: "([^"]*)")?\)$', re.MULTILINE)
+TABLE = re.compile(
+    r'^\[Table: ([^\]]+)\]\((?:\.\./\.\./docs/)?results/([\w-]+)\.csv(?: "([^"]*)")?\)$',
+    re.MULTILINE,
+)
 ENTRY = re.compile(r"(?<!`)\{\{([\w-]+): *([^,{}]+), *([^{}]+?) *\}\}")
 # columns of these are put to the right
 NUMBER = re.compile(r"[-+]?[\d.,]*(?:e[-+]?\d+)?(?: ?%)?")

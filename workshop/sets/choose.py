@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest, _solve, scenes
+from fclib._origin import origin_of
 from fclib.collections import catalog, known, standing, trajectory
 from fclib.collections.known import Choice
 from fclib.collections.plan import Plan, Simulation, source
@@ -147,7 +148,7 @@ def hard(
 def choice_of_row(folder: Path, row: Mapping[str, Any]) -> Choice:
     """A problem of a catalogue, with the parameters that its file says."""
     problem = _core.read(folder / (row["global_file"] or row["local_file"]))
-    made = json.loads(problem.info.description.splitlines()[-1])
+    made = origin_of(problem.info)
     return Choice(
         row["family"], made["parameters"], row["seed"], row["number"], row["step"], row["digest"]
     )

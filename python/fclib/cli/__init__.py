@@ -35,6 +35,7 @@ COMMANDS = (
     "solvers",
     "simulate",
     "record",
+    "judge",
     "demo",
     "profile",
     "report",

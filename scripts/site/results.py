@@ -16,6 +16,7 @@ import re
 from functools import cache
 from pathlib import Path
 
+# pages outside of docs/ name the way to it
 TABLE = re.compile(
     r'^\[Table: ([^\]]+)\]\((?:\.\./\.\./docs/)?results/([\w-]+)\.csv(?: "([^"]*)")?\)$',
     re.MULTILINE,

@@ -11,7 +11,7 @@ JOBS ?= auto
 
 # the sanitizer of threads of some compilers wants its shadow memory where Linux may have put others'
 NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
-CXX_SOURCES := $(shell find core bindings browser include tests examples benchmarks -name '*.[ch]pp' -o -name '*.[ch]')
+CXX_SOURCES := $(shell find core bindings browser include tests examples workshop -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
         collection-wheel results-wheel campaigns deb release clean help
@@ -90,18 +90,18 @@ build-cost: setup
 	$(BIN)/python scripts/build_cost.py
 
 lint: setup $(VENV)/.lint-tools $(VENV)/.test-tools $(VENV)/.docs-tools
-	$(BIN)/ruff check python tests benchmarks examples scripts
-	$(BIN)/ruff format --check python tests benchmarks examples scripts
+	$(BIN)/ruff check python tests workshop examples scripts
+	$(BIN)/ruff format --check python tests workshop examples scripts
 	$(BIN)/clang-format --dry-run --Werror $(CXX_SOURCES)
 	$(BIN)/mypy --package fclib
 	@# for the oldest Python; what NumPy's types say there differs
 	$(BIN)/mypy --python-version 3.10 --disable-error-code no-any-return --package fclib
-	$(BIN)/mypy tests benchmarks examples/python scripts/*.py
+	$(BIN)/mypy tests workshop examples/python scripts/*.py
 	$(BIN)/mypy scripts/site
 
 format: $(VENV)/.lint-tools
-	$(BIN)/ruff check --fix python tests benchmarks examples scripts
-	$(BIN)/ruff format python tests benchmarks examples scripts
+	$(BIN)/ruff check --fix python tests workshop examples scripts
+	$(BIN)/ruff format python tests workshop examples scripts
 	$(BIN)/clang-format -i $(CXX_SOURCES)
 
 tidy: setup $(VENV)/.lint-tools
@@ -131,7 +131,7 @@ wheels: sdist
 # tried as it is installed: every stored trajectory is found in it and read
 campaigns: setup
 	set -e; for name in $(CAMPAIGNS); do \
-	  $(BIN)/python benchmarks/published_campaigns.py $$name --budget $(BUDGET); done
+	  $(BIN)/python -m workshop.tables.campaign $$name --budget $(BUDGET); done
 	mkdir -p dist
 	tar -czf dist/fclib-campaigns.tar.gz -C $(BUILD) campaigns -C .. docs/results
 	@echo dist/fclib-campaigns.tar.gz

@@ -63,7 +63,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 PYTHON: dict[str, set[str]] = {
     "_geometry": set(),
     "_meant": set(),
-    "_origin": set(),
+    "_origin": {"_core"},
     "_symmetry": set(),
     "_verdicts": set(),
     "_core": set(),

@@ -63,11 +63,11 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 PYTHON: dict[str, set[str]] = {
     "_geometry": set(),
     "_meant": set(),
-    "_origin": {"_core"},
     "_symmetry": set(),
     "_verdicts": set(),
     "_core": set(),
     "_display": {"_core"},
+    "_origin": {"_core"},
     "_digest": set(),
     "_registry": {"_core", "_meant"},
     "_same": set(),

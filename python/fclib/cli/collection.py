@@ -17,7 +17,6 @@ from fclib import collections
 from fclib._judge import TOLERANCE
 from fclib._verdicts import CLASSES
 from fclib.bench import Store
-from fclib.cli import choose
 from fclib.cli._build import (
     Analyze,
     Count,
@@ -51,8 +50,6 @@ from fclib.collections.verify import LACKING
 app = typer.Typer(
     help="Families of problems: list, build, verify, publish, fetch.", no_args_is_help=True
 )
-app.add_typer(choose.app, name="choose")
-
 
 MOST_COPIES = 10  # largest number of copies named; the catalogue has all
 
@@ -212,7 +209,6 @@ def build(
         typer.Argument(help="Sets, families, or problems: SET/FAMILY/NUMBER."),
     ] = None,
     listed: ListFile = None,
-    every: Annotated[bool, typer.Option("--all", help="All families of the set rt444.")] = False,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the collection.")] = Path(
         "collection"
     ),
@@ -257,10 +253,10 @@ def build(
     Families without stored states are simulated first.
     """
     names = named(names, listed)
-    if every == bool(names):
-        raise typer.BadParameter("name sets, families or problems, or say --all")
+    if not names:
+        raise typer.BadParameter("name sets, families or problems")
     try:
-        folders = collections.numbered(names or ["rt444"], version)
+        folders = collections.numbered(names, version)
     except KeyError as error:
         usage_error(ValueError(error.args[0]))
     try:

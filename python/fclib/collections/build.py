@@ -34,10 +34,10 @@ import numpy as np
 from fclib import _core, _digest, _solve, scenes
 from fclib._judge import TOLERANCE
 from fclib._origin import origin_of
-from fclib.collections import catalog, references, rights, standing, trajectory
+from fclib.collections import catalog, references, standing, trajectory
 from fclib.collections.catalog import STATE
 from fclib.collections.guesses import guess_of
-from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan
+from fclib.collections.plan import HARD_SWEEPS, HARD_TOLERANCE, Plan, rights_of, stamped
 from fclib.collections.record import record
 from fclib.collections.references import Found
 
@@ -424,14 +424,14 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         found = references.best_first(found, item.problem, several)
         row |= found.row | {"tol": plan.tol}
     words, known = known_of(plan, item.problem, local, found, states, row)
-    info = rights.stamped(item.problem.info, plan, kept.looked, words)
+    info = stamped(item.problem.info, plan, kept.looked, words)
     for form in plan.forms if is_global else ("local",):
         path = Path(plan.name) / f"{kept.looked:04d}-{form}.hdf5"
         problem = item.problem if form == "global" else local
         mine = found
         if found is not None and is_global and form == "local":
             mine = references.carried(found, local)
-        stamped = problem.replace(
+        with_info = problem.replace(
             info=info,
             matrix_info={
                 name: info
@@ -441,7 +441,7 @@ def store(plan: Plan, kept: Kept, item: Item, before: Before | None, out: Path) 
         )
         own = [_core.Solution(r=guess.r, l=guess.l) for guess in guesses]
         references.write(
-            out / path, stamped, mine, own, several, compression=COMPRESSION, sync=False
+            out / path, with_info, mine, own, several, compression=COMPRESSION, sync=False
         )
         row |= {f"{form}_file": path.as_posix(), f"{form}_sha256": catalog.sha256(out / path)}
     for gone in kept.add(row):
@@ -524,7 +524,7 @@ def describe(plan: Plan, number: int, item: Item) -> dict[str, Any]:
         ),
         "rating": standing.classes(plan.collection).get(facts["digest"]),
         "left_out": "; ".join(item.left_out) or None,
-        **rights.of(plan),
+        **rights_of(plan),
     }
 
 

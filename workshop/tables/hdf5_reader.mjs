@@ -1,5 +1,5 @@
-// What workshop/tables/hdf5_reader.py asks: each line of the input is { reader, path, times }, and the
-// answer says whether the file is read, and in how many milliseconds.
+// What workshop/tables/hdf5_reader.py asks: each line of the input is { reader, path, times }, and
+// the answer says whether the file is read, and in how many milliseconds.
 //
 //   node hdf5_reader.mjs FOLDER         a folder with the reader of pages and h5wasm
 

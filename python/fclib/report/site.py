@@ -243,7 +243,8 @@ class Problems:
         """Name the first problem with the same data, of each other one."""
         first: dict[str, str] = {}
         for row in self.rows:
-            original = first.setdefault(row["digest"], row["id"])
+            # a catalogue of somebody else's may have no digests
+            original = first.setdefault(row["digest"] or row["id"], row["id"])
             row["same_as"] = None if original == row["id"] else original
 
     def share(self) -> None:
@@ -292,7 +293,7 @@ class Problems:
                 place = names.get("/".join(path.parts[-3:]))
                 if place is not None and not _is_of(self.rows[place], digest, facts):
                     place = None
-                elif place is not None:
+                elif place is not None and self.rows[place]["same_as"]:
                     place = digests[self.rows[place]["digest"]]
             if place is None:
                 place = digests.get(digest)

@@ -40,11 +40,6 @@ def make_collection(folder: Path, analyze: bool = False) -> Path:
     scene = scenes.get("BoxesStack")(boxes=3, gap=2e-3, time_step=5e-3).scene(seed=1)
     plan = Plan(scene=scene, collection="small", problems=12, analyze=analyze)
     collections.build([plan], folder, pictures=False)
-    # a picture as a build would draw it
-    part = next(folder.rglob("*-global.hdf5")).parent
-    (part / "distribution.svg").write_text(
-        '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 3"><path d="M0 0H5V3z"/></svg>'
-    )
     return folder
 
 

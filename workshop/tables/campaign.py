@@ -439,12 +439,13 @@ def along(store: Path, _: argparse.Namespace) -> list[Table]:
         }
         for row in profiles.along(store, rows)
     ]
-    load = max(row["load"] for row in rows)
-    limits = sorted({row["time_limit"] for row in rows})
-    note = f"{limits[-1]:g} s of CPU a solve, consecutive problems from the middle of the stored"
-    return [
-        Table(table, "Warm against cold along sequences", f"{note} states; load up to {load:.1f}")
-    ]
+    load, limit = max(row["load"] for row in rows), max(row["time_limit"] for row in rows)
+    tols = ", ".join(f"{tol:g}" for tol in sorted({row["tol"] for row in rows}))
+    note = (
+        f"tolerance {tols}, {limit:g} s of CPU a solve, consecutive problems from the middle of"
+        f" the stored states; load up to {load:.1f}"
+    )
+    return [Table(table, "Warm against cold along sequences", note)]
 
 
 TABLES = {

@@ -14,7 +14,7 @@ NO_RANDOM_ADDRESSES := $(shell command -v setarch >/dev/null && echo setarch -R)
 CXX_SOURCES := $(shell find core bindings browser include tests examples workshop -name '*.[ch]pp' -o -name '*.[ch]')
 
 .PHONY: setup demo test wasm docs fuzz asan tsan coverage build-cost lint tidy format layers man sdist wheel wheels \
-        collection-wheel campaigns deb release clean help
+        collection-wheel results-wheel campaigns deb release clean help
 
 help:
 	@echo "make setup   install what is missing, build, make $(VENV) import fclib from here"
@@ -36,6 +36,7 @@ help:
 	@echo "make wheel   a wheel of it with HDF5 and METIS inside, installed and tried (HDF5_SOURCE=FOLDER,"
 	@echo "             METIS_SOURCE=FOLDER: their sources, which are downloaded otherwise)"
 	@echo "make wheels  wheels for each Python from 3.10 to 3.14 that is found, each tried there"
+	@echo "make results-wheel     the published runs, as a wheel, into dist/results"
 	@echo "make collection-wheel  the stored states of the collection, as a wheel, into dist/collection"
 	@echo "make campaigns  run the published campaigns, BUDGET=10min each, and pack stores and tables"
 	@echo "make deb     the C library as Debian packages, into dist/"
@@ -140,6 +141,11 @@ collection-wheel: setup $(VENV)/.package-tools
 	$(BIN)/python -m build --wheel --outdir dist/collection collection
 	$(BIN)/python scripts/check_collection.py dist/collection/*.whl
 
+results-wheel: setup $(VENV)/.package-tools
+	$(BIN)/fclib results verify --in results/fclib_results/runs
+	rm -rf dist/results
+	$(BIN)/python -m build --wheel --outdir dist/results results
+
 deb:
 	cmake -S . -B $(BUILD)/deb -G Ninja -DFCLIB_PYTHON=OFF -DCMAKE_INSTALL_PREFIX=/usr
 	cmake --build $(BUILD)/deb
@@ -154,7 +160,7 @@ release: $(VENV)/.package-tools
 	$(BIN)/python scripts/release.py check
 	rm -rf dist
 	$(MAKE) lint test docs
-	$(MAKE) wheels collection-wheel deb
+	$(MAKE) wheels collection-wheel results-wheel deb
 	$(BIN)/python scripts/release.py finish dist
 
 clean:

@@ -38,6 +38,7 @@ COMMANDS = (
     "judge",
     "demo",
     "profile",
+    "results",
     "report",
     "view",
     "doctor",

@@ -103,7 +103,8 @@ def main() -> None:
         for option in ("time_limit", "wall_limit", "sample", "repeats"):
             if (value := getattr(arguments, option)) is not None:
                 command += [f"--{option.replace('_', '-')}", value]
-        subprocess.run(command, check=True)
+        if code := subprocess.run(command).returncode:
+            raise SystemExit(code)
     for table in TABLES[arguments.table](store, arguments):
         name = f"{arguments.results or f'campaign-{arguments.name}'}{table.ending}"
         title = table.title.format(name=arguments.name)

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib import _core
-from fclib._meant import nearest
+from fclib._suggest import nearest
 
 GROUP = "fclib.solvers"
 SolverError = _core.SolverError

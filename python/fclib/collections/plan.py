@@ -267,8 +267,8 @@ def stamped(info: _core.ProblemInfo, plan: Plan, number: int, facts: str = "") -
     The facts on existence and uniqueness come after those that the family states.
     """
     if facts:
-        said = info.math_info.rstrip(". ")
-        info = info.replace(math_info=f"{said}. {facts}" if said else facts)
+        stated = info.math_info.rstrip(". ")
+        info = info.replace(math_info=f"{stated}. {facts}" if stated else facts)
     *words, last = info.description.split("\n")
     try:
         told: Any = json.loads(last)

@@ -20,7 +20,7 @@ import importlib
 import pkgutil
 from typing import Any
 
-from fclib._meant import meant
+from fclib._suggest import suggestion
 from fclib.scenes.shared.family import Assembled, Assembly, Described, Family, Law, Scene, parameter
 
 __all__ = [
@@ -67,7 +67,7 @@ def get(name: str) -> type[Family]:
     known = families()
     if name not in known:
         raise KeyError(
-            f"no family of scenes is called {name!r}; {meant(name, known)}"
+            f"no family of scenes is called {name!r}; {suggestion(name, known)}"
             f"there is: {', '.join(known)}"
         )
     return known[name]

@@ -61,6 +61,7 @@ GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 # the parts of the Python package in one order, and what each may import of those above it: wherever
 # in a file an import stands, it counts. "__init__" is what `import fclib` gives
 PYTHON: dict[str, set[str]] = {
+    "_entry_points": set(),
     "_geometry": set(),
     "_suggest": set(),
     "_symmetry": set(),
@@ -69,7 +70,7 @@ PYTHON: dict[str, set[str]] = {
     "_display": {"_core"},
     "_origin": {"_core"},
     "_digest": set(),
-    "_registry": {"_core", "_suggest"},
+    "_registry": {"_core", "_entry_points", "_suggest"},
     "_equality": set(),
     "_solve": {"_core", "_registry"},
     "_judge": {"_core", "_solve"},
@@ -81,7 +82,7 @@ PYTHON: dict[str, set[str]] = {
     "jax": {"_layer"},
     "external": {"_core", "_registry"},
     "analysis": {"_core", "_digest", "_judge", "_registry", "_solve", "_symmetry"},
-    "scenes": {"_core", "_geometry", "_suggest"},
+    "scenes": {"_core", "_entry_points", "_geometry", "_suggest"},
     "simulate": {"_core", "_geometry", "_origin", "_solve", "scenes"},
     "recorders": {"_core", "_origin", "_solve", "external"},
     "collections": {
@@ -100,6 +101,7 @@ PYTHON: dict[str, set[str]] = {
     "bench": {
         "_core",
         "_digest",
+        "_entry_points",
         "_suggest",
         "_origin",
         "_registry",

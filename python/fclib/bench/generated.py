@@ -62,9 +62,12 @@ def simulated(
         ImportError: MuJoCo is not there.
         fclib.OptionError: there is no such family, or it refuses the parameters.
     """
+    from fclib import scenes
+
     wanted = set(steps)
     recipe = {
         "scene": family,
+        **scenes.identity_of(family),
         "parameters": dict(parameters),
         "steps": sorted(wanted),
         "seed": seed,
@@ -72,7 +75,7 @@ def simulated(
     }
 
     def make(folder: Path) -> None:
-        from fclib import scenes, simulate
+        from fclib import simulate
 
         try:
             kind = scenes.get(family)

@@ -28,7 +28,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fclib import _registry, external
+from fclib import _entry_points, _registry, external
 from fclib.bench import meter, processes
 
 # constants of clone(2) and mount(2)
@@ -109,7 +109,7 @@ def _run(link: socket.socket, lifeline: int, supervisor: int, mark: str, serve: 
         signal.signal(number, signal.SIG_IGN)
     # imports that each worker would need: to unpickle matrices, and to find solvers
     importlib.import_module("scipy.sparse")
-    _registry.entry_points_there()
+    _entry_points.listed(_registry.GROUP)
     external.adapters()
     gc.collect()
     gc.freeze()  # workers do not scan existing objects, so their pages are not copied

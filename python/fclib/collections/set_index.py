@@ -346,6 +346,7 @@ def published_digest(row: Mapping[str, Any]) -> str | None:
     family = families().get(row["family"])
     if (
         family is not None
+        and row["family"] in scenes.own()
         and hasattr(family, "digests")
         and (row["collection"], row["version"]) == (family.collection, version(family.collection))
     ):

@@ -471,10 +471,11 @@ void bind_solvers(nb::module_& m) {
           "if the proof is exact. It is finite if only the last digits of W are left of W^T E y.\n"
           "Else None.")
       .def_ro("stages", &Result::stages, "of a solver that chains others, in their order")
-      .def_prop_ro("history", history_of,
-                   nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
-                   "Where fclib.solve was asked for it: what the solver reported, a structured "
-                   "array with iteration, error, time [s] and stage.")
+      .def_prop_ro(
+          "history", history_of,
+          nb::sig("def history(self) -> numpy.typing.NDArray[numpy.void] | None"),
+          "The reports of the solver, if fclib.solve was asked for them: a structured array "
+          "with iteration, error, time [s] and stage.")
       .def("__repr__", [](const Result& r) {
         char text[160];
         std::snprintf(text, sizeof text, "<Result %s: %s, %lld iterations, error %.1e, %.2e s>",

@@ -139,7 +139,7 @@ class Group {
     return { path, dataset: found, metadata, shape, size: product(shape) };
   }
 
-  /** Where the file keeps the data of a dataset, as far as it can be told. */
+  /** The places at which the file keeps the data of a dataset, as far as they are known. */
   place_of({ path, metadata }) {
     let place = {};
     try {
@@ -274,7 +274,7 @@ class Group {
     return this.#text_of(path, length, metadata.vlen);
   }
 
-  /** The bytes as UTF-8, which h5wasm takes for Latin letters where they are marked as ASCII. */
+  /** The bytes as UTF-8. If they are marked as ASCII, h5wasm takes them for Latin letters. */
   #text_of(path, length, vlen) {
     const { module, file_id } = this.file;
     const place = module._malloc(length);

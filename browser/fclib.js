@@ -235,15 +235,15 @@ export class Fclib {
     return this.#call("validate", this.#block(problem).place());
   }
 
-  /** Throws where a solution does not fit the problem; `where` is its name in the message. */
+  /** Throws if a solution does not fit the problem; `where` is its name in the message. */
   validate_solution(problem, solution, where = "/solution") {
     this.#call("validate_solution", this.#block(problem).solution(solution).place(), where);
   }
 
   /**
-   * Solves a problem. on_report({ iteration, error, time, stage, r }) is called where the solver
-   * evaluates its error; where it returns false the solver stops. `r` is the iterate, copied when it
-   * is asked for, and undefined where the solver has none at hand.
+   * Solves a problem. Each time the solver evaluates its error, it calls
+   * on_report({ iteration, error, time, stage, r }). If this returns false, the solver stops. `r` is
+   * the iterate. It is copied when it is read, and undefined if the solver has no iterate to show.
    */
   solve(problem, settings = {}, on_report = undefined) {
     const own = complete(settings);
@@ -389,9 +389,9 @@ export class Fclib {
   }
 
   /**
-   * What a file holds: { problem, solution, guesses, contacts, bodies, left_out }, null where there is
-   * none. The bytes are those of an FCLIB file of any version, or of a text of Siconos; `kind` is of
-   * the problem where there are several. `left_out` says what could not be read beside the problem.
+   * The content of a file: { problem, solution, guesses, contacts, bodies, left_out }. What the file
+   * lacks is null. The bytes are those of an FCLIB file of any version, or of a text of Siconos. If
+   * the file has several problems, `kind` says which one. `left_out` names what could not be read.
    */
   async read(bytes, kind = "") {
     const content = bytes instanceof Uint8Array ? bytes : new Uint8Array(bytes);
@@ -406,7 +406,7 @@ export class Fclib {
     return { problem, solution: null, guesses: [], contacts: null, bodies: null, left_out: [] };
   }
 
-  /** The problem in a text of Siconos; `kind` where its sizes should not decide. */
+  /** The problem in a text of Siconos. If `kind` is given, the sizes do not decide the kind. */
   read_siconos(text, kind = "") {
     return this.#call("read_siconos", text, kind);
   }

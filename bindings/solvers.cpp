@@ -167,7 +167,7 @@ void for_each_part(OptionOrConst& option, const Visitor& visit) {
   visit("highest", option.highest);
 }
 
-/// ... and a stage.
+/// Visits (name, member) of all parts of a stage.
 template <class StageOrConst, class Visitor>
   requires std::same_as<std::remove_const_t<StageOrConst>, Stage>
 void for_each_part(StageOrConst& stage, const Visitor& visit) {
@@ -254,7 +254,7 @@ void set_state(Result& result, const nb::dict& values) {
   }
 }
 
-/// All but the times, which differ between runs.
+/// Whether two results agree. Times are not compared: they differ from run to run.
 bool same(const Result& a, const Result& b) {
   const auto same_point = [](const HistoryPoint& one, const HistoryPoint& other) {
     return std::tie(one.iteration, one.error, one.stage) ==

@@ -112,7 +112,7 @@ class Block {
     return reinterpret_cast<int>(bytes_);
   }
 
-  /// `address` is that of the integers, of which the first is the size of the arrays [bytes].
+  /// `address` points to the integers. The first of them is the size of the arrays [bytes].
   explicit Block(int address) : next_(reinterpret_cast<const std::int32_t*>(address)) {
     arrays_ = reinterpret_cast<const char*>(address) - integer();
   }

@@ -8,7 +8,7 @@
 // are Float64Array and whose matrices are { storage, rows, cols, p, i, x }. Calls do not return
 // before they are done: for a page that stays alive there is fclib-worker.js.
 
-/** What the core says is wrong. `kind`: file, problem, option, unsuitable, memory or internal. */
+/** An error of the core. `kind`: file, problem, option, unsuitable, memory or internal. */
 export class FclibError extends Error {
   constructor(kind, message, where = "") {
     super(message);
@@ -73,7 +73,7 @@ const is_missing = (value) => value === undefined || value === null;
 const is_array = (value) =>
   Array.isArray(value) || (ArrayBuffer.isView(value) && value.length !== undefined);
 
-/** A part of an array; to slice it takes a microsecond, whatever its size. */
+/** A part of an array. slice() would take a microsecond even for a small part. */
 function copy(numbers, first, size) {
   if (size > 64) return numbers.slice(first, first + size);
   const result = new Float64Array(size);
@@ -81,8 +81,8 @@ function copy(numbers, first, size) {
   return result;
 }
 
-/** What a call takes, in the memory of the core: arrays, and behind them integers that say what they
- * are, in the order of browser/convert.hpp. */
+/** The arguments of a call in the memory of the core: first the arrays, then integers that describe
+ * them, in the order of browser/convert.hpp. */
 class Block {
   #core;
   #structs;
@@ -230,7 +230,7 @@ export class Fclib {
     return this.solvers().filter((solver) => solver[dimensions].includes(problem.spacedim));
   }
 
-  /** { formulation, n, m, p, nc } of a problem; throws at the first thing wrong with its data. */
+  /** { formulation, n, m, p, nc } of a problem. Throws at the first fault of its data. */
   validate(problem) {
     return this.#call("validate", this.#block(problem).place());
   }
@@ -343,7 +343,7 @@ export class Fclib {
     return this.#call("merit", this.#block(problem).solution(solution).place());
   }
 
-  /** What libfclib calls MERIT_1. */
+  /** The merit that libfclib calls MERIT_1. */
   merit_1(problem, solution) {
     return this.#call("merit_1", this.#block(problem).solution(solution).place());
   }
@@ -374,8 +374,8 @@ export class Fclib {
     return this.#call("islands", this.#block(problem).place());
   }
 
-  /** What y (and z) prove: { y, z, gain, distance, bound }, or null. A proof whose bound is Infinity
-   * says that there is no solution, else that there is none of a smaller norm. */
+  /** The proof that y (and z) are: { y, z, gain, distance, bound }, or null if they prove nothing. If
+   * the bound is Infinity, there is no solution. Else no solution has a norm below the bound. */
   check_certificate(problem, y, z = undefined) {
     return this.#call(
       "check_certificate",
@@ -422,7 +422,7 @@ async function bytes_of(url) {
   return answer.arrayBuffer();
 }
 
-/** Loads the core, once; `wasm` are the bytes of fclib-core.wasm, from beside this file otherwise. */
+/** Loads the core, once. `wasm` has the bytes of fclib-core.wasm; without it the file is read. */
 export async function load({ wasm = undefined } = {}) {
   const { default: createCore } = await import("./fclib-core.mjs");
   const wasmBinary = wasm ?? (await bytes_of(new URL("./fclib-core.wasm", import.meta.url)));

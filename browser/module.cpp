@@ -165,7 +165,7 @@ val describe_fields() {
   return result;
 }
 
-/// The fields of all structs, by the names of these.
+/// The fields of each struct, by the name of the struct.
 val describe_structs() {
   val problems = val::object();
   for_each_formulation([&]<class P>(std::type_identity<P>) {

@@ -414,11 +414,9 @@ void bind_solvers(nb::module_& m) {
   def_html(result);
   result.def(
       "plot",
-      [](nb::handle self) {
-        return nb::module_::import_("fclib.notebook").attr("plot")(self);
-      },
+      [](nb::handle self) { return nb::module_::import_("fclib.notebook").attr("plot")(self); },
       nb::sig("def plot(self) -> Any"),
-      "How the error fell, for a notebook, where fclib.solve was asked for the history. See\n"
+      "How the error fell, for a notebook, if fclib.solve was asked for the history. See\n"
       "fclib.notebook.plot.");
   result.def_ro("solution", &Result::solution)
       .def_prop_ro(

@@ -43,8 +43,8 @@ from fclib import collections
 from fclib.analysis._brief import spectrum_of_W
 from fclib.analysis._data import Data, asymmetry
 from fclib.analysis._spectrum import spectrum
-from fclib.collections import known as versions
 from fclib.collections import published as stored
+from fclib.collections import set_index as versions
 from fclib.collections import trajectory
 from fclib.simulate import problem_at
 from workshop.tables import _results
@@ -74,7 +74,7 @@ def span(values: Iterable[Any]) -> str:
 
 def figures(problem: Any) -> tuple[float, float]:
     """Rank ratio and conditioning of W, as `fclib.analysis` finds them; NaN where it does not."""
-    data = Data.of(problem)
+    data = Data.of_problem(problem)
     found = spectrum_of_W(data, asymmetry(data.W))
     if found is None and data.reduced is not None:
         found = spectrum(data.reduced.W, rounding=data.reduced.rounding)

@@ -134,7 +134,7 @@ def solved(store: Path, _: argparse.Namespace) -> list[Table]:
     table = []
     for family in sorted({one.family for one in whole.instances}):
         places = [k for k, one in enumerate(whole.instances) if one.family == family]
-        part = whole.of(places)
+        part = whole.on_instances(places)
         sizes = [one.nc for one in part.instances]
         ends = dict.fromkeys((min(sizes), max(sizes)))
         cells: dict[str, Any] = {"family": family, "contacts": " to ".join(map(str, ends))}
@@ -166,7 +166,7 @@ def compared(store: Path, _: argparse.Namespace) -> list[Table]:
     with bench.Store(store, create=False) as opened:
         first = opened.status()[0]
         runs = opened.table(more=("key",))
-    spent = runner.spent(runs, set(runs["key"].values))
+    spent = runner.budget_used(runs, set(runs["key"].values))
     note = (
         f"{profiles.caption(whole, rows, WEIGH)}. {first.done} of the campaign's {first.planned}"
         f" runs, in {spent / 60:.0f} min of runs."

@@ -119,13 +119,13 @@ def writing(original: Any, told: Any, steps: Steps) -> Any:
                 arrays |= {"end": now, "h": simulation.timeStep()}
             start = time.process_time()
             info: int = self.solve()
-            spent = time.process_time() - start
+            cpu = time.process_time() - start
             if arrays:
                 m = dimension * nc
                 arrays |= {"r": np.array(self.z())[:m], "u": np.array(self.w())[:m]}
                 if hasattr(self, "globalVelocities"):
                     arrays["v"] = np.array(self.globalVelocities())[: len(arrays["q"])]
-                steps.write(arrays | {"solve_cpu_s": spent})
+                steps.write(arrays | {"solve_cpu_s": cpu})
             self.postCompute()
             return info
 

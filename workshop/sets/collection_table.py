@@ -46,7 +46,6 @@ from fclib.analysis._spectrum import spectrum
 from fclib.collections import published as stored
 from fclib.collections import set_index as versions
 from fclib.collections import trajectory
-from fclib.simulate import problem_at
 from workshop.tables import _results
 
 PUBLISHED = Path(__file__).with_name("published_sets.csv")
@@ -178,8 +177,7 @@ def growth(name: str, limit: int) -> Iterator[dict[str, str]]:
     states = trajectory.read(path)
     least = 0.0
     for k in range(len(states)):
-        position, velocity = states.position[k], states.velocity[k]
-        problem = problem_at(states.model, states.scheme, position, velocity).problem
+        problem = states.problem(k).problem
         last = k == len(states) - 1
         if not (problem.n >= least or last) or problem.m > limit:
             continue

@@ -12,7 +12,8 @@ the steps of the family's scene that have a contact, or the problems of a family
 directly.
 
 plan.py       which problems of a family are built, and which are kept; their license and citation
-trajectory.py stored states, from which problems are assembled, and their files
+trajectory.py stored states, from which problems are assembled, and their files. Needs handed.py
+handed.py     problems of states that another engine handed over, with its contacts
 published.py  the trajectories of all published versions. Needs trajectory.py
 set_index.py  the sets, their versions and their families; lists of chosen problems in data/
 record.py     a simulation into a trajectory. Needs trajectory.py, catalog.py

@@ -290,13 +290,12 @@ def item_of(plan: Plan, states: trajectory.Trajectory | None, number: int) -> It
         return Item(plan.scene.problem(number), number)
     place = states.index(number)
     part = states.problem(place)
-    bodies = int(np.unique(states.model.trees[part.dofs]).size)
     return Item(
         part.problem,
         int(states.step[place]),
         states.time(place),
-        bodies,
-        states.model.left_out,
+        states.moved(part),
+        states.left_out,
     )
 
 
@@ -341,7 +340,7 @@ def build_scene(
         from fclib.collections import figures
 
         if states is not None:
-            figures.draw_scene(states.model, folder)
+            figures.draw_states(states, folder)
         figures.draw_distribution(list(kept.rows.values()), folder, plan.scene.title)
     _core.sync_files(folder)
     return list(kept.rows.values())

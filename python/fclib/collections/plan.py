@@ -231,11 +231,12 @@ def origin(scene: Source) -> dict[str, Any]:
     }
     if isinstance(scene, scenes.Assembled):
         return known
-    # the version of the simulator decides the numbers
-    from fclib.simulate import engine
+    if scene.xml or scene.solids is not None:
+        # the version of the simulator decides the numbers
+        from fclib.simulate import engine
 
+        known |= engine(scene)
     return known | {
-        **engine(scene),
         **({"keyframe": scene.keyframe} if scene.keyframe else {}),
         "restitution": scene.restitution,
         "law": scene.law,

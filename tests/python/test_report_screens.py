@@ -339,7 +339,7 @@ def test_the_page_of_classes_is_of_the_problems_of_the_report(browser: Any, tmp_
     store = store_of(tmp_path / "runs.sqlite", errors, ("auto", "nsgs"))
     with Campaigns([store]) as campaigns:
         build_site(campaigns, tmp_path / "site", views=0)
-    (own,) = read_data(tmp_path / "site", "site")["standings"]
+    (own,) = read_data(tmp_path / "site", "site")["ratings"]
     assert own["set"] == "this report"
     assert own["families"] == [
         {"family": f"Family{k}", "easy": int(k == 2), "hard": int(k == 1), "open": int(k == 0)}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fclib._words import counted
+from fclib.collections.handed import drawing
 
 if TYPE_CHECKING:
+    from fclib.collections.trajectory import Trajectory
     from fclib.simulate import Model
 
 BINS = 40  # largest number, as in RT-0444
@@ -49,6 +52,18 @@ def bins_of(values: Sequence[float]) -> tuple[npt.NDArray[np.float64], npt.NDArr
 def is_whole(values: Sequence[float]) -> bool:
     """Whether all are whole numbers."""
     return all(float(value).is_integer() for value in values)
+
+
+def draw_states(states: Trajectory, folder: Path) -> Path | None:
+    """Write scene.png, the state that was assembled last; None if nothing can draw here."""
+    if states.handed is None:
+        return draw_scene(states.model, folder)
+    try:
+        from fclib.simulate import model_of
+    except ImportError:  # these states need no MuJoCo but for this picture
+        return None
+    xml = drawing(states.handed, states.scene, states.position[-1])
+    return draw_scene(model_of(replace(states.scene, xml=xml)), folder)
 
 
 def draw_scene(model: Model, folder: Path) -> Path | None:

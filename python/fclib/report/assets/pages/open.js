@@ -41,7 +41,7 @@
   };
 
   Fclib.pages.classes = async (page) => {
-    const list = site().standings;
+    const list = site().ratings;
     page.append(
       h("h1", {}, "Easy, hard and open"),
       h(

@@ -250,7 +250,7 @@
       ),
     );
     if (o) withRuns(page, params, keep);
-    const open = s.standings.filter((one) => one.open.length);
+    const open = s.ratings.filter((one) => one.open.length);
     if (open.length) page.append(h("h2", {}, "Open problems"));
     for (const one of open) page.append(Fclib.openProblems(one, FEW));
     if (open.length)

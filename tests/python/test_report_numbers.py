@@ -286,7 +286,7 @@ def test_the_overview_draws_the_chosen_problems_as_python_does(
         every = profiles.gather(rows.where(comparison.numbers_in(rows, "tol") == tol))
         sizes = {one.hash: one.nc for one in every.instances}
         for size, (low, high) in {"0-10": (0, 10), "10-50": (10, 50)}.items():
-            part = every.of(
+            part = every.on_instances(
                 k for k, one in enumerate(every.instances) if low <= sizes[one.hash] <= high
             )
             costs = comparison.compared(part)

@@ -9,7 +9,7 @@
 #include "arrays.hpp"
 #include "embed/batch.hpp"
 #include "embed/workspace.hpp"
-#include "linalg/cpu_watch.hpp"
+#include "linalg/stopwatch.hpp"
 #include "module.hpp"
 #include "solve/driver.hpp"
 
@@ -71,7 +71,7 @@ void bind_embed(nb::module_& m) {
           "solve",
           [span_of](Workspace& self, const LocalProblem& problem, const Names& contacts,
                     double tolerance, double time_limit) {
-            CpuWatch watch;
+            Stopwatch watch;
             Result result;
             const Unlocked unlocked;
             const auto answer = self.solve(LocalView(problem), span_of(contacts),
@@ -85,7 +85,9 @@ void bind_embed(nb::module_& m) {
             result.iterations = answer.iterations;
             result.error = answer.error;
             result.solver = answer.by_auto ? "auto" : "workspace";
-            result.cpu_s = watch.read();
+            const Times spent = watch.read();
+            result.cpu_s = spent.cpu;
+            result.time = spent.wall;
             return result;
           },
           "problem"_a, "contacts"_a.none(), "tolerance"_a, "time_limit"_a)

@@ -177,6 +177,7 @@ void for_each_part(StageOrConst& stage, const Visitor& visit) {
   visit("solved", stage.solved);
   visit("iterations", stage.iterations);
   visit("factorisations", stage.factorisations);
+  visit("cpu_s", stage.cpu_s);
   visit("time", stage.time);
 }
 
@@ -209,6 +210,7 @@ nb::dict state_of(const Result& result) {
   values["iterations"] = result.iterations;
   values["error"] = result.error;
   values["cpu_s"] = result.cpu_s;
+  values["time"] = result.time;
   values["setup_s"] = result.setup_s;
   values["solver"] = result.solver;
   values["message"] = result.message;
@@ -237,6 +239,7 @@ void set_state(Result& result, const nb::dict& values) {
   take(result.iterations, values, "iterations");
   take(result.error, values, "error");
   take(result.cpu_s, values, "cpu_s");
+  take(result.time, values, "time");
   take(result.setup_s, values, "setup_s");
   take(result.solver, values, "solver");
   take(result.message, values, "message");
@@ -397,6 +400,7 @@ void bind_solvers(nb::module_& m) {
       .def_ro("solved", &Stage::solved, "of these, how many it brought to the tolerance")
       .def_ro("iterations", &Stage::iterations)
       .def_ro("factorisations", &Stage::factorisations)
+      .def_ro("cpu_s", &Stage::cpu_s, "[s] CPU time of all threads")
       .def_ro("time", &Stage::time, "[s] wall clock")
       .def("__repr__", [](const Stage& s) {
         return "<Stage " + s.kind.name + ": solved " + std::to_string(s.solved) + " of " +
@@ -429,6 +433,7 @@ void bind_solvers(nb::module_& m) {
               "Merit.error of the solution on the problem as given (Merit.error_by if `solve` was "
               "asked for a merit)")
       .def_ro("cpu_s", &Result::cpu_s, "[s] CPU time of the solver alone")
+      .def_ro("time", &Result::time, "[s] wall clock of the solver alone")
       .def_ro("setup_s", &Result::setup_s, "[s] CPU time of conversions, validation and merit")
       .def_ro("solver", &Result::solver)
       .def_ro("message", &Result::message, "what a user should know, in words; mostly empty")

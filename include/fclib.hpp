@@ -463,6 +463,7 @@ struct Result {
   int iterations = 0;
   double error = 0;              ///< MERIT_2 of the solution
   double cpu_s = 0;              ///< CPU time of the solver alone [s]
+  double time = 0;               ///< wall clock of the solver alone [s]
   double certificate_bound = 0;  ///< if the status is FCLIB_INFEASIBLE
   Solution solution;
   std::vector<double> certificate_y, certificate_z;  ///< ... and its proof
@@ -539,6 +540,7 @@ Result solve(const C& problem, const std::string& solver = "auto", const Options
   result.iterations = static_cast<int>(number("iterations"));
   result.error = number("error");
   result.cpu_s = number("cpu_s");
+  result.time = number("time");
   result.certificate_bound = number("certificate_bound");
   result.solution.v = array("v");
   result.solution.u = array("u");

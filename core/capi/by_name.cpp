@@ -116,6 +116,7 @@ fclib_report* solve_with(const C* c, const fclib_options* options) {
                        {"iterations", static_cast<double>(solved.iterations)},
                        {"status", status_in_c(solved.status)},
                        {"cpu_s", solved.cpu_s},
+                       {"time", solved.time},
                        {"setup_s", solved.setup_s},
                        {"certificate_bound", solved.certificate.bound}};
     report->texts = {{"status", std::string(name_of(solved.status))}, {"solver", solved.solver}};

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -15,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "linalg/stopwatch.hpp"
 #include "solve/solver.hpp"
 
 namespace fclib::chain {
@@ -88,7 +88,8 @@ class Tracker {
     }
     monitor_.enter(name);
     const auto place = at - stages_.begin();  // a stage may run inside another one
-    const auto start = std::chrono::steady_clock::now();
+    Stopwatch watch;
+    const double others = others_cpu_;
     const auto before = iterations_;
     const auto [factorisations, solved] = run();
     Stage& stage = stages_[static_cast<std::size_t>(place)];
@@ -96,7 +97,9 @@ class Tracker {
     stage.solved += solved;
     stage.iterations += iterations_ - before;
     stage.factorisations += factorisations;
-    stage.time += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const Times spent = watch.read();
+    stage.cpu_s += spent.cpu + (others_cpu_ - others);
+    stage.time += spent.wall;
   }
 
  private:

@@ -9,7 +9,7 @@
 #include "convert/condense.hpp"
 #include "convert/eliminate.hpp"
 #include "joints/consistent.hpp"
-#include "linalg/cpu_watch.hpp"
+#include "linalg/stopwatch.hpp"
 #include "number_text.hpp"
 #include "solve/plugin.hpp"
 
@@ -56,7 +56,7 @@ struct Request {
   const Settings& settings;
   const OptionValues& options;
   const Deadline& deadline;  ///< of the whole solve, conversions included
-  CpuWatch& watch;           ///< of the whole solve, conversions included
+  Stopwatch& watch;          ///< of the whole solve, conversions included
 };
 
 /// What the merit is relative to.
@@ -196,11 +196,12 @@ Result run(const LocalProblem& plain, const Friction& friction, Measure measure,
   double least = std::numeric_limits<double>::infinity();
   Solution best;
   for (int correction = 0;; ++correction) {
-    const double start = request.watch.read();
+    const Times start = request.watch.read();
     Outcome outcome = request.solver.solve(reduced, request.options, settings, r);
-    const double own = request.watch.read() - start;
-    result.cpu_s += outcome.cpu_s.value_or(own);
-    result.setup_s -= own;
+    const Times own = request.watch.read() - start - outcome.setup;
+    result.cpu_s += outcome.cpu_s.value_or(own.cpu);
+    result.time += own.wall;
+    result.setup_s -= own.cpu;
     result.iterations += outcome.iterations;
     result.status = outcome.status;
     result.stages = std::move(outcome.stages);
@@ -452,12 +453,12 @@ Result solve_consistent(const P& given, const Request& request, const Solution& 
 template <class P, class Form>
 Result solve_any(const P& problem, const Solver& solver, const Settings& settings,
                  const OptionValues& options, const Solution& guess, const Form& form) {
-  CpuWatch watch;
+  Stopwatch watch;
   const Deadline deadline(settings.time_limit, settings.clock);
   const Request request{solver, settings, options, deadline, watch};
   require_solvable(problem, request.solver, guess);
   Result result = form(problem, request, guess);
-  result.setup_s += watch.read();  // the time of the thread in the solver is already taken off
+  result.setup_s += watch.read().cpu;  // the time of the thread in the solver is already taken off
   return result;
 }
 

@@ -27,6 +27,7 @@ struct Result {
   std::int64_t iterations = 0;
   double error = 0;  ///< Merit::error_by(Settings::merit) of the solution, on the problem as given
   double cpu_s = 0;  ///< CPU time of the solver alone [s]
+  double time = 0;   ///< wall clock of the solver alone [s]
   double setup_s = 0;         ///< CPU time of conversions, validation and merit [s]
   NoSolution certificate;     ///< the proof on the problem as given, if infeasible
   std::vector<Stage> stages;  ///< of solvers that chain others, in the last attempt

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "deadline.hpp"
+#include "linalg/stopwatch.hpp"
 #include "merit_kind.hpp"
 #include "reduced/reduced_problem.hpp"
 #include "solve/options.hpp"
@@ -144,7 +145,8 @@ struct Stage {
   std::int64_t solved = 0;  ///< ... how often it reached the tolerance
   std::int64_t iterations = 0;
   std::int64_t factorisations = 0;
-  double time = 0;  ///< wall clock [s]
+  double cpu_s = 0;  ///< CPU time of all threads [s]
+  double time = 0;   ///< wall clock [s]
 };
 
 /// What a solver returns besides r.
@@ -154,6 +156,7 @@ struct Outcome {
   std::vector<Stage> stages = {};    ///< in the order of their first call; empty for plain solvers
   std::optional<double> cpu_s = {};  ///< [s] if it is not that of the calling thread
   std::string message = {};          ///< what a user should know, in words; mostly empty
+  Times setup = {};                  ///< what it took to read the options, which is no solve
 };
 
 /// The entry of a solver in the registry.

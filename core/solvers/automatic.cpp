@@ -71,6 +71,9 @@ proximal point                  : proximal_point      from=best                 
 proximal point                  : proximal_point      from=best                        wander=true limit=1200
 )";
 
+/// Parsed as the library is loaded, so that no solve pays for it.
+const chain::Table own_table = chain::parse_table(table);
+
 struct Options {
   std::int64_t threads = 1;
   double memory_limit = 0;
@@ -93,15 +96,18 @@ struct Options {
 
 Outcome solve(const ReducedProblem& problem, const OptionValues& values, const Settings& settings,
               Vector& r) {
-  static const Options defaults;
-  static const chain::Table own = chain::parse_table(table);
-  if (values.empty()) return chain::run(problem, own, {}, settings, r);
+  if (values.empty()) return chain::run(problem, own_table, {}, settings, r);
+  Stopwatch watch;
   const auto options = parse_options<Options>(values);
   constexpr double gigabyte = 1e9;
   const chain::Resources resources{.threads = static_cast<int>(options.threads),
                                    .memory = gigabyte * options.memory_limit};
-  if (options.chain == defaults.chain) return chain::run(problem, own, resources, settings, r);
-  return chain::run(problem, chain::parse_table(options.chain), resources, settings, r);
+  const bool usual = options.chain == table;
+  const chain::Table given = usual ? chain::Table() : chain::parse_table(options.chain);
+  const Times setup = watch.read();
+  Outcome outcome = chain::run(problem, usual ? own_table : given, resources, settings, r);
+  outcome.setup = setup;
+  return outcome;
 }
 
 }  // namespace

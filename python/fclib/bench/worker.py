@@ -43,7 +43,7 @@ from fclib.external import command, plugin
 CACHE = 256e6  # [bytes] size of the problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
 CERTIFICATE = ("certificate_y", "certificate_z")
-STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
+STAGE = ("name", "calls", "solved", "iterations", "factorisations", "cpu_s", "time")
 HISTORY = 500  # number of reports kept of a run, with the first and the last
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.ENFILE)

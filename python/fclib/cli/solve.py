@@ -26,7 +26,7 @@ from fclib.cli._output import (
     warn_of,
 )
 
-STAGE = ("name", "calls", "solved", "iterations", "factorisations", "time")
+STAGE = ("name", "calls", "solved", "iterations", "factorisations", "cpu_s", "time")
 
 
 class Trace:

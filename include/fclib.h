@@ -460,10 +460,10 @@ const char* fclib_report_text(const struct fclib_report* report, const char* nam
 const double* fclib_report_array(const struct fclib_report* report, const char* name, int* count);
 
 /** New. Solves a problem as the options (or NULL) say. The report has the numbers "error",
- *  "iterations", "status" (of enum fclib_status), "cpu_s" and "time" (CPU time and wall clock of
- * the solver alone [s]), "setup_s", "certificate_bound"; the texts "status" and "solver"; the
- * arrays "v", "u", "r", "l", "certificate_y", "certificate_z". Delete it with
- * fclib_report_delete(). NULL for invalid data, or an unknown solver or option. */
+ *  "iterations", "status" (of enum fclib_status), "cpu_s" (CPU time of the solver alone [s]),
+ *  "time" (its wall clock [s]), "setup_s", "certificate_bound"; the texts "status" and "solver";
+ *  the arrays "v", "u", "r", "l", "certificate_y", "certificate_z". Delete it with
+ *  fclib_report_delete(). NULL for invalid data, or an unknown solver or option. */
 struct fclib_report* fclib_solve_global_with(const struct fclib_global* problem,
                                              const struct fclib_options* options);
 struct fclib_report* fclib_solve_local_with(const struct fclib_local* problem,

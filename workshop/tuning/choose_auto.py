@@ -2,6 +2,8 @@
 
     python -m workshop.tuning.choose_auto FILE... [--problems 12] [--seconds 10] [--tol 1e-8]
         [--half choose] [--only NAME...] [--rules] [--results auto-stages]
+    python -m workshop.tuning.choose_auto FILE... --needed [--remove] [--keep RUNS] [--chain FILE]
+        [--seconds 20] [--results auto-rows]
     python -m workshop.tuning.choose_auto FILE... --against OTHER_PYTHON [--limits 1 10 60]
         [--tols 1e-4 1e-8 1e-12] [--jobs 1] [--other NAME] [--results auto-judged]
 
@@ -22,6 +24,14 @@ tenth and ten times where it is small or large. The problems are those that the 
 second table, NAME-notable, has the rows in which a problem is lost, or whose interval does not have
 1 in it. The rules of "held bodies" are tried by constants.py.
 
+--needed says of each row of the table which problem needs it: one that is not solved without it
+within the limit, or else the one that loses most time, with the sums of CPU times over all on which
+the row does anything. The problems are those of the judging half at each tolerance, one of each
+family without memory for factors, steps of simulations from the reactions of the step before, and
+small planted ones. With --remove, the row whose loss costs least is taken out, and so on, until each
+row is needed. Runs are kept in the file RUNS, so that the command goes on where it ended; delete it
+after a change of the code.
+
 --against makes one table on the judging half: this fclib beside another one's (the Python that
 imports it), solved at 1e-4, 1e-8 and 1e-12 within each limit, sum and shifted geometric mean of CPU
 times, conversions included; a failure counts as the longest limit. What a limit does not solve is
@@ -40,15 +50,19 @@ import threading
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import fclib
-from fclib import scenes
+from fclib import collections, scenes
 from workshop.tables import _results
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "tests"))
+import planted_judge
+from ball_judge import judge
 
 CHOOSING = {"BoxesStack", "Capsules", "Bridge", "Chute", "LowWall", "Packing", "Wall"}
 HALVES = ("choose", "judge")
@@ -57,14 +71,22 @@ CHARGE = 2.0  # limits, for a failure
 SHIFT = 1e-3  # [s] of the geometric mean
 SHORT = 0.05  # [s] under which the least of three runs counts
 SAMPLES = 2000
+LOOSE = 1e-4  # tolerance without memory for factors
+NO_MEMORY = 1e-9  # [GB]
+PLANTED = range(100_000, 102_000)  # numbers of tests/planted_judge.py
+PLANTED_WORK = 1000  # iterations that a planted problem needs to be kept
+WARM = ("rt444/Chain", "rt444/KaplasTower")
+LEEWAY = 1.03  # of a ratio of CPU times: noise
 STAGES_TITLE = "What the stages of auto are worth"
 
 WORKER = """
 import json, sys, time
-import fclib
+import fclib, numpy
 for line in sys.stdin:
     job = json.loads(line)
-    options = {"chain": job["chain"]} if job.get("chain") else {}
+    options = job.get("options", {}) | ({"chain": job["chain"]} if job.get("chain") else {})
+    if "guess" in options:
+        options["guess"] = numpy.load(options["guess"])
     problem = fclib.read(job["file"])
     end = time.process_time() + job["limit"]
     try:
@@ -103,6 +125,14 @@ class Run:
         """CPU time with conversions [s]."""
         return self.cpu_s + self.setup_s
 
+    def worked(self, row: str) -> bool:
+        """Whether the stage of this row of `Runs` did anything."""
+        return any(self.stages.get(stage_of(row), (0,))[1:])
+
+    def solved_by(self, row: str) -> bool:
+        """Whether it brought something to the tolerance."""
+        return self.worked(row) and self.stages[stage_of(row)][1] > 0
+
     def same_path(self, other: Run) -> bool:
         """Whether the other made the same steps to the same end."""
         return (self.status, self.error, self.stages) == (other.status, other.error, other.stages)
@@ -120,16 +150,35 @@ class Worker:
 
     def run(self, file: Path, limit: float, tol: float = 0.0, chain: str = "") -> Run:
         """One solve."""
+        return run_of(*self.told(file, limit, tol, chain))
+
+    def told(
+        self, file: Path, limit: float, tol: float, chain: str, options: dict[str, Any] | None = None
+    ) -> list[Any]:
+        """What the process says of a solve."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         job = {"file": str(file), "limit": limit, "tol": tol or self._tol, "chain": chain}
+        job |= {"options": options or {}}
         self._process.stdin.write(json.dumps(job) + "\n")
         self._process.stdin.flush()
         line = self._process.stdout.readline()
         if not line:
             raise SystemExit(f"{self._python}: has ended with {self._process.wait()}")
-        status, cpu_s, setup_s, error, stages = json.loads(line)
-        return Run(status, cpu_s, setup_s, error, {name: tuple(rest) for name, *rest in stages})
+        answer: list[Any] = json.loads(line)
+        return answer
+
+
+def run_of(
+    status: str, cpu_s: float, setup_s: float, error: float | None, stages: list[list[Any]]
+) -> Run:
+    """What a process has told."""
+    return Run(status, cpu_s, setup_s, error, {name: tuple(rest) for name, *rest in stages})
+
+
+def stage_of(row: str) -> str:
+    """The name of the stage of a row of `Runs`, so that results tell rows apart."""
+    return row.replace(" ", "_")
 
 
 # ---- the table and its changes
@@ -545,6 +594,192 @@ def choose(problems: list[Problem], arguments: argparse.Namespace) -> None:
             _results.store(name, chosen, title="Rules of auto whose change matters", note=note)
 
 
+# ---- which rows are needed
+
+
+@dataclass(frozen=True)
+class Case:
+    """A solve that a row may be needed for."""
+
+    name: str
+    tol: float
+    file: Path = field(compare=False)
+    # "guess": a file of reactions; other keys are options of the solver
+    options: tuple[tuple[str, Any], ...] = field(default=(), compare=False)
+
+
+def planted(folder: Path) -> Iterable[Case]:
+    """Small problems with a known solution, if the first stages do not solve them."""
+    for number in PLANTED:
+        problem, solution, guess = planted_judge.planted(number)
+        if guess is not None or fclib.solve(problem, max_iterations=PLANTED_WORK).converged:
+            continue
+        if judge(problem, solution).error <= 0.1 * TOLERANCE:
+            file = folder / f"planted-{number}.hdf5"
+            fclib.write(file, problem)
+            yield Case(f"planted {number}", TOLERANCE, file)
+
+
+def warm(folder: Path, count: int) -> Iterable[Case]:
+    """Steps of simulations, each from the reactions of the step before."""
+    for name in WARM:
+        path = collections.plan_of(collections.folders([name])[0]).trajectory
+        assert path is not None
+        states = collections.read_trajectory(path)
+        for place in np.linspace(1, len(states) - 1, count).round().astype(int):
+            before, problem = (states.problem(int(k)).problem for k in (place - 1, place))
+            guess = collections.guess_of(before, fclib.solve(before), problem)
+            if guess is None or states.step[place] != states.step[place - 1] + 1:
+                continue
+            file = folder / f"{name.replace('/', '-')}-{place}.hdf5"
+            fclib.write(file, problem)
+            np.save(file.with_suffix(".npy"), guess.r)
+            options = (("guess", str(file.with_suffix(".npy"))),)
+            step = f"{name}/{states.number[place]:04d}, from the step before"
+            yield Case(step, TOLERANCE, file, options)
+
+
+def cases_of(problems: Sequence[Problem], folder: Path, arguments: argparse.Namespace) -> list[Case]:
+    """The problems at each tolerance, without memory for factors, from guesses; planted ones."""
+    found = []
+    families: set[str] = set()
+    for problem in problems:
+        if problem.half not in arguments.half:
+            continue
+        name = f"{problem.family}/{problem.file.stem}"
+        found += [Case(name, tol, problem.file) for tol in arguments.tols]
+        if problem.family not in families:
+            families.add(problem.family)
+            memory = (("memory_limit", NO_MEMORY),)
+            found.append(Case(f"{name}, no memory for factors", LOOSE, problem.file, memory))
+    if "judge" in arguments.half:
+        found += [*planted(folder), *warm(folder, arguments.steps)]
+    return found
+
+
+def texts(lines: Sequence[str]) -> list[str]:
+    """What each row says behind its name; of equal rows, later ones with a mark."""
+    found: list[str] = []
+    for line in lines:
+        text = " ".join(line.partition(":")[2].split())
+        while text in found:
+            text += " "
+        found.append(text)
+    return found
+
+
+class Runs:
+    """Runs of cases by tables of which rows are left out. Each is made once, and kept in a file."""
+
+    def __init__(self, limit: float, kept: Path | None) -> None:
+        self._worker = Worker()
+        self._limit = limit
+        self._kept = kept
+        self._found: dict[tuple[str, float], list[tuple[list[str], Run]]] = defaultdict(list)
+        if kept is not None and kept.is_file():
+            for line in kept.read_text(encoding="utf-8").splitlines():
+                name, tol, rows, run = json.loads(line)
+                self._found[name, tol].append((rows, run_of(*run)))
+
+    def of(self, case: Case, rows: Sequence[str]) -> Run:
+        """The run with these rows. A row that does nothing in a run may as well be left out."""
+        found = self._found[case.name, case.tol]
+        for others, run in found:
+            same = [row for row in others if row in rows] == list(rows)
+            if same and not any(run.worked(row) for row in others if row not in rows):
+                return run
+        chain = "\n".join(f"{stage_of(row)} : {row}" for row in rows)
+        told = self._worker.told(case.file, self._limit, case.tol, chain, dict(case.options))
+        found.append((list(rows), run_of(*told)))
+        if self._kept is not None:
+            with self._kept.open("a", encoding="utf-8") as stream:
+                stream.write(json.dumps([case.name, case.tol, list(rows), told]) + "\n")
+        return found[-1][1]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a row is worth: the problem that is lost without it, or the one that takes longer."""
+
+    row: str
+    worked: int  # cases on which it does anything
+    lost: bool  # whether the case is not solved without it
+    ratio: float  # sums of CPU times, without it over with it; of a lost one not known
+    case: Case | None = None
+    run: Run | None = None  # with it
+    other: Run | None = None  # without it
+
+
+def verdict(row: str, rows: Sequence[str], cases: Sequence[Case], runs: Runs) -> Verdict:
+    """The first problem that is lost; if there is none, the one that loses most time."""
+    rest = [other for other in rows if other != row]
+    working = [case for case in cases if runs.of(case, rows).worked(row)]
+
+    def likely(case: Case) -> tuple[bool, float]:
+        run = runs.of(case, rows)
+        return not run.solved_by(row), run.whole
+
+    sums = [1e-12, 1e-12]
+    worst: tuple[float, Case | None, Run | None, Run | None] = (0.0, None, None, None)
+    for case in sorted(working, key=likely):
+        run = runs.of(case, rows)
+        if not run.solved:
+            continue
+        other = runs.of(case, rest)
+        if not other.solved:
+            return Verdict(row, len(working), True, np.inf, case, run, other)
+        sums[0] += run.whole
+        sums[1] += other.whole
+        worst = max(worst, (other.whole - run.whole, case, run, other), key=lambda own: own[0])
+    return Verdict(row, len(working), False, sums[1] / sums[0], *worst[1:])
+
+
+def needed(problems: list[Problem], folder: Path, arguments: argparse.Namespace) -> None:
+    """Of each row of the table, the problem that needs it; with --remove, without the others."""
+    lines = arguments.chain.read_text().splitlines() if arguments.chain else table()
+    names = [numbered([name_of(line) for line in lines], k) for k in range(len(lines))]
+    rows = texts(lines)
+    named = dict(zip(rows, names, strict=True))
+    cases = cases_of(problems, folder, arguments)
+    runs = Runs(arguments.seconds, arguments.keep)
+    solved = [case for case in cases if runs.of(case, rows).solved]
+    print(f"{len(cases)} cases, {len(solved)} solved", flush=True)
+    while True:
+        found = []
+        for row in reversed(rows):
+            found.append(verdict(row, rows, solved, runs))
+            print(*verdict_row(found[-1], named).values(), sep="  ", flush=True)
+        free = [one for one in found if one.ratio <= LEEWAY]
+        if not (arguments.remove and free):
+            break
+        least = min(free, key=lambda one: one.ratio)
+        print(f"removed: {named[least.row]}", flush=True)
+        rows.remove(least.row)
+    if arguments.results:
+        _results.store(
+            arguments.results,
+            [verdict_row(one, named) for one in reversed(found)],
+            title="What each row of auto is needed for",
+            note=f"{len(solved)} of {len(cases)} cases are solved within {arguments.seconds:g} s.",
+        )
+
+
+def verdict_row(one: Verdict, named: dict[str, str]) -> dict[str, object]:
+    """As pages have it."""
+    run, other = one.run, one.other
+    return {
+        "row": named[one.row],
+        "works on": one.worked,
+        "problem": one.case.name if one.case else "",
+        "tolerance": _results.power(one.case.tol) if one.case else "",
+        "CPU [s]": run.whole if run else "",
+        "without it": "" if other is None else other.status if other.solved else "lost",
+        "error without it": "" if other is None or other.error is None else other.error,
+        "CPU without it [s]": other.whole if other else "",
+        "sum of CPU, without over with": "" if one.lost else round(one.ratio, 3),
+    }
+
+
 def shifted_mean(values: Sequence[float]) -> float:
     """The shifted geometric mean [s]."""
     return float(np.exp(np.mean(np.log(np.array(values) + SHIFT))) - SHIFT)
@@ -671,6 +906,11 @@ def main() -> None:
     parser.add_argument("--half", nargs="+", choices=HALVES, default=HALVES, help="both by default")
     parser.add_argument("--only", nargs="+", help="changes whose names have one of these in them")
     parser.add_argument("--rules", action="store_true", help="change each number, not the stages")
+    parser.add_argument("--needed", action="store_true", help="which problem needs each row")
+    parser.add_argument("--remove", action="store_true", help="rows that none needs, one by one")
+    parser.add_argument("--keep", type=Path, metavar="RUNS", help="file of the runs")
+    parser.add_argument("--chain", type=Path, metavar="FILE", help="another table")
+    parser.add_argument("--steps", type=int, default=12, help="of each simulation, from a guess")
     _results.add_option(parser)
     parser.add_argument("--against", help="the Python of another fclib")
     parser.add_argument("--other", default="older", help="what tables call it")
@@ -680,7 +920,10 @@ def main() -> None:
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         problems = gathered(arguments.files, Path(folder), arguments.problems)
-        (compare if arguments.against else choose)(problems, arguments)
+        if arguments.needed:
+            needed(problems, Path(folder), arguments)
+        else:
+            (compare if arguments.against else choose)(problems, arguments)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ list(PREPEND CMAKE_LIBRARY_PATH ${fclib_other} ${fclib_other}/hdf5/serial)
 list(PREPEND CMAKE_INCLUDE_PATH ${FCLIB_SYSROOT}/usr/include ${FCLIB_SYSROOT}/usr/include/hdf5/serial)
 list(PREPEND CMAKE_PREFIX_PATH ${FCLIB_SYSROOT}/usr)
 if(FCLIB_SYSROOT)
-  add_link_options(-Wl,-rpath-link,${fclib_other})
+  add_link_options(-Wl,-rpath-link,${fclib_other}:${FCLIB_SYSROOT}/lib/${CMAKE_LIBRARY_ARCHITECTURE})
 endif()
 # the h5cc of this machine knows the libraries of this machine alone
 set(HDF5_C_COMPILER_EXECUTABLE /bin/false CACHE FILEPATH "" FORCE)

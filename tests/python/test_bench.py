@@ -13,6 +13,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -114,15 +115,13 @@ def test_the_key_tells_runs_apart() -> None:
         {"solver": bench.SolverChoice("nsgs", {"relaxation": 1.3})},
         {"solver": bench.SolverChoice("nsgs", {}, version="other")},
     ]
-    keys = {Job(**{**vars(job), **other}).key for other in others}
+    keys = {replace(job, **other).key for other in others}
     assert len(keys | {job.key}) == len(others) + 1
     # where a file lies and what a table calls a solver does not matter
-    moved = Job(
-        **{
-            **vars(job),
-            "problem": bench.ProblemFacts(**{**vars(job.problem), "path": "/else", "name": "x"}),
-            "solver": bench.SolverChoice(**{**vars(job.solver), "label": "other"}),
-        }
+    moved = replace(
+        job,
+        problem=replace(job.problem, path="/else", name="x"),
+        solver=replace(job.solver, label="other"),
     )
     assert moved.key == job.key
 
@@ -809,6 +808,35 @@ def test_files_of_a_set_that_is_not_built_name_the_command(
         assert "collection build" not in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("entry", "wanted"),
+    [
+        ({"files": "scene"}, {"0001-global", "0002-local", "other"}),
+        ({"files": "scene/*.hdf5"}, {"0001-global", "0002-local", "other"}),
+        ({"files": "scene", "form": "local"}, {"0001-local", "0002-local", "other"}),
+        ({"files": "scene", "form": "both"}, {"0001-global", "0001-local", "0002-local", "other"}),
+        (
+            {"files": ["scene/0001-local.hdf5", "scene"]},
+            {"0001-global", "0001-local", "0002-local", "other"},
+        ),
+        ({"files": "scene/0001-local.hdf5"}, {"0001-local"}),
+    ],
+)
+def test_one_form_of_a_problem_is_run(
+    entry: dict[str, Any], wanted: set[str], tmp_path: Path
+) -> None:
+    folder = tmp_path / "scene"
+    folder.mkdir()
+    for seed, name in enumerate(("0001-global", "0001-local", "0002-local", "other")):
+        fclib.write(folder / f"{name}.hdf5", planted_local(seed).problem)
+    chosen = bench.Campaign.of({"solvers": ["nsgs"], "problems": [entry]}, tmp_path)
+    words: list[str] = []
+    jobs = chosen.plan(tell=words.append)
+    assert {Path(job.problem.path).stem for job in jobs} == wanted
+    left_out = wanted < {"0001-global", "0001-local", "0002-local", "other"} and len(wanted) > 1
+    assert [word.startswith("left out: 1 files") for word in words] == [True] * left_out
+
+
 # ---- what is asked for
 
 
@@ -817,7 +845,7 @@ def test_files_of_a_set_that_is_not_built_name_the_command(
     [
         ({"solvers": []}, "no list of solvers"),
         ({"solvers": "auto"}, "no list of solvers"),
-        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss.*did you mean nsgs"),
+        ({"solvers": ["nsgss"]}, r"solvers\[0\].*nsgss.*nearest are nsgs, "),
         ({"solvers": [{"name": "nsgs", "options": "relaxation=1"}]}, r"\.options: is no table"),
         ({"solvers": ["nsgs relaxation=-1"]}, "relaxation"),
         ({"solvers": ["nsgs", "nsgs"]}, "two that are called 'nsgs'"),
@@ -825,6 +853,7 @@ def test_files_of_a_set_that_is_not_built_name_the_command(
         ({"problems": []}, r"no \[\[problems\]\]"),
         ({"problems": [{"family": "x"}]}, "neither files"),
         ({"problems": [{"set": "tiny", "form": "square"}]}, r"problems\[0\]\.form"),
+        ({"problems": [{"set": "tiny", "form": "both"}]}, r"'both' is none of global, local"),
         ({"budget": "long"}, "budget"),
         ({"problems": [{"files": "a", "colour": "red"}]}, r"problems\[0\]\.colour"),
         ({"problems": [{"planted": {"count": 1}}]}, "no contacts"),

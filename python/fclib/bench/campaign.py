@@ -95,7 +95,7 @@ class Group:
     family: str = ""
     files: tuple[str, ...] = ()
     set: str = ""  # of the collection, or a family of it
-    form: str | None = None  # form of its problems: "global" or "local"
+    form: str | None = None  # form of its problems: "global", "local" or, of files, "both"
     sample: int | None = None
     simulate: Mapping[str, Any] | None = None
     planted: Mapping[str, Any] | None = None
@@ -323,7 +323,7 @@ class Campaign:
         return chosen
 
     def _all_paths(self, group: Group, tell: Callable[[str], None]) -> list[Path]:
-        paths = problems.files_of(group.files, self.base) if group.files else []
+        paths = problems.files_of(group.files, self.base, group.form, tell) if group.files else []
         if group.set and group.sequence is not None:
             steps = group.sequence
             paths += made.stored(group.set, group.form, steps.start, steps.count, steps.stride)
@@ -476,8 +476,9 @@ def _group(row: Any, entries: Mapping[str, Any], number: int) -> Group:
     _only(row, KNOWN_OF_PROBLEMS, where)
     if not WHAT & set(row):
         raise CampaignError(f"{where[:-1]}: has neither files, set, simulate nor planted")
-    if row.get("form") not in (None, "global", "local"):
-        raise CampaignError(f"{where}form: {row['form']!r} is neither 'global' nor 'local'")
+    forms = ("global", "local") if "set" in row else ("global", "local", "both")
+    if row.get("form") not in (None, *forms):
+        raise CampaignError(f"{where}form: {row['form']!r} is none of {', '.join(forms)}")
     steps = None
     if "sequence" in row:
         steps = _steps(row, where)

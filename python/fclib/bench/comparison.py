@@ -21,7 +21,6 @@ take these meanings from here. This module knows runs and numbers, but no proble
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -35,6 +34,7 @@ import numpy.typing as npt
 from fclib import _core
 from fclib._verdicts import SOLVED, UNSUITABLE
 from fclib.bench.job import SURROUNDINGS
+from fclib.bench.problems import FORM
 from fclib.bench.table import Table, Words
 
 Array: TypeAlias = npt.NDArray[np.float64]
@@ -59,7 +59,6 @@ TIMES = ("cpu_s", "total_cpu_s", "wall_s")
 # the common set keeps at least this share of the instances: a solver that has run few would
 # make it small for all others, and is compared only if it is asked for
 COMMON = 0.5
-FORM = re.compile(r"(.+)-(global|local)$")  # the stem of a file with one form of a problem
 
 
 class ProfileError(_core.Error, ValueError):
@@ -154,7 +153,7 @@ def pair_forms(problems: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     places: dict[tuple[Any, ...], dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
     for one in problems:
         path = PurePath(one["path"] or "")
-        found = FORM.match(path.stem)
+        found = FORM.fullmatch(path.stem)
         if found:
             facts = (one[name] for name in ("family", "nc", "p", "spacedim"))
             law = str(one["formulation"]).removeprefix("G")

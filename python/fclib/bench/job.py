@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -105,6 +106,12 @@ class SolverChoice:
         words = (f"{key}={value}" for key, value in self.options.items())
         return self.label or " ".join((self.name, *words))
 
+    @cached_property
+    def part_of_key(self) -> str:
+        """What it adds to the key of a run."""
+        options = sorted((name, repr(value)) for name, value in self.options.items())
+        return ", ".join(map(json.dumps, (self.name, options, self.version)))
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -113,6 +120,11 @@ class Limits:
     time: float  # [s] of CPU, all of its processes together
     wall: float  # [s]
     memory: float  # [MB] resident size, beyond that of the idle worker
+
+    @cached_property
+    def part_of_key(self) -> str:
+        """What they add to the key of a run."""
+        return json.dumps([repr(float(x)) for x in (self.time, self.wall, self.memory)])
 
 
 @dataclass(frozen=True)
@@ -170,20 +182,19 @@ class Job:
     def key(self) -> str:
         """Two runs of one key are the same; a store keeps one row for each key and machine."""
         parts = [
-            self.problem.hash,
-            self.solver.name,
-            sorted((name, repr(value)) for name, value in self.solver.options.items()),
-            self.solver.version,
-            repr(float(self.tol)),
-            [repr(float(x)) for x in (self.limits.time, self.limits.wall, self.limits.memory)],
-            self.threads,
-            self.repeat,
-            # left out: it was the only one when stores began
-            *([self.merit] if self.merit != "natural" else []),
-            *([["after", self.along.after]] if self.along else []),
-            *(["copy"] if self.copy else []),
+            json.dumps(self.problem.hash),
+            self.solver.part_of_key,
+            f'"{float(self.tol)!r}"',
+            self.limits.part_of_key,
+            f"{self.threads}, {self.repeat}",
         ]
-        return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32]
+        if self.merit != "natural":  # it was the only one when stores began
+            parts.append(json.dumps(self.merit))
+        if self.along:
+            parts.append(json.dumps(["after", self.along.after]))
+        if self.copy:
+            parts.append('"copy"')
+        return hashlib.sha256(f"[{', '.join(parts)}]".encode()).hexdigest()[:32]
 
     @property
     def copy(self) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -12,19 +12,35 @@ from typing import Any
 import numpy as np
 
 from fclib import _core, _digest
+from fclib._origin import origin_of
 from fclib.bench.job import ProblemFacts
 
 SUFFIXES = (".hdf5", ".h5")
+FORM = re.compile(r"(.+)-(global|local)")  # the stem of a file with one form of a problem
 PATIENCE = 10.0  # [s] between two messages on the progress of a build
 
 
-def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
+def files_of(
+    patterns: Sequence[str],
+    base: Path,
+    form: str | None = None,
+    tell: Callable[[str], None] = lambda _: None,
+) -> list[Path]:
     """The FCLIB files that patterns stand for: files, folders with all below them, globs.
+
+    Two files NAME-global and NAME-local of one folder are the forms of one problem.
+
+    Args:
+        patterns: files, folders or globs.
+        base: the folder that they are relative to.
+        form: of a problem with both forms: "global", "local" or "both"; None takes the global one,
+            and each file that is named by itself.
+        tell: called with the number of files that are left out, if there are any.
 
     Raises:
         fclib.FileError: a pattern matches no file.
     """
-    found: dict[Path, None] = {}
+    found: dict[Path, bool] = {}  # whether it is named by itself
     for pattern in patterns:
         path = Path(os.path.expandvars(pattern)).expanduser()
         path = path if path.is_absolute() else base / path
@@ -38,8 +54,24 @@ def files_of(patterns: Sequence[str], base: Path) -> list[Path]:
             raise _core.FileError(
                 f"{path}: there is no such file, and none in such a folder{_how_to_have(path)}"
             )
-        found |= dict.fromkeys(sorted(match.resolve() for match in matches))
-    return list(found)
+        for match in sorted(match.resolve() for match in matches):
+            found[match] = path.is_file() or found.get(match, False)
+    if form == "both":
+        return list(found)
+    kept, dropped = ("local", "global") if form == "local" else ("global", "local")
+    left = set()
+    for path, named in found.items():
+        own = FORM.fullmatch(path.stem)
+        if own is None or own[2] != dropped or (named and form is None):
+            continue
+        if path.with_name(f"{own[1]}-{kept}{path.suffix}") in found:
+            left.add(path)
+    if left:
+        tell(
+            f"left out: {len(left)} files, the first is {min(left)}; each has the {dropped}"
+            f' form of a problem whose {kept} form is run; form = "both" runs both'
+        )
+    return [path for path in found if path not in left]
 
 
 def _how_to_have(path: Path) -> str:
@@ -154,7 +186,7 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     return ProblemFacts(
         hash=_digest.digest(problem),
         name=f"{path.parent.name}/{path.stem}" if path.stem[0].isdigit() else path.stem,
-        family=family or _scene_of(problem.info) or path.parent.name,
+        family=family or str(origin_of(problem.info).get("scene", "")) or path.parent.name,
         path=str(path),
         kind=problem.kind,
         formulation=problem.formulation,
@@ -165,12 +197,3 @@ def look(path: Path, family: str = "") -> ProblemFacts:
         nnz=int(getattr(matrix, "nnz", getattr(matrix, "size", 0))),
         title=problem.info.title,
     )
-
-
-def _scene_of(info: _core.ProblemInfo) -> str:
-    """The family that a simulated problem names in the last line of its description."""
-    lines = info.description.splitlines()
-    try:
-        return str(json.loads(lines[-1])["scene"])
-    except (IndexError, KeyError, TypeError, ValueError):
-        return ""

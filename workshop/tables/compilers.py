@@ -119,10 +119,11 @@ def build(name: str, target: Target, given: argparse.Namespace) -> dict[str, str
     skipped = int(counts["skipped"]) + int(counts["disabled"])
     if failed:
         print(tested[-8000:])
+    family = "clang" if "clang" in target.cxx else "GCC"
     found = VERSION.search(must(target.cxx, "--version").partition("\n")[0])
     return {
-        "compiler": f"{name.partition('-')[0]} {found[0] if found else ''}".strip(),
-        "for": platform.machine() if target.native else f"{name} by {target.cxx}",
+        "compiler": f"{family} {found[0] if found else ''}".strip(),
+        "for": platform.machine() if target.native else name,
         "built": "library, tests" + (", Python extension" if with_python(target) else ""),
         "tests": tests,
         "passed": tests - failed - skipped,

@@ -9,10 +9,10 @@
 namespace fclib {
 
 struct Solution {
-  Vector v;
-  Vector u;
-  Vector r;
-  Vector l;
+  Vector v{};
+  Vector u{};
+  Vector r{};
+  Vector l{};
 
   static constexpr auto fields() {
     using S = Solution;

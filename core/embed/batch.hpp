@@ -33,7 +33,7 @@ struct BatchSettings {
   double tolerance = 1e-8;                                      ///< on Merit::error
   int threads = 1;                                              ///< 0: as many as the machine has
   double time_limit = std::numeric_limits<double>::infinity();  ///< of the batch, wall clock [s]
-  std::function<bool()> poll;  ///< called now and then in the calling thread; false stops
+  std::function<bool()> poll{};  ///< called now and then in the calling thread; false stops
 };
 
 struct BatchOutcome {

@@ -217,6 +217,15 @@ std::string read_file(const std::string& path) {
   return read_all(file.id(), static_cast<std::size_t>(status.st_size), path);
 }
 
+std::string why_unreadable(const std::string& path) {
+  return ::access(path.c_str(), R_OK) == 0 ? std::string() : std::strerror(errno);
+}
+
+bool is_locked(const std::string& path) {
+  const Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  return file.id() >= 0 && ::flock(file.id(), LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+}
+
 void replace_file(const std::string& path, std::string_view bytes) {
   replace_file(path, Pieces(&bytes, 1));
 }

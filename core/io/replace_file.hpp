@@ -1,4 +1,5 @@
-// Writes of whole files: a writer never leaves half a file behind.
+// Files as the system has them: reads and writes of whole files, and locks. A writer never leaves
+// half a file behind. All of core/ that calls POSIX for files is here.
 #pragma once
 
 #include <span>
@@ -13,6 +14,12 @@ std::string resolve_links(const std::string& path);
 
 /// All bytes of a regular file. Throws Error (file) that names it.
 std::string read_file(const std::string& path);
+
+/// Why this process may not read a file, in the words of the system. Empty if it may.
+std::string why_unreadable(const std::string& path);
+
+/// Whether another program has locked a file so that it alone may write to it.
+bool is_locked(const std::string& path);
 
 /// Puts the bytes in the place of the file, all or none: they go into a new file beside it, which
 /// is flushed and renamed over it. If the process is killed, the new file disappears, except in the

@@ -21,11 +21,12 @@ struct ReducedProblem {
   Vector q;
   Friction friction;
   double scale = 1;  ///< errors are relative to ||q|| before bilateral constraints were eliminated
-  Vector rho;        ///< of the scaled natural map (nc); empty: errors use only the plain one
+  Vector rho{};      ///< of the scaled natural map (nc); empty: errors use only the plain one
   double scaled_scale = 1;  ///< errors of the scaled map are relative to this: ||rho q||
   /// A point r at which u is known with less rounding than W r + q, if there is one. If reactions
   /// are large beside q, the change of u by W from that point rounds less (m each).
-  Vector known_r, known_u;
+  Vector known_r{};
+  Vector known_u{};
   const Primal* primal = nullptr;      ///< if the problem is known by its bodies
   const Deadline* deadline = nullptr;  ///< of the solve, if it has one
   /// Whether something near y (nc) proves that the problem as given has no solution: what solvers

@@ -1,29 +1,18 @@
 #include "fuzz.hpp"
 
-#include <unistd.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+
+#include "temporary_folder.hpp"
 
 namespace fclib::fuzz {
 
 namespace fs = std::filesystem;
 
 const fs::path& scratch() {
-  static const struct Folder {
-    Folder() {
-      std::string name = (fs::temp_directory_path() / "fclib-fuzz-XXXXXX").string();
-      require(::mkdtemp(name.data()) != nullptr, "a temporary folder can be made");
-      path = name;
-    }
-    ~Folder() {
-      std::error_code error;
-      fs::remove_all(path, error);
-    }
-    fs::path path;
-  } folder;
-  return folder.path;
+  static const testing::TemporaryFolder folder;
+  return folder.path();
 }
 
 void put_file(const std::string& path, std::string_view bytes) {

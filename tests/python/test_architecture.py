@@ -55,6 +55,9 @@ FORBIDDEN = {
     # files know no mathematics
     "io": {"contact", "reduced", "systems", "methods"},
 }
+# headers that not every system has, and the files of core/ that include them: a port writes these
+OF_A_SYSTEM = re.compile(r"(unistd|fcntl|dlfcn|link|pthread|windows|io|direct)\.h|sys/.*")
+SEES_THE_SYSTEM = {"io/replace_file.cpp", "solve/plugin.cpp"}
 # made by the build from the files that are there
 GENERATED = {"formulations.hpp", "version.hpp", "solver_table.cpp"}
 
@@ -273,6 +276,8 @@ def test_outside_libraries_are_seen_where_they_belong(root: Path) -> None:
             assert not name.startswith(("nanobind", "pybind11", "numpy")), where
             if name.lower().startswith(("hdf5", "h5")):
                 assert path.parent == root / "core" / "io" / "hdf5", where
+            if OF_A_SYSTEM.fullmatch(name):
+                assert path.relative_to(root / "core").as_posix() in SEES_THE_SYSTEM, where
 
 
 def test_no_solver_and_no_formulation_is_named_outside_its_file(root: Path) -> None:

@@ -1,14 +1,8 @@
 #include "io/hdf5/handles.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -82,15 +76,6 @@ std::string words_of_link(hid_t group, const std::string& name) {
 }
 
 Session* current = nullptr;  // protected by the lock
-
-/// Whether a program has a file open to write it. HDF5 locks the file meanwhile.
-bool is_being_written(const std::string& path) {
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) return false;
-  const bool locked = flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
-  close(file);
-  return locked;
-}
 
 /// The bytes of a file from an offset on, as many as there are.
 std::string bytes_of(const std::string& path, std::size_t from, std::size_t count) {
@@ -198,12 +183,13 @@ Handle open_file(const std::string& path) {
   if (!fs::exists(status)) fail("", "there is no such file");
   if (fs::is_directory(status)) fail("", "is a directory, expected an FCLIB file");
   if (!fs::is_regular_file(status)) fail("", "is not a regular file");
-  if (access(path.c_str(), R_OK) != 0) {
-    fail("", "cannot be opened: " + std::string(std::strerror(errno)));
+  if (const std::string why = why_unreadable(path); !why.empty()) {
+    fail("", "cannot be opened: " + why);
   }
   Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (!file.ok()) {
-    if (is_being_written(path)) fail("", "another program has it open, and may write to it");
+    // HDF5 locks a file that it may write to
+    if (is_locked(path)) fail("", "another program has it open, and may write to it");
     fail("", H5Fis_hdf5(path.c_str()) > 0 ? what_is_wrong_with(path) : what_else_is(path));
   }
   return file;

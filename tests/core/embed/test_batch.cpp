@@ -26,8 +26,9 @@ struct Problems {
       // 6 rows: redundant contacts
       Eigen::MatrixXd h(6, m);
       for (Eigen::Index j = 0; j < m; ++j) h.col(j) = random.vector(6);
-      const Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> w =
-          h.transpose() * h;
+      // not every processor rounds a product of matrices to a symmetric one
+      const Eigen::MatrixXd product = h.transpose() * h;
+      const Eigen::MatrixXd w = product.selfadjointView<Eigen::Lower>();
       const Vector free = h.transpose() * random.vector(6);
       nc.push_back(contacts);
       W.insert(W.end(), w.data(), w.data() + w.size());

@@ -59,6 +59,18 @@ TEST(DoubleDouble, SumsAndProductsOfDoublesAreExact) {
   }
 }
 
+/// What the compiler makes of a product and a sum, in every file that includes the core.
+TEST(DoubleDouble, NoProductIsFusedWithASum) {
+  Drawn drawn;
+  for (int k = 0; k < 100; ++k) {
+    const volatile double a = drawn();
+    const volatile double b = drawn();
+    const double product = a * b;
+    const volatile double stored = product;
+    EXPECT_EQ(a * b - stored, 0.0);
+  }
+}
+
 TEST(DoubleDouble, OperationsUndoEachOther) {
   Drawn drawn;
   for (int k = 0; k < 10000; ++k) {

@@ -24,6 +24,10 @@ ReducedProblem random_problem(std::uint64_t seed, Index nc) {
   return problem;
 }
 
+/// At the root of the rounding unit the error begins to creep, and whether it gets there depends on
+/// the processor: contact 0 has a cone without an inside.
+constexpr double tolerance = 1e-7;
+
 struct End {
   double first = 0;  // error of the start
   double error = 0;
@@ -40,7 +44,7 @@ End run(const ReducedProblem& problem, double tau, Vector& r) {
     if (method.iterations() == 0) end.first = error;
     end.error = error;
     r = at;
-    return error <= 1e-8;
+    return error <= tolerance;
   });
   end.iterations = method.iterations();
   return end;
@@ -52,9 +56,9 @@ void expect_less_work_near_a_guess() {
     const ReducedProblem problem = random_problem<D>(seed, 20);
     Vector r = Vector::Zero(problem.m());
     const End cold = run<D>(problem, 1, r);
-    ASSERT_LE(cold.error, 1e-8);
+    ASSERT_LE(cold.error, tolerance);
     const End warm = run<D>(problem, 1e-6, r);
-    EXPECT_LE(warm.error, 1e-8);
+    EXPECT_LE(warm.error, tolerance);
     EXPECT_LT(warm.first, 1e-2 * cold.first);
     EXPECT_LT(warm.iterations, cold.iterations / 2) << seed;
   }
@@ -68,7 +72,7 @@ TEST(InteriorPoint, starts_near_the_guess) {
 TEST(InteriorPoint, a_guess_outside_the_cones_will_do) {
   const ReducedProblem problem = random_problem<3>(1, 20);
   Vector r = Vector::Constant(problem.m(), -3);
-  EXPECT_LE(run<3>(problem, 1, r).error, 1e-8);
+  EXPECT_LE(run<3>(problem, 1, r).error, tolerance);
 }
 
 }  // namespace

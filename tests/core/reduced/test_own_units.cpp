@@ -73,8 +73,9 @@ void expect_same_way(const Rules& rules) {
   }
   ASSERT_EQ(ways[0].size(), 8);
   ASSERT_EQ(ways[1].size(), 8);
+  // each iterate amplifies the rounding of the one before, by an amount that the processor decides
   for (std::size_t k = 0; k < 8; ++k) {
-    EXPECT_LT((ways[1][k] - ways[0][k]).norm(), 1e-9 * ways[0][k].norm()) << k;
+    EXPECT_LT((ways[1][k] - ways[0][k]).norm(), 1e-7 * ways[0][k].norm()) << k;
   }
 }
 

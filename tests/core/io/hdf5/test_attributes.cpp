@@ -2,11 +2,12 @@
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+
+#include "temporary_folder.hpp"
 
 namespace fclib {
 namespace {
@@ -19,22 +20,19 @@ LocalProblem no_contacts() {
   return problem;
 }
 
-/// A folder of its own, removed at the end.
+/// Files in a folder of its own.
 class Attached : public ::testing::Test {
  protected:
   Attached() {
-    std::string name = (fs::temp_directory_path() / "fclib-attributes-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
     const LocalProblem problem = no_contacts();
     write_file(path(), &problem);
   }
-  ~Attached() override { fs::remove_all(folder_); }
 
   [[nodiscard]] std::string path(const std::string& name = "problem.hdf5") const {
-    return (folder_ / name).string();
+    return (folder_.path() / name).string();
   }
   [[nodiscard]] std::size_t files() const {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_), {}));
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), {}));
   }
   [[nodiscard]] std::string bytes() const {
     std::ifstream stream(path(), std::ios::binary);
@@ -61,7 +59,7 @@ class Attached : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 TEST_F(Attached, WhatIsNeitherOneNumberNorOneTextIsLeftOut) {

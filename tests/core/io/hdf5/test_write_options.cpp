@@ -1,13 +1,12 @@
 #include <gtest/gtest.h>
 
-#include <unistd.h>
 #include <algorithm>
-
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "io/hdf5/hdf5.hpp"
+#include "temporary_folder.hpp"
 
 namespace fclib {
 namespace {
@@ -50,17 +49,11 @@ Solution global_solution(double value) {
   return solution;
 }
 
-/// A folder of its own, removed at the end.
+/// Files in a folder of its own.
 class Writing : public ::testing::Test {
  protected:
-  Writing() {
-    std::string name = (fs::temp_directory_path() / "fclib-writing-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~Writing() override { fs::remove_all(folder_); }
-
   [[nodiscard]] std::string path(const char* name = "problem.hdf5") const {
-    return (folder_ / name).string();
+    return (folder_.path() / name).string();
   }
   [[nodiscard]] std::string bytes() const {
     std::ifstream stream(path(), std::ios::binary);
@@ -99,7 +92,7 @@ class Writing : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 using Values = std::vector<double>;
@@ -167,7 +160,8 @@ TEST_F(Writing, WithoutValidationTheDataGoesInAsItIs) {
   EXPECT_THROW(static_cast<void>(read_problem(path())), Error);
   RawProblem found = read_raw_problem(path(), "local");
   for (auto& [name, value] : found.members) {
-    if (name == "mu") EXPECT_EQ(std::get<MallocArray<double>>(value)[1], -1);
+    if (name != "mu") continue;
+    EXPECT_EQ(std::get<MallocArray<double>>(value)[1], -1);
   }
   // global matrices become triplets only where the data is known to be good
   write(global_problem(1), {.validate = false});

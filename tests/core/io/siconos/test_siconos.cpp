@@ -1,7 +1,6 @@
 #include "io/siconos/siconos.hpp"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -11,6 +10,7 @@
 #include "convert/storage.hpp"
 #include "io/replace_file.hpp"
 #include "random_data.hpp"
+#include "temporary_folder.hpp"
 
 namespace fclib {
 namespace {
@@ -18,16 +18,10 @@ namespace {
 namespace fs = std::filesystem;
 using testing::RandomData;
 
-/// A folder of its own, removed at the end.
+/// A file in a folder of its own.
 class SiconosText : public ::testing::Test {
  protected:
-  SiconosText() {
-    std::string name = (fs::temp_directory_path() / "fclib-siconos-XXXXXX").string();
-    folder_ = ::mkdtemp(name.data());
-  }
-  ~SiconosText() override { fs::remove_all(folder_); }
-
-  [[nodiscard]] std::string path() const { return (folder_ / "problem.dat").string(); }
+  [[nodiscard]] std::string path() const { return (folder_.path() / "problem.dat").string(); }
 
   [[nodiscard]] Problem read(const std::string& text, std::string_view kind = {}) const {
     std::ofstream(path(), std::ios::binary) << text;
@@ -52,7 +46,7 @@ class SiconosText : public ::testing::Test {
   }
 
  private:
-  fs::path folder_;
+  testing::TemporaryFolder folder_;
 };
 
 template <class P>

@@ -40,6 +40,7 @@ MODULE_FILES = ("fclib.js", "fclib-core.mjs", "fclib-core.wasm")
 # the menu; FOLDER/* stands for the generated pages of a folder
 MENU = {
     "Start": [
+        "installing",
         "tutorial-problem",
         "tutorial-solver",
         "tutorial-robot",
@@ -56,7 +57,7 @@ MENU = {
         "recorders",
     ],
     "The solvers": ["choosing", "speed", "auto", "solvers", "solvers/index", "solvers-of-your-own"],
-    "The bench": ["bench", "measurement", "report"],
+    "The bench": ["bench", "measurement", "published-runs", "report"],
     "Interfaces": [
         "command-line",
         "python",

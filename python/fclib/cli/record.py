@@ -14,7 +14,8 @@ def command(
     engine: Annotated[
         str,
         typer.Argument(
-            help="drake, newton, pybullet or siconos, which must be installed.", show_default=False
+            help="drake, mujoco, newton, pybullet or siconos, which must be installed.",
+            show_default=False,
         ),
     ],
     script: Annotated[Path, typer.Argument(help="A Python script.", show_default=False)],

@@ -32,7 +32,10 @@ class Unsolved(str, Enum):
 
 def command(
     scene: Annotated[
-        Path, typer.Argument(help="An MJCF file, or a URDF file.", show_default=False)
+        Path,
+        typer.Argument(
+            help="An MJCF file, a URDF file, or an input.dat of Siconos.", show_default=False
+        ),
     ],
     steps: Annotated[int, typer.Option(help="Steps of the simulation.", min=1)] = 500,
     folder: Annotated[Path, typer.Option("--out", help="Folder of the problems.")] = Path(
@@ -105,6 +108,15 @@ def command(
             show_default=False,
         ),
     ] = None,
+    friction: Annotated[
+        float | None,
+        typer.Option(
+            help="Of an input.dat, which does not have it.",
+            metavar="MU",
+            min=0.0,
+            show_default=False,
+        ),
+    ] = None,
     merit: Merit = MeritKind.both,
     unsolved: Annotated[
         Unsolved,
@@ -117,7 +129,7 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF or a URDF file, and store its problems.
+    """Simulate an MJCF file, a URDF file or an input.dat of Siconos, and store its problems.
 
     What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.
@@ -158,6 +170,7 @@ def command(
             activation=activation,
             floating=floating,
             ground=ground,
+            friction=friction,
         )
         model = MujocoModel(loaded, strict=strict)
         control = str(ctrl) if ctrl is not None else policy or ""

@@ -85,7 +85,7 @@ from fclib.simulate.arrays import (
     by_columns,
     columns_of,
     lengths_of,
-    take,
+    submatrix,
     times,
     transposed_times,
 )
@@ -300,7 +300,7 @@ class MoreauJean:
             if self.allowance:
                 active = active[ends(contacts[active], closed[active])]
             if len(active) < len(contacts):
-                contacts, H = contacts[active], take(H, block_columns(active, d))
+                contacts, H = contacts[active], submatrix(H, block_columns(active, d))
                 before = before[active]
             w_n = self.restitution * before
         else:
@@ -337,8 +337,8 @@ class MoreauJean:
             place[inside] = np.arange(len(inside), dtype=np.int32)
             all_M, all_G = M, G
             # nothing couples the bodies inside the problem to those outside
-            M, G = take(M, inside, place), take(G, rows, place)
-            H = take(H, np.arange(H.shape[1]), place)
+            M, G = submatrix(M, inside, place), submatrix(G, rows, place)
+            H = submatrix(H, np.arange(H.shape[1]), place)
         fields: dict[str, Any] = {
             "M": M,
             "H": H,

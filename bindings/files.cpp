@@ -31,20 +31,9 @@ std::string signature(const std::string& name, const std::string& rest, const st
   return "def " + name + "(" + path_type + rest + ") -> " + result;
 }
 
-const std::string list_type =
-    "collections.abc.Sequence[" + solution_type + "] | numpy.typing.NDArray[typing.Any]";
-const std::string guesses_type = "guesses: " + list_type;
+const std::string guesses_type = "guesses: " + solutions_type;
 const std::string compression_type =
     "compression: int = " + std::to_string(WriteOptions{}.compression);
-
-std::vector<Solution> solutions_from(const nb::object& given, const std::string& what) {
-  std::vector<Solution> result;
-  for (const nb::handle one : given) {
-    const std::string name = what + "[" + std::to_string(result.size()) + "]";
-    result.push_back(solution_from(one, name.c_str()));
-  }
-  return result;
-}
 
 /// The options of a mode's name.
 WriteOptions options_of(const std::string& mode, std::initializer_list<std::string_view> modes,
@@ -129,8 +118,8 @@ void bind_hdf5(nb::module_& m) {
                         {.replace = true, .compression = compression});
       },
       "path"_a, "solutions"_a, nb::kw_only(), "compression"_a = WriteOptions{}.compression,
-      nb::sig(signature("write_solutions", ", solutions: " + list_type + ", *, " + compression_type,
-                        "None")
+      nb::sig(signature("write_solutions",
+                        ", solutions: " + solutions_type + ", *, " + compression_type, "None")
                   .c_str()),
       "Puts all known solutions of a problem into its file, atomically.\n\n"
       "They replace those that write_solutions put there before; an empty list removes these. "
@@ -308,6 +297,15 @@ void bind_siconos(nb::module_& m) {
 }
 
 }  // namespace
+
+std::vector<Solution> solutions_from(const nb::object& given, const std::string& what) {
+  std::vector<Solution> result;
+  for (const nb::handle one : given) {
+    const std::string name = what + "[" + std::to_string(result.size()) + "]";
+    result.push_back(solution_from(one, name.c_str()));
+  }
+  return result;
+}
 
 void bind_files(nb::module_& m) {
   bind_hdf5(m);

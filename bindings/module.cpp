@@ -48,4 +48,5 @@ NB_MODULE(_core, m) {
   bind_embed(m);
   bind_merits(m);
   bind_files(m);
+  bind_sequences(m);
 }

@@ -5,6 +5,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "solution.hpp"
 
@@ -21,7 +22,11 @@ std::string problem_union();
 /// What a caller may give as a solution or as a guess: a Solution, a Result, or the reactions
 /// alone.
 Solution solution_from(nb::handle object, const char* what);
+/// ... and as several of them.
+std::vector<Solution> solutions_from(const nb::object& given, const std::string& what);
 const std::string solution_type = "Solution | Result | numpy.typing.ArrayLike";
+const std::string solutions_type =
+    "collections.abc.Sequence[" + solution_type + "] | numpy.typing.NDArray[typing.Any]";
 
 /// Lets Ctrl-C through: it returns true or throws.
 bool poll_signals();
@@ -47,5 +52,7 @@ void bind_embed(nb::module_& m);
 void bind_merits(nb::module_& m);
 /// Files: HDF5 and the text of Siconos.
 void bind_files(nb::module_& m);
+/// Files of many problems.
+void bind_sequences(nb::module_& m);
 
 }  // namespace fclib::bindings

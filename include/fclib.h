@@ -602,6 +602,59 @@ int fclib_write_geometry(const struct fclib_geometry* geometry, const char* path
 int fclib_write_geometry_with(const struct fclib_geometry* geometry, const char* path,
                               const struct fclib_options* options);
 
+/* ---- many problems in one file --------------------------------------------------------------- */
+
+/** New. A sequence: the problems of a simulation, or of several worlds, in one file that grows step
+ *  by step. Step k = 0, 1, ... of "run.h5" is a file to all functions that read:
+ *
+ *      struct fclib_local* problem = fclib_read_local("run.h5#17");
+ *
+ *  libfclib 3.1 does not read sequences. `fclib convert` writes their steps as files that it reads.
+ *
+ *  A step begins with its problem; its solution, guesses and geometry may follow. It ends where the
+ *  next one begins, or at a flush. Steps are confirmed by fclib_sequence_flush(), or by the first
+ *  step that ends a tenth of a second later, or after a MiB. What is confirmed stays if the process
+ *  is killed at any moment, and other programs can read it meanwhile. Values and indices are not
+ *  checked. An array that is equal to the one before it in its world is stored once. */
+struct fclib_sequence;
+
+/** New. A new file, in the place of one that is there. Of the options (or NULL) of a write it takes
+ *  "compression". NULL on failure, or if another program writes to the file. */
+struct fclib_sequence* fclib_sequence_create(const char* path, const struct fclib_options* options);
+
+/** New. Goes on with a sequence that is there, also after its writer was killed. NULL on failure.
+ */
+struct fclib_sequence* fclib_sequence_continue(const char* path);
+
+/** New. Begins a step of a world (0 if there is only one). Returns 1, or 0. */
+int fclib_sequence_add_global(struct fclib_sequence* sequence, const struct fclib_global* problem,
+                              int world);
+int fclib_sequence_add_local(struct fclib_sequence* sequence, const struct fclib_local* problem,
+                             int world);
+int fclib_sequence_add_global_rolling(struct fclib_sequence* sequence,
+                                      const struct fclib_global_rolling* problem, int world);
+int fclib_sequence_add_local_rolling(struct fclib_sequence* sequence,
+                                     const struct fclib_local_rolling* problem, int world);
+
+/** New. Add to the step. A solution and guesses need r, and l if p > 0; v and u may be NULL. Return
+ *  1, or 0. */
+int fclib_sequence_add_solution(struct fclib_sequence* sequence,
+                                const struct fclib_solution* solution);
+int fclib_sequence_add_guesses(struct fclib_sequence* sequence, int number_of_guesses,
+                               const struct fclib_solution* guesses);
+int fclib_sequence_add_geometry(struct fclib_sequence* sequence,
+                                const struct fclib_geometry* geometry);
+
+/** New. Ends the step and confirms all steps. Returns 1, or 0. */
+int fclib_sequence_flush(struct fclib_sequence* sequence);
+
+/** New. The same; then the disk has them, and the sequence (or NULL) is freed. Returns 1. Returns 0
+ *  if they could not be written; it is freed all the same. */
+int fclib_sequence_close(struct fclib_sequence* sequence);
+
+/** New. How many confirmed steps a file has; -1 on failure, or if it is no sequence. */
+int fclib_sequence_size(const char* path);
+
 /* ---- many small problems --------------------------------------------------------------------- */
 
 /** New. Local problems of a few contacts, one after another in the caller's arrays. Later versions

@@ -66,6 +66,7 @@ struct Calls;
     static constexpr std::string_view name = #kind;           \
     static constexpr auto read = fclib_read_##kind;           \
     static constexpr auto write = fclib_write_##kind;         \
+    static constexpr auto add = fclib_sequence_add_##kind;    \
     static constexpr auto free_members = fclib_delete_##kind; \
     static constexpr auto validate = fclib_validate_##kind;   \
     static constexpr auto merit = fclib_merit_##kind;         \
@@ -386,13 +387,16 @@ struct Geometry {
   std::string mass_unit{};  ///< of masses, empty for kg
 };
 
-/// Adds a geometry to a file that has a problem with the same number of contacts.
-inline void write_geometry(const std::string& path, const Geometry& geometry) {
+namespace detail {
+
+/// What call(view) returns of the struct that the library takes.
+template <class Call>
+auto with_view(const Geometry& geometry, const Call& call) {
   const std::size_t nc = geometry.body.size() / 2;
   const std::size_t nb = geometry.moves.size();
   const std::size_t ns = geometry.shape_kind.size();
   const auto array = [](const char* name, const auto& values, std::size_t expected) {
-    if (!values.empty()) detail::require_size(name, values.size(), expected);
+    if (!values.empty()) require_size(name, values.size(), expected);
     return values.empty() ? nullptr : values.data();
   };
   std::vector<const char*> names;
@@ -434,7 +438,76 @@ inline void write_geometry(const std::string& path, const Geometry& geometry) {
   c.planar = geometry.planar ? 1 : 0;
   c.unit = geometry.unit.empty() ? nullptr : geometry.unit.c_str();
   c.mass_unit = geometry.mass_unit.empty() ? nullptr : geometry.mass_unit.c_str();
-  checked(fclib_write_geometry(&c, path.c_str()));
+  return call(c);
+}
+
+}  // namespace detail
+
+/// Adds a geometry to a file that has a problem with the same number of contacts.
+inline void write_geometry(const std::string& path, const Geometry& geometry) {
+  detail::with_view(geometry, [&](const fclib_geometry& view) {
+    return checked(fclib_write_geometry(&view, path.c_str()));
+  });
+}
+
+// ---- many problems in one file
+
+/// Whether a sequence replaces a file that is there, or goes on with it.
+enum class Start { create, go_on };
+
+/// Writes a sequence: the problems of a simulation, step by step, in one file. fclib.h says when a
+/// step is confirmed. Step 17 of "run.h5" is read as "run.h5#17".
+class SequenceWriter {
+ public:
+  explicit SequenceWriter(const std::string& path, Start start = Start::create)
+      : handle_(checked(start == Start::create ? fclib_sequence_create(path.c_str(), nullptr)
+                                               : fclib_sequence_continue(path.c_str()))) {}
+
+  /// Begins a step of a world.
+  template <Problem C>
+  void add(const C& problem, int world = 0) {
+    checked(Calls<C>::add(handle_.get(), &problem, world));
+    sizes_ = sizes(problem);
+  }
+
+  // what else belongs to the step
+  void add_solution(const Solution& solution) {
+    detail::require_sizes(solution, sizes_);
+    fclib_solution view = solution.view();
+    checked(fclib_sequence_add_solution(handle_.get(), &view));
+  }
+  void add_guesses(std::span<const Solution> guesses) {
+    std::vector<fclib_solution> views;
+    for (const Solution& guess : guesses) {
+      detail::require_sizes(guess, sizes_);
+      views.push_back(guess.view());
+    }
+    checked(fclib_sequence_add_guesses(handle_.get(), detail::count(views.size()), views.data()));
+  }
+  void add_geometry(const Geometry& geometry) {
+    detail::with_view(geometry, [&](const fclib_geometry& view) {
+      return checked(fclib_sequence_add_geometry(handle_.get(), &view));
+    });
+  }
+
+  /// Ends the step and confirms all.
+  void flush() { checked(fclib_sequence_flush(handle_.get())); }
+  /// The same, and the disk has it. Without this call the destructor does so, and reports no error.
+  void close() { checked(fclib_sequence_close(handle_.release())); }
+
+ private:
+  struct Close {
+    void operator()(fclib_sequence* sequence) const { fclib_sequence_close(sequence); }
+  };
+  std::unique_ptr<fclib_sequence, Close> handle_;
+  Sizes sizes_;
+};
+
+/// How many confirmed steps a sequence has.
+inline std::size_t sequence_size(const std::string& path) {
+  const int size = fclib_sequence_size(path.c_str());
+  if (size < 0) fail();
+  return static_cast<std::size_t>(size);
 }
 
 // ---- solving

@@ -14,6 +14,7 @@
 
 #include "capi/errors.hpp"
 #include "capi/from_c.hpp"
+#include "capi/geometry_of_c.hpp"
 #include "capi/options.hpp"
 #include "capi/structs.hpp"
 #include "io/hdf5/write.hpp"
@@ -214,21 +215,26 @@ Geometry geometry_of(const fclib_geometry& c) {
   return geometry;
 }
 
-int write(const fclib_geometry* given_geometry, const char* path, const fclib_options* options) {
+int write(const fclib_geometry* geometry, const char* path, const fclib_options* options) {
   return guarded(0, [&] {
-    const std::size_t size = given(given_geometry, "geometry").size;
-    if (size < offsetof(fclib_geometry, mass_unit) + sizeof(char*)) {
-      fail("geometry->size",
-           "is " + std::to_string(size) + ", expected sizeof(struct fclib_geometry)");
-    }
-    fclib_geometry c{};
-    std::memcpy(&c, given_geometry, std::min(size, sizeof c));
-    write_geometry(&given(path, "path"), geometry_of(c), write_options(options));
+    write_geometry(&given(path, "path"), geometry_of_c(given(geometry, "geometry")),
+                   write_options(options));
     return 1;
   });
 }
 
 }  // namespace
+
+Geometry geometry_of_c(const fclib_geometry& geometry) {
+  const std::size_t size = geometry.size;
+  if (size < offsetof(fclib_geometry, mass_unit) + sizeof(char*)) {
+    fail("geometry->size",
+         "is " + std::to_string(size) + ", expected sizeof(struct fclib_geometry)");
+  }
+  fclib_geometry c{};
+  std::memcpy(&c, &geometry, std::min(size, sizeof c));
+  return geometry_of(c);
+}
 
 }  // namespace fclib::c
 

@@ -27,6 +27,7 @@ from fclib._core import (
     ProblemError,
     ProblemInfo,
     Result,
+    SequenceWriter,
     Solution,
     SolverInfo,
     UnsuitableError,
@@ -44,6 +45,8 @@ from fclib._core import (
     read_siconos,
     read_solution,
     read_solutions,
+    step_path,
+    steps,
     sync_files,
     write,
     write_attributes,
@@ -57,6 +60,7 @@ from fclib._derivatives import Gradient, Tangent, jvp, vjp
 from fclib._digest import digest
 from fclib._geometry import Bodies, Contacts
 from fclib._registry import Option, SolverError, find_solver, solver, solvers
+from fclib._sequence import Sequence
 from fclib._solve import Problem, solve
 from fclib._workspace import Workspace
 
@@ -83,8 +87,16 @@ def collection(name: str = "rt444", folder: "str | Path | None" = None) -> "Coll
     return Collection(name, folder)
 
 
-def load(name: str, form: str | None = None, folder: "str | Path | None" = None) -> Problem:
+def load(
+    name: str,
+    form: str | None = None,
+    folder: "str | Path | None" = None,
+    *,
+    step: int | None = None,
+) -> Problem:
     """One problem of the collection, for example ``fclib.load("rt444/KaplasTower/0100")``.
+
+    With a step, it is that of a sequence: ``fclib.load("run.h5", step=17)``.
 
     It is read from the user's folder; a missing family is built, in about a minute, or fetched from
     FCLIB_COLLECTION_URL. Those of the set ``tiny`` come with the package.
@@ -93,11 +105,16 @@ def load(name: str, form: str | None = None, folder: "str | Path | None" = None)
         name: SET/FAMILY/NUMBER.
         form: "global" or "local"; by default the global one of a problem that has both.
         folder: as in ``collection``.
+        step: the number of a step; ``name`` is the file of a sequence then.
 
     Raises:
         KeyError: there is no such problem.
         ValueError: the form is neither.
+        FileError: the sequence cannot be read.
+        IndexError: it has no such step.
     """
+    if step is not None:
+        return Sequence(name)[step]
     from fclib import collections
 
     return collections.load(name, form, folder)
@@ -112,12 +129,13 @@ def sequence(
     ...     result = fclib.solve(step.problem, guess=step.guess())
 
     Args:
-        name: a family, as ``fclib collection list`` prints them.
+        name: a family, as ``fclib collection list`` prints them, or the file of a sequence.
         folder: as in ``collection``.
         form: "global" or "local"; by default the global one of problems that have both.
 
     Raises:
         KeyError: there is no such family.
+        FileError: the file cannot be read.
         ValueError: the name is a set of several families.
     """
     from fclib import collections
@@ -162,6 +180,8 @@ __all__ = [
     "ProblemError",
     "ProblemInfo",
     "Result",
+    "Sequence",
+    "SequenceWriter",
     "Solution",
     "SolverError",
     "SolverInfo",
@@ -194,6 +214,8 @@ __all__ = [
     "solve_batch",
     "solver",
     "solvers",
+    "step_path",
+    "steps",
     "sync_files",
     "vjp",
     "write",

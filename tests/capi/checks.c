@@ -297,6 +297,80 @@ static void geometry(void) {
   fclib_options_delete(again);
 }
 
+/* many problems in one file */
+static void sequence(void) {
+  struct fclib_local a = local();
+  struct fclib_global b = global();
+  double r[] = {1, -0.5, 0}, half[] = {0.5, 0, 0};
+  struct fclib_solution s = {NULL, NULL, r, NULL}, more[] = {s, {NULL, NULL, half, NULL}};
+  char step[4200];
+
+  CHECK(!fclib_sequence_create(NULL, NULL));
+  CHECK(!fclib_sequence_continue(path_of("no_sequence")));
+  CHECK(fclib_write_local(&a, path_of("no_steps")));
+  CHECK(fclib_sequence_size(path_of("no_steps")) == -1);
+  SAYS("is no sequence");
+  CHECK(!fclib_sequence_continue(path_of("no_steps")));
+  struct fclib_options* options = fclib_options_create();
+  CHECK(fclib_options_set_number(options, "compression", 4));
+  struct fclib_sequence* written = fclib_sequence_create(path_of("sequence"), options);
+  fclib_options_delete(options);
+  CHECK(written);
+  CHECK(!fclib_sequence_create(path_of("sequence"), NULL));
+  SAYS("another writer has it open");
+
+  CHECK(!fclib_sequence_add_solution(written, &s));
+  SAYS("has no step yet");
+  CHECK(fclib_sequence_add_local(written, &a, 0));
+  CHECK(fclib_sequence_add_solution(written, &s));
+  CHECK(fclib_sequence_add_global(written, &b, 7));
+  CHECK(fclib_sequence_add_guesses(written, 2, more));
+  CHECK(!fclib_sequence_add_guesses(written, -1, more));
+  int body[] = {0, 1}, moves[] = {0, 1};
+  double point[] = {0, 0, 0}, normal[] = {0, 0, 1}, place[] = {0, 0, 0, 0, 0, 1};
+  struct fclib_geometry g = {0};
+  int shape[] = {-1, -1};
+  g.size = sizeof g;
+  g.nb = 2;
+  g.body = body;
+  g.shape = shape;
+  g.moves = moves;
+  g.point = g.normal = g.tangent = normal;
+  g.point = point;
+  g.place = place;
+  CHECK(!fclib_sequence_add_geometry(written, &g));
+  SAYS("/contacts: has 0 rows, expected nc = 1");
+  g.nc = 1;
+  CHECK(fclib_sequence_add_geometry(written, &g));
+  CHECK(fclib_sequence_size(path_of("sequence")) <= 1);
+  CHECK(fclib_sequence_flush(written));
+  CHECK(fclib_sequence_size(path_of("sequence")) == 2);
+  CHECK(!fclib_sequence_add_local(written, NULL, 0) && !fclib_sequence_add_local(NULL, &a, 0));
+  CHECK(fclib_sequence_close(written) && fclib_sequence_close(NULL));
+
+  /* each step is a file to what reads, and to nothing that writes */
+  snprintf(step, sizeof step, "%s#0", path_of("sequence"));
+  struct fclib_local* read = fclib_read_local(step);
+  struct fclib_solution* found = fclib_read_solution(step);
+  CHECK(read && found && found->r[1] == -0.5 && found->u[1] == 1.5 && !found->v);
+  CHECK(!fclib_write_solution(found, step));
+  SAYS("is a step of a sequence");
+  fclib_delete_solutions(found, 1);
+  fclib_delete_local(read);
+  free(read);
+  snprintf(step, sizeof step, "%s#1", path_of("sequence"));
+  CHECK(!strcmp(fclib_problem_kind(step), "global") && !fclib_read_local(step));
+  int count = 0;
+  found = fclib_read_guesses(step, &count);
+  CHECK(found && count == 2 && found[1].r[0] == 0.5 && found[1].v);
+  fclib_delete_solutions(found, 2);
+
+  written = fclib_sequence_continue(path_of("sequence"));
+  CHECK(written && fclib_sequence_add_local(written, &a, 7));
+  CHECK(fclib_sequence_close(written));
+  CHECK(fclib_sequence_size(path_of("sequence")) == 3);
+}
+
 static void rolling(void) {
   struct fclib_matrix five = {5, 5, 5, columns, rows, one, -1, NULL};
   double q5[] = {-1, 2, 0, 0.5, 0}, mu_r[] = {0.1};
@@ -401,6 +475,7 @@ int main(int argc, char** argv) {
   validation_and_merits();
   rolling();
   geometry();
+  sequence();
   solving();
   certificates();
   return 0;

@@ -96,6 +96,33 @@ void files(const std::string& folder) {
   CHECK(guesses.size() == 2 && guesses[0].r == solution.r && guesses[1].u.size() == 3);
 }
 
+void sequence(const std::string& folder) {
+  Ball ball;
+  const std::string path = folder + "/run.h5";
+  fclib::Solution solution;
+  solution.r = {1, -0.5, 0};
+  {
+    fclib::SequenceWriter writer(path);
+    writer.add(ball.local());
+    writer.add_solution(solution);
+    writer.flush();
+    CHECK(fclib::sequence_size(path) == 1);
+    writer.add(ball.global(), 3);
+    writer.add_guesses(std::vector{solution, solution});
+    solution.r.pop_back();
+    THROWS("r has 2 entries, expected 3", writer.add_solution(solution));
+    writer.close();
+  }
+  CHECK(fclib::read<fclib_local>(path + "#0")->q[1] == 2);
+  CHECK(fclib::read_solution(path + "#0").u[1] == 1.5);
+  CHECK(fclib::read_guesses(path + "#1").size() == 2);
+  {
+    fclib::SequenceWriter(path, fclib::Start::go_on).add(ball.local());
+  }
+  CHECK(fclib::sequence_size(path) == 3);
+  THROWS("no such file", fclib::sequence_size(folder + "/missing"));
+}
+
 template <class C>
 void solving(C problem) {
   const fclib::Result result = fclib::solve(problem, "nsgs", {.tolerance = 1e-10});
@@ -170,6 +197,7 @@ int main(int argc, char** argv) {
   solving(ball.local());
   solving(ball.global());
   matrices();
+  sequence(argv[1]);
   pictures(std::string(argv[1]) + "/pictures.hdf5");
   CHECK(!fclib::solvers().empty() && fclib::solvers()[0] == fclib_solver_name(0));
   return failures == 0 ? 0 : 1;

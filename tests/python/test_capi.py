@@ -192,6 +192,12 @@ def test_the_examples_run(examples: dict[str, Path], tmp_path: Path) -> None:
     assert "converged" in done.stdout
     assert "contact 0: r = 1 -0.5" in done.stdout
     done = subprocess.run(
+        [examples["sequence"], tmp_path / "run.h5"], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("100 steps\nstep 0: slides with 1.95 m/s, error ")
+    assert len(fclib.Sequence(tmp_path / "run.h5")) == 100
+    done = subprocess.run(
         [examples["solve"], path, "no_such_solver"], capture_output=True, text=True
     )
     assert done.returncode == 1

@@ -96,6 +96,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, root: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         case = planted_local(len(name), nc=4)
         fclib.write(path, case.problem, case.solution)
+    with fclib.SequenceWriter(folder / "run.h5") as writer:
+        for k in range(20):
+            writer.append(planted_local(k).problem)
     for name in ("robot.xml", "scene.xml"):
         (folder / name).write_text(SCENE)
     shutil.copy(root / "examples/python/own_solver.py", folder / "my_solver.py")

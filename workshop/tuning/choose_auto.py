@@ -28,9 +28,9 @@ second table, NAME-notable, has the rows in which a problem is lost, or whose in
 within the limit, or else the one that loses most time, with the sums of CPU times over all on which
 the row does anything. The problems are those of the judging half at each tolerance, one of each
 family without memory for factors, steps of simulations from the reactions of the step before, and
-small planted ones. With --remove, the row whose loss costs least is taken out, and so on, until each
-row is needed. Runs are kept in the file RUNS, so that the command goes on where it ended; delete it
-after a change of the code.
+small planted ones. With --remove, the row whose loss costs least is taken out, and so on, until
+each row is needed. Runs are kept in the file RUNS, so that the command goes on where it ended;
+delete it after a change of the code.
 
 --against makes one table on the judging half: this fclib beside another one's (the Python that
 imports it), solved at 1e-4, 1e-8 and 1e-12 within each limit, sum and shifted geometric mean of CPU
@@ -153,7 +153,12 @@ class Worker:
         return run_of(*self.told(file, limit, tol, chain))
 
     def told(
-        self, file: Path, limit: float, tol: float, chain: str, options: dict[str, Any] | None = None
+        self,
+        file: Path,
+        limit: float,
+        tol: float,
+        chain: str,
+        options: dict[str, Any] | None = None,
     ) -> list[Any]:
         """What the process says of a solve."""
         assert self._process.stdin is not None
@@ -639,7 +644,9 @@ def warm(folder: Path, count: int) -> Iterable[Case]:
             yield Case(step, TOLERANCE, file, options)
 
 
-def cases_of(problems: Sequence[Problem], folder: Path, arguments: argparse.Namespace) -> list[Case]:
+def cases_of(
+    problems: Sequence[Problem], folder: Path, arguments: argparse.Namespace
+) -> list[Case]:
     """The problems at each tolerance, without memory for factors, from guesses; planted ones."""
     found = []
     families: set[str] = set()

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "io/hdf5/contents.hpp"
+#include "io/hdf5/open.hpp"
 #include "io/hdf5/transaction.hpp"
 
 namespace fclib {
@@ -15,7 +16,7 @@ namespace {
 /// The path of a group that has attributes, by its short name.
 std::string group_with_attributes(const Group& root, std::string_view name) {
   if (name == "solution" || name.starts_with("guesses/")) return std::string(name);
-  if (name == "info") return "fclib_" + owner_of(kinds_of(root)) + "/info";
+  if (name == "info") return "fclib_" + owner_of(root) + "/info";
   throw Error(ErrorKind::option,
               "there is no group '" + std::string(name) +
                   "'; there are: solution, info, guesses/1, guesses/2, ...",
@@ -69,14 +70,11 @@ std::optional<std::variant<double, std::string>> read_attribute(hid_t group,
   return text.substr(0, text.find('\0'));
 }
 
-/// A new attribute of one number.
-void write_number_attribute(const Group& group, const std::string& name, hid_t stored, hid_t memory,
-                            const Handle& space, const void* value) {
-  const std::string where = path_of(group, name);
-  const Handle attribute(
-      H5Acreate2(group.id, name.c_str(), stored, space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  if (!attribute.ok()) fail(where, "cannot be created");
-  check(H5Awrite(attribute.id(), memory, value), where);
+/// A new attribute of one integer: an array of one number, as libfclib 3.1 writes it.
+void write_int(const Group& group, const std::string& name, Index value) {
+  const hsize_t extent = 1;
+  const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
+  write_attribute(group, name.c_str(), H5T_STD_I32LE, space, H5T_NATIVE_INT32, &value);
 }
 
 }  // namespace
@@ -109,9 +107,7 @@ void write_attributes(const std::string& path, std::string_view group,
       if (const auto* text = std::get_if<std::string>(&value)) {
         write_text_attribute(target, key.c_str(), *text);
       } else {
-        const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-        write_number_attribute(target, key, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, space,
-                               std::get_if<double>(&value));
+        write_number_attribute(target, key.c_str(), std::get<double>(value));
       }
     }
   });
@@ -120,17 +116,14 @@ void write_attributes(const std::string& path, std::string_view group,
 void write_int_attribute(const std::string& path, const std::string& name, Index value,
                          const WriteOptions& options) {
   change_file(path, Start::existing, options.compression, [&](const Target& root) {
-    const std::string problem = "fclib_" + owner_of(kinds_of(root), "local");
+    const std::string problem = "fclib_" + owner_of(root, "local");
     const Handle parent = open_group(root, problem);
     const Target group{{parent.id(), root.child(problem)}, root.style};
     const Handle handle =
         group.has("info") ? open_group(group, "info") : create_group(group, "info");
     const Group info{handle.id(), group.child("info")};
     make_room_for(info, name, options.replace);
-    // an array of one number, as libfclib 3.1 writes it
-    const hsize_t extent = 1;
-    const Handle space(H5Screate_simple(1, &extent, nullptr), H5Sclose);
-    write_number_attribute(info, name, H5T_STD_I32LE, H5T_NATIVE_INT32, space, &value);
+    write_int(info, name, value);
   });
 }
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "io/hdf5/stored_sequence.hpp"
+
 namespace fclib::hdf5 {
 
 std::vector<std::string> kinds_of(const Group& root) {
@@ -10,6 +12,13 @@ std::vector<std::string> kinds_of(const Group& root) {
     if (root.has(group_name<P>())) kinds.emplace_back(P::kind);
   });
   return kinds;
+}
+
+void fail_without_problem(const Group& root, const std::string& more) {
+  if (root.has(sequence_group)) {
+    fail("/", "is a sequence of many problems: name one of them by FILE#NUMBER, the first is #0");
+  }
+  fail("/", "holds no problem in a known FCLIB layout" + more);
 }
 
 bool has_solution(const Group& root) {
@@ -51,9 +60,14 @@ Contents contents_of(const Group& root) {
 }
 
 std::string owner_of(const std::vector<std::string>& kinds, std::string_view preferred) {
-  if (kinds.empty()) fail("/", "holds no problem in a known FCLIB layout; it must come first");
   const bool found = std::find(kinds.begin(), kinds.end(), preferred) != kinds.end();
   return found ? std::string(preferred) : kinds.front();
+}
+
+std::string owner_of(const Group& root, std::string_view preferred) {
+  const std::vector<std::string> kinds = kinds_of(root);
+  if (kinds.empty()) fail_without_problem(root, "; it must come first");
+  return owner_of(kinds, preferred);
 }
 
 namespace {
@@ -83,7 +97,7 @@ P read_sizes(const Group& root) {
 }  // namespace
 
 Problem outline_of(const Group& root) {
-  const std::string owner = owner_of(kinds_of(root));
+  const std::string owner = owner_of(root);
   Problem problem;
   for_each_formulation([&]<class P>(std::type_identity<P>) {
     if (owner == P::kind) problem = read_sizes<P>(root);

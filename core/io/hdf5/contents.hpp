@@ -14,6 +14,9 @@ namespace fclib::hdf5 {
 
 std::vector<std::string> kinds_of(const Group& root);
 
+/// Throws because a file holds no problem, and says what it holds instead.
+[[noreturn]] void fail_without_problem(const Group& root, const std::string& more = {});
+
 /// A group of numbered solutions, and the number that says how many.
 struct Numbered {
   const char* group;
@@ -33,6 +36,8 @@ Contents contents_of(const Group& root);
 
 /// The kind of the problem that a solution of the file belongs to.
 std::string owner_of(const std::vector<std::string>& kinds, std::string_view preferred = "global");
+/// ... of a file. Throws if it holds no problem.
+std::string owner_of(const Group& root, std::string_view preferred = "global");
 
 /// The sizes of that problem.
 Problem outline_of(const Group& root);

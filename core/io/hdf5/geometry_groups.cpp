@@ -8,17 +8,13 @@ namespace fclib::hdf5 {
 
 namespace {
 
-/// The attribute that marks our groups: other programs may use such names too.
-constexpr const char* mark = "layout";
-constexpr const char* layout = "FCLIB geometry 1";
-
 bool is_ours(const Group& root, const std::string& name) {
   if (!root.has(name)) return false;
   const Handle group(H5Gopen2(root.id, name.c_str(), H5P_DEFAULT), H5Gclose);
-  if (!group.ok() || H5Aexists(group.id(), mark) <= 0) return false;
-  const Handle attribute(H5Aopen(group.id(), mark, H5P_DEFAULT), H5Aclose);
+  if (!group.ok() || H5Aexists(group.id(), geometry_mark) <= 0) return false;
+  const Handle attribute(H5Aopen(group.id(), geometry_mark, H5P_DEFAULT), H5Aclose);
   const Handle type(H5Aget_type(attribute.id()), H5Tclose);
-  const std::string_view expected(layout);
+  const std::string_view expected(geometry_layout);
   if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) > 0 ||
       H5Tget_size(type.id()) != expected.size() + 1) {
     return false;
@@ -99,7 +95,7 @@ void write_geometry(const Target& root, const Geometry& geometry) {
     const std::string name(view);
     if (root.has(name)) fail(root.child(name), "is in the file already, and is not ours");
     const NewGroup group(root, name);
-    write_text_attribute(group.target(), mark, layout);
+    write_text_attribute(group.target(), geometry_mark, geometry_layout);
     for (const auto& column : table) {
       const std::string& key = column.first;
       std::visit(

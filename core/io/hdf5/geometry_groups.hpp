@@ -6,6 +6,10 @@
 
 namespace fclib::hdf5 {
 
+/// The attribute that marks our groups: other programs may use such names too.
+inline constexpr const char* geometry_mark = "layout";
+inline constexpr const char* geometry_layout = "FCLIB geometry 1";
+
 /// The geometry of a file, or null if it has none. A group of such a name is ours only if it says
 /// so; others are ignored.
 GeometryPointer read_geometry(const Group& root);

@@ -87,18 +87,37 @@ std::string bytes_of(const std::string& path, std::size_t from, std::size_t coun
   return bytes;
 }
 
+/// The marks that a program leaves in byte 11 of a superblock of version 3 while it writes to the
+/// file: that it may be read meanwhile is the third bit.
+constexpr std::size_t version_byte = 8;
+constexpr std::size_t flags_byte = 11;
+constexpr int readable_while_written = 4;
+
+/// Opens a file that grows while it is read, or whose writer was killed so.
+Handle open_growing(const std::string& path) {
+  const std::string block = bytes_of(path, 0, flags_byte + 1);
+  if (block.size() <= flags_byte || block[version_byte] != 3 ||
+      (block[flags_byte] & readable_while_written) == 0) {
+    return {-1, H5Fclose};
+  }
+  // HDF5 waits 1, 2, 4, ... ns if a checksum is wrong: the writer may be at work there. By its
+  // default a damaged file would take minutes. This is 30 ms
+  constexpr unsigned attempts = 25;
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  H5Pset_metadata_read_attempts(access.id(), attempts);
+  return {H5Fopen(path.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, access.id()), H5Fclose};
+}
+
 /// Why an HDF5 file cannot be opened. A program that writes a file in a newer format says so in
 /// byte 11 of its superblock, and takes that back at the end.
 std::string what_is_wrong_with(const std::string& path) {
   constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
-  constexpr std::size_t version = 8;
-  constexpr std::size_t flags = 11;
   // HDF5 looks for its superblock at 0, 512, 1024, 2048, ...
   for (std::size_t at = 0;; at = at == 0 ? 512 : 2 * at) {
-    const std::string block = bytes_of(path, at, flags + 1);
-    if (block.size() <= flags) break;
+    const std::string block = bytes_of(path, at, flags_byte + 1);
+    if (block.size() <= flags_byte) break;
     if (!block.starts_with(signature)) continue;
-    if (block[version] < 2 || block[flags] == 0) break;
+    if (block[version_byte] < 2 || block[flags_byte] == 0) break;
     return "was not closed by the program that wrote it. If that program has ended, run 'h5clear "
            "-s " +
            path + "'; what it had not yet written is missing";
@@ -186,7 +205,10 @@ Handle open_file(const std::string& path) {
   if (const std::string why = why_unreadable(path); !why.empty()) {
     fail("", "cannot be opened: " + why);
   }
-  Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
+  if (Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose); file.ok()) {
+    return file;
+  }
+  Handle file = open_growing(path);
   if (!file.ok()) {
     // HDF5 locks a file that it may write to
     if (is_locked(path)) fail("", "another program has it open, and may write to it");

@@ -91,14 +91,4 @@ auto in_file(const std::string& path, const Body& body) {
   }
 }
 
-/// What body(root) returns of the root group of a file.
-template <class Body>
-auto read_from(const std::string& path, const Body& body) {
-  const Session session;
-  return in_file(path, [&] {
-    const Handle file = open_file(path);
-    return body(Group{file.id(), "/"});
-  });
-}
-
 }  // namespace fclib::hdf5

@@ -6,6 +6,7 @@
 //   /solution/{v,u,r,l}
 //   /guesses/{number_of_guesses, 1/{v,u,r,l}, 2/, ...}
 //   /solutions/{number_of_solutions, error, 1/{v,u,r,l}, 2/, ...}: all known solutions
+//   /fclib_sequence: many problems in one file that grows (stored_sequence.hpp)
 //   matrix group: nzmax, m, n, nz, p, i, x; nz >= 0 triplet, -1 CSC, -2 CSR, -3 dense
 //
 // Every function throws Error (file) that names the file and the dataset. Writes are atomic: the
@@ -17,4 +18,5 @@
 #include "io/hdf5/library.hpp"
 #include "io/hdf5/raw.hpp"
 #include "io/hdf5/read.hpp"
+#include "io/hdf5/sequence.hpp"
 #include "io/hdf5/write.hpp"

@@ -24,6 +24,10 @@ namespace fclib {
 inline const std::string absent_text(1, '\0');
 /// The same if not even the group of the texts is there.
 inline const std::string absent_group(2, '\0');
+/// Whether a text is written.
+inline bool is_there(const std::string& text) {
+  return text != absent_text && text != absent_group;
+}
 
 /// The storages of a matrix as files and C structs number them in `nz`. A number from 0 on is the
 /// number of triplets.
@@ -114,6 +118,14 @@ struct RawMatrixView {
   std::span<const Index> i = {};
   std::span<const double> x = {};
   std::optional<MatrixInfo> info = {};
+
+  /// The storage as files number it.
+  [[nodiscard]] Index nz() const {
+    if (storage == Storage::csc) return nz_csc;
+    if (storage == Storage::csr) return nz_csr;
+    if (storage == Storage::dense) return nz_dense;
+    return static_cast<Index>(x.size());
+  }
 
   /// Read from a file without it.
   [[nodiscard]] bool absent() const { return rows == 0 && cols == 0 && x.empty() && p.empty(); }

@@ -8,6 +8,7 @@
 
 #include "io/hdf5/contents.hpp"
 #include "io/hdf5/geometry_groups.hpp"
+#include "io/hdf5/open.hpp"
 #include "io/hdf5/raw.hpp"
 #include "linalg/places.hpp"
 
@@ -271,7 +272,7 @@ std::string kind_to_read(const Group& root, std::string_view asked) {
   if (!asked.empty()) {
     fail("/", "holds no " + name + " problem" + (known.empty() ? "" : "; it holds: " + known));
   }
-  if (kinds.empty()) fail("/", "holds no problem in a known FCLIB layout");
+  if (kinds.empty()) fail_without_problem(root);
   if (kinds.size() > 1) fail("/", "holds several problems, name one of: " + known);
   return kinds.front();
 }

@@ -124,6 +124,12 @@ bool is_flat(const Handle& space) {
   return std::count_if(extents, extents + std::max(rank, 0), [](hsize_t n) { return n != 1; }) <= 1;
 }
 
+/// Whether all numbers of a type fit an integer of 32 bits.
+bool is_narrow(const Handle& type) {
+  return H5Tget_class(type.id()) == H5T_INTEGER &&
+         H5Tget_precision(type.id()) < (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
+}
+
 /// Why HDF5 could not read a dataset.
 std::string reason_of(const Numbers& dataset) {
   const Handle properties(H5Dget_create_plist(dataset.id.id()), H5Pclose);
@@ -173,8 +179,7 @@ Numbers open_numbers(const Group& group, const std::string& name) {
   if (size > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max())) {
     fail(path, "has " + std::to_string(size) + " entries, more than can be numbered");
   }
-  const bool narrow = kind == H5T_INTEGER && H5Tget_precision(type.id()) <
-                                                 (H5Tget_sign(type.id()) == H5T_SGN_NONE ? 32 : 33);
+  const bool narrow = is_narrow(type);
   return {std::move(dataset),
           path,
           size,
@@ -226,6 +231,65 @@ void read_into(const Numbers& dataset, std::int32_t* values) {
            std::to_string(wide[k]) + " does not fit a 32-bit integer");
     }
     values[k] = static_cast<std::int32_t>(wide[k]);
+  }
+}
+
+Rows open_rows(const Group& group, const std::string& name, H5T_class_t kind) {
+  const std::string path = group.child(name);
+  if (!group.has(name)) fail(path, "the dataset is missing");
+  Handle dataset(H5Dopen2(group.id, name.c_str(), H5P_DEFAULT), H5Dclose);
+  if (!dataset.ok()) fail(path, "is not a dataset that HDF5 can open");
+  const Handle type(H5Dget_type(dataset.id()), H5Tclose);
+  if (H5Tget_class(type.id()) != kind || (kind == H5T_INTEGER && !is_narrow(type))) {
+    fail(path, "has entries of another type");
+  }
+  const Handle space(H5Dget_space(dataset.id()), H5Sclose);
+  hsize_t size = 0;
+  if (H5Sget_simple_extent_ndims(space.id()) != 1 ||
+      H5Sget_simple_extent_dims(space.id(), &size, nullptr) != 1) {
+    fail(path, "does not have one dimension");
+  }
+  const Handle properties = properties_of(dataset.id(), path);
+  require_chunks(properties, dataset.id(), static_cast<double>(size),
+                 static_cast<double>(H5Tget_size(type.id())), path);
+  hsize_t chunk = 0;
+  if (properties.ok() && H5Pget_layout(properties.id()) == H5D_CHUNKED) {
+    H5Pget_chunk(properties.id(), 1, &chunk);
+  } else if (properties.ok() && is_unwritten(dataset, properties, static_cast<std::size_t>(size))) {
+    fail(path, "was declared and never written: its data are missing");
+  }
+  return {std::move(dataset), path, size, chunk};
+}
+
+void require_held(const Rows& rows, double bytes, const std::string& where) {
+  const auto held = static_cast<double>(size_of_file_with(rows.id.id()));
+  if (bytes > best_compression * held) {
+    fail(where, "declares " + shortest(bytes) + " bytes, but the file does not hold them");
+  }
+}
+
+void read_rows(const Rows& rows, hsize_t first, hsize_t count, hid_t memory, void* values) {
+  if (count == 0) return;
+#if H5_VERSION_GE(1, 10, 5)
+  for (hsize_t at = first; rows.chunk > 0 && at < first + count; at += rows.chunk) {
+    unsigned mask = 0;
+    haddr_t address = HADDR_UNDEF;
+    hsize_t bytes = 0;
+    const hsize_t chunk = at - at % rows.chunk;
+    if (H5Dget_chunk_info_by_coord(rows.id.id(), &chunk, &mask, &address, &bytes) < 0 ||
+        address == HADDR_UNDEF) {
+      fail(rows.path + "[" + std::to_string(std::max(chunk, first)) + "]",
+           "was never written: its data are missing");
+    }
+    at = chunk;
+  }
+#endif
+  const Handle space(H5Dget_space(rows.id.id()), H5Sclose);
+  const Handle room(H5Screate_simple(1, &count, nullptr), H5Sclose);
+  if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, &first, nullptr, &count, nullptr) < 0 ||
+      H5Dread(rows.id.id(), memory, room.id(), space.id(), H5P_DEFAULT, values) < 0) {
+    fail(rows.path + "[" + std::to_string(first) + "]",
+         "cannot be read (the file is damaged or cut short)");
   }
 }
 

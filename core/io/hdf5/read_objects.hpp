@@ -63,6 +63,24 @@ Number read_number(const Group& group, const std::string& name) {
   return values.front();
 }
 
+/// A dataset of one dimension that may have more entries than memory has room for.
+struct Rows {
+  Handle id;
+  std::string path;
+  hsize_t size;
+  hsize_t chunk;  ///< entries of a chunk, 0 if it is not in chunks
+};
+
+/// Opens a dataset of entries of this class. Only what all of it needs is checked.
+Rows open_rows(const Group& group, const std::string& name, H5T_class_t kind);
+
+/// Reads entries that lie in the dataset as the type `memory`. Throws if some were never written.
+/// The caller asks for no more than the file can hold: see require_held().
+void read_rows(const Rows& rows, hsize_t first, hsize_t count, hid_t memory, void* values);
+
+/// Throws if so many bytes cannot come from the file of a dataset, however it is packed.
+void require_held(const Rows& rows, double bytes, const std::string& where);
+
 /// A text of fixed length (with or without its final NUL), of variable length, or stored as bytes.
 std::string read_text(const Group& group, const std::string& name);
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "io/hdf5/memory_file.hpp"
+#include "io/hdf5/open.hpp"
 #include "io/hdf5/write.hpp"
 #include "io/replace_file.hpp"
 #include "version.hpp"
@@ -37,6 +38,7 @@ void change_file(const std::string& path, Start start, int compression,
   require_level(compression);
   const Session session;
   in_file(path, [&] {
+    if (as_step(path)) fail("", "is a step of a sequence, which stays as it was recorded");
     const FolderLock lock(path);
     std::error_code error;
     bool existing =
@@ -51,6 +53,7 @@ void change_file(const std::string& path, Start start, int compression,
     const Style style(compression,
                       [&](const void* data, std::size_t size) { file.lend(data, size); });
     const Target root{{file.id(), "/"}, &style};
+    if (root.has(sequence_group)) fail("/", "is a sequence, which grows by whole steps only");
     if (!existing) {
       write_text_attribute(root, "format", format_version);
       write_text_attribute(root, "generator", "fclib " + std::string(version));

@@ -20,7 +20,7 @@ namespace {
 
 /// A text that its file did not have is not written.
 void write_text_if_there(const Target& group, const std::string& name, const std::string& text) {
-  if (text != absent_text && text != absent_group) write_text(group, name, text);
+  if (is_there(text)) write_text(group, name, text);
 }
 
 RawMatrixView view_of(const Matrix& a) {
@@ -36,24 +36,10 @@ RawMatrixView view_of(const Matrix& a) {
 void write_matrix(const Target& parent, const std::string& name, const RawMatrixView& a) {
   const NewGroup created(parent, name);
   const Target& group = created.target();
-  const auto nnz = static_cast<Index>(a.x.size());
-  const auto nz = [&]() -> Index {
-    switch (a.storage) {
-      case Storage::triplet:
-        return nnz;
-      case Storage::csc:
-        return nz_csc;
-      case Storage::csr:
-        return nz_csr;
-      case Storage::dense:
-        return nz_dense;
-    }
-    return nnz;
-  }();
-  write_number(group, "nzmax", nnz);
+  write_number(group, "nzmax", static_cast<Index>(a.x.size()));
   write_number(group, "m", a.rows);
   write_number(group, "n", a.cols);
-  write_number(group, "nz", nz);
+  write_number(group, "nz", a.nz());
   if (a.storage != Storage::dense) {
     write_lasting(group, "p", a.p);
     write_lasting(group, "i", a.i);
@@ -155,13 +141,13 @@ void write_from(const Target& group, const Numbered& list, std::size_t first,
 /// if it loses its own to another.
 void require_owner(const Group& root, const std::string& kind, bool owned_before, bool brings) {
   const bool others = root.has("solution") || root.has("guesses") || root.has("solutions");
-  const bool owner = owner_of(kinds_of(root)) == kind;
+  const bool owner = owner_of(root) == kind;
   if (!owned_before && owner && others) {
     fail("/",
          "the solution and the guesses in the file would become those of the " + kind + " problem");
   }
   if (brings && !owner) {
-    fail("/", "a solution or a guess in the file belongs to its " + owner_of(kinds_of(root)) +
+    fail("/", "a solution or a guess in the file belongs to its " + owner_of(root) +
                   " problem, not to the " + kind + " one");
   }
 }
@@ -223,6 +209,11 @@ void write_view(const std::string& path, const ProblemView& problem, const Solut
 }
 
 }  // namespace
+
+ProblemView view_of(ProblemPointer problem) {
+  std::list<Matrix> none;  // without validation, no matrix is converted
+  return std::visit([&](const auto* p) { return view_of(*p, {.validate = false}, none); }, problem);
+}
 
 void write_file(const std::string& path, const ProblemView& problem, const WriteOptions& options) {
   write_view(path, problem, nullptr, {}, options);

@@ -32,6 +32,10 @@ void write_file(const std::string& path, ProblemPointer problem, const Solution*
 /// The same for a problem as it is, without validation: nothing is checked.
 void write_file(const std::string& path, const ProblemView& problem, const WriteOptions& options);
 
+/// A problem of the core as it is written without validation. It refers to the arrays of the
+/// problem.
+ProblemView view_of(ProblemPointer problem);
+
 /// Writes a solution into a file that has its problem, by default in place of the old solution.
 void write_solution(const std::string& path, const Solution& solution,
                     const WriteOptions& options = {.replace = true});

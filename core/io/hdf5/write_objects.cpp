@@ -331,13 +331,24 @@ void write_text(const Target& group, const std::string& name, const std::string&
         group.child(name));
 }
 
+void write_attribute(const Group& group, const char* name, hid_t stored, const Handle& space,
+                     hid_t memory, const void* value) {
+  const std::string where = group.path + ", attribute " + name;
+  const Handle attribute(H5Acreate2(group.id, name, stored, space.id(), H5P_DEFAULT, H5P_DEFAULT),
+                         H5Aclose);
+  if (!attribute.ok()) fail(where, "cannot be created");
+  check(H5Awrite(attribute.id(), memory, value), where);
+}
+
 void write_text_attribute(const Group& group, const char* name, const std::string& text) {
   const Handle type = text_type(text);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
-  const Handle attribute(
-      H5Acreate2(group.id, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
-  if (!attribute.ok()) fail(group.path, std::string("attribute ") + name + " cannot be created");
-  check(H5Awrite(attribute.id(), type.id(), text.c_str()), group.path);
+  write_attribute(group, name, type.id(), space, type.id(), text.c_str());
+}
+
+void write_number_attribute(const Group& group, const char* name, double value) {
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  write_attribute(group, name, H5T_IEEE_F64LE, space, H5T_NATIVE_DOUBLE, &value);
 }
 
 }  // namespace fclib::hdf5

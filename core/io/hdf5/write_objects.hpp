@@ -73,6 +73,10 @@ void write_number(const Target& group, const std::string& name, Number value) {
 
 void write_text(const Target& group, const std::string& name, const std::string& text);
 
+/// A new attribute of the type `stored`, from the type `memory`.
+void write_attribute(const Group& group, const char* name, hid_t stored, const Handle& space,
+                     hid_t memory, const void* value);
 void write_text_attribute(const Group& group, const char* name, const std::string& text);
+void write_number_attribute(const Group& group, const char* name, double value);
 
 }  // namespace fclib::hdf5

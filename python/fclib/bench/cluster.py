@@ -28,7 +28,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from fclib import _core
+from fclib import _core, _sequence
 from fclib.bench import generated
 from fclib.bench.job import Job, ProblemFacts, Record, Runner
 from fclib.bench.pool import SupervisorClient
@@ -125,7 +125,7 @@ def runner(
             if problem is None or not send:
                 return None
             if problem.hash not in sent:
-                data = Path(problem.path).read_bytes()
+                data = _sequence.content(Path(problem.path))
                 sent[problem.hash] = client.scatter(data, hash=False)
             return sent[problem.hash]
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fclib import _core, _digest
+from fclib import _core, _digest, _sequence
 from fclib._origin import origin_of
 from fclib.bench.job import ProblemFacts
 
@@ -28,7 +28,8 @@ def files_of(
 ) -> list[Path]:
     """The FCLIB files that patterns stand for: files, folders with all below them, globs.
 
-    Two files NAME-global and NAME-local of one folder are the forms of one problem.
+    A sequence stands for its steps, and "run.h5#17" for one of them. Two files NAME-global and
+    NAME-local of one folder are the forms of one problem.
 
     Args:
         patterns: files, folders or globs.
@@ -46,7 +47,7 @@ def files_of(
         path = path if path.is_absolute() else base / path
         if path.is_dir():
             matches = [p for p in path.rglob("*") if p.suffix in SUFFIXES]
-        elif path.is_file():
+        elif _sequence.place_of(path)[0].is_file():
             matches = [path]
         else:
             matches = [p for p in _glob(path) if p.is_file()]
@@ -55,7 +56,8 @@ def files_of(
                 f"{path}: there is no such file, and none in such a folder{_how_to_have(path)}"
             )
         for match in sorted(match.resolve() for match in matches):
-            found[match] = path.is_file() or found.get(match, False)
+            for one in _sequence.expanded(match):
+                found[one] = path.is_file() or found.get(one, False)
     if form == "both":
         return list(found)
     kept, dropped = ("local", "global") if form == "local" else ("global", "local")
@@ -180,13 +182,14 @@ def look(path: Path, family: str = "") -> ProblemFacts:
     kinds = _core.kinds(path)
     kind = "global" if "global" in kinds else kinds[0] if kinds else None
     problem = _core.read(path, kind)
+    stem = _sequence.name_of(path)
     matrix: Any = getattr(problem, "W", None)
     if matrix is None:
         matrix = getattr(problem, "M", None)
     return ProblemFacts(
         hash=_digest.digest(problem),
-        name=f"{path.parent.name}/{path.stem}" if path.stem[0].isdigit() else path.stem,
-        family=family or str(origin_of(problem.info).get("scene", "")) or path.parent.name,
+        name=f"{path.parent.name}/{stem}" if stem[0].isdigit() else stem,
+        family=family or str(origin_of(problem.info).get("scene", "")) or _sequence.family_of(path),
         path=str(path),
         kind=problem.kind,
         formulation=problem.formulation,

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fclib import _core
+from fclib import _core, _sequence
 from fclib._solve import MERITS
 from fclib._verdicts import SOLVED
 from fclib.bench import layout
@@ -783,7 +783,7 @@ class Store:
 
     def known(self, path: Path) -> ProblemFacts | None:
         """The problem of a file that has not changed since it was noted."""
-        info = path.stat()
+        info = _sequence.place_of(path)[0].stat()
         same = "path = ? AND size = ? AND modified = ?"
         noted = (text_of(str(path)), info.st_size, info.st_mtime_ns)
         for row in self._read("files", same, noted):
@@ -795,7 +795,7 @@ class Store:
         """Note the facts of the problem in a file."""
         if text_of(str(path)) != str(path):
             return  # SQLite cannot store such names
-        info = path.stat()
+        info = _sequence.place_of(path)[0].stat()
         with self.transaction():
             problem = self._id("problems", PROBLEM, [getattr(facts, name) for name in PROBLEM])
             self.db.execute(

@@ -28,7 +28,6 @@ import resource
 import signal
 import tempfile
 from collections import OrderedDict
-from pathlib import Path
 from socket import MSG_PEEK, MSG_WAITALL, socket
 from typing import Any
 
@@ -44,6 +43,7 @@ CACHE = 256e6  # [bytes] size of the problems that a process keeps
 VECTORS = ("v", "u", "r", "l")
 CERTIFICATE = ("certificate_y", "certificate_z")
 STAGE = ("name", "calls", "solved", "iterations", "factorisations", "cpu_s", "time")
+PARTS = ("data", "indices", "indptr", "row", "col")  # of a sparse matrix
 HISTORY = 500  # number of reports kept of a run, with the first and the last
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.ENFILE)
@@ -53,6 +53,15 @@ GO = b"go"
 BY_SIGNAL = re.compile(r"(?:was ended by signal|ended with signal) (\d+)")
 NOTHING = ("made no output", "wrote no /solution")
 GARBAGE = ("its output", "its solution has", "returned an array of shape")
+
+
+def bytes_of(problem: _solve.Problem) -> int:
+    """The bytes of a problem's numbers and indices, without its geometry."""
+    found = 0
+    for value in problem.__getstate__().values():
+        parts = [value] if isinstance(value, np.ndarray) else [getattr(value, a, 0) for a in PARTS]
+        found += sum(part.nbytes for part in parts if isinstance(part, np.ndarray))
+    return found
 
 
 class Problems:
@@ -74,7 +83,7 @@ class Problems:
                 raise _core.FileError(
                     f"{order['path']}: has changed since the campaign looked at it; start it again"
                 )
-            self.kept[key] = problem, Path(order["path"]).stat().st_size
+            self.kept[key] = problem, bytes_of(problem)
         self.kept.move_to_end(key)
         while len(self.kept) > 1 and sum(size for _, size in self.kept.values()) > CACHE:
             self.kept.popitem(last=False)

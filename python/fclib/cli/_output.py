@@ -29,6 +29,7 @@ from rich.table import Table
 from rich.text import Text
 
 import fclib
+from fclib import _sequence
 
 
 def plain(text: str) -> str:
@@ -343,9 +344,17 @@ class Report:
         raise typer.Exit(int(self.failed))
 
 
+def steps_of(file: Path) -> list[Path]:
+    """The steps of a sequence, or the file itself."""
+    try:
+        return _sequence.expanded(file)
+    except fclib.Error:
+        return [file]  # reading it will report the fault
+
+
 def each_file(files: Iterable[Path], what: str) -> Iterator[Path]:
-    """Go through the files with progress."""
-    paths = list(files)
+    """Go through the files, and the steps of sequences, with progress."""
+    paths = [path for file in files for path in steps_of(file)]
     with progress_bar(len(paths)) as show:
         for path in paths:
             show(f"{what} {path.name}")

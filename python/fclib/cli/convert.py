@@ -12,8 +12,9 @@ import numpy as np
 import typer
 
 import fclib
+from fclib import _sequence
 from fclib.cli._files import contents_of
-from fclib.cli._output import Json, Report, each_file, err, usage_error
+from fclib.cli._output import Json, Report, each_file, err, steps_of, usage_error
 
 
 class Format(str, Enum):
@@ -57,7 +58,7 @@ class Request:
 def format_of(path: Path) -> Format:
     """The format of a file that is there: its first bytes decide, or else its name."""
     try:
-        with path.open("rb") as file:
+        with _sequence.place_of(path)[0].open("rb") as file:
             if file.read(len(HDF5_SIGNATURE)) == HDF5_SIGNATURE:
                 return Format.hdf5
     except OSError:
@@ -211,7 +212,8 @@ def targets_of(
     """
     if out_dir is not None:
         output = output or Format.hdf5
-        targets = [out_dir / (path.stem + EXTENSION_OF[output]) for path in files]
+        files = [path for file in files for path in steps_of(file)]
+        targets = [out_dir / (_sequence.name_of(path) + EXTENSION_OF[output]) for path in files]
         for target in targets:
             if targets.count(target) > 1:
                 raise ValueError(f"several inputs would be written to {target}")
@@ -268,7 +270,8 @@ def command(
 ) -> None:
     """Convert files to other formulations, storages, Siconos' texts.
 
-    The format of an input follows from its content. Solutions, guesses and what is known of the
+    The format of an input follows from its content. A step of a sequence, run.h5#17, becomes a file
+    of its own; with --out, all steps do. Solutions, guesses and what is known of the
     matrices are kept if they hold for the new problem. Siconos' texts cannot hold them, nor
     bilateral constraints, nor titles.
     """

@@ -10,12 +10,15 @@ from typing import Annotated
 import typer
 
 import fclib
+from fclib import _sequence
 from fclib.cli._files import contents_of
 from fclib.cli._output import err, fail, out
 
 
 def command(
-    file: Annotated[Path, typer.Argument(help="An FCLIB file.", show_default=False)],
+    file: Annotated[
+        Path, typer.Argument(help="An FCLIB file, or a step: run.h5#17.", show_default=False)
+    ],
     kind: Annotated[
         str | None, typer.Option(help="Which of its problems: local, global, ...")
     ] = None,
@@ -44,6 +47,11 @@ def command(
         built = browser.find(module)
         if serve and built is None:
             raise ReportError("there is no module for browsers (make wasm, --browser DIR)")
+        if _sequence.place_of(file)[1] is not None:
+            # the page refers to a file of one problem
+            step = Path(tempfile.mkdtemp(prefix="fclib-view-")) / f"{_sequence.name_of(file)}.hdf5"
+            _sequence.copy(file, step)
+            file = step
         contents = contents_of(file)
         kind = kind or contents.owner
         problem = fclib.read(file, kind)

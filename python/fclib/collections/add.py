@@ -1,4 +1,4 @@
-"""Take existing files into a collection, as a set.
+"""Take existing files, and the steps of sequences, into a collection, as a set.
 
     OUT/NAME/FAMILY/0000-local.hdf5   a copy, with a reference solution (references.py)
                     catalog.parquet   of the family; column `source` has the file's path
@@ -12,15 +12,15 @@ in; column `same_as` names the first of them.
 
 from __future__ import annotations
 
+import hashlib
 import re
-import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fclib import _core
+from fclib import _core, _sequence
 from fclib._judge import MARK, TOLERANCE, judge
 from fclib.collections import catalog, references, set_index
 from fclib.collections.build import CHECKPOINT, facts_of, nnz
@@ -88,7 +88,8 @@ def add(
         # the collection may lie inside the source
         if path.suffix in SUFFIXES and path.is_file() and out not in path.parents:
             inner = path.parent.relative_to(source).parts
-            families.setdefault(plain("-".join(inner) or source.name), []).append(path)
+            family = plain("-".join(inner) or source.name)
+            families.setdefault(family, []).extend(_steps_of(path))
     if not families:
         raise FileNotFoundError(f"{source}: holds no file *{' and no *'.join(SUFFIXES)}")
     report = progress or (lambda family, done, total: None)
@@ -100,6 +101,20 @@ def add(
             report(f"{collection}/{family}", done, len(paths))
         catalog.gather(out)
     return refused
+
+
+def _steps_of(path: Path) -> list[Path]:
+    try:
+        return _sequence.expanded(path)
+    except _core.Error:
+        return [path]  # taking it in will report the fault
+
+
+def _sha256(path: Path) -> str:
+    """The SHA-256 of a file; of a step, that of its own file: the sequence may grow."""
+    if _sequence.place_of(path)[1] is None:
+        return catalog.sha256(path)
+    return hashlib.sha256(_sequence.content(path)).hexdigest()
 
 
 def plain(name: str) -> str:
@@ -156,7 +171,7 @@ class Part:
         catalog.write_catalog(self.catalogue, self.rows.values())
 
     def _add_file(self, path: Path) -> None:
-        key = path.relative_to(self.source).as_posix(), catalog.sha256(path)
+        key = path.relative_to(self.source).as_posix(), _sha256(path)
         row = self.rows.get(key)
         if row is not None and all(
             (self.out / file).is_file() and catalog.sha256(self.out / file) == digest
@@ -187,7 +202,7 @@ class Part:
             several = [one for one in stored if judge(problem, one).ok]
             kept = own is None if found is None else found.ok and found.solver == OF_FILE
             if len(kinds) == 1 and kept and len(several) == len(stored):
-                shutil.copyfile(path, beside)
+                _sequence.copy(path, beside)
                 if found is not None:
                     _core.write_attributes(beside, "solution", found.attributes)
                 return

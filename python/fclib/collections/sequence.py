@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from fclib import _core
+from fclib import _core, _sequence
 from fclib._solve import Given, Problem
 from fclib.collections.guesses import guess_of
 from fclib.collections.library import Collection
@@ -23,7 +23,7 @@ from fclib.collections.library import Collection
 class Step:
     """A problem of a sequence, and the one before it."""
 
-    id: str  # SET/FAMILY/NUMBER
+    id: str  # SET/FAMILY/NUMBER, or the path of a step
     step: int  # of the simulation
     problem: Problem
     solution: _core.Solution | None  # the stored one
@@ -52,7 +52,7 @@ def sequence(
     """The problems of a family in the order of their steps, as they are read.
 
     Args:
-        name: a family, or SET/FAMILY; it is built if it is missing.
+        name: a family, or SET/FAMILY, which is built if it is missing; or the file of a sequence.
         folder: as in `collection`.
         form: "global" or "local"; by default the global one of problems that have both.
 
@@ -60,12 +60,24 @@ def sequence(
         KeyError: there is no such family.
         ValueError: the name is of a set of several families.
     """
+    if Path(name).is_file():
+        return _recorded(_sequence.Sequence(name))
     problems = Collection(name, folder)
     if len(problems.folders) != 1:
         raise ValueError(
             f"a sequence is of one family, and {name} has several: {', '.join(problems.folders)}"
         )
     return _steps(problems, form)
+
+
+def _recorded(steps: _sequence.Sequence) -> Iterator[Step]:
+    last: dict[int, Step] = {}  # of each world
+    for k in range(len(steps)):
+        world, number = steps.worlds[k], steps.numbers[k]
+        before = last.get(world)
+        step = Step(steps.path(k), number, steps[k], steps.solution(k), before)
+        yield step
+        last[world] = Step(step.id, number, step.problem, step.solution, None)
 
 
 def _steps(problems: Collection, form: str | None) -> Iterator[Step]:

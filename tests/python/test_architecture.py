@@ -82,7 +82,7 @@ PYTHON: dict[str, set[str]] = {
     "analysis": {"_core", "_digest", "_judge", "_registry", "_solve", "_symmetry"},
     "scenes": {"_core", "_geometry", "_meant"},
     "simulate": {"_core", "_geometry", "_solve", "scenes"},
-    "recorders": {"_core", "_solve", "external"},
+    "recorders": {"_core", "_solve", "external", "scenes"},
     "collections": {
         "_core",
         "_digest",

@@ -7,7 +7,8 @@
 _assemble.py   common parts: order of rows, redundant joints, limits, dry friction, compliance
 _recorded.py   a recorded step, what is exact in it, and a folder of them
 _scripts.py    steps of a user's script, while it runs
-_drake.py, _newton.py, _pinocchio.py, _pybullet.py, _siconos.py    one engine each
+_drake.py, _lmgc90.py, _newton.py, _pinocchio.py, _pybullet.py, _siconos.py    one engine each
+_lmgc90_steps.py   run in a process of its own, which LMGC90 may end
 _siconos_steps.py  run by the interpreter that has Siconos
 
 An engine is imported only when its adapter is called.
@@ -24,6 +25,7 @@ from fclib.recorders._assemble import (
     solve_associated,
 )
 from fclib.recorders._drake import drake
+from fclib.recorders._lmgc90 import lmgc90
 from fclib.recorders._newton import newton
 from fclib.recorders._pinocchio import pinocchio
 from fclib.recorders._pybullet import pybullet
@@ -43,6 +45,7 @@ __all__ = [
     "assemble",
     "associated_error",
     "drake",
+    "lmgc90",
     "newton",
     "pinocchio",
     "pybullet",

@@ -174,7 +174,7 @@ def command(
         "--floating": floating,
         "--ground": ground is not None,
     }
-    is_deck = deck.folder_of(scene) is not None
+    is_deck = scene.is_dir()
     for name, given in only_files.items():
         if is_deck and given:
             raise typer.BadParameter(f"{name} is not for decks: a deck says all but step and theta")

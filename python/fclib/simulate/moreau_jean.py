@@ -423,8 +423,8 @@ class MoreauJean:
         Also the shares of their penetrations that are undone in the step.
         """
         alert = np.array([one.alert for one in self.interactions])
-        stays_open = np.array([one.law == "VEL_SGR_CLB" for one in self.interactions])
-        undone = np.array([float(one.law == "GAP_SGR_CLB") for one in self.interactions])
+        stays_open = np.array([one.law == "VEL_SGR_CLB" for one in self.interactions], dtype=bool)
+        undone = np.array([one.law == "GAP_SGR_CLB" for one in self.interactions], dtype=float)
         taken = (middle <= alert[interaction]) & ~(stays_open[interaction] & (middle > 0))
         active = np.flatnonzero(taken)
         return active, undone[interaction[active]]

@@ -105,6 +105,10 @@ def add_ghosts(spec: Any, driven: frozenset[int] = frozenset()) -> None:
     if driven != frozenset(range(len(bodies) - len(driven), len(bodies))):
         raise ValueError("in a periodic scene bodies that are driven come last")
     bodies = bodies[: len(bodies) - len(driven)]
+    # MuJoCo would copy keyframes with each body
+    keys = [(key.name, list(key.qpos), list(key.qvel)) for key in spec.keys]
+    for key in list(spec.keys):
+        spec.delete(key)
     for body in bodies:
         joints = list(body.joints)
         free = len(joints) == 1 and joints[0].type == mujoco.mjtJoint.mjJNT_FREE
@@ -126,3 +130,5 @@ def add_ghosts(spec: Any, driven: frozenset[int] = frozenset()) -> None:
                 geom.mass = 0
                 geom.rgba = (0, 0, 0, 0)
                 geom.material = ""
+    for name, qpos, qvel in keys:
+        spec.add_key(name=name, qpos=qpos, qvel=qvel)

@@ -13,7 +13,10 @@ CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1)]
 FACES += [(2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
 PAD = " " * 29
-STILL = [f" vlocy  {k:5d}" + "  0.0000000D+00" * 4 + "  0.1000000D+01  0.0000000D+00" for k in range(1, 7)]
+STILL = [
+    f" vlocy  {k:5d}" + "  0.0000000D+00" * 4 + "  0.1000000D+01  0.0000000D+00"
+    for k in range(1, 7)
+]
 
 
 def fortran(value: float) -> str:
@@ -61,7 +64,8 @@ def plate(half: Any, colour: str = "VERTx") -> str:
 
 def body(number: int, place: Any, *contactors: str, material: str = "STONE", bulk: str = "") -> str:
     """A rigid body; without `bulk` its mass follows from its contactors."""
-    bulk = bulk or f"avrd= 0.0000000D+00  gyrd= 0.0000000D+00\n{PAD}{row(('I1', 'I2', 'I3'), (0, 0, 0))}"
+    zeros = PAD + row(("I1", "I2", "I3"), (0, 0, 0))
+    bulk = bulk or f"avrd= 0.0000000D+00  gyrd= 0.0000000D+00\n{zeros}"
     return "\n".join(
         [
             "$bdyty",
@@ -86,7 +90,7 @@ def driven(number: int, *rows: str, kind: str = "RBDY3", node: int = 1) -> str:
             f" {kind}  {number:5d}",
             "$nodty",
             f" {'NO6xx' if kind == 'RBDY3' else 'NO3xx'}  {node:5d}",
-            "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]...*...[RAMPI.....+.RAMP]",
+            "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]..*..[RAMPI.+.RAMP]",
             *rows,
             "$$$$$$",
         ]
@@ -160,7 +164,9 @@ def blocks(folder: Path, *, gap: float = 0.0, mu: float = 0.5, **more: str) -> P
     return write(folder, **(files | more))
 
 
-def hexahedra(number: int, elements: int, place: Any, patches: Sequence[str], edge: float = 1.0) -> str:
+def hexahedra(
+    number: int, elements: int, place: Any, patches: Sequence[str], edge: float = 1.0
+) -> str:
     """A cube MAILx of elements H8."""
     k = elements + 1
     axis = np.linspace(0, edge, k)
@@ -217,9 +223,7 @@ $behav  lawty
 
 def cubes(folder: Path, elements: int = 2, law_kind: str = "GAP_SGR_CLB", **more: str) -> Path:
     """An elastic cube on another, which is held at its foot."""
-    foot = [
-        driven(1, *STILL[:3], kind="MAILx", node=i + 1) for i in range((elements + 1) ** 2)
-    ]
+    foot = [driven(1, *STILL[:3], kind="MAILx", node=i + 1) for i in range((elements + 1) ** 2)]
     files = {
         "BODIES": hexahedra(1, elements, (0, 0, 0), ["ASpx4"])
         + "\n"

@@ -6,13 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
-import helpers_deck as write
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from typer.testing import CliRunner
 
 import fclib
+import helpers_deck as write
 from fclib.cli import app
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene, polyhedron
@@ -61,7 +61,9 @@ def test_names_of_columns_and_comments_may_differ(tmp_path: Path) -> None:
     changed = "1! File BODIES\n any words\n! a comment\n" + text.replace("coo3=", "coor=")
     changed = changed.replace("nb_faces=", "nb_face=").replace("$$$$$$", "$$$$$$     \n\n! more")
     (path / "BODIES.DAT").write_text(changed)
-    for one, other in zip(decks.read(path).rigid, decks.read(write.blocks(tmp_path / "b")).rigid, strict=True):
+    for one, other in zip(
+        decks.read(path).rigid, decks.read(write.blocks(tmp_path / "b")).rigid, strict=True
+    ):
         np.testing.assert_array_equal(one.centre, other.centre)
         np.testing.assert_array_equal(one.contactors[0].faces, other.contactors[0].faces)
 
@@ -120,11 +122,23 @@ def cut(name: str, line: int, characters: int) -> Any:
         (cut("BODIES.DAT", 12, 99), "BODIES.DAT:10: the contactor ends before all its lines"),
         (cut("BODIES.DAT", 3, 99), "BODIES.DAT:2: $nodty is expected here"),
         (cut("BODIES.DAT", 20, 45), "BODIES.DAT:21: a face: ver1=, ver2= and ver3= are expected"),
-        (cut("BODIES.DAT", 31, 99), "the file ends where the kind and number of a body is expected"),
-        (broken("BODIES.DAT", f"coo1={write.fortran(2.0)}", "coo1=NaN"), "coo1: 'NaN' is not finite"),
+        (
+            cut("BODIES.DAT", 31, 99),
+            "the file ends where the kind and number of a body is expected",
+        ),
+        (
+            broken("BODIES.DAT", f"coo1={write.fortran(2.0)}", "coo1=NaN"),
+            "coo1: 'NaN' is not finite",
+        ),
         (broken("BODIES.DAT", f"coo1={write.fortran(2.0)}", "coo1=1.0x"), "'1.0x' is no number"),
-        (broken("BODIES.DAT", "RBDY3      3", "RBDY3      2"), "the number 2 of a body is there twice"),
-        (broken("BODIES.DAT", "RBDY3      2", "RBDY3      1"), "the number 1 of a body is there twice"),
+        (
+            broken("BODIES.DAT", "RBDY3      3", "RBDY3      2"),
+            "the number 2 of a body is there twice",
+        ),
+        (
+            broken("BODIES.DAT", "RBDY3      2", "RBDY3      1"),
+            "the number 1 of a body is there twice",
+        ),
         (broken("BODIES.DAT", "ver1=      1", "ver1=      9"), "a face has vertices 1 to 8"),
         (broken("BODIES.DAT", "STONE", "IRONx"), "the material 'IRONx' is not in BULK_BEHAV.DAT"),
         (broken("BODIES.DAT", "$tacty", "$other"), "$tacty is expected here"),
@@ -132,16 +146,31 @@ def cut(name: str, line: int, characters: int) -> Any:
         (broken("BULK_BEHAV.DAT", "Umas=", "Mass="), "BULK_BEHAV.DAT:6: has no Umas="),
         (broken("BULK_BEHAV.DAT", "Umas=2", "Umas=-2"), "the density of 'STONE' must be > 0"),
         (broken("TACT_BEHAV.DAT", "fric=", "fri="), "TACT_BEHAV.DAT:2: has no fric="),
-        (broken("TACT_BEHAV.DAT", "RBDY3  POLYR", "RBDY9  POLYR"), "TACT_BEHAV.DAT:5: the see table names bodies 'RBDY9'"),
-        (broken("TACT_BEHAV.DAT", "BLEUx  iqsc0", "BLEUx  iqsc9"), "names the law 'iqsc9', and there is none such"),
-        (broken("TACT_BEHAV.DAT", "RBDY3  POLYR", "RBDY3  POLYX"), "names 'POLYX', and there is no such contactor"),
+        (
+            broken("TACT_BEHAV.DAT", "RBDY3  POLYR", "RBDY9  POLYR"),
+            "TACT_BEHAV.DAT:5: the see table names bodies 'RBDY9'",
+        ),
+        (
+            broken("TACT_BEHAV.DAT", "BLEUx  iqsc0", "BLEUx  iqsc9"),
+            "names the law 'iqsc9', and there is none such",
+        ),
+        (
+            broken("TACT_BEHAV.DAT", "RBDY3  POLYR", "RBDY3  POLYX"),
+            "names 'POLYX', and there is no such contactor",
+        ),
         (cut("TACT_BEHAV.DAT", 4, 50), "TACT_BEHAV.DAT:5: a see table has cdbdy"),
         (broken("DRV_DOF.DAT", "RBDY3      1", "RBDY3      7"), "there is no body RBDY3 7, only 3"),
-        (broken("DRV_DOF.DAT", " vlocy      2", " vlocy      1"), "this vlocy is given twice, also in DRV_DOF.DAT:6"),
-        (broken("DRV_DOF.DAT", " vlocy      2", " vlocy      8"), "RBDY3 has no degree of freedom 8"),
+        (
+            broken("DRV_DOF.DAT", " vlocy      2", " vlocy      1"),
+            "this vlocy is given twice, also in DRV_DOF.DAT:6",
+        ),
+        (
+            broken("DRV_DOF.DAT", " vlocy      2", " vlocy      8"),
+            "RBDY3 has no degree of freedom 8",
+        ),
         (cut("DRV_DOF.DAT", 7, 60), "DRV_DOF.DAT:8: a driven value has six numbers"),
     ],
-)  # fmt: skip
+)
 def test_a_bad_deck_is_refused(tmp_path: Path, change: Any, message: str) -> None:
     path = write.blocks(tmp_path)
     decks.read(path)
@@ -150,16 +179,16 @@ def test_a_bad_deck_is_refused(tmp_path: Path, change: Any, message: str) -> Non
         decks.read(path)
     assert message in str(caught.value)
     assert str(path) in str(caught.value)
-    done = CliRunner().invoke(app, ["simulate", str(path), "--time-step", "1e-3", "--out", str(tmp_path / "out")])
+    done = CliRunner().invoke(
+        app, ["simulate", str(path), "--time-step", "1e-3", "--out", str(tmp_path / "out")]
+    )
     assert done.exit_code == 1
     assert "Traceback" not in done.output
     assert "".join(message.split()) in "".join(done.output.split())
 
 
 def test_a_bad_evolution_is_refused(tmp_path: Path) -> None:
-    path = write.blocks(
-        tmp_path, DRV_DOF=write.driven(2, " force      1 evolution push.dat")
-    )
+    path = write.blocks(tmp_path, DRV_DOF=write.driven(2, " force      1 evolution push.dat"))
     with pytest.raises(decks.DeckError, match=r"DRV_DOF.DAT:6: the file push.dat is missing"):
         decks.read(path)
     (path / "push.dat").write_text("0. 1.\n1. 2.\n1. 3.\n")
@@ -287,7 +316,7 @@ def test_a_polyhedron_with_a_dent_has_its_own_mass(tmp_path: Path) -> None:
     """A box whose top has a pit: its triangles tell its mass, its hull collides, which is named."""
     vertices = np.vstack((write.CORNERS, (0.0, 0.0, 0.0)))
     # the two triangles of the top, z = 1, become four that go down to the middle
-    faces = write.FACES[:10] + [(1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
+    faces = [*write.FACES[:10], (1, 5, 8), (5, 7, 8), (7, 3, 8), (3, 1, 8)]
     path = write.blocks(
         tmp_path, BODIES=write.body(1, (0, 0, 1), write.polyhedron(vertices, faces)), DRV_DOF=""
     )
@@ -298,7 +327,7 @@ def test_a_polyhedron_with_a_dent_has_its_own_mass(tmp_path: Path) -> None:
 
 
 def test_masses_that_the_deck_gives(tmp_path: Path) -> None:
-    """avrd and I1, I2, I3, or gyrd, stand for what the contactors would give."""
+    """Avrd and I1, I2, I3, or gyrd, stand for what the contactors would give."""
     given = f"avrd={write.fortran(0.4)}\n{write.PAD}{write.row(('I1', 'I2', 'I3'), (1, 2, 2.5))}"
     gyration = f"avrd={write.fortran(0.4)}  gyrd={write.fortran(0.3)}"
     bodies = [
@@ -336,7 +365,9 @@ def test_a_block_rides_on_a_driven_plate(tmp_path: Path) -> None:
     path = write.blocks(
         tmp_path,
         BODIES="\n".join(bodies),
-        TACT_BEHAV=write.law("iqsc0", mu=0.9) + "\n" + write.see(second="RBDY3  PLANx  VERTx", alert=0.1),
+        TACT_BEHAV=write.law("iqsc0", mu=0.9)
+        + "\n"
+        + write.see(second="RBDY3  PLANx  VERTx", alert=0.1),
         DRV_DOF=write.driven(1, *rows),
         DOF=write.start(2, (0, 0, 0), (0.05 * np.cos(0.3), 0, 0, 0, 0, 0)),
     )
@@ -402,7 +433,9 @@ def test_each_law(tmp_path: Path, law: str, gap: float, speed: float | None, the
     path = write.blocks(
         tmp_path,
         BODIES="\n".join(bodies),
-        TACT_BEHAV=write.law("iqsc0", law) + "\n" + write.see("RBDY3  SPHER  BLEUx", "RBDY3  PLANx  VERTx", alert=0.1),
+        TACT_BEHAV=write.law("iqsc0", law)
+        + "\n"
+        + write.see("RBDY3  SPHER  BLEUx", "RBDY3  PLANx  VERTx", alert=0.1),
         DRV_DOF=write.driven(1, *write.STILL),
         DOF=write.start(2, (0, 0, 0), (0, 0, -1.5, 0, 0, 0)),
     )
@@ -517,7 +550,9 @@ def test_matrices_of_hexahedra_are_those_of_scikit_fem() -> None:
     M = skfem.BilinearForm(lambda u, v, _: 1e3 * (u * v).sum(axis=0)).assemble(basis)
     # each element's ring order, from the unit cube that scikit-fem maps to it
     reference = skfem.ElementHex1.doflocs
-    order = [int(np.flatnonzero((reference == 0.5 * (1 + c)).all(axis=1))[0]) for c in hexahedra.CORNERS]
+    order = [
+        int(np.flatnonzero((reference == 0.5 * (1 + c)).all(axis=1))[0]) for c in hexahedra.CORNERS
+    ]
     elements = mesh.t[order].T.astype(np.int64)
     corner = nodes[elements[0]]
     if np.linalg.det(corner[[1, 3, 4]] - corner[0]) < 0:
@@ -554,7 +589,13 @@ def test_a_mesh_that_is_pulled_moves_as_it_is_told(tmp_path: Path) -> None:
     k = 3
     foot = [write.driven(1, *write.STILL[:3], kind="MAILx", node=i + 1) for i in range(k * k)]
     top = [
-        write.driven(1, *write.STILL[:2], " vlocy      3  1e-5 0. 0. 0. 1. 0.", kind="MAILx", node=2 * k * k + i + 1)
+        write.driven(
+            1,
+            *write.STILL[:2],
+            " vlocy      3  1e-5 0. 0. 0. 1. 0.",
+            kind="MAILx",
+            node=2 * k * k + i + 1,
+        )
         for i in range(k * k)
     ]
     path = write.cubes(

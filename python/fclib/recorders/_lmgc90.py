@@ -13,9 +13,9 @@ moments of the polyhedra, and
 
     M (v' - v) = h F + H r,  u = H^T v' + w,  w_N = max(0, gap) / h
 
-F has weights, driven forces and the gyroscopic moments at the start of the step. Velocities that are
-driven are in w. The forces of a step are those after the engine's last sweep, and its velocities
-those before it, so that they agree as far as its sweeps have converged.
+F has weights, driven forces and the gyroscopic moments at the start of the step. Velocities that
+are driven are in w. The forces of a step are those after the engine's last sweep, its velocities
+those before it: they agree as far as its sweeps have converged.
 
 F. Dubois, M. Jean, M. Renouf, R. Mozul, A. Martin, M. Bagneris, LMGC90, 10e colloque national en
   calcul des structures, 2011.
@@ -138,8 +138,8 @@ def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
             )
         sys.stderr.write(ran.stderr)
         state: _State | None = None
-        count = 0
-        for count, file in enumerate(sorted(folder.glob("[0-9]*.npz")), 1):
+        files = sorted(folder.glob("[0-9]*.npz"))
+        for file in files:
             with np.load(file) as data:
                 step = dict(data)
             number = int(step["simulation"])
@@ -151,7 +151,7 @@ def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
     if ran.returncode:
         raise ChildProcessError(
             f"{source.path}: LMGC90's engine ended with status {ran.returncode} after"
-            f" {count} steps; what it said is above"
+            f" {len(files)} steps; what it said is above"
         )
 
 
@@ -362,9 +362,7 @@ class _State:
         velocity = np.concatenate(
             ((place - middle) / share, turn_of(middle_axes, axes) / share), axis=1
         )
-        return _State(
-            self.simulation, model, self.number + 1, place, axes, velocity.ravel()
-        )
+        return _State(self.simulation, model, self.number + 1, place, axes, velocity.ravel())
 
 
 def _columns(frame: Vector) -> Vector:
@@ -463,10 +461,12 @@ def recorded(
     off = made.mismatch or 0.0
     # the largest velocity, with reactions or without
     largest = max(np.abs(made.velocity).max(initial=0.0), np.abs(f / model.mass)[free].max())
-    word = () if off <= AGREES * largest else (
-        f"From the reaction follows the next velocity to {off / largest:.1e} of the largest one:"
-        " the engine's sweeps had not converged further.",
-    )
+    word = []
+    if off > AGREES * largest:
+        word = [
+            f"From the reaction follows the next velocity to {off / largest:.1e} of the largest:"
+            " the engine's sweeps had not converged further."
+        ]
     return replace(made, notes=(*made.notes, *word), more={**made.more, "velocity_off": off})
 
 

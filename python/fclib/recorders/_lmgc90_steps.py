@@ -21,7 +21,7 @@ del sys.path[0]  # the folder of this file, which has modules of the same names 
 try:
     import numpy as np
 
-    engine = importlib.import_module("compas_lmgc90._lmgc90")
+    engine: Any = importlib.import_module("compas_lmgc90._lmgc90")
 except ImportError as error:
     sys.exit(f"{sys.executable}: {error}; to record LMGC90 it needs compas_lmgc90 and numpy")
 

@@ -1,7 +1,7 @@
 """Elastic bodies by finite elements, in contact with each other and with a rigid floor.
 
-They are blocks, of equal elements, or meshes of hexahedra of any shape (`hexahedra.py`), which touch
-by the interactions of their scene: nodes of one surface and faces of another.
+They are blocks, of equal elements, or meshes of hexahedra of any shape (`hexahedra.py`), which
+touch by the interactions of their scene: nodes of one surface and faces of another.
 
 Hexahedra with 8 nodes, linear isotropic elasticity, consistent mass:
 

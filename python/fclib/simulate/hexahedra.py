@@ -78,8 +78,8 @@ def matrices(
             strain[:, i, :, i] = slope[:, i]
         for row, (i, j) in enumerate(((1, 2), (2, 0), (0, 1)), 3):
             strain[:, row, :, i], strain[:, row, :, j] = slope[:, j], slope[:, i]
-        strain = strain.reshape(count, 6, 24)
-        stiffness += size[:, None, None] * (strain.transpose(0, 2, 1) @ elasticity @ strain)
+        rows = strain.reshape(count, 6, 24)
+        stiffness += size[:, None, None] * (rows.transpose(0, 2, 1) @ elasticity @ rows)
         mass += density * size[:, None, None] * np.outer(shape, shape)
     if lumped:
         mass = mass.sum(axis=2)[:, :, None] * np.eye(8)

@@ -301,7 +301,7 @@ class MoreauJean:
         if self.law == "gap" and self.restitution:
             raise ValueError("the gap law is inelastic: restitution needs the velocity law")
         if self.law != "gap" and self.interactions:
-            raise ValueError("interactions have laws of gaps: the law must be \"gap\"")
+            raise ValueError('interactions have laws of gaps: the law must be "gap"')
 
     def assemble(self, model: ContactModel) -> System:
         """The model's system, with the contacts that this law needs."""
@@ -357,7 +357,11 @@ class MoreauJean:
             # their velocities are known: they go to the right sides, and leave the unknowns
             moved = np.zeros(len(f))
             moved[given.dof] = given.velocity
-            f, w, b = f - times(M, moved), w + transposed_times(H, moved), b + transposed_times(G, moved)
+            f, w, b = (
+                f - times(M, moved),
+                w + transposed_times(H, moved),
+                b + transposed_times(G, moved),
+            )
             kept = np.setdiff1d(np.arange(len(f)), given.dof)
             # contacts that move nothing else are none
             new = np.full(len(f), -1, dtype=np.int32)

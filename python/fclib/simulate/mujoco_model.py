@@ -448,7 +448,9 @@ class Meetings:
     def taken(self, contacts: Contacts) -> tuple[npt.NDArray[np.intp], Contacts]:
         """The contacts that have an interaction, and these with its number and friction."""
         kinds = self.kind[contacts.pair]
-        number = np.where(kinds.min(axis=1, initial=0) >= 0, self.number[kinds[:, 0], kinds[:, 1]], -1)
+        number = np.where(
+            kinds.min(axis=1, initial=0) >= 0, self.number[kinds[:, 0], kinds[:, 1]], -1
+        )
         kept = np.flatnonzero(number >= 0)
         number = number[kept]
         return kept, replace(contacts[kept], mu=self.mu[number], interaction=number)

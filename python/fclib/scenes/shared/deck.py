@@ -319,9 +319,8 @@ class _Reader:
         self.folder = folder
         self.unknown: list[str] = []
         self.sha256: dict[str, str] = {}
-        self.rigid: list[RigidBody] = []
-        self.meshes: list[Mesh | None] = []  # None: left out
-        self.left_out_rigid: set[int] = set()
+        # (k) of each mesh of the file its number among those that are taken; -1: left out
+        self.mesh_number: list[int] = []
 
     def lines(self, name: str) -> _Lines | None:
         """The lines of a file; None if there is no such file."""
@@ -343,18 +342,19 @@ class _Reader:
         if not rigid and not meshes:
             raise DeckError(f"{self.folder / NEEDED[0]}:1: has no body that is known here")
         laws, sees = self.tact()
-        for body in (*rigid, *meshes):
-            if body.material not in materials:
-                body.place.fail(f"the material {body.material!r} is not in BULK_BEHAV.DAT")
+        named = [(body.material, body.place) for body in rigid]
+        named += [(mesh.material, mesh.place) for mesh in meshes]
+        for name, place in named:
+            if name not in materials:
+                place.fail(f"the material {name!r} is not in BULK_BEHAV.DAT")
         for mesh in meshes:
             if mesh.model not in lumped:
                 mesh.place.fail(f"the model {mesh.model!r} is not in MODELS.DAT")
             if materials[mesh.material].young is None:
                 mesh.place.fail(f"the material {mesh.material!r} is rigid, and this is a mesh")
-        count = {RIGID: len(rigid), MESH: len(meshes)}
-        nodes = {RIGID: [1] * len(rigid), MESH: [len(mesh.nodes) for mesh in meshes]}
-        starts = self.starts(count, nodes)
-        driven = self.driven(count, nodes)
+        self.nodes = {RIGID: [1] * len(rigid), MESH: [len(mesh.nodes) for mesh in meshes]}
+        starts = self.starts()
+        driven = self.driven()
         self.check_unread()
         return Deck(
             path=self.folder,
@@ -479,14 +479,15 @@ class _Reader:
                     rigid.append(self.rigid_body(lines, place))
                 else:
                     mesh = self.mesh(lines, place)
+                    self.mesh_number.append(-1 if mesh is None else len(meshes))
                     if mesh is not None:
                         meshes.append(mesh)
             elif head.text.startswith("$$"):
                 continue
             else:
                 head.place.fail(f"{head.text[:20]!r}: $bdyty or $$$$$$ is expected here")
-        for written in numbers.values():
-            check_numbers(written)
+        for own in numbers.values():
+            check_numbers(own)
         return tuple(rigid), tuple(meshes)
 
     def head(self, lines: _Lines) -> tuple[str, int, Place]:
@@ -523,9 +524,7 @@ class _Reader:
         words = bulk[0].words
         if "behav" not in words[:-1]:
             bulk[0].place.fail("has no behav (the line is cut)")
-        entries = {
-            key: number(text, line.place, key) for line in bulk for key, text in line.values
-        }
+        entries = {key: number(text, line.place, key) for line in bulk for key, text in line.values}
         node = self.part(lines, "nodty", place)
         if not node or not node[0].words[0].startswith("NO6"):
             (node[0].place if node else place).fail("a rigid body has a node NO6xx")
@@ -572,7 +571,9 @@ class _Reader:
         counts = [whole(text, head.place, key) for key, text in head.values]
         if len(counts) < 2 or counts[0] < 4 or counts[1] < 4:
             head.place.fail("a POLYR has nb_vertex= and nb_faces=, each at least 4")
-        vertices = [self.row(rest, head, "a vertex").numbers(3, "a vertex") for _ in range(counts[0])]
+        vertices = [
+            self.row(rest, head, "a vertex").numbers(3, "a vertex") for _ in range(counts[0])
+        ]
         faces = []
         for _ in range(counts[1]):
             line = self.row(rest, head, "a face")
@@ -631,11 +632,11 @@ class _Reader:
         for i, line in enumerate(self.part(lines, "nodty", place), 1):
             if line.words[0] != "NO3xx":
                 line.place.fail(f"a node NO3xx is expected here, not {line.words[0]!r}")
-            written = whole((line.words + [""])[1], line.place, "the number of a node")
+            written = whole([*line.words, ""][1], line.place, "the number of a node")
             if written != i:
                 line.place.fail(f"the number of this node must be {i}, not {written}")
             nodes.append(line.numbers(3, "a node"))
-        patches = []
+        patches: list[Patch] = []
         for line in self.part(lines, "tacty", place):
             patch = self.patch(line, len(nodes))
             if patch is None:
@@ -657,7 +658,9 @@ class _Reader:
             place.fail(f"a mesh of one model and one material is known here, not {set(models)}")
         array = np.array(elements, np.int64)
         if array.min() < 1 or array.max() > len(nodes):
-            place.fail(f"an element has nodes 1 to {len(nodes)}, not {array.min()} or {array.max()}")
+            place.fail(
+                f"an element has nodes 1 to {len(nodes)}, not {array.min()} or {array.max()}"
+            )
         return Mesh(
             nodes=np.array(nodes),
             elements=array - 1,
@@ -774,8 +777,8 @@ class _Reader:
 
     # ---- DOF.INI, DRV_DOF.DAT
 
-    def records(self, lines: _Lines) -> Iterator[tuple[str, int, Line, list[Line]]]:
-        """Each $nodty of each body: kind and number of the body from 0, its line, what follows."""
+    def records(self, lines: _Lines) -> Iterator[tuple[str, int, Line]]:
+        """Each $nodty of each body: kind and number of the body from 0, and the node's line."""
         kind, index, place = "", -1, None
         while lines:
             head = lines.take("a keyword")
@@ -787,12 +790,19 @@ class _Reader:
                         place.fail(f"{kind!r} is no kind of body")
                     self.skip(place, f"bodies {kind} are not known: this one is left out")
                 index = written - 1
+                if kind == MESH:
+                    if index >= len(self.mesh_number):
+                        place.fail(f"there is no body {kind} {written}")
+                    index = self.mesh_number[index]
             elif word == "nodty":
                 if place is None:
                     head.place.fail("$nodty is expected after $bdyty")
                 node = lines.take("a node")
-                if kind in CONTACTORS:
-                    yield kind, index, node, []
+                if kind in CONTACTORS and index >= 0:
+                    yield kind, index, node
+                else:
+                    while lines and keyword(lines.lines[lines.next]) in ("", "dofty"):
+                        lines.take("")
             elif word in ("steps", "model", "dofty") or head.text.startswith("$$"):
                 # rows of several nodes follow
                 if word == "dofty":
@@ -802,27 +812,23 @@ class _Reader:
                 self.skip(head.place, f"the keyword {head.words[0]} is not known")
                 list(lines.body())
 
-    def body_at(
-        self, place: Place, kind: str, index: int, node: int, nodes: dict[str, list[int]]
-    ) -> None:
+    def body_at(self, place: Place, kind: str, index: int, node: int) -> None:
         """DeckError if there is no such node of such a body."""
-        if index >= len(nodes[kind]):
-            place.fail(f"there is no body {kind} {index + 1}, only {len(nodes[kind])}")
-        if not 0 <= node < nodes[kind][index]:
+        if index >= len(self.nodes[kind]):
+            place.fail(f"there is no body {kind} {index + 1}, only {len(self.nodes[kind])}")
+        if not 0 <= node < self.nodes[kind][index]:
             place.fail(f"body {kind} {index + 1} has no node {node + 1}")
 
-    def starts(
-        self, count: dict[str, int], nodes: dict[str, list[int]]
-    ) -> dict[tuple[str, int, int], Start]:
+    def starts(self) -> dict[tuple[str, int, int], Start]:
         lines = self.lines(START)
         found: dict[tuple[str, int, int], Start] = {}
         if lines is None:
             return found
-        for kind, index, first, _ in self.records(lines):
+        for kind, index, first in self.records(lines):
             line = first
             while True:
-                node = whole((line.words + [""])[1], line.place, "the number of a node") - 1
-                self.body_at(line.place, kind, index, node, nodes)
+                node = whole([*line.words, ""][1], line.place, "the number of a node") - 1
+                self.body_at(line.place, kind, index, node)
                 key = (kind, index, node)
                 if key in found:
                     line.place.fail(f"{kind} {index + 1}, node {node + 1} is there twice")
@@ -845,7 +851,11 @@ class _Reader:
             if all(name in values for name in wanted):
                 break
             following = lines.peek()
-            if following is None or following.text.startswith("$") or following.words[0][:2] == "NO":
+            if (
+                following is None
+                or following.text.startswith("$")
+                or following.words[0][:2] == "NO"
+            ):
                 missing = next(name for name in wanted if name not in values)
                 here.place.fail(f"the start of a body: {missing}= is missing")
             here = lines.take("the start of a body")
@@ -865,16 +875,14 @@ class _Reader:
             place=line.place,
         )
 
-    def driven(
-        self, count: dict[str, int], nodes: dict[str, list[int]]
-    ) -> tuple[Driven, ...]:
+    def driven(self) -> tuple[Driven, ...]:
         lines = self.lines(DRIVEN)
         found: dict[tuple[str, int, int, int, bool], Driven] = {}
         if lines is None:
             return ()
-        for kind, index, line, _ in self.records(lines):
-            node = whole((line.words + [""])[1], line.place, "the number of a node") - 1
-            self.body_at(line.place, kind, index, node, nodes)
+        for kind, index, line in self.records(lines):
+            node = whole([*line.words, ""][1], line.place, "the number of a node") - 1
+            self.body_at(line.place, kind, index, node)
             head = lines.peek()
             if head is None or keyword(head) != "dofty":
                 (lines.end if head is None else head.place).fail("$dofty is expected here")
@@ -884,7 +892,7 @@ class _Reader:
                 if words[0] not in ("vlocy", "force"):
                     self.skip(row.place, f"{words[0]!r} is not known: neither vlocy nor force")
                     continue
-                axis = whole((words + [""])[1], row.place, "the number of a degree of freedom") - 1
+                axis = whole([*words, ""][1], row.place, "the number of a degree of freedom") - 1
                 if not 0 <= axis < (6 if kind == RIGID else 3):
                     row.place.fail(f"{kind} has no degree of freedom {axis + 1}")
                 key = (kind, index, node, axis, words[0] == "vlocy")
@@ -937,7 +945,9 @@ class _Reader:
                 continue
             if len(words) < 2:
                 place.fail("a time and a value are expected")
-            time, value = (number(w, place, n) for w, n in zip(words, ("time", "value"), strict=False))
+            time, value = (
+                number(w, place, n) for w, n in zip(words, ("time", "value"), strict=False)
+            )
             if points and not time > points[-1][0]:
                 place.fail(f"the times must increase, and {time:g} follows {points[-1][0]:g}")
             points.append((time, value))

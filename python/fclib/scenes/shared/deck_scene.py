@@ -3,8 +3,8 @@
     scene = scene_of(read("DATBOX"), time_step=1e-3, theta=0.5)
 
 A rigid body has its centre of mass as its origin and its principal axes as its axes, so that M is
-diagonal, as in LMGC90. A body whose six velocities are 0 is fixed. A PLANx is a plate, that is a box.
-A polyhedron collides as its convex hull; its mass is that of its own triangles.
+diagonal, as in LMGC90. A body whose six velocities are 0 is fixed. A PLANx is a plate, that is a
+box. A polyhedron collides as its convex hull; its mass is that of its own triangles.
 
 Differences: LMGC90 finds contacts in the middle of a step and moves the axes of a body by a
 linearised rotation; here contacts are those at the start, with their gaps moved on, and rotations
@@ -13,7 +13,7 @@ are exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -28,8 +28,6 @@ from fclib.scenes.shared.deck import (
     Deck,
     DeckError,
     Mesh,
-    Place,
-    RigidBody,
 )
 from fclib.scenes.shared.family import Scene
 from fclib.scenes.shared.interaction import Drive, Interaction
@@ -165,7 +163,9 @@ def scene_of(
     parameters: dict[str, Any] = {"deck": name, "sha256": dict(deck.sha256)}
     if period is not None:
         parameters["period"] = list(period)
-    made = _elastic(deck, unknown) if deck.meshes else _rigid(deck, name, time_step, period, unknown)
+    made = (
+        _elastic(deck, unknown) if deck.meshes else _rigid(deck, name, time_step, period, unknown)
+    )
     values: dict[str, Any] = {
         "name": name,
         "time_step": time_step,
@@ -182,15 +182,17 @@ def scene_of(
     return Scene(**(values | more))
 
 
-def kinds_of(deck: Deck, unknown: list[str]) -> tuple[dict[tuple[str, str], int], tuple[Interaction, ...]]:
+def kinds_of(
+    deck: Deck, unknown: list[str]
+) -> tuple[dict[tuple[str, str], int], tuple[Interaction, ...]]:
     """A number for each kind and colour that sees something, and the interactions."""
     kinds: dict[tuple[str, str], int] = {}
     found = []
     for see in deck.sees:
-        pair = tuple(kinds.setdefault(one, len(kinds)) for one in (see.first, see.second))
+        first, second = (kinds.setdefault(one, len(kinds)) for one in (see.first, see.second))
         law = deck.laws[see.law]
         assert law.mu is not None
-        found.append(Interaction(kinds=pair, mu=law.mu, alert=see.alert, law=law.name))
+        found.append(Interaction(kinds=(first, second), mu=law.mu, alert=see.alert, law=law.name))
     return kinds, tuple(found)
 
 
@@ -208,8 +210,8 @@ def _rigid(
     if len(kinds) > KINDS:
         deck.sees[-1].place.fail(f"at most {KINDS} kinds and colours see each other here")
     masks = [0] * len(kinds)
-    for one in interactions:
-        first, second = one.kinds
+    for meeting in interactions:
+        first, second = meeting.kinds
         masks[first] |= 1 << second
         masks[second] |= 1 << first
     bits = {key: (1 << kind, masks[kind], kind) for key, kind in kinds.items()}
@@ -320,9 +322,7 @@ def _elastic(deck: Deck, unknown: list[str]) -> dict[str, Any]:
     for body in deck.rigid:
         unknown.append(f"{body.place}: a rigid body beside meshes is left out")
     drives = tuple(
-        Drive(
-            dof=3 * (first[d.body[1]] + d.node) + d.axis, velocity=d.velocity, course=d.course
-        )
+        Drive(dof=3 * (first[d.body[1]] + d.node) + d.axis, velocity=d.velocity, course=d.course)
         for d in deck.driven
         if d.body[0] == MESH
     )

@@ -90,7 +90,7 @@ def driven(number: int, *rows: str, kind: str = "RBDY3", node: int = 1) -> str:
             f" {kind}  {number:5d}",
             "$nodty",
             f" {'NO6xx' if kind == 'RBDY3' else 'NO3xx'}  {node:5d}",
-            "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]..*..[RAMPI.+.RAMP]",
+            "$dofty  numbr [CT......+......AMP..*..cos.(..OMEGA.*.time.+.PHI..)]..*..[RAMPI+RAMP]",
             *rows,
             "$$$$$$",
         ]

@@ -17,6 +17,7 @@ from fclib.cli import app
 from fclib.recorders import _lmgc90
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene
+from fclib.scenes.shared.recorded import jacobian
 from helpers import dense
 
 H = 1e-3
@@ -66,7 +67,8 @@ def test_the_jacobian_is_that_of_rigid_bodies() -> None:
     frame = np.linalg.qr(rng.normal(size=(4, 3, 3)))[0]
     bodies = np.array([(0, 1), (1, 2), (2, 0), (1, 0)])
     v = rng.normal(size=(3, 6))
-    u = _lmgc90.jacobian(bodies, point, frame, centre, axes).T @ v.ravel()
+    sides = [(bodies[:, 0], 1.0), (bodies[:, 1], -1.0)]
+    u = jacobian(sides, point, frame, centre, axes).T @ v.ravel()
     for c, (first, second) in enumerate(bodies):
         speed = [
             v[b, :3] + np.cross(axes[b] @ v[b, 3:], point[c] - centre[b]) for b in (first, second)

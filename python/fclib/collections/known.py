@@ -44,6 +44,7 @@ KNOWN: dict[str, tuple[str, str]] = {
     "robots": ("2", "a gripper that lifts, an arm that pushes a pile"),
     "machines": ("1", "gears, a hand, a rover on rubble, a net of rings, a shear box"),
     "simulators": ("1", "steps of Drake, Newton, PyBullet and Siconos, as these handed them over"),
+    "decks": ("1", "the scenes of LMGC90's authors, by their decks"),
     "rr9118": ("5", "families in the regimes of the sets published with RR-9118"),
     "ladder": ("2", "one problem in growing sizes and in worse and worse conditioning"),
     "extended": ("15", "all families that came after RT-0444"),

@@ -32,7 +32,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from fclib import _core
@@ -41,6 +40,7 @@ from fclib.recorders._recorded import Origin, Recorded, Recording
 from fclib.scenes.shared import deck as decks
 from fclib.scenes.shared import deck_scene, polyhedron
 from fclib.scenes.shared.interaction import Course
+from fclib.scenes.shared.recorded import jacobian
 
 STEPS: Final = Path(__file__).with_name("_lmgc90_steps.py")
 GRAVITY: Final = np.array([0.0, 0.0, -9.81])  # the engine's, which cannot be changed [m/s^2]
@@ -118,6 +118,11 @@ def record(
 
 def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
     """Each step; None if it is not kept, or nothing touches."""
+    return (step for _, step in states_of(source, every))
+
+
+def states_of(source: Source, every: int) -> Iterator[tuple[State, Recorded | None]]:
+    """Each step and the state at its start; None if it is not kept, or nothing touches."""
     if every < 1:
         raise ValueError(f"every must be at least 1, not {every}")
     notes: tuple[str, ...] = ()
@@ -137,16 +142,16 @@ def steps_of(source: Source, every: int) -> Iterator[Recorded | None]:
                 f"{ran.stderr.strip()}; install it with: pip install 'fclib[recorders]'"
             )
         sys.stderr.write(ran.stderr)
-        state: _State | None = None
+        state: State | None = None
         files = sorted(folder.glob("[0-9]*.npz"))
         for file in files:
             with np.load(file) as data:
                 step = dict(data)
             number = int(step["simulation"])
             if state is None or state.simulation != number:
-                state = _State.start(folder / f"model-{number}.npz", number)
+                state = State.start(folder / f"model-{number}.npz", number)
             following = state.after(step)
-            yield recorded(state, following, step, notes) if "gap" in step else None
+            yield state, recorded(state, following, step, notes) if "gap" in step else None
             state = following
     if ran.returncode:
         raise ChildProcessError(
@@ -275,7 +280,7 @@ def solid(deck: decks.Deck, index: int, notes: list[str]) -> tuple[Vector, Any]:
 
 
 @dataclass(frozen=True)
-class _Model:
+class Model:
     """What a simulation was told."""
 
     h: float
@@ -287,7 +292,7 @@ class _Model:
     driven: tuple[tuple[int, bool, Course], ...]  # degree of freedom, velocity or force, course
 
     @classmethod
-    def of(cls, file: Path) -> _Model:
+    def of(cls, file: Path) -> Model:
         with np.load(file) as data:
             told = dict(data)
         h, theta = float(told["h"]), float(told["theta"])
@@ -324,11 +329,11 @@ class _Model:
 
 
 @dataclass(frozen=True)
-class _State:
+class State:
     """Where bodies are, and how they move."""
 
     simulation: int
-    model: _Model
+    model: Model
     number: int  # of the step that begins here
     place: Vector  # (nb x 3)
     axes: Vector  # (nb x 3 x 3) columns
@@ -336,8 +341,8 @@ class _State:
     middle: tuple[Vector, Vector] = field(repr=False, default=(np.zeros(0), np.zeros(0)))
 
     @classmethod
-    def start(cls, file: Path, number: int) -> _State:
-        model = _Model.of(file)
+    def start(cls, file: Path, number: int) -> State:
+        model = Model.of(file)
         with np.load(file) as data:
             place, frame = data["place"], data["frame"]
         velocity = np.zeros(6 * len(place))
@@ -352,7 +357,7 @@ class _State:
         v = self.velocity.reshape(-1, 6)
         return self.place + rest * v[:, :3], turned(self.axes, rest * v[:, 3:])
 
-    def after(self, step: dict[str, Any]) -> _State:
+    def after(self, step: dict[str, Any]) -> State:
         """The state after a step."""
         model, place, axes = self.model, step["place"], _columns(step["frame"])
         share = model.theta * model.h
@@ -362,7 +367,7 @@ class _State:
         velocity = np.concatenate(
             ((place - middle) / share, turn_of(middle_axes, axes) / share), axis=1
         )
-        return _State(self.simulation, model, self.number + 1, place, axes, velocity.ravel())
+        return State(self.simulation, model, self.number + 1, place, axes, velocity.ravel())
 
 
 def _columns(frame: Vector) -> Vector:
@@ -401,7 +406,7 @@ def crosses(a: Vector) -> Vector:
 
 
 def recorded(
-    state: _State, following: _State, step: dict[str, Any], notes: tuple[str, ...]
+    state: State, following: State, step: dict[str, Any], notes: tuple[str, ...]
 ) -> Recorded | None:
     """The problem of a step. ValueError if its law is not known."""
     model = state.model
@@ -412,7 +417,9 @@ def recorded(
         raise ValueError(f"the law {model.law!r} is not known: recorded are {', '.join(LAWS)}")
     frame = step["axes"][:, ORDER]
     centre, axes = state.halfway()
-    whole = jacobian(step["bodies"], step["point"], frame, centre, axes)
+    # the candidate comes first, and N points to it
+    sides = [(step["bodies"][:, side], sign) for side, sign in ((0, 1.0), (1, -1.0))]
+    whole = jacobian(sides, step["point"], frame, centre, axes)
     gap = step["gap"] - (step["internal"] if model.law == "IQS_CLB_g0" else 0.0)
     w = np.zeros(3 * nc)
     w[::3] = np.maximum(gap, 0.0) / h
@@ -436,7 +443,6 @@ def recorded(
         w=w,
         point=step["point"],
         frame=frame,
-        # N points to the candidate, which comes first
         bodies=step["bodies"][:, ::-1].astype(np.int64),
         gap=step["gap"],
     )
@@ -467,26 +473,11 @@ def recorded(
             f"From the reaction follows the next velocity to {off / largest:.1e} of the largest:"
             " the engine's sweeps had not converged further."
         ]
-    return replace(made, notes=(*made.notes, *word), more={**made.more, "velocity_off": off})
+    more = {**made.more, "velocity_off": off, "unconverged": bool(word)}
+    return replace(made, notes=(*made.notes, *word), more=more)
 
 
-def jacobian(
-    bodies: npt.NDArray[np.int64], point: Vector, frame: Vector, centre: Vector, axes: Vector
-) -> Vector:
-    """H (6 nb x 3 nc): the candidate's velocity at a point, less the other's, in the frame."""
-    nc = len(point)
-    H = np.zeros((len(centre), 6, nc, 3))
-    each = np.arange(nc)
-    for side, sign in ((0, 1.0), (1, -1.0)):
-        body = bodies[:, side]
-        arm = point - centre[body]
-        moment = np.cross(arm[:, None], frame) @ axes[body]  # nc, row, dof
-        H[body, :3, each] += sign * frame.transpose(0, 2, 1)
-        H[body, 3:, each] += sign * moment.transpose(0, 2, 1)
-    return H.reshape(6 * len(centre), 3 * nc)
-
-
-def forces(state: _State) -> Vector:
+def forces(state: State) -> Vector:
     """Weights, driven forces in their mean over the step, and gyroscopic moments (6 nb)."""
     model = state.model
     mass = model.mass.reshape(-1, 6)

@@ -84,7 +84,7 @@ def placed(deck: Deck, index: int, unknown: list[str] | None = None) -> Placed:
         (one, (one.vertices - centre) @ axes, -axes.T @ centre) for one in body.contactors
     )
     return Placed(
-        density * volume,
+        float(density * volume),
         moments,
         body.centre + moved + turn @ centre,
         turn @ axes,

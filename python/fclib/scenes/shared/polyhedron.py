@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ class Moments:
 
 def ball(radius: float) -> Moments:
     """A ball about the origin."""
-    volume = 4 / 3 * np.pi * radius**3
+    volume = 4 / 3 * math.pi * float(radius) ** 3
     return Moments(volume, np.zeros(3), 0.4 * volume * radius**2 * np.eye(3))
 
 

@@ -517,6 +517,17 @@ def test_a_periodic_deck_with_a_floor_that_moves(tmp_path: Path) -> None:
     np.testing.assert_allclose(step.velocity[12:15], [0, 0, -0.5])
 
 
+def test_a_penetration_stays_in_a_stored_state(tmp_path: Path) -> None:
+    """The law of the deck says what becomes of it: nothing moves bodies before a state is stored."""
+    pytest.importorskip("mujoco")
+    from fclib.simulate import MujocoModel, relaxed, scheme_of
+
+    model = MujocoModel(scene_of(write.blocks(tmp_path, gap=-0.05)))
+    position = model.position
+    moved = relaxed(model, scheme_of(model), position, model.velocity, 0.01)
+    np.testing.assert_array_equal(moved, position)
+
+
 def test_a_deck_is_stored_and_read_back(tmp_path: Path) -> None:
     from fclib.collections import trajectory
 

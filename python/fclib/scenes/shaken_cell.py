@@ -34,7 +34,7 @@ class ShakenCell:
     authors: ClassVar[str] = "V. Acary, the developers of LMGC90"
     friction: ClassVar[str] = "Coulomb, one coefficient between polyhedra, one on the floor"
     collection: ClassVar[str] = "decks"
-    problems: ClassVar[int] = 2000
+    problems: ClassVar[int] = 800
 
     polyhedra: int = parameter(100, "1", "number of polyhedra, at least 1")
     edge: float = parameter(6.0, "m", "edge of the square, and height, of a polyhedron")

@@ -137,7 +137,7 @@ def command(
     pictures: Pictures = True,
     as_json: Json = False,
 ) -> None:
-    """Simulate an MJCF or URDF file, or a deck, and store its problems.
+    """Simulate an MJCF, a URDF or a deck, and store its problems.
 
     What no problem can hold is left out. The command prints a
     line about each such thing; the catalogue and the description of each file have it too.
